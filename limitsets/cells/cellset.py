@@ -1,0 +1,123 @@
+"""Sets of cells of one grid and their algebra: union, intersection, difference, complement, inclusion."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from limitsets.cells.grid import Grid
+from limitsets.errors import GridError
+
+__all__ = ["CellSet"]
+
+
+@dataclass(frozen=True, eq=False)
+class CellSet:
+    """A set of cells of a grid.
+
+    Attributes
+    ----------
+    grid : Grid
+        The grid.
+    mask : ndarray of bool, shape (n_cells,)
+        True for the cells in the set.
+
+    Examples
+    --------
+    >>> import limitsets as ls
+    >>> from limitsets.cells import CellSet
+    >>> cover = ls.grid([(0.0, 1.0)], cells=4)
+    >>> left, middle = CellSet.of(cover, [0, 1]), CellSet.of(cover, [1, 2])
+    >>> (left | middle).extents()
+    {0: [(0.0, 0.75)]}
+    >>> (left & middle).measure(), left <= middle
+    (0.25, False)
+    """
+
+    grid: Grid
+    mask: NDArray[np.bool_]
+
+    def __post_init__(self) -> None:
+        if self.mask.shape != (self.grid.n_cells,) or self.mask.dtype != bool:
+            raise GridError("the mask", self.mask.shape, f"{self.grid.n_cells} booleans", "give one per cell")
+
+    @classmethod
+    def of(cls, grid: Grid, cells: ArrayLike) -> CellSet:
+        """Return the set of the given cell numbers."""
+        mask = np.zeros(grid.n_cells, dtype=bool)
+        mask[np.asarray(cells, dtype=np.int64)] = True
+        return cls(grid, mask)
+
+    def _other(self, other: CellSet) -> NDArray[np.bool_]:
+        if other.grid is not self.grid:
+            raise GridError("the other set", "cells of another grid", "cells of the same grid", "build it on this grid")
+        return other.mask
+
+    def __or__(self, other: CellSet) -> CellSet:
+        return CellSet(self.grid, self.mask | self._other(other))
+
+    def __and__(self, other: CellSet) -> CellSet:
+        return CellSet(self.grid, self.mask & self._other(other))
+
+    def __sub__(self, other: CellSet) -> CellSet:
+        return CellSet(self.grid, self.mask & ~self._other(other))
+
+    def __invert__(self) -> CellSet:
+        return CellSet(self.grid, ~self.mask)
+
+    def __le__(self, other: CellSet) -> bool:
+        return not bool((self.mask & ~self._other(other)).any())
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, CellSet) and bool((self.mask == self._other(other)).all())
+
+    __hash__ = None  # type: ignore[assignment]  # sets of cells compare by content
+
+    def __len__(self) -> int:
+        return int(self.mask.sum())
+
+    def __iter__(self) -> Iterator[int]:
+        return iter(self.numbers().tolist())
+
+    def __contains__(self, cell: int) -> bool:
+        return bool(self.mask[cell])
+
+    def numbers(self) -> NDArray[np.int64]:
+        """Numbers of the cells, ascending."""
+        return np.flatnonzero(self.mask)
+
+    def measure(self) -> float:
+        """Length, area or volume of the set."""
+        return float(self.grid.measure[self.mask].sum())
+
+    def extents(self) -> dict[int, list[tuple[float, float]]]:
+        """Per side the intervals that the cells make up; in more dimensions their ranges along the first axis.
+
+        Returns
+        -------
+        dict of int to list of (lo, hi)
+            Ascending; a side without cells is left out.
+        """
+        found: dict[int, list[tuple[float, float]]] = {}
+        for side in range(self.grid.sides):
+            mask = self.mask[self.grid.of_side(side)]
+            if self.grid.dimension > 1:
+                mask = mask.reshape(tuple(self.grid.shape[side])).any(axis=tuple(range(1, self.grid.dimension)))
+            border = np.flatnonzero(np.diff(np.concatenate([[0], mask.astype(np.int8), [0]])))
+            edges = self.grid.edges[side][0]
+            if border.size:
+                found[side] = [(float(edges[a]), float(edges[b])) for a, b in border.reshape(-1, 2)]
+        return found
+
+    def refined(self, fine: Grid) -> CellSet:
+        """Return the cells of a refinement (`Grid.refine`) that lie in this set."""
+        mask = np.zeros(fine.n_cells, dtype=bool)
+        for side in range(self.grid.sides):
+            block = self.mask[self.grid.of_side(side)].reshape(tuple(self.grid.shape[side]))
+            for axis in range(self.grid.dimension):
+                block = np.repeat(block, int(fine.shape[side, axis] // self.grid.shape[side, axis]), axis=axis)
+            mask[fine.of_side(side)] = block.ravel()
+        return CellSet(fine, mask)

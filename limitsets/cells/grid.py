@@ -1,0 +1,240 @@
+"""Grids: uniform, or graded so that cells shrink in proportion to their distance from an anchor."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from limitsets.cells.domain import Domain, as_domain
+from limitsets.errors import GridError
+
+__all__ = ["Grid", "grid"]
+
+# Graded cells grow with their distance from the anchor up to this share of the side's extent and are equal beyond:
+# near a_i of the throw, where jogs shrink in proportion to R - a_i, resolution is relative; far from it, absolute.
+EQUAL_BEYOND = 0.25
+
+# Nodes are kept as 32-bit integers.
+MOST_CELLS = 2**31 - 16
+
+
+@dataclass(frozen=True, eq=False)
+class Grid:
+    """A grid of closed cells on each side.
+
+    Attributes
+    ----------
+    domain : Domain
+        What is covered.
+    edges : tuple of tuple of ndarray
+        ``edges[side][axis]``, shape (n + 1,): ascending cell borders.
+    """
+
+    domain: Domain
+    edges: tuple[tuple[NDArray[np.float64], ...], ...]
+
+    @property
+    def sides(self) -> int:
+        """Number of sides."""
+        return len(self.edges)
+
+    @property
+    def dimension(self) -> int:
+        """Number of axes."""
+        return len(self.edges[0])
+
+    @cached_property
+    def shape(self) -> NDArray[np.int64]:
+        """Cells per side and axis, shape (n_sides, dimension)."""
+        return np.array([[axis.size - 1 for axis in side] for side in self.edges], dtype=np.int64)
+
+    @cached_property
+    def offset(self) -> NDArray[np.int64]:
+        """Number of the first cell of each side, and last the number of cells, shape (n_sides + 1,)."""
+        return np.concatenate([[0], np.cumsum(self.shape.prod(axis=1))]).astype(np.int64)
+
+    @property
+    def n_cells(self) -> int:
+        """Number of cells."""
+        return int(self.offset[-1])
+
+    def of_side(self, side: int) -> slice:
+        """Cells of one side."""
+        return slice(int(self.offset[side]), int(self.offset[side + 1]))
+
+    def side_of(self, cells: ArrayLike) -> NDArray[np.int64]:
+        """Side of each cell."""
+        return np.searchsorted(self.offset, np.asarray(cells), side="right").astype(np.int64) - 1
+
+    def index(self, x: ArrayLike, side: int) -> NDArray[np.int64]:
+        """Cells that hold the given states of one side; -1 outside, the upper one on a shared border.
+
+        Parameters
+        ----------
+        x : array_like, shape (n,) or (n, dimension)
+            States.
+        side : int
+            Their side.
+
+        Returns
+        -------
+        ndarray of int, shape (n,)
+            Numbers of the cells.
+        """
+        states = np.asarray(x, dtype=np.float64).reshape(-1, self.dimension)
+        inside = np.ones(len(states), dtype=bool)
+        number = np.zeros(len(states), dtype=np.int64)
+        for axis, edges in enumerate(self.edges[side]):
+            column = states[:, axis]
+            inside &= (column >= edges[0]) & (column <= edges[-1])
+            k = np.clip(np.searchsorted(edges, column, side="right") - 1, 0, edges.size - 2)
+            number = number * (edges.size - 1) + k
+        return np.where(inside, number + self.offset[side], -1)
+
+    def axes(self, cells: ArrayLike, side: int) -> tuple[NDArray[np.int64], ...]:
+        """Position along each axis of cells of one side."""
+        shape = tuple(int(n) for n in self.shape[side])
+        return tuple(np.unravel_index(np.asarray(cells) - self.offset[side], shape))
+
+    def boxes(self, cells: ArrayLike, side: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Corners of cells of one side: two arrays of shape (n, dimension)."""
+        position = self.axes(cells, side)
+        pairs = [(edges[k], edges[k + 1]) for edges, k in zip(self.edges[side], position, strict=True)]
+        return np.stack([lo for lo, _ in pairs], axis=-1), np.stack([hi for _, hi in pairs], axis=-1)
+
+    def centres(self, side: int) -> NDArray[np.float64]:
+        """Middles of all cells of one side, shape (n,) in one dimension, (n, dimension) otherwise."""
+        middles = [0.5 * (edges[1:] + edges[:-1]) for edges in self.edges[side]]
+        if self.dimension == 1:
+            return middles[0]
+        return np.stack([m.ravel() for m in np.meshgrid(*middles, indexing="ij")], axis=-1)
+
+    @cached_property
+    def measure(self) -> NDArray[np.float64]:
+        """Length, area or volume of every cell, shape (n_cells,)."""
+        parts = []
+        for side in self.edges:
+            volume = np.ones(1)
+            for edges in side:
+                volume = np.multiply.outer(volume, np.diff(edges)).ravel()
+            parts.append(volume)
+        return np.concatenate(parts)
+
+    def refine(self, parts: int = 2) -> Grid:
+        """Cut every cell into `parts` equal ones along each axis.
+
+        Examples
+        --------
+        >>> import limitsets as ls
+        >>> ls.grid([(0.0, 1.0)], cells=8).refine(4).n_cells
+        32
+        """
+        if parts < 1:
+            raise GridError("the number of parts", parts, "an integer from 1", "pass parts=2")
+        return Grid(self.domain, tuple(tuple(_split(edges, parts) for edges in side) for side in self.edges))
+
+
+def _split(edges: NDArray[np.float64], parts: int) -> NDArray[np.float64]:
+    weight = np.arange(parts) / parts
+    inner = edges[:-1, None] + weight * np.diff(edges)[:, None]
+    return np.append(inner.ravel(), edges[-1])
+
+
+def _graded(lo: float, hi: float, anchor: float, cells: int) -> NDArray[np.float64]:
+    """Edges whose distance from the anchor grows by a constant factor, then by a constant step of the same size.
+
+    With y the distance from the anchor the edges are equidistant in u = ln y up to y_c and in y / y_c beyond it,
+    so that width and rate of growth are continuous at y_c.
+    """
+    first, last = lo - anchor, hi - anchor
+    change = max(first, EQUAL_BEYOND * last)
+    log_part = math.log(change / first)
+    u = np.linspace(0.0, log_part + (last - change) / change, cells + 1)
+    near = first * np.exp(np.minimum(u, log_part))
+    y = np.where(u <= log_part, near, change + change * (u - log_part))
+    edges: NDArray[np.float64] = anchor + y
+    edges[0], edges[-1] = lo, hi
+    return edges
+
+
+def _counts(cells: Any, depth: int | None, dimension: int) -> tuple[int, ...]:
+    if depth is not None:
+        if not isinstance(depth, int) or depth < 1:
+            raise GridError("the depth of the grid", depth, "an integer from 1", "pass depth=16, or cells=...")
+        return tuple(2 ** ((depth + dimension - 1 - axis) // dimension) for axis in range(dimension))
+    counts = tuple(cells) if isinstance(cells, Sequence | np.ndarray) else (cells,) * dimension
+    if len(counts) != dimension or not all(isinstance(n, int | np.integer) and n >= 1 for n in counts):
+        raise GridError(
+            "the number of cells", cells, f"an integer from 1, or {dimension} of them", "pass cells=1024, or one per axis"
+        )
+    return tuple(int(n) for n in counts)
+
+
+def grid(
+    domain: Domain | ArrayLike,
+    cells: int | Sequence[int] = 1024,
+    *,
+    depth: int | None = None,
+    grading: str | None = None,
+) -> Grid:
+    """Cut a domain into cells.
+
+    Parameters
+    ----------
+    domain : Domain or list of (lo, hi)
+        What to cover; a list of pairs is one side, one pair per axis.
+    cells : int or sequence of int
+        Cells per axis of each side.
+    depth : int, optional
+        Instead of `cells`: halve the box `depth` times, the axes in turn beginning with the first.
+    grading : {"uniform", "graded"}, optional
+        Default: graded where the domain has an anchor.
+
+    Returns
+    -------
+    Grid
+        The cells.
+
+    Raises
+    ------
+    GridError
+        For a domain, number or word that cannot be.
+
+    Examples
+    --------
+    >>> import limitsets as ls
+    >>> ls.grid(ls.load("paper-designed").domain, cells=1024).n_cells
+    3072
+    """
+    region = as_domain(domain)
+    counts = _counts(cells, depth, region.dimension)
+    words = ("uniform", "graded")
+    if grading is not None and grading not in words:
+        raise GridError("the grading", grading, " or ".join(words), "correct the word")
+    if grading == "graded" and region.anchor is None:
+        raise GridError("the grading", grading, "uniform, for a domain without anchor", "give the domain an anchor")
+    if math.prod(counts) * region.sides > MOST_CELLS:
+        raise GridError(
+            "the number of cells", math.prod(counts) * region.sides, f"at most {MOST_CELLS}", "ask for fewer cells"
+        )
+    graded = region.anchor is not None and grading != "uniform"
+    sides = []
+    for side in range(region.sides):
+        if graded and region.anchor is not None:
+            lo, hi, anchor = float(region.lo[side, 0]), float(region.hi[side, 0]), float(region.anchor[side])
+            axes = (_graded(lo, hi, anchor, counts[0]),)
+        else:
+            pairs = zip(region.lo[side], region.hi[side], counts, strict=True)
+            axes = tuple(np.linspace(lo, hi, n + 1) for lo, hi, n in pairs)
+        if not all((np.diff(axis) > 0).all() for axis in axes):
+            raise GridError(
+                "the number of cells", counts, "cells wider than the spacing of floating-point numbers", "ask for fewer"
+            )
+        sides.append(axes)
+    return Grid(region, tuple(sides))

@@ -1,0 +1,87 @@
+"""The one exception family of the package.
+
+Every error names the thing that is wrong, the value it has, what would be allowed and what to do; a caller can
+read these as attributes, a person reads them as one sentence.  Numerical outcomes (no attractor within a budget,
+an undecided cell) are values of the answers, never exceptions.
+"""
+
+from __future__ import annotations
+
+__all__ = ["AnswerError", "GeometryError", "GridError", "LimitsetsError", "MapError", "SceneError"]
+
+
+class LimitsetsError(Exception):
+    """Base of every error this package raises on purpose.
+
+    Parameters
+    ----------
+    thing : str
+        What is wrong, in the user's words: ``"the length of the arm"``.
+    value : object
+        The value found.
+    allowed : str
+        What would be accepted.
+    remedy : str
+        What to do about it.
+    key : str, optional
+        Where it stands in the scene: ``"arm.length"``.
+    file : str, optional
+        The file it was read from.
+
+    Examples
+    --------
+    >>> print(LimitsetsError("the number of cells", -3, "an integer from 1", "pass cells=1024"))
+    the number of cells is -3; allowed: an integer from 1; pass cells=1024
+    """
+
+    def __init__(
+        self,
+        thing: str,
+        value: object,
+        allowed: str,
+        remedy: str,
+        *,
+        key: str | None = None,
+        file: str | None = None,
+    ) -> None:
+        self.thing, self.value, self.allowed, self.remedy = thing, value, allowed, remedy
+        self.key, self.file = key, file
+        place = ": ".join(part for part in (file, key) if part)
+        sentence = f"{thing} is {value!r}; allowed: {allowed}; {remedy}"
+        super().__init__(f"{place}: {sentence}" if place else sentence)
+
+    def __reduce__(self) -> tuple[object, ...]:
+        """Rebuild from the parts, so that an error crosses process borders whole."""
+        return (_rebuild, (type(self), self.thing, self.value, self.allowed, self.remedy, self.key, self.file))
+
+
+def _rebuild(
+    kind: type[LimitsetsError],
+    thing: str,
+    value: object,
+    allowed: str,
+    remedy: str,
+    key: str | None,
+    file: str | None,
+) -> LimitsetsError:
+    return kind(thing, value, allowed, remedy, key=key, file=file)
+
+
+class SceneError(LimitsetsError):
+    """A scene's text or values cannot be what they say."""
+
+
+class GeometryError(SceneError):
+    """A part that cannot be, or that cannot rest where it should."""
+
+
+class MapError(LimitsetsError):
+    """A map's parameters, kernels or states do not fit the map contract."""
+
+
+class GridError(LimitsetsError):
+    """A domain, grid or cell set that cannot be built or combined."""
+
+
+class AnswerError(LimitsetsError):
+    """A question that the map, grid or graph at hand cannot be asked."""

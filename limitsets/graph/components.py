@@ -1,0 +1,193 @@
+"""Strongly connected components, their order, and reachability, on ranges.
+
+`strong_components` is Tarjan's algorithm in Pearce's form (Inf. Proc. Letters 116, 2016) with an explicit stack: it
+walks each cell's runs of targets where they lie.  Components come out in reverse topological order, so a component
+can only lead to components of smaller number, and `reach` needs one sweep.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from limitsets.graph.ranges import Ranges, box_rows, hits, row_start
+from limitsets.jit import kernel
+
+__all__ = ["descend", "reach", "strong_components"]
+
+
+@kernel(entry=True)
+def _strong(r: Ranges, rank: Any, label: Any, order: Any, path: Any, boxes: Any, rows: Any, waiting: Any) -> int:
+    """Fill `label` and `order`; the number of components.
+
+    `rank` is 0 for a cell not yet met, the smallest visiting number known to be reachable while it is open, and
+    ``n - component`` once its component is closed: always larger than any open number, so one minimum serves both.
+    """
+    n = label.size
+    closed, done, held, clock = n, 0, 0, 1
+    for root in range(n):
+        if rank[root] != 0:
+            continue
+        depth = 0
+        path[0], boxes[0], rows[0] = root, r.first[root], 0
+        rank[root] = clock
+        label[root] = clock  # its own number, to see later whether it reached an older one
+        clock += 1
+        while depth >= 0:
+            cell = path[depth]
+            best = rank[cell]
+            child = -1
+            box, row = np.int64(boxes[depth]), np.int64(rows[depth])
+            last = r.first[cell + 1]
+            while box < last and child < 0:
+                count, run = box_rows(r, box), np.int64(r.run[box])
+                while row < count:
+                    begin = row_start(r, box, row)
+                    for target in range(begin, begin + run):
+                        known = rank[target]
+                        if known == 0:
+                            child = target
+                            break
+                        best = min(best, known)
+                    if child >= 0:
+                        break
+                    row += 1
+                if child < 0:
+                    box += 1
+                    row = 0
+            rank[cell] = best
+            if child >= 0:
+                boxes[depth], rows[depth] = box, row
+                depth += 1
+                path[depth], boxes[depth], rows[depth] = child, r.first[child], 0
+                rank[child] = clock
+                label[child] = clock
+                clock += 1
+                continue
+            if best == label[cell]:  # nothing older reached: the cell closes a component
+                clock -= 1
+                while held > 0 and rank[waiting[held - 1]] >= best:
+                    held -= 1
+                    member = waiting[held]
+                    rank[member] = closed
+                    label[member] = n - closed
+                    order[done] = member
+                    done += 1
+                    clock -= 1
+                rank[cell] = closed
+                label[cell] = n - closed
+                order[done] = cell
+                done += 1
+                closed -= 1
+            else:
+                waiting[held] = cell
+                held += 1
+            depth -= 1
+    return n - closed
+
+
+@kernel(entry=True)
+def _recurrent(r: Ranges, label: Any, size: Any, order: Any, out: Any) -> None:
+    for cell in order:
+        c = label[cell]
+        if size[c] > 1:
+            out[c] = True
+        else:
+            out[c] = hits(r, cell, cell)
+
+
+@kernel(entry=True)
+def _reach(r: Ranges, label: Any, order: Any, marks: Any) -> None:
+    i = 0
+    while i < order.size:
+        c, j, found = label[order[i]], i, marks[order[i]]
+        while j < order.size and label[order[j]] == c:
+            cell = order[j]
+            found |= marks[cell]
+            for box in range(r.first[cell], r.first[cell + 1]):
+                run = np.int64(r.run[box])
+                for row in range(box_rows(r, box)):
+                    begin = row_start(r, box, row)
+                    for target in range(begin, begin + run):
+                        found |= marks[target]
+            j += 1
+        for k in range(i, j):
+            marks[order[k]] = found
+        i = j
+
+
+@kernel(entry=True)
+def _descend(r: Ranges, seen: Any, stack: Any, held: int) -> None:
+    while held > 0:
+        held -= 1
+        cell = stack[held]
+        for box in range(r.first[cell], r.first[cell + 1]):
+            for row in range(box_rows(r, box)):
+                begin = row_start(r, box, row)
+                for target in range(begin, begin + r.run[box]):
+                    if not seen[target]:
+                        seen[target] = True
+                        stack[held] = target
+                        held += 1
+
+
+def strong_components(
+    r: Ranges,
+) -> tuple[NDArray[np.int32], NDArray[np.int32], NDArray[np.int64], NDArray[np.bool_]]:
+    """Strongly connected components of the cells.
+
+    Returns
+    -------
+    label : ndarray of int32, shape (n_cells,)
+        Component of each cell; an edge never leads to a component of larger number.
+    order : ndarray of int32, shape (n_cells,)
+        The cells, component by component in ascending number.
+    size : ndarray of int64, shape (n_components,)
+        Cells per component.
+    recurrent : ndarray of bool, shape (n_components,)
+        Whether a cell of it can return to itself: more than one cell, or one that meets its own image.
+    """
+    n = r.first.size - 1
+    label, order = np.empty(n, np.int32), np.empty(n, np.int32)
+    path, waiting, rows = np.empty(n, np.int32), np.empty(n, np.int32), np.empty(n, np.int32)
+    boxes = np.empty(n, np.int64 if r.start.size >= 2**31 else np.int32)
+    count = _strong(r, np.zeros(n, np.int32), label, order, path, boxes, rows, waiting)
+    size = np.bincount(label, minlength=count)
+    recurrent = np.empty(count, dtype=np.bool_)
+    _recurrent(r, label, size, order, recurrent)
+    return label, order, size, recurrent
+
+
+def reach(
+    r: Ranges, label: NDArray[np.int32], order: NDArray[np.int32], marks: NDArray[np.uint64]
+) -> NDArray[np.uint64]:
+    """Spread up to 64 marks backwards along the edges: bit b of a cell's answer says that it can reach mark b.
+
+    Parameters
+    ----------
+    r : Ranges
+        The graph.
+    label, order : ndarray
+        From `strong_components`.
+    marks : ndarray of an unsigned type, shape (n_cells,)
+        The bits that each cell carries itself.
+
+    Returns
+    -------
+    ndarray, shape (n_cells,)
+        The bits it carries or can reach, in any number of steps.
+    """
+    spread = marks.copy()
+    _reach(r, label, order, spread)
+    return spread
+
+
+def descend(r: Ranges, cells: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """Cells that can be reached from the given ones in one step or more."""
+    n = r.first.size - 1
+    seen, stack = np.zeros(n, dtype=np.bool_), np.empty(n + cells.size, np.int64)
+    stack[: cells.size] = cells
+    _descend(r, seen, stack, cells.size)
+    return seen

@@ -1,0 +1,201 @@
+"""The transition graph: who can go where in one step, cells as nodes, ways out as the last nodes.
+
+To networkx it is a directed graph of its own backend (`backend.py`); it keeps its map and its grid.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from limitsets.cells import CellSet, Grid
+from limitsets.errors import AnswerError
+from limitsets.graph.components import reach, strong_components
+from limitsets.graph.ranges import Ranges, count_edges, expand
+from limitsets.maps import kind_of
+
+if TYPE_CHECKING:
+    import networkx as nx
+
+__all__ = ["Components", "TransitionGraph"]
+
+
+@dataclass(frozen=True, eq=False)
+class Components:
+    """Strongly connected components of the cells (the ways out are components of their own, not listed).
+
+    Attributes
+    ----------
+    label : ndarray of int32, shape (n_cells,)
+        Component of each cell; an edge never leads to a component of larger number.
+    order : ndarray of int32, shape (n_cells,)
+        The cells, component by component.
+    size : ndarray of int64, shape (count,)
+        Cells per component.
+    recurrent : ndarray of bool, shape (count,)
+        Components in which an orbit of cells can stay.
+    """
+
+    label: NDArray[np.int32]
+    order: NDArray[np.int32]
+    size: NDArray[np.int64]
+    recurrent: NDArray[np.bool_]
+
+    @property
+    def count(self) -> int:
+        """Number of components."""
+        return int(self.size.size)
+
+
+@dataclass(frozen=True, eq=False)
+class TransitionGraph:
+    """Transitions between the cells of a grid under a map.
+
+    Nodes are the cells ``0 .. n_cells - 1`` and then one sink per way out, in the order of `exits`, each with an edge
+    to itself; no other node is without successors.  Build it with `limitsets.transitions`.
+
+    Attributes
+    ----------
+    map : NamedTuple
+        The map.
+    grid : Grid
+        The cells.
+    ranges : Ranges
+        Images of the cells.
+    method : str
+        How the images were found; all methods so far sample them.
+    second_pass : float
+        Share of the sampled states that the map's fast kernel could not vouch for.
+    """
+
+    map: Any
+    grid: Grid
+    ranges: Ranges
+    method: str
+    second_pass: float = 0.0
+    graph: dict[str, Any] = field(default_factory=dict)  # networkx: attributes of the graph
+
+    __networkx_backend__ = "limitsets"
+
+    @property
+    def exits(self) -> dict[str, int]:
+        """Names and codes of the ways out, in the order of the sinks."""
+        return kind_of(self.map).exits
+
+    @property
+    def n_cells(self) -> int:
+        """Number of cells."""
+        return self.grid.n_cells
+
+    def __len__(self) -> int:
+        return self.n_cells + len(self.exits)
+
+    def __iter__(self) -> Iterator[int]:
+        return iter(range(len(self)))
+
+    def __contains__(self, node: object) -> bool:
+        return isinstance(node, int | np.integer) and 0 <= node < len(self)
+
+    def __repr__(self) -> str:
+        return f"TransitionGraph({type(self.map).__name__}, {self.n_cells} cells, {self.method})"
+
+    def is_directed(self) -> bool:
+        """Tell networkx that edges have a direction."""
+        return True
+
+    def is_multigraph(self) -> bool:
+        """Tell networkx that no edge comes twice."""
+        return False
+
+    def number_of_nodes(self) -> int:
+        """Cells and ways out."""
+        return len(self)
+
+    def number_of_cell_edges(self) -> int:
+        """Count the edges from cell to cell."""
+        return count_edges(self.ranges)
+
+    def number_of_edges(self) -> int:
+        """Count all edges: from cell to cell, from cells to sinks, and the loops of the sinks."""
+        bits = np.unpackbits(self.ranges.exits[:, None], axis=1).sum()
+        return self.number_of_cell_edges() + int(bits) + len(self.exits)
+
+    def successors(self, node: int) -> NDArray[np.int64]:
+        """Nodes that a node's image meets, ascending.
+
+        Raises
+        ------
+        AnswerError
+            For a number that is no node.
+        """
+        if node not in self:
+            raise AnswerError("the node", node, f"an integer from 0 to {len(self) - 1}", "pass the number of a cell")
+        if node >= self.n_cells:
+            return np.array([node])
+        r = self.ranges
+        parts = []
+        for box in range(int(r.first[node]), int(r.first[node + 1])):
+            rows = np.arange(r.rows[box], dtype=np.int64) * r.row_stride[r.side[box]]
+            planes = np.arange(r.planes[box], dtype=np.int64) * r.plane_stride[r.side[box]]
+            corner = int(r.start[box]) + np.add.outer(planes, rows)
+            parts.append(np.add.outer(corner, np.arange(r.run[box])).ravel())
+        sinks = [self.n_cells + e for e in range(len(self.exits)) if r.exits[node] >> e & 1]
+        return np.unique(np.concatenate([*parts, np.array(sinks, dtype=np.int64)]))
+
+    @cached_property
+    def _components(self) -> Components:
+        return Components(*strong_components(self.ranges))
+
+    def components(self) -> Components:
+        """Strongly connected components of the cells, as labels."""
+        return self._components
+
+    def reaches(self, sets: list[NDArray[np.int64]]) -> Iterator[tuple[slice, NDArray[np.uint64]]]:
+        """Which of the given sets of cells, and which exits, each cell can reach; at most 56 sets at a time.
+
+        Yields
+        ------
+        (slice, ndarray of an unsigned type, shape (n_cells,))
+            The sets at hand; bit b for the b-th of them and, above these, one bit per exit.
+        """
+        parts = self.components()
+        for begin in range(0, max(len(sets), 1), 56):
+            chunk = sets[begin : begin + 56]
+            bits = len(chunk) + len(self.exits)
+            kind = np.uint8 if bits <= 8 else np.uint64
+            marks = self.ranges.exits.astype(kind) << kind(len(chunk))
+            for b, cells in enumerate(chunk):
+                marks[cells] |= kind(1 << b)
+            yield slice(begin, begin + len(chunk)), reach(self.ranges, parts.label, parts.order, marks)
+
+    def recurrent_components(self) -> list[NDArray[np.int32]]:
+        """Cells of each recurrent component, ascending in topological number: attracting ones come early."""
+        parts = self.components()
+        ends = np.concatenate([[0], np.cumsum(parts.size)])
+        return [np.sort(parts.order[ends[c] : ends[c + 1]]) for c in np.flatnonzero(parts.recurrent)]
+
+    def recurrent_set(self) -> CellSet:
+        """All cells in which an orbit of cells can stay."""
+        parts = self.components()
+        return CellSet(self.grid, parts.recurrent[parts.label])
+
+    def to_networkx(self) -> nx.DiGraph[int]:
+        """Write the graph out as a `networkx.DiGraph`, edge by edge."""
+        import networkx as nx
+
+        pointer, targets = expand(self.ranges)
+        plain: nx.DiGraph[int] = nx.DiGraph(**self.graph)
+        plain.add_nodes_from(range(len(self)))
+        cells = np.repeat(np.arange(self.n_cells), np.diff(pointer))
+        plain.add_edges_from(zip(cells.tolist(), targets.tolist(), strict=True))
+        for e in range(len(self.exits)):
+            sink = self.n_cells + e
+            leaving = np.flatnonzero(self.ranges.exits >> e & 1)
+            plain.add_edges_from((cell, sink) for cell in leaving.tolist())
+            plain.add_edge(sink, sink)
+        return plain

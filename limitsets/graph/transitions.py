@@ -1,0 +1,78 @@
+"""Build the transition graph of a map on a grid."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from limitsets.cells import Grid
+from limitsets.errors import AnswerError
+from limitsets.graph.assemble import Target, boxes_of_side
+from limitsets.graph.graph import TransitionGraph
+from limitsets.graph.images import METHODS
+from limitsets.graph.ranges import build
+from limitsets.maps import kind_of
+
+__all__ = ["transitions"]
+
+
+def transitions(map: Any, grid: Grid, method: str | None = None, **options: Any) -> TransitionGraph:
+    """Who can go where in one step.
+
+    Parameters
+    ----------
+    map : NamedTuple
+        A map (`scene.map`, `limitsets.maps`, or your own after `limitsets.register`).
+    grid : Grid
+        Cells to go between.
+    method : {"end-points", "corners", "corners-padded", "centres", "random"}, optional
+        How the image of a cell is found.  Default: the end points in one dimension, padded corners in more.  All of
+        them sample; none proves that nothing is missed.
+    **options
+        For "random": samples=16, seed=0.
+
+    Returns
+    -------
+    TransitionGraph
+        A directed graph that networkx runs on.
+
+    Raises
+    ------
+    AnswerError
+        For a method that is none, or does not fit the map.
+
+    Examples
+    --------
+    >>> import limitsets as ls
+    >>> import networkx as nx
+    >>> scene = ls.load("paper-designed")
+    >>> graph = ls.transitions(scene.map, ls.grid(scene.domain, cells=4096))
+    >>> nx.number_attracting_components(graph)  # the limit set, and the three sinks
+    4
+    """
+    kind = kind_of(map)
+    if kind.dimension != grid.dimension:
+        raise AnswerError(
+            "the dimension of the grid", grid.dimension, f"{kind.dimension}, that of {kind.name}", "cut another domain"
+        )
+    chosen = method or ("end-points" if grid.dimension == 1 else "corners-padded")
+    if chosen not in METHODS:
+        raise AnswerError("the image method", chosen, ", ".join(METHODS), "correct the word")
+    target = Target.of(grid, kind.exits)
+    parts = [
+        boxes_of_side(map, grid, side, target, METHODS[chosen](grid, side, **options)) for side in range(grid.sides)
+    ]
+    if len(parts) == 1:
+        cell, side, lo, hi, exits = (getattr(parts[0], name) for name in ("cell", "side", "lo", "hi", "exits"))
+    else:
+        cell = np.concatenate([part.cell + grid.offset[k] for k, part in enumerate(parts)])
+        side, lo, hi, exits = (
+            np.concatenate([getattr(part, name) for part in parts]) for name in ("side", "lo", "hi", "exits")
+        )
+    if cell.size == grid.n_cells and int(cell[-1]) == grid.n_cells - 1 and (np.diff(cell) == 1).all():
+        first = np.arange(grid.n_cells + 1)
+    else:
+        first = np.concatenate([[0], np.cumsum(np.bincount(cell, minlength=grid.n_cells))])
+    share = float(np.average([part.second_pass for part in parts], weights=grid.shape.prod(axis=1)))
+    return TransitionGraph(map, grid, build(grid, first, side, lo, hi, exits), chosen, share)

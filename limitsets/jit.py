@@ -1,0 +1,382 @@
+"""The only file that imports numba: the decorators of all compiled code, and the cache that never lies.
+
+Three words are used elsewhere:
+
+``kernel``
+    Compiles a function for estimates: a multiplication and an addition may be contracted into one instruction.
+    Plain ``@kernel`` is for small pieces, which are inlined where they are called (a call costs 80 ns and stops
+    the loop from vectorising); ``@kernel(entry=True)`` is for a loop over whole arrays called from Python, the
+    only kind that is kept on disk.
+``proof_kernel``
+    The same without contraction, for arithmetic whose rounding a proof relies on.
+``generic``
+    A function whose method is chosen by the class of its first argument, at compile time.
+
+Why a cache of our own.  Numba's disk cache looks at the file of the entry point alone: after an edit of a helper in
+another file, an upgrade of the package or a swap of two fields of a NamedTuple it runs the old machine code and
+says nothing.  Here the cache folder is named after a digest of every file of the package that can hold a kernel, and
+for classes from outside the package the key also covers each file and constant their kernels reach; where one of
+those cannot be read, that signature is not cached at all.  The hooks are numba internals, so they stay in this file,
+numba is pinned to one minor release, and a test edits a copied helper and expects the new number.  If the internals
+are gone, compiled code is simply not kept.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import inspect
+import os
+import shutil
+import sys
+import types as python_types
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, TypeVar, overload
+
+import numba
+import numpy as np
+from numba import extending, types
+
+__all__ = ["cover_foreign_class", "generic", "kernel", "named_tuple_class", "proof_kernel"]
+
+F = TypeVar("F", bound=Callable[..., Any])
+
+PACKAGE = Path(__file__).resolve().parent
+
+# Rooms without kernels: editing a picture must not throw away every compiled loop.  An import contract keeps
+# them from importing this file.
+KERNEL_FREE = {"scene", "goals", "analysis", "plot", "report", "cli"}
+
+# Digests kept side by side; older ones are deleted when a new one appears.
+KEPT_DIGESTS = 8
+
+_COMMON = {"nopython": True, "error_model": "numpy", "no_cfunc_wrapper": True}
+_ESTIMATE = {**_COMMON, "fastmath": {"contract"}}
+_PROOF = {**_COMMON, "fastmath": False}
+
+
+def _package_digest() -> str:
+    """Digest of every source file of the package in which a kernel, or a class kernels are compiled for, may stand."""
+    digest = hashlib.sha256(f"{numba.__version__} {np.__version__} {sys.version_info[:2]}".encode())
+    for file in sorted(PACKAGE.rglob("*.py")):
+        path = file.relative_to(PACKAGE)
+        if path.parts[0] not in KERNEL_FREE:
+            digest.update(path.as_posix().encode() + b"\0" + file.read_bytes() + b"\0")
+    return digest.hexdigest()[:24]
+
+
+def _cache_root() -> Path:
+    """Where compiled code is kept: NUMBA_CACHE_DIR if set, else the user's cache folder."""
+    if chosen := os.environ.get("NUMBA_CACHE_DIR"):
+        return Path(chosen) / "limitsets"
+    if sys.platform == "win32":
+        base = Path(os.environ.get("LOCALAPPDATA", Path.home() / "AppData" / "Local"))
+    elif sys.platform == "darwin":
+        base = Path.home() / "Library" / "Caches"
+    else:
+        base = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
+    return base / "limitsets"
+
+
+def _open_cache() -> Path | None:
+    """Make the folder of this very source, delete the oldest others; None where nothing can be written."""
+    try:
+        root = _cache_root()
+        folder = root / _package_digest()
+        if not folder.is_dir():
+            folder.mkdir(parents=True, exist_ok=True)
+            others = sorted(root.iterdir(), key=lambda path: path.stat().st_mtime, reverse=True)
+            for old in others[KEPT_DIGESTS:]:
+                shutil.rmtree(old, ignore_errors=True)
+        return folder if os.access(folder, os.W_OK) else None
+    except OSError:
+        return None
+
+
+# ---------------------------------------------------------------- classes from outside the package
+
+# Class of map parameters -> digest of everything its kernels reach, or None where that is not known.
+_FOREIGN: dict[type, str | None] = {}
+
+
+class _UnknownSourceError(Exception):
+    """Something a kernel reaches has no source or no value that could be digested."""
+
+
+def _reached(function: Callable[..., Any], seen: dict[str, bytes]) -> None:
+    """Collect into `seen` the file of a function and of all it calls, and the constants they freeze."""
+    function = getattr(function, "py_func", function)
+    if not isinstance(function, python_types.FunctionType):
+        raise _UnknownSourceError
+    module = function.__module__ or ""
+    if module.split(".")[0] in {"numpy", "math", "numba", "limitsets"}:
+        return
+    file = inspect.getsourcefile(function)
+    mark = f"{module}.{function.__qualname__}"
+    if file is None or not os.path.isfile(file):
+        raise _UnknownSourceError
+    if mark in seen:
+        return
+    seen[mark] = Path(file).read_bytes()
+    names: set[str] = set()
+    codes = [function.__code__]
+    while codes:
+        code = codes.pop()
+        names.update(code.co_names)
+        codes.extend(const for const in code.co_consts if isinstance(const, python_types.CodeType))
+    scope = {name: function.__globals__[name] for name in names if name in function.__globals__}
+    for name, cell in zip(function.__code__.co_freevars, function.__closure__ or (), strict=True):
+        scope[name] = cell.cell_contents
+    for name, value in sorted(scope.items()):
+        _reached_value(f"{mark}:{name}", value, names, seen)
+
+
+def _reached_value(mark: str, value: Any, names: set[str], seen: dict[str, bytes]) -> None:
+    """Collect what a kernel reaches through one global name."""
+    if isinstance(value, (bool, int, float, complex, str, bytes, type(None), np.generic)):
+        seen[mark] = repr(value).encode()
+    elif isinstance(value, np.ndarray) and value.dtype != object:
+        seen[mark] = repr((value.shape, value.dtype)).encode() + value.tobytes()
+    elif isinstance(value, tuple):
+        for k, entry in enumerate(value):
+            _reached_value(f"{mark}[{k}]", entry, names, seen)
+    elif isinstance(value, python_types.ModuleType):
+        if value.__name__.split(".")[0] in {"numpy", "math", "numba", "limitsets"}:
+            return
+        for name in sorted(names & set(vars(value))):
+            _reached_value(f"{mark}.{name}", vars(value)[name], names, seen)
+    elif isinstance(value, type):
+        if value.__module__ == "builtins":
+            return
+        file = inspect.getsourcefile(value)
+        if file is None or not os.path.isfile(file):
+            raise _UnknownSourceError
+        seen[mark] = Path(file).read_bytes()
+    elif getattr(value, "__module__", None) != "builtins" or not callable(value):
+        _reached(value, seen)
+
+
+def cover_foreign_class(cls: type, functions: list[Callable[..., Any]]) -> None:
+    """Make the cache key of every signature with `cls` cover the source that its kernels reach.
+
+    Parameters
+    ----------
+    cls : type
+        A NamedTuple class of map parameters.
+    functions : list of callable
+        The kernels compiled for it.
+
+    Notes
+    -----
+    Classes of this package need nothing: its digest names the folder.  A class typed in at a prompt, or a kernel
+    that reaches an object without source, gets no key and is compiled anew in each process.
+    """
+    inside = (cls.__module__ or "").split(".")[0] == "limitsets"
+    if inside and all((f.__module__ or "").split(".")[0] == "limitsets" for f in functions):
+        return
+    seen: dict[str, bytes] = {}
+    try:
+        if not inside:
+            if cls.__module__ == "__main__":  # pickled by value: the class of another run is another class
+                raise _UnknownSourceError
+            seen["class"] = Path(inspect.getsourcefile(cls) or "").read_bytes()
+        for function in functions:
+            _reached(function, seen)
+    except (_UnknownSourceError, OSError, TypeError, ValueError):
+        _FOREIGN[cls] = None
+        return
+    digest = hashlib.sha256()
+    for mark, content in sorted(seen.items()):
+        digest.update(mark.encode() + b"\0" + content + b"\0")
+    _FOREIGN[cls] = digest.hexdigest()[:24]
+
+
+def _signature_key(signature: Any) -> str | None:
+    """Sub-folder for one signature: '' for the package's own classes, None where nothing may be cached."""
+    parts: set[str] = set()
+    waiting = list(signature)
+    while waiting:
+        item = waiting.pop()
+        cls = getattr(item, "instance_class", None)
+        if cls is not None:
+            if cls in _FOREIGN:
+                digest = _FOREIGN[cls]
+                if digest is None:
+                    return None
+                parts.add(digest)
+            elif cls.__module__.split(".")[0] != "limitsets":
+                return None
+        if isinstance(item, types.BaseTuple):
+            waiting.extend(item)
+        elif isinstance(item, types.Function | types.Dispatcher):
+            return None
+    return "-".join(sorted(parts))
+
+
+# ---------------------------------------------------------------- the cache
+
+
+def _source_cache(folder: Path) -> type | None:
+    """Subclass numba's function cache so that it lives in `folder`; None if this numba has other internals."""
+    try:
+        from numba.core import caching
+
+        class SourceImpl(caching.CompileResultCacheImpl):  # type: ignore[misc]  # numba has no types
+            def __init__(self, py_func: Callable[..., Any]) -> None:
+                abi = getattr(sys, "abiflags", "")
+                line = py_func.__code__.co_firstlineno
+                self._lineno = line
+                name = f"{py_func.__module__}.{py_func.__qualname__}"
+                self._filename_base = f"{name}-{line}.py{sys.version_info[0]}{sys.version_info[1]}{abi}"
+
+        class SourceCache(caching.FunctionCache):  # type: ignore[misc]  # numba has no types
+            _impl_class = SourceImpl
+
+            def __init__(self, py_func: Callable[..., Any]) -> None:
+                self._name, self._py_func = repr(py_func), py_func
+                self._impl = SourceImpl(py_func)
+                self._cache_path = str(folder)
+                self._files: dict[str, Any] = {}
+                self.enable()
+
+            def _file(self, signature: Any) -> Any:
+                key = _signature_key(signature)
+                if key is None:
+                    return None
+                if key not in self._files:
+                    path = folder / key if key else folder
+                    path.mkdir(parents=True, exist_ok=True)
+                    base = self._impl.filename_base
+                    self._files[key] = caching.IndexDataCacheFile(str(path), base, "named by digest")
+                return self._files[key]
+
+            def flush(self) -> None:
+                for file in self._files.values():
+                    file.flush()
+
+            def _load_overload(self, sig: Any, target_context: Any) -> Any:
+                file = self._file(sig)
+                if not self._enabled or file is None:
+                    return None
+                data = file.load(self._index_key(sig, target_context.codegen()))
+                return None if data is None else self._impl.rebuild(target_context, data)
+
+            def _save_overload(self, sig: Any, data: Any) -> None:
+                file = self._file(sig)
+                if self._enabled and file is not None and self._impl.check_cachable(data):
+                    file.save(self._index_key(sig, data.codegen), self._impl.reduce(data))
+
+        needed = ("_index_key", "_guard_against_spurious_io_errors", "load_overload", "save_overload")
+        return SourceCache if all(hasattr(SourceCache, name) for name in needed) else None
+    except (ImportError, AttributeError):
+        return None
+
+
+_folder = _open_cache()
+_CACHE = _source_cache(_folder) if _folder is not None else None
+
+
+def _compile(function: F, options: dict[str, Any], entry: bool) -> F:
+    dispatcher = numba.jit(**options, forceinline=not entry)(function)
+    if entry and _CACHE is not None and hasattr(dispatcher, "_cache"):
+        dispatcher._cache = _CACHE(function)
+    return dispatcher  # type: ignore[no-any-return]  # a dispatcher is called like the function
+
+
+@overload
+def kernel(function: F) -> F: ...
+@overload
+def kernel(*, entry: bool) -> Callable[[F], F]: ...
+def kernel(function: Any = None, *, entry: bool = False) -> Any:
+    """Compile for estimates (contraction allowed); ``entry=True`` for a loop called from Python.
+
+    Parameters
+    ----------
+    function : callable
+        A module-level function of numbers, arrays and NamedTuples.
+    entry : bool
+        True for a loop over whole arrays: kept on disk, not inlined.
+
+    Examples
+    --------
+    >>> from limitsets.jit import kernel
+    >>> @kernel
+    ... def half(x):
+    ...     return 0.5 * x
+    >>> half(3.0)
+    1.5
+    """
+    if function is None:
+        return lambda f: _compile(f, _ESTIMATE, entry)
+    return _compile(function, _ESTIMATE, entry)
+
+
+@overload
+def proof_kernel(function: F) -> F: ...
+@overload
+def proof_kernel(*, entry: bool) -> Callable[[F], F]: ...
+def proof_kernel(function: Any = None, *, entry: bool = False) -> Any:
+    """Compile without contraction: every operation rounds as written.  Arguments as for `kernel`.
+
+    Examples
+    --------
+    >>> from limitsets.jit import proof_kernel
+    >>> @proof_kernel
+    ... def residual(a, b, c):
+    ...     return a * b - c
+    >>> residual(1.0 + 2.0**-30, 1.0 - 2.0**-30, 1.0)  # contracted it would be -2^-60
+    0.0
+    """
+    if function is None:
+        return lambda f: _compile(f, _PROOF, entry)
+    return _compile(function, _PROOF, entry)
+
+
+def named_tuple_class(numba_type: Any) -> type | None:
+    """Class of a NamedTuple as numba sees it, None for any other type."""
+    return getattr(numba_type, "instance_class", None) if isinstance(numba_type, types.BaseTuple) else None
+
+
+def generic(stub: F, *, proof: bool = False, default: Callable[..., Any] | None = None) -> F:
+    """Make a function whose method is chosen by the class of its first argument.
+
+    Parameters
+    ----------
+    stub : callable
+        A module-level function that names the arguments; its body is never compiled.
+    proof : bool
+        Compile the methods without contraction.
+    default : callable, optional
+        The method of every class that has none of its own.
+
+    Returns
+    -------
+    callable
+        The stub, with an attribute `on`: ``stub.on(Class, method)`` adds a module-level method.  For a plain tuple
+        of equal entries the key is its length instead.  In compiled code the choice is made at compile time and
+        the method is inlined.
+
+    Notes
+    -----
+    The table is read by one numba overload per generic function.  A method is never passed as an argument nor kept
+    in a closure: numba does not cache such code (numba issues 2065, 2952, 6264).
+    """
+    methods: dict[Any, Callable[..., Any]] = {}
+    options = {**(_PROOF if proof else _ESTIMATE), "forceinline": True}
+    options.pop("nopython")
+    options.pop("no_cfunc_wrapper")
+
+    def choose(first: Any, *rest: Any) -> Callable[..., Any] | None:
+        key: Any = named_tuple_class(first)
+        if key is None and isinstance(first, types.UniTuple):
+            key = first.count
+        return methods.get(key, default)
+
+    extending.overload(stub, jit_options=options, strict=False)(choose)
+
+    def on(key: type | int, method: Callable[..., Any]) -> None:
+        methods[key] = getattr(method, "py_func", method)
+
+    stub.on = on  # type: ignore[attr-defined]  # a function may carry attributes
+    stub.methods = methods  # type: ignore[attr-defined]
+    return stub

@@ -1,0 +1,49 @@
+"""What a throw, or one step of any map, can end in.
+
+A code of zero or more is the branch of the map that was taken (for the throw: jog or flip); a negative code is a
+state of its own, never folded into a neighbour.
+"""
+
+from __future__ import annotations
+
+__all__ = [
+    "FLIP",
+    "INWARD",
+    "JOG",
+    "NAMES",
+    "OUTSIDE",
+    "OUTSIDE_MODEL",
+    "OUTWARD",
+    "ROLL",
+    "UNDECIDED",
+    "UNSETTLED",
+]
+
+JOG = 0
+"""Rests on the same side."""
+FLIP = 1
+"""Rests on the next side."""
+ROLL = 2
+"""Rests on another side, or after several rolls."""
+INWARD = -1
+"""Lands with the centre of mass at or inside the left vertex of its side: R' <= a."""
+OUTWARD = -2
+"""Lands beyond the arm's end."""
+OUTSIDE = -2
+"""Leaves the domain: the one exit of a map other than the throw."""
+OUTSIDE_MODEL = -3
+"""Nothing the model speaks of: a start with R <= a, or no impact within a full turn."""
+UNDECIDED = -4
+"""Cells only: parts of the cell do different things."""
+UNSETTLED = -128
+"""Inside the drivers only: the fast kernel could not vouch for its answer, the sure one is asked."""
+
+NAMES = {
+    JOG: "jog",
+    FLIP: "flip",
+    ROLL: "roll",
+    INWARD: "inward",
+    OUTWARD: "outward",
+    OUTSIDE_MODEL: "outside-model",
+    UNDECIDED: "undecided",
+}

@@ -1,0 +1,251 @@
+"""The map contract: what a discrete-time map on (x, side) has to offer, and how one is registered.
+
+A map is a NamedTuple of parameters; its class decides which kernels run (`limitsets.jit.generic`).  Drivers are
+written once, here and in the rooms above, and know maps only through these functions:
+
+======================================  =============================================================================
+``image(params, x, side)``              ``(x', side', code)``: one step (required)
+``image_on(params, x, side, branch)``   ``(x', side', slope)``: one step on a forced branch, for one-sided limits,
+                                        slopes and Newton's method
+``image_box(lo, hi, x_lo, x_hi, side)`` one or two boxes that contain the image of a box, for proofs
+``on_side(params, side)``               gathers what one side needs, once for a whole batch; the class of what it
+                                        returns then has the methods `image`, `image_on` and so on
+``fallback(params, x, side)``           as `image`, slow and sure; asked where `image` answers ``UNSETTLED``
+``margin(params, x, side)``             a number whose sign decides between branch 0 (not positive) and branch 1
+``displacement(params, x, side)``       x' - x computed without cancellation
+======================================  =============================================================================
+
+In two and three dimensions x is a tuple and the slope a tuple of rows.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from limitsets.errors import MapError
+from limitsets.jit import cover_foreign_class, generic
+from limitsets.maps import codes
+
+__all__ = [
+    "MapKind",
+    "coerce",
+    "displacement",
+    "fallback",
+    "image",
+    "image_box",
+    "image_on",
+    "kind_of",
+    "margin",
+    "on_side",
+    "register",
+]
+
+
+def _same(params: Any, side: int) -> Any:
+    return params
+
+
+def _no_fallback(params: Any, x: Any, side: int) -> Any:
+    return x, side, codes.OUTSIDE_MODEL
+
+
+def image(params: Any, x: Any, side: int) -> Any:
+    """One step: ``(x', side', code)``."""
+
+
+def image_on(params: Any, x: Any, side: int, branch: int) -> Any:
+    """One step on a forced branch: ``(x', side', slope)``."""
+
+
+def image_box(params_lo: Any, params_hi: Any, lo: Any, hi: Any, side: int) -> Any:
+    """Boxes that contain the image of a box, for every parameter between the two."""
+
+
+def on_side(params: Any, side: int) -> Any:
+    """Return what the kernels need to know of one side."""
+
+
+def fallback(params: Any, x: Any, side: int) -> Any:
+    """One step, slow and sure."""
+
+
+def margin(params: Any, x: Any, side: int) -> Any:
+    """Return a number whose sign decides between branches 0 and 1."""
+
+
+def displacement(params: Any, x: Any, side: int) -> Any:
+    """x' - x without cancellation."""
+
+
+image = generic(image)
+image_on = generic(image_on)
+image_box = generic(image_box, proof=True)
+on_side = generic(on_side, default=_same)
+fallback = generic(fallback, default=_no_fallback)
+margin = generic(margin)
+displacement = generic(displacement)
+
+EXITS_OF_A_MAP = {"outside": codes.OUTSIDE}
+
+
+@dataclass(frozen=True)
+class MapKind:
+    """What the drivers know of a class of maps.
+
+    Attributes
+    ----------
+    name : str
+        For messages and reports.
+    dimension : int
+        1, 2 or 3: the number of coordinates of x.
+    branches : tuple of str
+        Names of the branches; the code of a step is an index into it.
+    exits : dict of str to int
+        Names and codes of the ways out, in the order of the sinks of a graph.
+    has_image_on, has_margin, has_displacement : bool
+        Which of the optional kernels exist.
+    """
+
+    name: str
+    dimension: int
+    branches: tuple[str, ...]
+    exits: dict[str, int]
+    has_image_on: bool
+    has_margin: bool
+    has_displacement: bool
+
+
+_KINDS: dict[type, MapKind] = {}
+
+
+def register(
+    cls: type,
+    *,
+    image: Callable[..., Any],
+    image_on: Callable[..., Any] | None = None,
+    image_box: Callable[..., Any] | None = None,
+    on_side: Callable[..., Any] | None = None,
+    fallback: Callable[..., Any] | None = None,
+    margin: Callable[..., Any] | None = None,
+    displacement: Callable[..., Any] | None = None,
+    dimension: int = 1,
+    branches: tuple[str, ...] = ("map",),
+    exits: dict[str, int] | None = None,
+) -> type:
+    """Make a class of parameters a map, at the speed of the built-in ones.
+
+    Parameters
+    ----------
+    cls : type
+        A NamedTuple class whose fields are floats, arrays with one entry per side, NamedTuples of such, or None.
+        Build its values with `limitsets.maps.coerce`, or give floats and float64 arrays.
+    image : callable
+        ``image(params, x, side) -> (x', side', code)``; code is the index of the branch taken, or
+        `limitsets.maps.OUTSIDE` (-2).  A module-level function, not decorated.
+    image_on, image_box, on_side, fallback, margin, displacement : callable, optional
+        See this module's table.
+    dimension : int
+        1, 2 or 3.
+    branches : tuple of str
+        Names of the branches.
+    exits : dict, optional
+        Names and codes of the ways out; default ``{"outside": -2}``.
+
+    Returns
+    -------
+    type
+        `cls`, so that it can be used as a decorator with ``functools.partial``.
+
+    Raises
+    ------
+    MapError
+        For a class that is no NamedTuple, is registered already, or a kernel that is no module-level function.
+
+    Examples
+    --------
+    >>> from typing import NamedTuple
+    >>> import limitsets as ls
+    >>> class Tent(NamedTuple):
+    ...     slope: float
+    >>> def tent(params, x, side):
+    ...     return (params.slope * x, side, 0) if x < 0.5 else (params.slope * (1.0 - x), side, 1)
+    >>> _ = ls.register(Tent, image=tent, branches=("left", "right"))
+    >>> ls.orbit(Tent(2.0), 0.2, 0, 3).x
+    array([0.2, 0.4, 0.8, 0.4])
+    """
+    if not (isinstance(cls, type) and issubclass(cls, tuple) and hasattr(cls, "_fields")):
+        raise MapError("the class of parameters", cls, "a NamedTuple class", "write class Params(NamedTuple): ...")
+    if cls in _KINDS:
+        raise MapError(
+            "the class of parameters", cls.__name__, "a class not registered before", "give the new map a new class"
+        )
+    if dimension not in (1, 2, 3):
+        raise MapError("the dimension of the map", dimension, "1, 2 or 3", "pass dimension=1, 2 or 3")
+    given = {
+        "image": image,
+        "image_on": image_on,
+        "image_box": image_box,
+        "on_side": on_side,
+        "fallback": fallback,
+        "margin": margin,
+        "displacement": displacement,
+    }
+    kernels = {name: f for name, f in given.items() if f is not None}
+    for name, function in kernels.items():
+        plain = getattr(function, "py_func", function)
+        if not callable(plain) or getattr(plain, "__closure__", None) or getattr(plain, "__name__", "") == "<lambda>":
+            raise MapError(
+                f"the kernel {name}", function, "a function defined at module level", "move it out of the function"
+            )
+    cover_foreign_class(cls, list(kernels.values()))
+    for name, function in kernels.items():
+        globals()[name].on(cls, function)
+    _KINDS[cls] = MapKind(
+        cls.__name__,
+        dimension,
+        tuple(branches),
+        dict(EXITS_OF_A_MAP if exits is None else exits),
+        image_on is not None,
+        margin is not None,
+        displacement is not None,
+    )
+    return cls
+
+
+def kind_of(params: Any) -> MapKind:
+    """Return what is known of a map; raises MapError where its class was never registered."""
+    kind = _KINDS.get(type(params))
+    if kind is None:
+        raise MapError(
+            "the map", type(params).__name__, "parameters of a registered class", "register it with limitsets.register"
+        )
+    return kind
+
+
+def coerce(params: Any) -> Any:
+    """Give a map's parameters the one form kernels are compiled for.
+
+    Integers become floats and arrays become C-contiguous, writeable float64: any other form is another type to
+    numba, and would compile everything once more.
+
+    Examples
+    --------
+    >>> from limitsets import maps
+    >>> maps.coerce(maps.Logistic(4))
+    Logistic(r=4.0)
+    """
+    if params is None or isinstance(params, (bool, np.bool_)):
+        return params
+    if isinstance(params, tuple) and hasattr(params, "_fields"):
+        return type(params)(*(coerce(field) for field in params))
+    if isinstance(params, (int, float, np.integer, np.floating)):
+        return float(params)
+    if isinstance(params, (np.ndarray, list)):
+        return np.array(params, dtype=np.float64, order="C")
+    raise MapError(
+        "a parameter of the map", params, "a number, an array, a NamedTuple of such, or None", "convert it first"
+    )

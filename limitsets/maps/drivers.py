@@ -1,0 +1,315 @@
+"""Loops over whole arrays, written once for every map.
+
+A batch is all on one side: what the side needs is gathered once and the loop vectorises.  States of a map in more
+than one dimension travel as a tuple of arrays, one per coordinate.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from limitsets.errors import MapError
+from limitsets.jit import generic, kernel
+from limitsets.maps import codes
+from limitsets.maps.contract import displacement, fallback, image, image_on, kind_of, on_side
+
+__all__ = ["Images", "Orbit", "advance", "columns", "images", "images_on", "orbit", "rows", "step"]
+
+
+def pick(xs: Any, k: int) -> Any:
+    """State number k of a tuple of coordinate arrays: a number, or a tuple from two coordinates up."""
+
+
+def put(xs: Any, k: int, x: Any) -> None:
+    """Store state number k."""
+
+
+def _pick1(xs: Any, k: int) -> Any:
+    return xs[0][k]
+
+
+def _pick2(xs: Any, k: int) -> Any:
+    return xs[0][k], xs[1][k]
+
+
+def _pick3(xs: Any, k: int) -> Any:
+    return xs[0][k], xs[1][k], xs[2][k]
+
+
+def _put1(xs: Any, k: int, x: Any) -> None:
+    xs[0][k] = x
+
+
+def _put2(xs: Any, k: int, x: Any) -> None:
+    xs[0][k], xs[1][k] = x
+
+
+def _put3(xs: Any, k: int, x: Any) -> None:
+    xs[0][k], xs[1][k], xs[2][k] = x
+
+
+pick = generic(pick)
+put = generic(put)
+for _n, _get, _set in ((1, _pick1, _put1), (2, _pick2, _put2), (3, _pick3, _put3)):
+    pick.on(_n, _get)  # type: ignore[attr-defined]  # generic functions carry `on`
+    put.on(_n, _set)  # type: ignore[attr-defined]
+
+
+@kernel
+def step(params: Any, x: Any, side: int) -> Any:
+    """One step of any map, the sure way where the fast one cannot vouch for its answer."""
+    after, side_after, code = image(params, x, side)
+    if code == codes.UNSETTLED:
+        after, side_after, code = fallback(params, x, side)
+    return after, side_after, code
+
+
+@kernel(entry=True)
+def _images(params: Any, side: int, xs: Any, after: Any, side_after: Any, code_after: Any) -> int:
+    here = on_side(params, side)
+    for k in range(xs[0].size):
+        x, to, code = image(here, pick(xs, k), side)
+        put(after, k, x)
+        side_after[k] = to
+        code_after[k] = code
+    again = 0
+    for k in range(xs[0].size):
+        if code_after[k] == codes.UNSETTLED:
+            x, to, code = fallback(here, pick(xs, k), side)
+            put(after, k, x)
+            side_after[k] = to
+            code_after[k] = code
+            again += 1
+    return again
+
+
+@kernel(entry=True)
+def _images_on(params: Any, side: int, branch: int, xs: Any, after: Any, side_after: Any) -> None:
+    here = on_side(params, side)
+    for k in range(xs[0].size):
+        x, to, _ = image_on(here, pick(xs, k), side, branch)
+        put(after, k, x)
+        side_after[k] = to
+
+
+@kernel(entry=True)
+def _slopes(params: Any, sides: Any, branches: Any, x: Any, out: Any) -> None:
+    for k in range(x.size):
+        _, _, out[k] = image_on(params, x[k], sides[k], branches[k])
+
+
+@kernel(entry=True)
+def _orbit(params: Any, xs: Any, sides: Any, code_after: Any) -> int:
+    """Fill an orbit from its first state; the number of steps made before an exit."""
+    for k in range(code_after.size):
+        x, side, code = step(params, pick(xs, k), sides[k])
+        put(xs, k + 1, x)
+        sides[k + 1] = side
+        code_after[k] = code
+        if code < 0:
+            return k + 1
+    return code_after.size
+
+
+@kernel(entry=True)
+def _advance(params: Any, count: int, xs: Any, sides: Any, code_after: Any, steps: Any) -> None:
+    for k in range(steps.size):
+        x, side, code = pick(xs, k), np.int64(sides[k]), 0
+        made = 0
+        while made < count and code >= 0:
+            x, side, code = step(params, x, side)
+            made += 1
+        put(xs, k, x)
+        sides[k] = side
+        code_after[k] = code
+        steps[k] = made
+
+
+@kernel(entry=True)
+def _displacement(params: Any, x: float, side: int) -> Any:
+    return displacement(on_side(params, side), x, side)
+
+
+def columns(x: ArrayLike, dimension: int) -> tuple[NDArray[np.float64], ...]:
+    """States of shape (n,) or (n, dimension) as a tuple of coordinate arrays, as kernels take them."""
+    states = np.asarray(x, dtype=np.float64)
+    if dimension == 1:
+        states = states.reshape(states.shape[0], 1) if states.ndim == 1 else states
+    if states.ndim != 2 or states.shape[1] != dimension:
+        raise MapError(
+            "the shape of the states", states.shape, f"(n, {dimension}), or (n,) in one dimension", "reshape them"
+        )
+    return tuple(np.ascontiguousarray(states[:, k]) for k in range(dimension))
+
+
+def rows(xs: tuple[NDArray[np.float64], ...]) -> NDArray[np.float64]:
+    """Undo `columns`."""
+    return xs[0] if len(xs) == 1 else np.stack(xs, axis=1)
+
+
+@dataclass(frozen=True)
+class Images:
+    """Images of many states that share a side.
+
+    Attributes
+    ----------
+    x : ndarray, shape (n,) or (n, dimension)
+        Where they land.
+    side, code : ndarray of int, shape (n,)
+        On which side, and what happened (`limitsets.maps.codes`).
+    second_pass : float
+        Share of the states that the fast kernel could not vouch for.
+    """
+
+    x: NDArray[np.float64]
+    side: NDArray[np.int64]
+    code: NDArray[np.int64]
+    second_pass: float
+
+
+def images(params: Any, x: ArrayLike, side: int) -> Images:
+    """Images of many states on one side.
+
+    Parameters
+    ----------
+    params : NamedTuple
+        A map.
+    x : array_like, shape (n,) or (n, dimension)
+        States.
+    side : int
+        Their side.
+
+    Returns
+    -------
+    Images
+        Where they land, and what happened.
+
+    Examples
+    --------
+    >>> from limitsets import maps
+    >>> maps.images(maps.Doubling(2.0), [0.1, 0.6], 0).x
+    array([0.2, 0.2])
+    """
+    xs = columns(x, kind_of(params).dimension)
+    count = xs[0].size
+    after = tuple(np.empty(count) for _ in xs)
+    side_after, code = np.empty(count, np.int64), np.empty(count, np.int64)
+    again = _images(params, side, xs, after, side_after, code)
+    return Images(rows(after), side_after, code, again / max(count, 1))
+
+
+def images_on(params: Any, x: ArrayLike, side: int, branch: int) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """Images of many states on one side if they all took one branch: ``(x', side')``."""
+    xs = columns(x, kind_of(params).dimension)
+    after = tuple(np.empty(xs[0].size) for _ in xs)
+    side_after = np.empty(xs[0].size, np.int64)
+    _images_on(params, side, branch, xs, after, side_after)
+    return rows(after), side_after
+
+
+@dataclass(frozen=True)
+class Orbit:
+    """Successive states of one start.
+
+    Attributes
+    ----------
+    x : ndarray, shape (m + 1,) or (m + 1, dimension)
+        States, the start first.
+    side : ndarray of int, shape (m + 1,)
+        Their sides.
+    code : ndarray of int, shape (m,)
+        What each step was.
+    stopped : str or None
+        Why there are fewer steps than asked for: the name of an exit, or "stalled" where a step moves by less than
+        the spacing of floating-point numbers at x, which is no fixed point.
+    """
+
+    x: NDArray[np.float64]
+    side: NDArray[np.int64]
+    code: NDArray[np.int64]
+    stopped: str | None
+
+
+def start_of(params: Any, x: Any, side: int) -> tuple[float, ...]:
+    """Check one start of a map; its coordinates, or MapError."""
+    kind = kind_of(params)
+    start = np.atleast_1d(np.asarray(x, dtype=np.float64))
+    if start.shape != (kind.dimension,) or not np.isfinite(start).all():
+        raise MapError("the start", x, f"{kind.dimension} finite numbers", "give one state")
+    if side < 0:
+        raise MapError("the side of the start", side, "an integer from 0", "count sides from 0")
+    return tuple(float(v) for v in start)
+
+
+def orbit(params: Any, x: Any, side: int, count: int) -> Orbit:
+    """Follow one start for `count` steps, or until it leaves or stalls.
+
+    Parameters
+    ----------
+    params : NamedTuple
+        A map.
+    x : float or sequence of float
+        Start.
+    side : int
+        Side of the start.
+    count : int
+        Steps.
+
+    Returns
+    -------
+    Orbit
+        The states, and why it stopped early if it did.
+
+    Raises
+    ------
+    MapError
+        For a start that is no state of the map.
+
+    Examples
+    --------
+    >>> import limitsets as ls
+    >>> ls.orbit(ls.maps.Logistic(4.0), 0.75, 0, 2).x
+    array([0.75, 0.75, 0.75])
+    """
+    start = start_of(params, x, side)
+    if count < 0:
+        raise MapError("the number of steps", count, "an integer from 0", "pass count=100")
+    kind = kind_of(params)
+    xs = tuple(np.empty(count + 1) for _ in start)
+    for values, value in zip(xs, start, strict=True):
+        values[0] = value
+    sides, code = np.empty(count + 1, np.int64), np.empty(count, np.int64)
+    sides[0] = side
+    made = _orbit(params, xs, sides, code)
+    stopped = None
+    if made and code[made - 1] < 0:
+        stopped = next(name for name, exit_code in kind.exits.items() if exit_code == code[made - 1])
+    elif kind.has_displacement and kind.dimension == 1:
+        still = np.flatnonzero((xs[0][1 : made + 1] == xs[0][:made]) & (sides[1 : made + 1] == sides[:made]))
+        for k in still[:1]:  # the states repeat from there on
+            if _displacement(params, float(xs[0][k]), int(sides[k])) != 0.0:
+                made, stopped = int(k), "stalled"
+    return Orbit(rows(tuple(values[: made + 1] for values in xs)), sides[: made + 1], code[:made], stopped)
+
+
+def advance(
+    params: Any, x: ArrayLike, side: ArrayLike, count: int
+) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
+    """Send many starts `count` steps ahead: states, sides, last codes, steps made before an exit.
+
+    Examples
+    --------
+    >>> from limitsets import maps
+    >>> x, side, code, steps = maps.advance(maps.Logistic(3.2), [0.3, 0.4], [0, 0], 1000)
+    >>> steps
+    array([1000, 1000])
+    """
+    xs = tuple(values.copy() for values in columns(x, kind_of(params).dimension))
+    sides = np.array(np.broadcast_to(np.asarray(side, dtype=np.int64), xs[0].shape))
+    code, steps = np.empty(sides.size, np.int64), np.empty(sides.size, np.int64)
+    _advance(params, count, xs, sides, code, steps)
+    return rows(xs), sides, code, steps

@@ -1,0 +1,38 @@
+"""Landing: how far the centre of mass has moved when the part lies still.
+
+A jog moves it by -h phi + a (1 - cos phi) - d (phi - sin phi); a flip about the struck vertex by `Side.shift` less.
+Both come from the angle alone, so that a short throw loses no digit to x.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from limitsets.jit import generic, kernel
+from limitsets.thrower.params import Exact, Side, SmallAngle, SmallAngle2
+from limitsets.thrower.turn import turn
+
+__all__ = ["jog_displacement"]
+
+
+def jog_displacement(flight: Any, part: Side, phi: float) -> tuple[float, float]:
+    """Shift of the centre of mass by a jog, and its derivative with respect to phi."""
+
+
+jog_displacement = generic(jog_displacement)
+
+
+@kernel
+def _exact(flight: Any, part: Side, phi: float) -> tuple[float, float]:
+    s, v, w = turn(phi)
+    return part.a * v - part.d * w - part.h * phi, part.a * s - part.d * v - part.h
+
+
+@kernel
+def _small(flight: Any, part: Side, phi: float) -> tuple[float, float]:
+    return -part.h * phi, -part.h
+
+
+jog_displacement.on(Exact, _exact)  # type: ignore[attr-defined]  # generic functions carry `on`
+jog_displacement.on(SmallAngle, _small)  # type: ignore[attr-defined]
+jog_displacement.on(SmallAngle2, _small)  # type: ignore[attr-defined]

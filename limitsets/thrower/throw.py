@@ -1,0 +1,148 @@
+"""One throw, its steps in the order in which nature applies them.
+
+These are the kernels the map contract asks for: `image` (fast, says where it cannot vouch), `fallback` (sure),
+`image_on` (a forced branch, with the slope), `margin` (what decides the flip) and `displacement`.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from limitsets.jit import kernel
+from limitsets.maps import codes
+from limitsets.maps.contract import register
+from limitsets.thrower.flight import impact_angle, sure_impact_angle
+from limitsets.thrower.impact import decide, strike
+from limitsets.thrower.landing import jog_displacement
+from limitsets.thrower.params import Side, Throw, gather
+
+__all__ = ["outcome"]
+
+EXITS = {"inward": codes.INWARD, "outward": codes.OUTWARD, "outside-model": codes.OUTSIDE_MODEL}
+
+gather_side = kernel(gather)
+
+
+@kernel
+def flip_margin(part: Side, x: float, phi: float) -> float:
+    """Positive where the part flips after an impact at phi."""
+    omega, kinetic, barrier = strike(part.flight, part, x, phi)
+    return decide(part.flip, omega, kinetic, barrier)
+
+
+@kernel
+def outcome(part: Side, x: float, phi: float) -> tuple[float, int, int, float]:
+    """Where a throw ends that meets the arm at phi: ``(x', side', code, displacement)``."""
+    flips = flip_margin(part, x, phi) > 0.0
+    shift, _ = jog_displacement(part.flight, part, phi)
+    shift = shift - part.shift if flips else shift
+    after = x + shift
+    code = codes.FLIP if flips else codes.JOG
+    code = codes.INWARD if after <= (part.a_next if flips else part.a) else code
+    code = codes.OUTWARD if after > part.arm_length else code
+    return after, part.next if flips else part.side, code, shift
+
+
+@kernel
+def side_image(part: Side, x: float, side: int) -> tuple[float, int, int]:
+    """`image` of the throw on one side."""
+    phi, _, settled = impact_angle(part.flight, part, x)
+    after, side_after, code, _ = outcome(part, x, phi)
+    code = code if settled else codes.UNSETTLED
+    # Only a start beyond the vertex flies, and the model ends at a full turn.  For the exact flight with one root
+    # the second test is f(2 pi) > 0, that is x > pi kappa, and agrees with phi > 2 pi to rounding.
+    model = (x > part.a) & (phi > 0.0) & (phi <= part.flight.full_turn)
+    code = code if model or (x > part.a and not settled) else codes.OUTSIDE_MODEL
+    inside = code != codes.OUTSIDE_MODEL
+    return after if inside else x, side_after if inside else side, code
+
+
+@kernel
+def side_fallback(part: Side, x: float, side: int) -> tuple[float, int, int]:
+    """`fallback` of the throw on one side: the smallest root by a march."""
+    phi, _ = sure_impact_angle(part.flight, part, x)
+    if not (x > part.a and 0.0 < phi <= part.flight.full_turn):
+        return x, side, codes.OUTSIDE_MODEL
+    after, side_after, code, _ = outcome(part, x, phi)
+    return after, side_after, code
+
+
+@kernel
+def settle(part: Side, x: float) -> tuple[float, float]:
+    """Angle of the impact and its derivative, by the fast way where that can be vouched for."""
+    phi, slope, settled = impact_angle(part.flight, part, x)
+    if not settled:
+        phi, slope = sure_impact_angle(part.flight, part, x)
+    return phi, slope
+
+
+@kernel
+def side_image_on(part: Side, x: float, side: int, branch: int) -> tuple[float, int, float]:
+    """`image_on` of the throw on one side: branch 0 jogs, branch 1 flips, whatever the energy says."""
+    phi, phi_slope = settle(part, x)
+    shift, shift_slope = jog_displacement(part.flight, part, phi)
+    slope = 1.0 + shift_slope * phi_slope
+    if branch == codes.FLIP:
+        return x + (shift - part.shift), part.next, slope
+    return x + shift, side, slope
+
+
+@kernel
+def side_margin(part: Side, x: float, side: int) -> float:
+    """`margin` of the throw on one side: nan where there is no impact within a full turn."""
+    phi, _ = settle(part, x)
+    if not (x > part.a and 0.0 < phi <= part.flight.full_turn):
+        return math.nan
+    return flip_margin(part, x, phi)
+
+
+@kernel
+def side_displacement(part: Side, x: float, side: int) -> float:
+    """`displacement` of the throw on one side."""
+    phi, _ = settle(part, x)
+    _, _, _, shift = outcome(part, x, phi)
+    return shift
+
+
+def _image(params: Throw, x: float, side: int) -> Any:
+    return side_image(gather_side(params, side), x, side)
+
+
+def _fallback(params: Throw, x: float, side: int) -> Any:
+    return side_fallback(gather_side(params, side), x, side)
+
+
+def _image_on(params: Throw, x: float, side: int, branch: int) -> Any:
+    return side_image_on(gather_side(params, side), x, side, branch)
+
+
+def _margin(params: Throw, x: float, side: int) -> Any:
+    return side_margin(gather_side(params, side), x, side)
+
+
+def _displacement(params: Throw, x: float, side: int) -> Any:
+    return side_displacement(gather_side(params, side), x, side)
+
+
+register(
+    Throw,
+    image=_image,
+    image_on=_image_on,
+    on_side=gather,
+    fallback=_fallback,
+    margin=_margin,
+    displacement=_displacement,
+    branches=("jog", "flip"),
+    exits=EXITS,
+)
+register(
+    Side,
+    image=side_image,
+    image_on=side_image_on,
+    fallback=side_fallback,
+    margin=side_margin,
+    displacement=side_displacement,
+    branches=("jog", "flip"),
+    exits=EXITS,
+)

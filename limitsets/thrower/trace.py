@@ -1,0 +1,156 @@
+"""Throws with everything worth knowing beside where they end: for the command line, pictures and reports."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from limitsets.errors import MapError
+from limitsets.jit import kernel
+from limitsets.maps import codes
+from limitsets.maps.drivers import orbit
+from limitsets.thrower.impact import strike
+from limitsets.thrower.params import Throw, gather
+from limitsets.thrower.throw import outcome, settle
+
+__all__ = ["Flight", "Trace", "fly", "trace"]
+
+_gather = kernel(gather)
+
+
+@kernel(entry=True)
+def _details(params: Throw, x: Any, side: Any, phi_out: Any, shift_out: Any, other: Any) -> None:
+    for k in range(x.size):
+        part = _gather(params, side[k])
+        phi, _ = settle(part, x[k])
+        _, _, _, shift = outcome(part, x[k], phi)
+        phi_out[k] = phi
+        shift_out[k] = shift
+        other[k] = phi > part.corner
+
+
+@kernel(entry=True)
+def _fly(params: Throw, x: float, side: int) -> tuple[float, float, float, float]:
+    part = _gather(params, side)
+    phi, _ = settle(part, x)
+    omega, kinetic, barrier = strike(part.flight, part, x, phi)
+    return phi, omega, kinetic, barrier
+
+
+@dataclass(frozen=True)
+class Trace:
+    """Successive throws of one start.
+
+    Attributes
+    ----------
+    x, side : ndarray, shape (m + 1,)
+        Where the part rests before the first throw and after each [scene's unit], and on which side.
+    code : ndarray of int, shape (m,)
+        What each throw was (`limitsets.maps.codes`).
+    phi : ndarray, shape (m,)
+        Angle at the impact [rad]; nan where the throw is outside the model.
+    displacement : ndarray, shape (m,)
+        Shift of the centre of mass [scene's unit], exact where x' - x has rounded away; nan outside the model.
+    turned : ndarray of int, shape (m,)
+        Sides turned counterclockwise.
+    other_vertex_first : ndarray of bool, shape (m,)
+        Whether another vertex would have landed before the left one: an assumption of the model broken.
+    stopped : str or None
+        The exit, or "stalled".
+    """
+
+    x: NDArray[np.float64]
+    side: NDArray[np.int64]
+    code: NDArray[np.int64]
+    phi: NDArray[np.float64]
+    displacement: NDArray[np.float64]
+    turned: NDArray[np.int64]
+    other_vertex_first: NDArray[np.bool_]
+    stopped: str | None
+
+
+@dataclass(frozen=True)
+class Flight:
+    """One throw up to its impact.
+
+    Attributes
+    ----------
+    phi : float
+        Angle at the impact [rad], nan if there is none within a full turn.
+    omega : float
+        Rate of rotation after the impact, in units of the throw's; positive towards a flip.
+    kinetic, barrier : float
+        Energy of that rotation and what is left to climb to the top, in units of m w^2.
+    """
+
+    phi: float
+    omega: float
+    kinetic: float
+    barrier: float
+
+
+def _check_side(params: Throw, side: int) -> None:
+    if not 0 <= side < params.a.size:
+        raise MapError("the side", side, f"an integer from 0 to {params.a.size - 1}", "name a side of the part")
+
+
+def trace(params: Throw, x: float, side: int, count: int = 1) -> Trace:
+    """Throw a part `count` times, with the angle, displacement and broken assumptions of each throw.
+
+    Parameters
+    ----------
+    params : Throw
+        The throw map.
+    x : float
+        Where the part rests [scene's unit].
+    side : int
+        On which side.
+    count : int
+        Throws; fewer are made when the part leaves or stalls.
+
+    Returns
+    -------
+    Trace
+        One entry per throw made.
+
+    Raises
+    ------
+    MapError
+        For a side the part has not.
+
+    Examples
+    --------
+    >>> import limitsets as ls
+    >>> from limitsets.thrower import trace
+    >>> round(float(trace(ls.load("paper-designed").map, 8.0, 2).phi[0]), 6)
+    0.311437
+    """
+    _check_side(params, side)
+    path = orbit(params, x, side, count)
+    made = path.code.size
+    phi, shift, other = np.empty(made), np.empty(made), np.empty(made, np.bool_)
+    _details(params, path.x[:made], path.side[:made], phi, shift, other)
+    outside = path.code == codes.OUTSIDE_MODEL
+    phi[outside] = shift[outside] = math.nan
+    other &= ~outside
+    turned = (path.side[1:] - path.side[:-1]) % params.a.size
+    return Trace(path.x, path.side, path.code, phi, shift, turned, other, path.stopped)
+
+
+def fly(params: Throw, x: float, side: int) -> Flight:
+    """Return one throw's flight and impact.
+
+    Examples
+    --------
+    >>> import limitsets as ls
+    >>> from limitsets.thrower import fly
+    >>> flight = fly(ls.load("paper-designed").map, 21.0, 2)
+    >>> flight.kinetic > flight.barrier and flight.omega > 0  # beyond r_2 = 20 it flips
+    True
+    """
+    _check_side(params, side)
+    return Flight(*(float(value) for value in _fly(params, float(x), side)))
