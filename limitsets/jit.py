@@ -23,9 +23,11 @@ are gone, compiled code is simply not kept.
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import inspect
 import os
+import pickle
 import shutil
 import sys
 import types as python_types
@@ -98,12 +100,15 @@ def _open_cache() -> Path | None:
 # Class of map parameters -> digest of everything its kernels reach, or None where that is not known.
 _FOREIGN: dict[type, str | None] = {}
 
+# The same class -> classes named in those kernels: they may be registered as maps themselves (what `on_side` returns).
+_NAMED: dict[type, set[type]] = {}
+
 
 class _UnknownSourceError(Exception):
     """Something a kernel reaches has no source or no value that could be digested."""
 
 
-def _reached(function: Callable[..., Any], seen: dict[str, bytes]) -> None:
+def _reached(function: Callable[..., Any], seen: dict[str, bytes], named: set[type]) -> None:
     """Collect into `seen` the file of a function and of all it calls, and the constants they freeze."""
     function = getattr(function, "py_func", function)
     if not isinstance(function, python_types.FunctionType):
@@ -111,9 +116,11 @@ def _reached(function: Callable[..., Any], seen: dict[str, bytes]) -> None:
     module = function.__module__ or ""
     if module.split(".")[0] in {"numpy", "math", "numba", "limitsets"}:
         return
+    if hasattr(function, "methods"):  # a generic function: more methods may come
+        raise _UnknownSourceError
     file = inspect.getsourcefile(function)
     mark = f"{module}.{function.__qualname__}"
-    if file is None or not os.path.isfile(file):
+    if file is None or not Path(file).is_file():
         raise _UnknownSourceError
     if mark in seen:
         return
@@ -128,10 +135,12 @@ def _reached(function: Callable[..., Any], seen: dict[str, bytes]) -> None:
     for name, cell in zip(function.__code__.co_freevars, function.__closure__ or (), strict=True):
         scope[name] = cell.cell_contents
     for name, value in sorted(scope.items()):
-        _reached_value(f"{mark}:{name}", value, names, seen)
+        _reached_value(f"{mark}:{name}", value, names, seen, named)
 
 
-def _reached_value(mark: str, value: Any, names: set[str], seen: dict[str, bytes]) -> None:
+def _reached_value(
+    mark: str, value: Any, names: set[str], seen: dict[str, bytes], named: set[type]
+) -> None:
     """Collect what a kernel reaches through one global name."""
     if isinstance(value, (bool, int, float, complex, str, bytes, type(None), np.generic)):
         seen[mark] = repr(value).encode()
@@ -139,21 +148,22 @@ def _reached_value(mark: str, value: Any, names: set[str], seen: dict[str, bytes
         seen[mark] = repr((value.shape, value.dtype)).encode() + value.tobytes()
     elif isinstance(value, tuple):
         for k, entry in enumerate(value):
-            _reached_value(f"{mark}[{k}]", entry, names, seen)
+            _reached_value(f"{mark}[{k}]", entry, names, seen, named)
     elif isinstance(value, python_types.ModuleType):
         if value.__name__.split(".")[0] in {"numpy", "math", "numba", "limitsets"}:
             return
         for name in sorted(names & set(vars(value))):
-            _reached_value(f"{mark}.{name}", vars(value)[name], names, seen)
+            _reached_value(f"{mark}.{name}", vars(value)[name], names, seen, named)
     elif isinstance(value, type):
         if value.__module__ == "builtins":
             return
         file = inspect.getsourcefile(value)
-        if file is None or not os.path.isfile(file):
+        if file is None or not Path(file).is_file():
             raise _UnknownSourceError
         seen[mark] = Path(file).read_bytes()
+        named.add(value)
     elif getattr(value, "__module__", None) != "builtins" or not callable(value):
-        _reached(value, seen)
+        _reached(value, seen, named)
 
 
 def cover_foreign_class(cls: type, functions: list[Callable[..., Any]]) -> None:
@@ -181,7 +191,7 @@ def cover_foreign_class(cls: type, functions: list[Callable[..., Any]]) -> None:
                 raise _UnknownSourceError
             seen["class"] = Path(inspect.getsourcefile(cls) or "").read_bytes()
         for function in functions:
-            _reached(function, seen)
+            _reached(function, seen, _NAMED.setdefault(cls, set()))
     except (_UnknownSourceError, OSError, TypeError, ValueError):
         _FOREIGN[cls] = None
         return
@@ -193,24 +203,31 @@ def cover_foreign_class(cls: type, functions: list[Callable[..., Any]]) -> None:
 
 def _signature_key(signature: Any) -> str | None:
     """Sub-folder for one signature: '' for the package's own classes, None where nothing may be cached."""
-    parts: set[str] = set()
+    classes: set[type] = set()
     waiting = list(signature)
     while waiting:
         item = waiting.pop()
         cls = getattr(item, "instance_class", None)
         if cls is not None:
-            if cls in _FOREIGN:
-                digest = _FOREIGN[cls]
-                if digest is None:
-                    return None
-                parts.add(digest)
-            elif cls.__module__.split(".")[0] != "limitsets":
+            if cls not in _FOREIGN and cls.__module__.split(".")[0] != "limitsets":
                 return None
+            classes.add(cls)
         if isinstance(item, types.BaseTuple):
             waiting.extend(item)
         elif isinstance(item, types.Function | types.Dispatcher):
             return None
-    return "-".join(sorted(parts))
+    digests: set[str] = set()
+    waiting, done = list(classes), set()
+    while waiting:
+        cls = waiting.pop()
+        if cls in _FOREIGN and cls not in done:
+            digest = _FOREIGN[cls]
+            if digest is None:
+                return None
+            digests.add(digest)
+            done.add(cls)
+            waiting.extend(_NAMED[cls])
+    return hashlib.sha256("-".join(sorted(digests)).encode()).hexdigest()[:24] if digests else ""
 
 
 # ---------------------------------------------------------------- the cache
@@ -236,35 +253,52 @@ def _source_cache(folder: Path) -> type | None:
                 self._name, self._py_func = repr(py_func), py_func
                 self._impl = SourceImpl(py_func)
                 self._cache_path = str(folder)
-                self._files: dict[str, Any] = {}
+                self._files: dict[tuple[str, str], Any] = {}
                 self.enable()
 
-            def _file(self, signature: Any) -> Any:
+            def _file(self, signature: Any, codegen: Any) -> Any:
+                """One pair of files per signature, for numba's index is no safer than its last writer.
+
+                Two processes that compile two signatures at once would take the same file name.
+                """
                 key = _signature_key(signature)
                 if key is None:
                     return None
-                if key not in self._files:
-                    path = folder / key if key else folder
-                    path.mkdir(parents=True, exist_ok=True)
-                    base = self._impl.filename_base
-                    self._files[key] = caching.IndexDataCacheFile(str(path), base, "named by digest")
-                return self._files[key]
+                word = hashlib.sha256(f"{signature} {codegen.magic_tuple()}".encode()).hexdigest()[:16]
+                if (key, word) not in self._files:
+                    base = f"{self._impl.filename_base}-{word}"
+                    file = caching.IndexDataCacheFile(str(folder / key), base, "named by digest")
+                    self._files[key, word] = file
+                return self._files[key, word]
 
             def flush(self) -> None:
                 for file in self._files.values():
                     file.flush()
 
             def _load_overload(self, sig: Any, target_context: Any) -> Any:
-                file = self._file(sig)
+                codegen = target_context.codegen()
+                file = self._file(sig, codegen)
                 if not self._enabled or file is None:
                     return None
-                data = file.load(self._index_key(sig, target_context.codegen()))
+                try:
+                    data = file.load(self._index_key(sig, codegen))
+                except (EOFError, pickle.UnpicklingError):  # cut short: compiled anew
+                    with contextlib.suppress(OSError):
+                        file.flush()
+                    return None
+                except OSError:
+                    return None
                 return None if data is None else self._impl.rebuild(target_context, data)
 
             def _save_overload(self, sig: Any, data: Any) -> None:
-                file = self._file(sig)
-                if self._enabled and file is not None and self._impl.check_cachable(data):
+                file = self._file(sig, data.codegen)
+                if not self._enabled or file is None or not self._impl.check_cachable(data):
+                    return
+                try:
+                    Path(file._cache_path).mkdir(parents=True, exist_ok=True)
                     file.save(self._index_key(sig, data.codegen), self._impl.reduce(data))
+                except OSError:  # a full disk, or a folder just deleted
+                    self.disable()
 
         needed = ("_index_key", "_guard_against_spurious_io_errors", "load_overload", "save_overload")
         return SourceCache if all(hasattr(SourceCache, name) for name in needed) else None

@@ -44,6 +44,9 @@ class CellSet:
         if self.mask.shape != (self.grid.n_cells,) or self.mask.dtype != bool:
             raise GridError("the mask", self.mask.shape, f"{self.grid.n_cells} booleans", "give one per cell")
 
+    def __repr__(self) -> str:
+        return f"CellSet({len(self)} of {self.grid.n_cells} cells)"
+
     @classmethod
     def of(cls, grid: Grid, cells: ArrayLike) -> CellSet:
         """Return the set of the given cell numbers."""

@@ -39,6 +39,9 @@ class Grid:
     domain: Domain
     edges: tuple[tuple[NDArray[np.float64], ...], ...]
 
+    def __repr__(self) -> str:
+        return f"Grid({self.n_cells} cells: {', '.join('x'.join(map(str, n)) for n in self.shape.tolist())})"
+
     @property
     def sides(self) -> int:
         """Number of sides."""

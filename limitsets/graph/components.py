@@ -7,6 +7,7 @@ can only lead to components of smaller number, and `reach` needs one sweep.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -15,7 +16,34 @@ from numpy.typing import NDArray
 from limitsets.graph.ranges import Ranges, box_rows, hits, row_start
 from limitsets.jit import kernel
 
-__all__ = ["descend", "reach", "strong_components"]
+__all__ = ["Components", "descend", "reach", "strong_components"]
+
+
+@dataclass(frozen=True, eq=False)
+class Components:
+    """Strongly connected components of the cells (the ways out are components of their own, not listed).
+
+    Attributes
+    ----------
+    label : ndarray of int32, shape (n_cells,)
+        Component of each cell; an edge never leads to a component of larger number.
+    order : ndarray of int32, shape (n_cells,)
+        The cells, component by component.
+    size : ndarray of int64, shape (count,)
+        Cells per component.
+    recurrent : ndarray of bool, shape (count,)
+        Components in which an orbit of cells can stay.
+    """
+
+    label: NDArray[np.int32]
+    order: NDArray[np.int32]
+    size: NDArray[np.int64]
+    recurrent: NDArray[np.bool_]
+
+    @property
+    def count(self) -> int:
+        """Number of components."""
+        return int(self.size.size)
 
 
 @kernel(entry=True)
@@ -133,22 +161,8 @@ def _descend(r: Ranges, seen: Any, stack: Any, held: int) -> None:
                         held += 1
 
 
-def strong_components(
-    r: Ranges,
-) -> tuple[NDArray[np.int32], NDArray[np.int32], NDArray[np.int64], NDArray[np.bool_]]:
-    """Strongly connected components of the cells.
-
-    Returns
-    -------
-    label : ndarray of int32, shape (n_cells,)
-        Component of each cell; an edge never leads to a component of larger number.
-    order : ndarray of int32, shape (n_cells,)
-        The cells, component by component in ascending number.
-    size : ndarray of int64, shape (n_components,)
-        Cells per component.
-    recurrent : ndarray of bool, shape (n_components,)
-        Whether a cell of it can return to itself: more than one cell, or one that meets its own image.
-    """
+def strong_components(r: Ranges) -> Components:
+    """Strongly connected components of the cells; recurrent are those of several cells or with a loop."""
     n = r.first.size - 1
     label, order = np.empty(n, np.int32), np.empty(n, np.int32)
     path, waiting, rows = np.empty(n, np.int32), np.empty(n, np.int32), np.empty(n, np.int32)
@@ -157,20 +171,18 @@ def strong_components(
     size = np.bincount(label, minlength=count)
     recurrent = np.empty(count, dtype=np.bool_)
     _recurrent(r, label, size, order, recurrent)
-    return label, order, size, recurrent
+    return Components(label, order, size, recurrent)
 
 
-def reach(
-    r: Ranges, label: NDArray[np.int32], order: NDArray[np.int32], marks: NDArray[np.uint64]
-) -> NDArray[np.uint64]:
-    """Spread up to 64 marks backwards along the edges: bit b of a cell's answer says that it can reach mark b.
+def reach(r: Ranges, components: Components, marks: NDArray[Any]) -> NDArray[Any]:
+    """Spread marks backwards along the edges: bit b of a cell's answer says that it can reach mark b.
 
     Parameters
     ----------
     r : Ranges
         The graph.
-    label, order : ndarray
-        From `strong_components`.
+    components : Components
+        Its strong components.
     marks : ndarray of an unsigned type, shape (n_cells,)
         The bits that each cell carries itself.
 
@@ -180,7 +192,7 @@ def reach(
         The bits it carries or can reach, in any number of steps.
     """
     spread = marks.copy()
-    _reach(r, label, order, spread)
+    _reach(r, components.label, components.order, spread)
     return spread
 
 

@@ -15,41 +15,15 @@ from numpy.typing import NDArray
 
 from limitsets.cells import CellSet, Grid
 from limitsets.errors import AnswerError
-from limitsets.graph.components import reach, strong_components
+from limitsets.graph.components import Components, strong_components
 from limitsets.graph.ranges import Ranges, count_edges, expand
+from limitsets.graph.survey import Survey, survey
 from limitsets.maps import kind_of
 
 if TYPE_CHECKING:
     import networkx as nx
 
-__all__ = ["Components", "TransitionGraph"]
-
-
-@dataclass(frozen=True, eq=False)
-class Components:
-    """Strongly connected components of the cells (the ways out are components of their own, not listed).
-
-    Attributes
-    ----------
-    label : ndarray of int32, shape (n_cells,)
-        Component of each cell; an edge never leads to a component of larger number.
-    order : ndarray of int32, shape (n_cells,)
-        The cells, component by component.
-    size : ndarray of int64, shape (count,)
-        Cells per component.
-    recurrent : ndarray of bool, shape (count,)
-        Components in which an orbit of cells can stay.
-    """
-
-    label: NDArray[np.int32]
-    order: NDArray[np.int32]
-    size: NDArray[np.int64]
-    recurrent: NDArray[np.bool_]
-
-    @property
-    def count(self) -> int:
-        """Number of components."""
-        return int(self.size.size)
+__all__ = ["TransitionGraph"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -149,29 +123,11 @@ class TransitionGraph:
 
     @cached_property
     def _components(self) -> Components:
-        return Components(*strong_components(self.ranges))
+        return strong_components(self.ranges)
 
     def components(self) -> Components:
         """Strongly connected components of the cells, as labels."""
         return self._components
-
-    def reaches(self, sets: list[NDArray[np.int64]]) -> Iterator[tuple[slice, NDArray[np.uint64]]]:
-        """Which of the given sets of cells, and which exits, each cell can reach; at most 56 sets at a time.
-
-        Yields
-        ------
-        (slice, ndarray of an unsigned type, shape (n_cells,))
-            The sets at hand; bit b for the b-th of them and, above these, one bit per exit.
-        """
-        parts = self.components()
-        for begin in range(0, max(len(sets), 1), 56):
-            chunk = sets[begin : begin + 56]
-            bits = len(chunk) + len(self.exits)
-            kind = np.uint8 if bits <= 8 else np.uint64
-            marks = self.ranges.exits.astype(kind) << kind(len(chunk))
-            for b, cells in enumerate(chunk):
-                marks[cells] |= kind(1 << b)
-            yield slice(begin, begin + len(chunk)), reach(self.ranges, parts.label, parts.order, marks)
 
     def recurrent_components(self) -> list[NDArray[np.int32]]:
         """Cells of each recurrent component, ascending in topological number: attracting ones come early."""
@@ -179,23 +135,36 @@ class TransitionGraph:
         ends = np.concatenate([[0], np.cumsum(parts.size)])
         return [np.sort(parts.order[ends[c] : ends[c + 1]]) for c in np.flatnonzero(parts.recurrent)]
 
+    @cached_property
+    def _survey(self) -> Survey:
+        return survey(self.ranges, self.components(), self.exits, self.recurrent_components())
+
+    def survey(self) -> Survey:
+        """Order of the recurrent components, and where each cell leads."""
+        return self._survey
+
     def recurrent_set(self) -> CellSet:
         """All cells in which an orbit of cells can stay."""
         parts = self.components()
         return CellSet(self.grid, parts.recurrent[parts.label])
 
+    def edge_arrays(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """All edges, written out: from where, to where."""
+        pointer, targets = expand(self.ranges)
+        sources = [np.repeat(np.arange(self.n_cells), np.diff(pointer))]
+        ends = [targets]
+        for e in range(len(self.exits)):
+            leaving = np.flatnonzero(self.ranges.exits >> e & 1)
+            sources += [leaving, np.array([self.n_cells + e])]
+            ends.append(np.full(leaving.size + 1, self.n_cells + e))
+        return np.concatenate(sources), np.concatenate(ends)
+
     def to_networkx(self) -> nx.DiGraph[int]:
         """Write the graph out as a `networkx.DiGraph`, edge by edge."""
         import networkx as nx
 
-        pointer, targets = expand(self.ranges)
         plain: nx.DiGraph[int] = nx.DiGraph(**self.graph)
         plain.add_nodes_from(range(len(self)))
-        cells = np.repeat(np.arange(self.n_cells), np.diff(pointer))
-        plain.add_edges_from(zip(cells.tolist(), targets.tolist(), strict=True))
-        for e in range(len(self.exits)):
-            sink = self.n_cells + e
-            leaving = np.flatnonzero(self.ranges.exits >> e & 1)
-            plain.add_edges_from((cell, sink) for cell in leaving.tolist())
-            plain.add_edge(sink, sink)
+        source, target = self.edge_arrays()
+        plain.add_edges_from(zip(source.tolist(), target.tolist(), strict=True))
         return plain

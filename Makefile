@@ -1,0 +1,76 @@
+# Every target does all of its own set-up: it makes .venv and installs into it what constraints.txt pins, and does so
+# again when pyproject.toml or constraints.txt changes.  `make PYTHON=/path/to/python3.12 test` chooses the interpreter.
+
+.DEFAULT_GOAL := help
+.NOTPARALLEL:
+PY := .venv/bin/python
+ROOMS := $(subst /,.,$(patsubst %/__init__.py,%,$(wildcard limitsets/*/__init__.py)))
+SCENE ?= paper-designed
+
+# For pip inside `python -m build` too, where the build backend is installed; newer pip reads the second name there.
+export PIP_CONSTRAINT := constraints.txt
+export PIP_BUILD_CONSTRAINT := constraints.txt
+export PIP_DISABLE_PIP_VERSION_CHECK := 1
+unexport PYTHONPATH PYTHONHOME
+
+# A checkout that was copied or moved with its .venv would go on importing the package from the old place.
+$(shell test "$$(cat .venv/checkout 2>/dev/null)" = "$(CURDIR)" || rm -f .venv/*.stamp)
+
+help:  ## this list
+	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' Makefile
+
+analyse: .venv/run.stamp  ## report and pictures of the paper's designed feeder (SCENE=... for another)
+	$(PY) -m limitsets analyse $(SCENE)
+
+test: .venv/dev.stamp  ## the tests, with the examples in the docstrings, the studies and the notebooks
+	$(PY) -m pytest
+
+lint: .venv/dev.stamp  ## ruff: rules and format
+	$(PY) -m ruff check .
+	$(PY) -m ruff format --check .
+
+types: .venv/dev.stamp  ## mypy
+	$(PY) -m mypy
+
+contracts: .venv/dev.stamp  ## which room may import which
+	.venv/bin/lint-imports
+
+bench: .venv/bench.stamp  ## the benchmarks, with their rivals in the same run
+	$(PY) -m pytest tests/bench -s
+
+docs: .venv/dev.stamp  ## the reference, from the docstrings, into docs/api
+	$(PY) -m pdoc --docformat numpy --output-directory docs/api limitsets limitsets.errors limitsets.jit $(ROOMS)
+
+studies: .venv/dev.stamp  ## run every study again, writing its figures and numbers
+	set -e; for study in studies/*/study.py; do $(PY) $$study; done
+
+notebooks: .venv/dev.stamp  ## run every notebook again, in place
+	set -e; for notebook in notebooks/*.ipynb; do .venv/bin/jupyter-execute --inplace $$notebook; done
+
+check: lint types contracts test docs  ## all that has to pass
+
+clean:  ## remove .venv, caches and what was built
+	rm -rf .venv build dist docs/api .benchmarks .hypothesis .import_linter_cache .mypy_cache .pytest_cache .ruff_cache
+	find . -name __pycache__ -type d -prune -exec rm -rf {} +
+
+.venv/run.stamp: extras :=
+.venv/dev.stamp: extras := [dev]
+.venv/bench.stamp: extras := [dev,bench]
+.venv/run.stamp .venv/dev.stamp .venv/bench.stamp: pyproject.toml constraints.txt $(PY)
+	@echo "setting up .venv: a minute or two, once"
+	$(PY) -m pip install --quiet --editable '.$(extras)'
+	@echo "$(CURDIR)" > .venv/checkout
+	@touch $@
+
+# A name on the PATH may be a shim that does not run, or a Python without ensurepip: take the first that can do it.
+$(PY):
+	@for python in $(PYTHON) python3.13 python3.12 python3.11 python3; do \
+	    if $$python -c 'import ensurepip, sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null; then \
+	        exec $$python -m venv --clear .venv; \
+	    fi; \
+	done; \
+	echo "no Python 3.11 or newer with venv found: install one (on Debian and Ubuntu also python3-venv)," >&2; \
+	echo "or name it: make PYTHON=/path/to/python3.12" >&2; \
+	exit 1
+
+.PHONY: help analyse test lint types contracts bench docs studies notebooks check clean

@@ -1,0 +1,87 @@
+"""The goals, one dataclass each; `kind` is the word that names it in a scene and in JSON."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar, TypeAlias
+
+__all__ = ["AttractsAll", "FlipOrder", "Goal", "OrientedBeyond", "Reaches", "StaysOnArm"]
+
+
+@dataclass(frozen=True)
+class OrientedBeyond:
+    """Every part at rest beyond x lies on one side.
+
+    Parameters
+    ----------
+    x : float
+        Distance from the joint [scene's length unit].
+    side : int
+        The side wanted.
+    from_anywhere : bool
+        Ask it of every throw from every start, not only of the limit set.
+    """
+
+    kind: ClassVar[str] = "oriented_beyond"
+    x: float
+    side: int
+    from_anywhere: bool = False
+
+
+@dataclass(frozen=True)
+class Reaches:
+    """The part comes to rest on a side at x or beyond.
+
+    Parameters
+    ----------
+    x : float
+        Distance from the joint [scene's length unit].
+    side : int
+        The side wanted.
+    every_orbit : bool
+        Every orbit, the repelling periodic ones included, not only almost every one.
+    from_anywhere : bool
+        Count what is reached on the way to the limit set.
+    """
+
+    kind: ClassVar[str] = "reaches"
+    x: float
+    side: int
+    every_orbit: bool = False
+    from_anywhere: bool = False
+
+
+@dataclass(frozen=True)
+class AttractsAll:
+    """One attractor takes every start."""
+
+    kind: ClassVar[str] = "attracts_all"
+    from_anywhere: bool = False
+
+
+@dataclass(frozen=True)
+class FlipOrder:
+    """The sides follow each other in one cyclic order.
+
+    Parameters
+    ----------
+    order : tuple of int
+        The sides in cyclic order; where it begins does not matter.
+    from_anywhere : bool
+        Ask it of every start, not only of the limit set.
+    """
+
+    kind: ClassVar[str] = "flip_order"
+    order: tuple[int, ...]
+    from_anywhere: bool = False
+
+
+@dataclass(frozen=True)
+class StaysOnArm:
+    """No throw carries the part off the arm or into the joint."""
+
+    kind: ClassVar[str] = "stays_on_arm"
+    from_anywhere: bool = False
+
+
+Goal: TypeAlias = OrientedBeyond | Reaches | AttractsAll | FlipOrder | StaysOnArm

@@ -1,0 +1,125 @@
+"""One sweep over the graph that tells the order of the recurrent components and where each cell leads."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from limitsets.graph.components import Components, reach
+from limitsets.graph.ranges import Ranges, box_rows, row_start
+from limitsets.jit import kernel
+from limitsets.maps import codes
+
+__all__ = ["Survey", "survey"]
+
+# Components per sweep; the other bits of a 64-bit mark are for the ways out.
+SETS_PER_SWEEP = 56
+
+
+@dataclass(frozen=True, eq=False)
+class Survey:
+    """Order of the recurrent components and destinations of the cells.
+
+    Attributes
+    ----------
+    order : ndarray of bool, shape (k, k)
+        ``order[i, j]``: from recurrent component i cells lead to j (each to itself).
+    exits : ndarray of bool, shape (k, n_exits)
+        Which ways out it can reach.
+    attracting : ndarray of bool, shape (k,)
+        It leads nowhere else.
+    destination : ndarray of int32, shape (n_cells,)
+        What every path from the cell ends in: attractor number (0 for the first attracting component) or the code
+        of an exit; `UNDECIDED` (-4) where paths end in different places.
+    """
+
+    order: NDArray[np.bool_]
+    exits: NDArray[np.bool_]
+    attracting: NDArray[np.bool_]
+    destination: NDArray[np.int32]
+
+
+@kernel(entry=True)
+def _leaves(r: Ranges, label: Any, cells: Any) -> bool:
+    """Whether an edge leads out of the component that the given cells make up."""
+    for cell in cells:
+        if r.exits[cell]:
+            return True
+        for box in range(r.first[cell], r.first[cell + 1]):
+            for row in range(box_rows(r, box)):
+                begin = row_start(r, box, row)
+                for target in range(begin, begin + r.run[box]):
+                    if label[target] != label[cell]:
+                        return True
+    return False
+
+
+def _destinations(bits: NDArray[Any], names: dict[int, int], so_far: NDArray[np.int32] | None) -> NDArray[np.int32]:
+    """Destinations after one more sweep: `names` gives what each bit that counts stands for."""
+    nothing = np.int32(-(2**31))
+    if bits.dtype == np.uint8:
+        table = np.full(256, codes.UNDECIDED, dtype=np.int32)
+        count = sum(np.arange(256) >> bit & 1 for bit in names)
+        for bit, name in names.items():
+            table[(count == 1) & (np.arange(256) >> bit & 1 == 1)] = name
+        table[np.asarray(count) == 0] = nothing
+        now = table[bits]
+    else:
+        relevant = bits & np.uint64(sum(1 << bit for bit in names))
+        now = np.where(relevant == 0, nothing, np.int32(codes.UNDECIDED)).astype(np.int32)
+        for bit, name in names.items():
+            now[relevant == np.uint64(1 << bit)] = name
+    if so_far is None:
+        return now
+    both = np.where(now == nothing, so_far, np.where((so_far == nothing) | (so_far == now), now, codes.UNDECIDED))
+    return both.astype(np.int32)
+
+
+def survey(r: Ranges, components: Components, exits: dict[str, int], sets: Sequence[NDArray[np.int32]]) -> Survey:
+    """Sweep the graph, up to 56 recurrent components at a time.
+
+    Parameters
+    ----------
+    r : Ranges
+        The graph.
+    components : Components
+        Its strong components.
+    exits : dict of str to int
+        Names and codes of the ways out.
+    sets : sequence of ndarray
+        Cells of each recurrent component.
+
+    Returns
+    -------
+    Survey
+        Order, attracting components, destinations.
+    """
+    k = len(sets)
+    attracting = np.array([not _leaves(r, components.label, cells) for cells in sets], dtype=bool)
+    number = np.cumsum(attracting) - 1
+    order, out = np.zeros((k, k), dtype=bool), np.zeros((k, len(exits)), dtype=bool)
+    destination: NDArray[np.int32] | None = None
+    one_of_each = np.array([cells[0] for cells in sets], dtype=np.int64)
+    for begin in range(0, max(k, 1), SETS_PER_SWEEP):
+        chunk = sets[begin : begin + SETS_PER_SWEEP]
+        bits = len(chunk) + len(exits)
+        kind = np.uint8 if bits <= 8 else np.uint64
+        marks = r.exits.astype(kind) << kind(len(chunk))
+        for b, cells in enumerate(chunk):
+            marks[cells] |= kind(1 << b)
+        marks = reach(r, components, marks)
+        seen = marks[one_of_each].astype(np.uint64)
+        names = {len(chunk) + e: code for e, code in enumerate(exits.values())}
+        for b in range(len(chunk)):
+            order[:, begin + b] = seen >> np.uint64(b) & np.uint64(1)
+            if attracting[begin + b]:
+                names[b] = int(number[begin + b])
+        for e in range(len(exits)):
+            out[:, e] = seen >> np.uint64(len(chunk) + e) & np.uint64(1)
+        destination = _destinations(marks, names, destination)
+    assert destination is not None  # the loop runs once at least
+    return Survey(order, out, attracting, destination)

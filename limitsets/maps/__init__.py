@@ -1,0 +1,61 @@
+"""Discrete-time maps on (x, side): the contract, the drivers, and textbook maps with answers on paper.
+
+The throw map (`limitsets.thrower`) is one such map; a user's own map becomes another by `register`.
+"""
+
+from limitsets.maps.codes import (
+    FLIP,
+    INWARD,
+    JOG,
+    OUTSIDE,
+    OUTSIDE_MODEL,
+    OUTWARD,
+    ROLL,
+    UNDECIDED,
+)
+from limitsets.maps.contract import MapKind, coerce, kind_of, register
+from limitsets.maps.critical import CriticalPoint, critical_points, turning_points
+from limitsets.maps.drivers import Images, Orbit, advance, images, images_on, orbit
+from limitsets.maps.lyapunov import Lyapunov, lyapunov
+
+# One line for each textbook map; `as` makes the name public.
+from limitsets.maps.textbook.baker import Baker as Baker
+from limitsets.maps.textbook.contraction import Contraction as Contraction
+from limitsets.maps.textbook.cubic import Cubic as Cubic
+from limitsets.maps.textbook.domains import domain_of
+from limitsets.maps.textbook.doubling import Doubling as Doubling
+from limitsets.maps.textbook.henon import Henon as Henon
+from limitsets.maps.textbook.leslie import Leslie as Leslie
+from limitsets.maps.textbook.linear import Linear2 as Linear2
+from limitsets.maps.textbook.logistic import Logistic as Logistic
+from limitsets.maps.textbook.product import Product as Product
+from limitsets.maps.textbook.rotation import Rotation as Rotation
+from limitsets.maps.textbook.three_state import ThreeState as ThreeState
+from limitsets.maps.textbook.two_state import TwoState as TwoState
+
+__all__ = [
+    "FLIP",
+    "INWARD",
+    "JOG",
+    "OUTSIDE",
+    "OUTSIDE_MODEL",
+    "OUTWARD",
+    "ROLL",
+    "UNDECIDED",
+    "CriticalPoint",
+    "Images",
+    "Lyapunov",
+    "MapKind",
+    "Orbit",
+    "advance",
+    "coerce",
+    "critical_points",
+    "domain_of",
+    "images",
+    "images_on",
+    "kind_of",
+    "lyapunov",
+    "orbit",
+    "register",
+    "turning_points",
+]

@@ -1,0 +1,130 @@
+"""The part of a scene: its shape, its mass, and the sides it rests on."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from limitsets.geometry import (
+    OnSide,
+    RestingSides,
+    convex_polygon,
+    plate_with_points,
+    require_inside,
+    require_rest,
+    resting_sides,
+    triangle,
+)
+from limitsets.scene.resolve import LEAST, Resolver
+
+if TYPE_CHECKING:
+    from limitsets.scene.schema import CenterTable, MassTable, PartTable
+
+__all__ = ["Body", "resolve_body"]
+
+
+class Body(NamedTuple):
+    """Shape and mass in the scene's unit."""
+
+    vertices: npt.NDArray[np.float64]
+    centre: tuple[float, float]
+    radius_of_gyration: float
+    sides: RestingSides
+
+
+def resolve_body(table: PartTable, resolver: Resolver) -> Body:
+    """Resolve ``[part]``."""
+    vertices, lengths = _shape(table, resolver)
+    mass = table.mass
+    if _by_centre(mass, resolver):
+        assert mass.center is not None
+        assert mass.radius_of_gyration is not None
+        on_side = _centre(mass.center, vertices, resolver)
+        corners = [(x, y) for x, y in vertices.tolist()]
+        centre = on_side.in_frame(corners)
+        with resolver.at("part.mass.center"):
+            require_inside(vertices, centre, "the centre of mass")
+        radius = resolver.positive(mass.radius_of_gyration, "length", "part.mass.radius_of_gyration")
+        sides = resting_sides(vertices, on_side, lengths)
+    else:
+        centre, radius = _plate(mass, vertices, resolver)
+        sides = resting_sides(vertices, centre, lengths)
+    with resolver.at("part.mass" if mass.center is None else "part.mass.center"):
+        require_rest(sides, resolver.unit)
+    vertices.flags.writeable = False
+    return Body(vertices, centre, radius, sides)
+
+
+def _shape(table: PartTable, resolver: Resolver) -> tuple[npt.NDArray[np.float64], list[float] | None]:
+    if (table.sides is None) == (table.vertices is None):
+        found = "neither is given" if table.sides is None else "both are given"
+        raise resolver.refusal(
+            "part",
+            "the shape",
+            found,
+            "sides = [three lengths] or vertices = [[x, y], ...]",
+            "give one of them",
+        )
+    if table.sides is not None:
+        lengths = [
+            resolver.positive(text, "length", f"part.sides[{side}]") for side, text in enumerate(table.sides)
+        ]
+        with resolver.at("part.sides"):
+            return triangle(lengths), lengths
+    points = [
+        [
+            resolver.value(text, "length", f"part.vertices[{index}].{axis}")
+            for text, axis in zip(pair, "xy", strict=True)
+        ]
+        for index, pair in enumerate(table.vertices or ())
+    ]
+    given = np.array(points).reshape(-1, 2)
+    if len(given) and np.ptp(given, axis=0).max() < LEAST:
+        allowed = f"at least {LEAST:g} {resolver.unit} across"
+        raise resolver.refusal("part.vertices", "the part", "smaller", allowed, "correct the vertices")
+    with resolver.at("part.vertices"):
+        return convex_polygon(given), None
+
+
+def _by_centre(mass: MassTable, resolver: Resolver) -> bool:
+    """Tell how the mass is given; a mixture and half a description are refused."""
+    measured = [name for name in ("center", "radius_of_gyration") if getattr(mass, name) is not None]
+    made = [name for name in ("plate_density", "points") if getattr(mass, name) is not None]
+    allowed = "center and radius_of_gyration, or plate_density and points"
+    if measured and made:
+        found = " and ".join(measured + made)
+        raise resolver.refusal("part.mass", "the mass", found, allowed, "give one of the two, not both")
+    if len(measured) == 1 or made == ["points"] or not (measured or made):
+        found = f"only {(measured + made)[0]}" if measured or made else "empty"
+        raise resolver.refusal("part.mass", "the mass", found, allowed, "add what is missing")
+    return bool(measured)
+
+
+def _centre(table: CenterTable, vertices: npt.NDArray[np.float64], resolver: Resolver) -> OnSide:
+    last = len(vertices) - 1
+    if table.side > last:
+        key = "part.mass.center.side"
+        raise resolver.refusal(key, "the side", table.side, f"0 to {last}", "name a side of this part")
+    return OnSide(
+        table.side,
+        resolver.value(table.along, "length", "part.mass.center.along"),
+        resolver.value(table.above, "length", "part.mass.center.above"),
+    )
+
+
+def _plate(
+    mass: MassTable, vertices: npt.NDArray[np.float64], resolver: Resolver
+) -> tuple[tuple[float, float], float]:
+    assert mass.plate_density is not None
+    density = resolver.positive(mass.plate_density, "mass per area", "part.mass.plate_density")
+    points = []
+    for index, point in enumerate(mass.points or ()):
+        key = f"part.mass.points[{index}]"
+        x, y = resolver.value(point.x, "length", f"{key}.x"), resolver.value(point.y, "length", f"{key}.y")
+        points.append((x, y, resolver.positive(point.mass, "mass", f"{key}.mass")))
+    with resolver.at("part.mass.points"):
+        found = plate_with_points(vertices, density, points)
+    x, y = found.centre
+    return (x, y), found.radius_of_gyration

@@ -1,0 +1,243 @@
+"""The names of quantities: the one list that scenes, calls, the command line and JSON share."""
+
+from __future__ import annotations
+
+import copy
+import difflib
+import math
+import numbers
+import re
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from limitsets.errors import SceneError
+from limitsets.scene.facts import Deviation
+from limitsets.scene.units import convert, parse, shown, written
+from limitsets.scene.validation import Tree
+
+if TYPE_CHECKING:
+    from limitsets.scene.scene import Scene
+
+__all__ = ["NAMES", "Place", "base_unit", "deviation", "find", "replaced", "require", "value_of"]
+
+NAMES: dict[str, str] = {
+    "throw.speed": "angular speed",
+    "throw.kappa": "length",
+    "part.mass.center.along": "length",
+    "part.mass.center.above": "length",
+    "part.mass.radius_of_gyration": "length",
+    "part.mass.points[i].x": "length",
+    "part.mass.points[i].y": "length",
+    "part.mass.points[i].mass": "mass",
+    "part.sides[i]": "length",
+    "part.vertices[i].x": "length",
+    "part.vertices[i].y": "length",
+    "arm.surface_height": "length",
+    "arm.length": "length",
+    "gravity.acceleration": "acceleration",
+    "gravity.tilt": "angle",
+    "landing.x": "length",
+}
+"""The quantities and their dimensions; i stands for a number."""
+
+# a scene gives one of each pair; naming the other replaces it
+_RIVALS = {
+    "throw.speed": "throw.kappa",
+    "throw.kappa": "throw.speed",
+    "gravity.acceleration": "gravity.tilt",
+    "gravity.tilt": "gravity.acceleration",
+}
+_NOISE_ONLY = "landing.x"
+
+
+class Place(NamedTuple):
+    """Where a quantity stands in a scene, and its dimension."""
+
+    name: str
+    path: tuple[str | int, ...]
+    dimension: str
+
+
+def find(name: object, *, key: str | None = None, file: str | None = None) -> Place:
+    """Look a name up.
+
+    Raises
+    ------
+    SceneError
+        No quantity bears this name; the nearest one is named.
+
+    Examples
+    --------
+    >>> find("part.vertices[3].y").path
+    ('part', 'vertices', 3, 1)
+    """
+    text = name if isinstance(name, str) else ""
+    pattern = re.sub(r"\[(0|[1-9][0-9]{0,3})\]", "[i]", text)
+    if pattern not in NAMES or "[i]" in text:
+        near = difflib.get_close_matches(pattern[:64], NAMES, n=1, cutoff=0.0)
+        remedy = f"did you mean {near[0]!r}?" if near else "name one of them"
+        raise SceneError("the quantity", shown(name), ", ".join(NAMES), remedy, key=key, file=file)
+    words = re.split(r"[.\[]", text)
+    path: list[str | int] = [int(word[:-1]) if word.endswith("]") else word for word in words]
+    if path[1] == "vertices":
+        path[-1] = "xy".index(str(path[-1]))
+    return Place(text, tuple(path), NAMES[pattern])
+
+
+def base_unit(dimension: str, unit: str) -> str:
+    """Give the unit in which a scene of a length unit holds values of a dimension.
+
+    Examples
+    --------
+    >>> base_unit("acceleration", "in"), base_unit("angular speed", "in")
+    ('in/s^2', 'rad/s')
+    """
+    units = {"length": unit, "angle": "rad", "angular speed": "rad/s", "acceleration": f"{unit}/s^2"}
+    return units.get(
+        dimension, {"mass": "kg", "mass per area": f"kg/{unit}^2", "share": ""}.get(dimension, unit)
+    )
+
+
+def _text_at(tree: Mapping[str, Any], path: tuple[str | int, ...]) -> str | None:
+    node: Any = tree
+    for word in path:
+        known = word in node if isinstance(node, dict) else isinstance(word, int) and word < len(node)
+        if not known:
+            return None
+        node = node[word]
+    return str(node)
+
+
+def require(tree: Tree, name: str, key: str, file: str | None) -> None:
+    """Refuse a quantity of a part that this scene describes in other words, or that the part does not have."""
+    place = find(name, key=key, file=file)
+    if place.path[0] == "part" and _text_at(tree, place.path) is None:
+        raise SceneError(
+            "the quantity",
+            name,
+            "the quantities that this scene is written in",
+            "this scene does not give it",
+            key=key,
+            file=file,
+        )
+
+
+def value_of(scene: Scene, name: str) -> float:
+    """Give the value of a quantity in the scene's units (`Scene.value`)."""
+    place = find(name, file=scene.file)
+    text = _text_at(scene.text, place.path)
+    if text is not None:
+        return convert(parse(text, place.dimension), base_unit(place.dimension, scene.unit))
+    derived = {
+        "throw.kappa": scene.kappa,
+        "throw.speed": None if scene.gravity is None else math.sqrt(scene.gravity / scene.kappa),
+        "gravity.acceleration": scene.gravity,
+        "part.mass.radius_of_gyration": scene.radius_of_gyration,
+    }
+    found = derived.get(name)
+    if found is None:
+        remedy = "add [gravity]" if name == "throw.speed" else "it is given in other words here"
+        if name == _NOISE_ONLY:
+            remedy = "it names the noise of landings only"
+        raise SceneError(
+            "the quantity", name, "a quantity that the scene gives", remedy, key=name, file=scene.file
+        )
+    return found
+
+
+def replaced(scene: Scene, values: Mapping[str, float | str]) -> Tree:
+    """Write new values into a copy of a scene's text (`Scene.with_values`)."""
+    tree = copy.deepcopy(dict(scene.text))
+    for name, value in values.items():
+        place = find(name, file=scene.file)
+        rival = _RIVALS.get(name)
+        if name == _NOISE_ONLY or rival in values:
+            remedy = (
+                "it names the noise of landings only"
+                if rival is None
+                else f"leave out one of {name}, {rival}"
+            )
+            raise SceneError(
+                "the quantity", name, "quantities that can be set", remedy, key=name, file=scene.file
+            )
+        require(tree, name, name, scene.file)
+        if rival is not None:
+            section, other = rival.split(".")
+            tree.get(section, {}).pop(other, None)
+        node: Any = tree
+        for word in place.path[:-1]:
+            node = node.setdefault(word, {}) if isinstance(node, dict) else node[word]
+        node[place.path[-1]] = _as_text(value, place, scene)
+    return tree
+
+
+def _as_text(value: object, place: Place, scene: Scene) -> str:
+    unit = base_unit(place.dimension, scene.unit)
+    if isinstance(value, str):
+        quantity = parse(value, place.dimension, key=place.name, file=scene.file)
+        # the scene keeps its unit, which is that of the arm's length
+        changes_unit = place.name == "arm.length" and quantity.unit != unit
+        return written(convert(quantity, unit), unit) if changes_unit else value
+    if isinstance(value, numbers.Real) and not isinstance(value, bool):
+        try:
+            return written(float(value), unit)
+        except OverflowError:
+            pass
+    raise SceneError(
+        f"this {place.dimension}",
+        shown(value),
+        f'a number [{unit}] or text "<decimal number> <unit>"',
+        "give one of these",
+        key=place.name,
+        file=scene.file,
+    )
+
+
+def deviation(
+    text: object,
+    name: str,
+    unit: str,
+    *,
+    zero: bool = False,
+    key: str | None = None,
+    file: str | None = None,
+) -> Deviation:
+    """Read a symmetric deviation of a quantity, in percent or with a unit.
+
+    Parameters
+    ----------
+    text : object
+        ``"1 %"`` or ``"0.02 in"``.
+    name : str
+        The quantity.
+    unit : str
+        The scene's unit of length.
+    zero : bool
+        Whether a deviation of zero is allowed.
+    key, file : str, optional
+        Where it stands, for the error.
+
+    Returns
+    -------
+    Deviation
+
+    Raises
+    ------
+    SceneError
+        No deviation, a wrong dimension, a negative one, or 100 % and more.
+
+    Examples
+    --------
+    >>> deviation("1 %", "throw.speed", "in"), deviation("2.54 cm", "arm.length", "in")
+    (Deviation(value=0.01, relative=True), Deviation(value=1.0, relative=False))
+    """
+    place = find(name, key=key, file=file)
+    # where a landing is measured from is a convention: a share of it means nothing
+    relative = isinstance(text, str) and text.rstrip().endswith("%") and name != _NOISE_ONLY
+    dimension = "share" if relative else place.dimension
+    value = convert(parse(text, dimension, key=key, file=file), base_unit(dimension, unit))
+    if value < 0 or (value == 0 and not zero) or (relative and value >= 1):
+        least = "from 0" if zero else "above 0"
+        allowed = f"{least}{' and below 100 %' if relative else ''}"
+        raise SceneError(f"the deviation of {name}", text, allowed, "correct it", key=key, file=file)
+    return Deviation(value, relative)

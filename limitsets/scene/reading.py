@@ -1,0 +1,155 @@
+"""Read scenes: built-in ones by name, TOML files, TOML text, and structures."""
+
+from __future__ import annotations
+
+import difflib
+import re
+import tomllib
+from collections.abc import Mapping
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+from limitsets.errors import SceneError
+from limitsets.scene.scene import Scene
+from limitsets.scene.units import shown
+
+__all__ = ["load", "scenes"]
+
+_MOST_BYTES = 1 << 20
+_MOST_DOTS = 16
+# what may hold a point without being a dotted key; the order is that of TOML's own lexer
+_NOT_KEYS = re.compile(
+    r'"""(?:[^\\]|\\.)*?"""|' + r"'''.*?'''|" + r'"(?:[^"\\\n]|\\.)*"|' + r"'[^'\n]*'|#[^\n]*", re.DOTALL
+)
+
+
+def scenes() -> list[str]:
+    """List the names of the built-in scenes.
+
+    Returns
+    -------
+    list of str
+
+    Examples
+    --------
+    >>> scenes()[0]
+    'paper-designed'
+    """
+    folder = resources.files("limitsets.scene") / "builtin"
+    return sorted(
+        entry.name.removesuffix(".toml") for entry in folder.iterdir() if entry.name.endswith(".toml")
+    )
+
+
+def load(source: str | Path | Mapping[str, Any]) -> Scene:
+    """Read a scene.
+
+    Parameters
+    ----------
+    source : str, Path or mapping
+        The name of a built-in scene, the path of a TOML file, TOML text (any string with a line break in it), or the
+        structure of a scene such as `Scene.as_dict` gives.  A built-in name goes before a file of the same name.
+
+    Returns
+    -------
+    Scene
+        With its units resolved.
+
+    Raises
+    ------
+    SceneError
+        The file cannot be read, is not TOML, or does not describe a scene; the first thing wrong is named.
+
+    Examples
+    --------
+    >>> scene = load("paper-designed")
+    >>> scene.kappa, scene.unit
+    (25.3778518, 'in')
+    """
+    from limitsets.scene.build import build
+
+    if isinstance(source, Mapping):
+        return build({"name": "scene", **source}, None)
+    if isinstance(source, str) and "\n" in source:
+        return build({"name": "scene", **_parsed(source, None)}, None)
+    if not isinstance(source, str | Path):
+        allowed = "a built-in name, a path, TOML text or a structure"
+        raise SceneError("the source of a scene", shown(source), allowed, "give one of these")
+    # a name that no terminal can print would fail in the error that reports it
+    file = str(source).encode("utf-8", "backslashreplace").decode()
+    builtin = isinstance(source, str) and file in scenes()
+    text = _builtin(file) if builtin else _decoded(_read(Path(source), file), file)
+    stem = Path(file).stem
+    return build({"name": stem if _can_name(stem) else "scene", **_parsed(text, file)}, file)
+
+
+def _can_name(stem: str) -> bool:
+    return re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9 ._-]{0,63}", stem) is not None
+
+
+def _builtin(name: str) -> str:
+    return (resources.files("limitsets.scene") / "builtin" / f"{name}.toml").read_text(encoding="utf-8")
+
+
+def _read(path: Path, file: str) -> bytes:
+    shown_file = str(shown(file))
+    try:
+        # a pipe or a device may never end
+        if path.is_file():
+            with path.open("rb") as stream:
+                content = stream.read(_MOST_BYTES + 1)
+        else:
+            raise _not_found(path, shown_file)
+    except (OSError, ValueError) as error:  # ValueError: a null byte in the path
+        reason = getattr(error, "strerror", None) or str(error)
+        raise SceneError(
+            "the file",
+            shown_file,
+            "a scene that can be read",
+            f"it could not be opened: {reason}",
+            file=shown_file,
+        ) from None
+    if len(content) > _MOST_BYTES:
+        allowed = f"at most {_MOST_BYTES} bytes"
+        raise SceneError("the size of the file", "larger", allowed, "give a scene file", file=file)
+    return content
+
+
+def _not_found(path: Path, file: str) -> SceneError:
+    names = scenes()
+    near = difflib.get_close_matches(file, names, n=1)
+    what = "a folder" if path.is_dir() else "not a regular file" if path.exists() else "not there"
+    return SceneError(
+        "the scene",
+        file,
+        f"the path of a TOML file or a built-in scene: {', '.join(names)}",
+        f"did you mean {near[0]!r}?" if near else f"this is {what}",
+        file=file,
+    )
+
+
+def _decoded(content: bytes, file: str) -> str:
+    try:
+        return content.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise SceneError(
+            "the text", f"undecodable at byte {error.start}", "UTF-8", "save the file as UTF-8", file=file
+        ) from None
+
+
+def _parsed(text: str, file: str | None) -> dict[str, Any]:
+    def refuse(value: str, remedy: str) -> SceneError:
+        return SceneError("the text of the scene", value, "TOML", remedy, file=file)
+
+    if len(text) > _MOST_BYTES:
+        raise refuse("too long", f"a scene has at most {_MOST_BYTES} bytes")
+    # tomllib needs a time quadratic in the length of a dotted key: 26 s for 60 kB
+    if any(piece.count(".") > _MOST_DOTS for piece in re.split(r"[,=\[\]{}\n]", _NOT_KEYS.sub("s", text))):
+        raise refuse("too deeply nested", "a key has too many points; flatten it")
+    try:
+        return tomllib.loads(text)
+    except RecursionError:
+        raise refuse("too deeply nested", "flatten it") from None
+    except ValueError as error:  # TOMLDecodeError is one; so is a whole number of 5000 digits
+        raise refuse("not valid", str(shown(str(error)))) from None

@@ -1,0 +1,185 @@
+"""A scene with its units resolved: what every later room reads."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from limitsets.geometry import RestingSides
+from limitsets.goals import Goal
+from limitsets.scene.facts import Deviation, Effects, World
+
+if TYPE_CHECKING:
+    from limitsets.cells import Domain
+    from limitsets.thrower import Throw
+
+__all__ = ["Scene"]
+
+# below this share of the way from a_i to the arm's end the number of throws needed to get away is unbounded
+_NEAREST = 1e-6
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """A part, an arm, a throw and what is asked of them.  Build it with `limitsets.load`.
+
+    Parameters
+    ----------
+    name : str
+        Its name; files that belong to it are named after it.
+    unit : str
+        Unit of all lengths here, that of the arm's length in the file: ``"in"``.
+    vertices : ndarray, shape (n, 2)
+        The part, counterclockwise [unit]; a triangle given by its sides lies on side 0, from the origin.
+    centre : tuple of float
+        Centre of mass in the frame of `vertices` [unit].
+    radius_of_gyration : float
+        About the centre of mass [unit].
+    sides : RestingSides
+        Where the centre of mass stands over each side [unit, rad].
+    surface_height : float
+        Signed height of the arm's surface over the joint [unit].
+    arm_length : float
+        The largest x at which a part can rest [unit].
+    kappa : float
+        Gravity over the squared angular speed of the throw [unit].
+    gravity : float or None
+        Gravity in the plane of the motion, where it is given [unit/s^2].
+    flight, flip : str
+        Which formulas.
+    goal : Goal or None
+        What is asked.
+    world : World
+        Facts, whether or not an effect uses them.
+    effects : Effects
+        What is simulated beyond the minimal model.
+    tolerance : mapping of str to Deviation
+        Scales of a joint margin, by quantity.
+    file : str or None
+        The file it was read from, or the name of a built-in scene.
+    text : mapping
+        The scene as it was written; `as_dict` gives a copy of it.
+    """
+
+    name: str
+    unit: str
+    vertices: npt.NDArray[np.float64]
+    centre: tuple[float, float]
+    radius_of_gyration: float
+    sides: RestingSides
+    surface_height: float
+    arm_length: float
+    kappa: float
+    gravity: float | None
+    flight: str
+    flip: str
+    goal: Goal | None
+    world: World
+    effects: Effects
+    tolerance: Mapping[str, Deviation]
+    file: str | None
+    text: Mapping[str, Any] = field(repr=False)
+
+    def __eq__(self, other: object) -> bool:
+        """Two scenes are equal that are written in the same words, wherever they were read."""
+        return self.text == other.text if isinstance(other, Scene) else NotImplemented
+
+    def __hash__(self) -> int:
+        return hash((self.name, self.unit, self.kappa, self.arm_length))
+
+    @cached_property
+    def map(self) -> Throw:
+        """The throw map of the scene, as kernels take it."""
+        from limitsets.thrower import throw_map  # lazily: it loads numba
+
+        return throw_map(
+            a=self.sides.a,
+            d=self.sides.d,
+            length=self.sides.length,
+            corner=self.sides.corner,
+            radius_of_gyration=self.radius_of_gyration,
+            kappa=self.kappa,
+            surface_height=self.surface_height,
+            arm_length=self.arm_length,
+            flight=self.flight,
+            flip=self.flip,
+        )
+
+    @cached_property
+    def domain(self) -> Domain:
+        """Where the part can rest on each side, from just beyond the least x with a flight to the arm's end."""
+        from limitsets.cells import Domain
+
+        a = self.sides.a
+        hi = np.full_like(a, self.arm_length)
+        lo = a + _NEAREST * (hi - a)
+        return Domain(lo[:, None], hi[:, None], a)
+
+    def value(self, name: str) -> float:
+        """Give the value of a quantity.
+
+        Parameters
+        ----------
+        name : str
+            A name of `limitsets.scene.NAMES`, with numbers for i: ``"part.sides[1]"``.
+
+        Returns
+        -------
+        float
+            In the scene's units: lengths in `unit`, angles in rad, speeds in rad/s, masses in kg.
+
+        Raises
+        ------
+        SceneError
+            No such quantity, or this scene does not give it.
+
+        Examples
+        --------
+        >>> from limitsets.scene import load
+        >>> load("paper-designed").value("arm.length")
+        28.0
+        """
+        from limitsets.scene.quantities import value_of
+
+        return value_of(self, name)
+
+    def with_values(self, values: Mapping[str, float | str]) -> Scene:
+        """Give the scene with other values; everything that follows from them is computed anew.
+
+        The scene keeps its unit of length.  Naming throw.speed in a scene given by throw.kappa replaces it (the scene
+        needs [gravity] then), and the other way round; likewise gravity.tilt and gravity.acceleration.
+
+        Parameters
+        ----------
+        values : mapping of str to float or str
+            Numbers in the scene's units (see `value`), or text with a unit, by name of the quantity.
+
+        Returns
+        -------
+        Scene
+
+        Raises
+        ------
+        SceneError
+            An unknown quantity, one that this scene is not written in, or a scene that cannot be.
+
+        Examples
+        --------
+        >>> from limitsets.scene import load
+        >>> load("paper-designed").with_values({"arm.length": 30, "throw.kappa": "2 ft"}).kappa
+        24.0
+        """
+        from limitsets.scene.build import build
+        from limitsets.scene.quantities import replaced
+
+        return build(replaced(self, values), self.file)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Give the scene as it was written, as plain tables and lists that `limitsets.load` reads again."""
+        return copy.deepcopy(dict(self.text))

@@ -1,0 +1,250 @@
+"""The words of a scene, as pydantic models: which keys there are and what may stand under each.
+
+Values stay the text they were written as; `build` gives them units.  Each leaf type carries what is allowed and what
+to do, so that a refusal reads the same whether a type, a range or a unit is wrong.  Only `reading` imports this file,
+lazily: pydantic takes 0.1 s.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Annotated, Any, TypeAlias
+
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
+from pydantic_core import PydanticCustomError
+
+from limitsets.errors import SceneError
+from limitsets.scene.units import parse
+
+__all__ = ["SceneTable"]
+
+
+def _refusal(thing: str, allowed: str, remedy: str) -> PydanticCustomError:
+    return PydanticCustomError("refused", "{thing}", {"thing": thing, "allowed": allowed, "remedy": remedy})
+
+
+def _quantity(dimension: str) -> BeforeValidator:
+    def check(value: object) -> object:
+        try:
+            parse(value, dimension)
+        except SceneError as error:
+            raise _refusal(error.thing, error.allowed, error.remedy) from None
+        return value
+
+    return BeforeValidator(check)
+
+
+def _fitting(fits: Callable[[Any], bool], thing: str, allowed: str, remedy: str) -> BeforeValidator:
+    def check(value: object) -> object:
+        if not fits(value):
+            raise _refusal(thing, allowed, remedy)
+        return value
+
+    return BeforeValidator(check)
+
+
+def _number(thing: str, most: float, example: str) -> BeforeValidator:
+    def fits(value: object) -> bool:
+        return isinstance(value, float | int) and not isinstance(value, bool) and 0 <= value <= most
+
+    return _fitting(fits, thing, f"a number from 0 to {most:g}, without a unit", f"write it like {example}")
+
+
+def _word(*words: str) -> BeforeValidator:
+    allowed = " or ".join(f'"{word}"' for word in words)
+    return _fitting(lambda value: value in words, "this word", allowed, "write one of them")
+
+
+def _is_side(value: object) -> bool:
+    return isinstance(value, int) and not isinstance(value, bool) and 0 <= value < 1000
+
+
+def _is_name(value: object) -> bool:
+    return (
+        isinstance(value, str)
+        and 0 < len(value) <= 64
+        and value[0].isalnum()
+        and all(sign.isalnum() or sign in " ._-" for sign in value)
+    )
+
+
+Length: TypeAlias = Annotated[str, _quantity("length")]
+Pair: TypeAlias = Annotated[list[Length], Field(min_length=2, max_length=2)]
+Angle: TypeAlias = Annotated[str, _quantity("angle")]
+AngularSpeed: TypeAlias = Annotated[str, _quantity("angular speed")]
+Acceleration: TypeAlias = Annotated[str, _quantity("acceleration")]
+Mass: TypeAlias = Annotated[str, _quantity("mass")]
+Density: TypeAlias = Annotated[str, _quantity("mass per area")]
+Flag: TypeAlias = Annotated[
+    bool,
+    _fitting(lambda value: isinstance(value, bool), "this switch", "true or false", "write it unquoted"),
+]
+Yes: TypeAlias = Annotated[
+    bool,
+    _fitting(lambda value: value is True, "this goal", "true", "leave the line out if it is not asked for"),
+]
+SideNumber: TypeAlias = Annotated[
+    int, _fitting(_is_side, "the side", "a whole number from 0", "count the sides in flip order")
+]
+Friction: TypeAlias = Annotated[float, _number("the coefficient of friction", 1e6, "0.9")]
+Restitution: TypeAlias = Annotated[float, _number("the coefficient of restitution", 1.0, "0.4")]
+Flight: TypeAlias = Annotated[str, _word("exact", "small-angle", "small-angle-2")]
+Flip: TypeAlias = Annotated[str, _word("signed", "energy")]
+Spread: TypeAlias = Annotated[str, _word("bounded", "gaussian")]
+Deviation: TypeAlias = Annotated[
+    str,
+    _fitting(
+        lambda value: isinstance(value, str),
+        "this deviation",
+        'text, "<decimal number> %" or "<decimal number> <unit>"',
+        'write it like "1 %"; names with a point are quoted: "throw.speed" = "1 %"',
+    ),
+]
+Name: TypeAlias = Annotated[
+    str,
+    _fitting(
+        _is_name,
+        "the name",  # it becomes part of file names
+        "1 to 64 letters, digits, blanks and . _ -, beginning with a letter or digit",
+        "choose such a name",
+    ),
+]
+
+
+class Table(BaseModel):
+    """A table of a scene: no key but those named, no value converted."""
+
+    model_config = ConfigDict(extra="forbid", strict=True, frozen=True, defer_build=True)
+
+
+class CenterTable(Table):
+    """Centre of mass, measured from the left end of a side that lies at the bottom."""
+
+    side: SideNumber
+    along: Length
+    above: Length
+
+
+class PointTable(Table):
+    """A point mass, in the frame of the vertices; a triangle given by sides lies on side 0, from the origin."""
+
+    x: Length
+    y: Length
+    mass: Mass
+
+
+class MassTable(Table):
+    """Centre and radius of gyration, or a plate with point masses."""
+
+    center: CenterTable | None = None
+    radius_of_gyration: Length | None = None
+    plate_density: Density | None = None
+    points: Annotated[list[PointTable], Field(max_length=1000)] | None = None
+
+
+class PartTable(Table):
+    """Shape and mass of the part."""
+
+    sides: Annotated[list[Length], Field(max_length=1000)] | None = None
+    vertices: Annotated[list[Pair], Field(max_length=1000)] | None = None
+    mass: MassTable
+
+
+class ArmTable(Table):
+    """The arm; the unit of its length is the scene's unit."""
+
+    surface_height: Length
+    length: Length
+
+
+class ThrowTable(Table):
+    """The throw, by kappa or by its angular speed."""
+
+    kappa: Length | None = None
+    speed: AngularSpeed | None = None
+
+
+class GravityTable(Table):
+    """Gravity in the plane of the motion."""
+
+    acceleration: Acceleration | None = None
+    tilt: Angle | None = None
+
+
+class ModelTable(Table):
+    """Which formulas."""
+
+    flight: Flight = "exact"
+    flip: Flip = "signed"
+
+
+class OrientedBeyondTable(Table):
+    """Beyond x only this side."""
+
+    x: Length
+    side: SideNumber
+
+
+class ReachesTable(Table):
+    """Comes to rest on the side at x or beyond."""
+
+    x: Length
+    side: SideNumber
+    every_orbit: Flag = False
+
+
+class GoalTable(Table):
+    """What is asked of the feeder."""
+
+    oriented_beyond: OrientedBeyondTable | None = None
+    reaches: ReachesTable | None = None
+    attracts_all: Yes | None = None
+    flip_order: Annotated[list[SideNumber], Field(min_length=1, max_length=1000)] | None = None
+    stays_on_arm: Yes | None = None
+    from_anywhere: Flag = False
+
+
+class ScatterTable(Table):
+    """Noise at every throw."""
+
+    speed: Deviation | None = None
+    landing: Deviation | None = None
+
+
+class WorldTable(Table):
+    """Facts, whether or not an effect uses them."""
+
+    friction: Friction | None = None
+    restitution: Restitution | None = None
+    bounce_threshold: Length | None = None
+    stroke: Angle | None = None
+    scatter: ScatterTable | None = None
+
+
+class EffectsTable(Table):
+    """What is simulated beyond the minimal model."""
+
+    landing: Flag = False
+    roll: Flag = False
+    pivot: Flag = False
+    slip: Flag = False
+    bounce: Flag = False
+    drive: Flag = False
+    contact: Flag = False
+    spread: Spread | None = None
+    auto: Flag = False
+
+
+class SceneTable(Table):
+    """A whole scene."""
+
+    name: Name
+    part: PartTable
+    arm: ArmTable
+    throw: ThrowTable
+    gravity: GravityTable | None = None
+    model: ModelTable = Field(default_factory=ModelTable)
+    goal: GoalTable | None = None
+    world: WorldTable = Field(default_factory=WorldTable)
+    effects: EffectsTable = Field(default_factory=EffectsTable)
+    tolerance: dict[str, Deviation] = Field(default_factory=dict)

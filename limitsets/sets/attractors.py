@@ -1,0 +1,141 @@
+"""Attractors of a transition graph: where they lie (from cells) and what goes on in them (from one long orbit)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from limitsets.cells import CellSet
+from limitsets.errors import AnswerError
+from limitsets.graph import TransitionGraph
+from limitsets.maps import kind_of, orbit
+from limitsets.maps.lyapunov import lyapunov
+
+__all__ = ["Attractor", "attractors"]
+
+# Steps thrown away before anything is counted.
+TRANSIENT = 1000
+
+
+@dataclass(frozen=True, eq=False)
+class Attractor:
+    """An attracting component of the transition graph.
+
+    The cells contain the attractor as far as their sampled images can tell; what happens inside is counted on one
+    orbit of `throws` steps from the middle of a cell.
+
+    Attributes
+    ----------
+    cells : CellSet
+        Its cells.
+    extents : dict of int to list of (lo, hi)
+        Per side the intervals they make up [scene's unit].
+    flip_order : tuple of int, or None
+        The sides in the cyclic order in which they are visited, beginning with the smallest; None where the order
+        changes along the orbit.
+    jogs_per_visit : dict of int to (int, int)
+        Per side the least and the largest number of steps that stay on it between arriving and leaving; empty if
+        the orbit never changes sides.
+    flips_per_throw : float
+        Share of the steps that change the side.
+    lyapunov : float or None
+        Largest Lyapunov exponent per step, None for a map without slopes.
+    throws : int
+        Steps that were counted.
+    in_cells : float
+        Share of the orbit's states in the cells: less than 1 shows cells that the images missed.
+    """
+
+    cells: CellSet
+    extents: dict[int, list[tuple[float, float]]]
+    flip_order: tuple[int, ...] | None
+    jogs_per_visit: dict[int, tuple[int, int]]
+    flips_per_throw: float
+    lyapunov: float | None
+    throws: int
+    in_cells: float
+
+
+def _visits(side: NDArray[np.int64]) -> tuple[tuple[int, ...] | None, dict[int, tuple[int, int]]]:
+    """Cyclic order of the sides and steps per visit, of the visits that lie whole in the orbit."""
+    change = np.flatnonzero(np.diff(side)) + 1
+    if change.size == 0:
+        return (int(side[0]),), {}
+    visited, jogs = side[change[:-1]], np.diff(change) - 1
+    per_side = {int(s): (int(jogs[visited == s].min()), int(jogs[visited == s].max())) for s in np.unique(visited)}
+    sides = side[change]
+    after: dict[int, set[int]] = {}
+    for one, two in zip(sides[:-1].tolist(), sides[1:].tolist(), strict=True):
+        after.setdefault(one, set()).add(two)
+    if not after or any(len(options) > 1 for options in after.values()):
+        return None, per_side
+    cycle = [min(after)]
+    while (following := next(iter(after.get(cycle[-1], {cycle[0]})))) != cycle[0] and len(cycle) <= len(after):
+        cycle.append(following)
+    return tuple(cycle), per_side
+
+
+def _start(cells: CellSet) -> tuple[Any, int]:
+    """Middle of the middle cell, and its side."""
+    numbers = cells.numbers()
+    cell = numbers[numbers.size // 2]
+    side = int(cells.grid.side_of(cell))
+    lo, hi = cells.grid.boxes(np.array([cell]), side)
+    middle = 0.5 * (lo[0] + hi[0])
+    return (float(middle[0]) if middle.size == 1 else middle), side
+
+
+def _attractor(graph: TransitionGraph, cells: CellSet, throws: int) -> Attractor:
+    x, side = _start(cells)
+    path = orbit(graph.map, x, side, TRANSIENT + throws)
+    skip = min(TRANSIENT, path.code.size)
+    sides, states = path.side[skip:], path.x[skip:]
+    here = np.full(sides.size, -1)
+    for s in np.unique(sides).tolist():
+        if s < graph.grid.sides:
+            here[sides == s] = graph.grid.index(states[sides == s], s)
+    inside = float((cells.mask[here] & (here >= 0)).mean())
+    order, jogs = _visits(sides)
+    kind = kind_of(graph.map)
+    exponent = lyapunov(graph.map, x, side, throws, skip=TRANSIENT).exponent if kind.has_image_on else None
+    flips = float((np.diff(sides) != 0).mean()) if sides.size > 1 else 0.0
+    return Attractor(cells, cells.extents(), order, jogs, flips, exponent, max(sides.size - 1, 0), inside)
+
+
+def attractors(graph: TransitionGraph, throws: int = 200_000) -> tuple[Attractor, ...]:
+    """Attracting components: those from which no path leads elsewhere.
+
+    Parameters
+    ----------
+    graph : TransitionGraph
+        From `limitsets.transitions`.
+    throws : int
+        Length of the orbit on which what happens inside is counted.
+
+    Returns
+    -------
+    tuple of Attractor
+        In the order of the graph's components.  The ways out of the domain are attracting components to networkx;
+        here they are not attractors but states of their own (`limitsets.basins`).
+
+    Raises
+    ------
+    AnswerError
+        For a number of throws below 1.
+
+    Examples
+    --------
+    >>> import limitsets as ls
+    >>> scene = ls.load("paper-designed")
+    >>> found = ls.attractors(ls.transitions(scene.map, ls.grid(scene.domain, cells=4096)))
+    >>> found[0].flip_order, found[0].jogs_per_visit[2]
+    ((0, 1, 2), (4, 8))
+    """
+    if throws < 1:
+        raise AnswerError("the number of throws", throws, "an integer from 1", "pass throws=200_000")
+    sets = graph.recurrent_components()
+    chosen = [cells for cells, ends in zip(sets, graph.survey().attracting, strict=True) if ends]
+    return tuple(_attractor(graph, CellSet.of(graph.grid, cells), throws) for cells in chosen)

@@ -1,0 +1,13 @@
+"""Settings for every test: random examples without deadlines, and no window ever opened."""
+
+import os
+
+from hypothesis import settings
+
+# Before anything imports matplotlib, in this process and in those that tests start.
+os.environ["MPLBACKEND"] = "Agg"
+
+# Deadlines would fail the first example of a kernel, which compiles.  In CI the examples are the same at every run.
+settings.register_profile("here", deadline=None)
+settings.register_profile("ci", deadline=None, derandomize=True, print_blob=True)
+settings.load_profile("ci" if os.environ.get("CI") else "here")

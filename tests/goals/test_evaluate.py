@@ -1,0 +1,58 @@
+import math
+
+import pytest
+
+from limitsets.goals import AttractsAll, FlipOrder, Goal, OrientedBeyond, Reaches, StaysOnArm, evaluate
+
+# the limit sets of two paper scenes (docs/model.md)
+DESIGNED = {
+    0: [(15.205338825681, 19.75268801485)],
+    1: [(12.637023572659, 17.439819281769)],
+    2: [(8.9140259080455, 23.383151921158)],
+}
+INITIAL = {
+    0: [(13.522673689975, 20.915912223359)],
+    1: [(18.994941734574, 19.975954977782), (20.434045200511, 21.554457325114)],
+    2: [(16.262705754072, 21.886351326378)],
+}
+
+
+@pytest.mark.parametrize(
+    ("extents", "goal", "holds", "threshold"),
+    [
+        (DESIGNED, OrientedBeyond(20.0, 2), True, 19.75268801485),
+        (DESIGNED, OrientedBeyond(19.75268801485, 2), True, 19.75268801485),
+        (DESIGNED, OrientedBeyond(19.7526880, 2), False, 19.75268801485),
+        (DESIGNED, OrientedBeyond(20.0, 0), False, 23.383151921158),
+        (INITIAL, OrientedBeyond(20.0, 2), False, 21.554457325114),
+        ({2: [(1.0, 5.0)]}, OrientedBeyond(2.0, 2), True, -math.inf),
+        ({0: [], 2: [(1.0, 5.0)]}, OrientedBeyond(2.0, 2), True, -math.inf),
+        (DESIGNED, Reaches(23.0, 2), True, 23.383151921158),
+        (DESIGNED, Reaches(24.0, 2), False, 23.383151921158),
+        (DESIGNED, Reaches(24.0, 2, every_orbit=True), False, 23.383151921158),
+        (DESIGNED, Reaches(21.0, 2, every_orbit=True), None, 23.383151921158),
+        (DESIGNED, Reaches(1.0, 3), False, -math.inf),
+    ],
+)
+def test_goals_about_places(extents: dict, goal: Goal, holds: bool | None, threshold: float) -> None:
+    assert evaluate(goal, extents) == (holds, threshold)
+
+
+@pytest.mark.parametrize(
+    ("goal", "facts", "holds"),
+    [
+        (AttractsAll(), {"fractions": [1.0]}, True),
+        (AttractsAll(), {"fractions": [0.75]}, False),
+        (AttractsAll(), {"fractions": [0.5, 0.5]}, False),
+        (AttractsAll(), {}, False),
+        (FlipOrder((0, 1, 2)), {"flip_order": (0, 1, 2)}, True),
+        (FlipOrder((0, 1, 2)), {"flip_order": [2, 0, 1]}, True),
+        (FlipOrder((0, 1, 2)), {"flip_order": (0, 2, 1)}, False),
+        (FlipOrder((0, 1, 2)), {"flip_order": (0, 1)}, False),
+        (FlipOrder((0, 1, 2)), {}, False),
+        (StaysOnArm(), {}, True),
+        (StaysOnArm(), {"leaving": 0.01}, False),
+    ],
+)
+def test_goals_about_the_whole(goal: Goal, facts: dict, holds: bool) -> None:
+    assert evaluate(goal, DESIGNED, **facts) == (holds, None)

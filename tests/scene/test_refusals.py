@@ -1,0 +1,309 @@
+"""Scenes that cannot be: each is one SceneError that names file, key, value, what is allowed and what to do."""
+
+import os
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from limitsets.errors import GeometryError, SceneError
+from limitsets.scene import dump, load
+
+GONE = object()
+BOTH = {"sides": ["3 in", "4 in", "5 in"], "vertices": [["0 in", "0 in"], ["1 in", "0 in"], ["0 in", "1 in"]]}
+
+
+def changed(table: dict[str, Any], key: str, value: Any) -> dict[str, Any]:
+    """Put a value at a dotted key; GONE deletes."""
+    *path, last = key.split("/")
+    node: Any = table
+    for word in path:
+        node = node[int(word)] if isinstance(node, list) else node.setdefault(word, {})
+    if value is GONE:
+        del node[last]
+    elif isinstance(node, list):
+        node[int(last)] = value
+    else:
+        node[last] = value
+    return table
+
+
+# what is changed in the scene of conftest, the key that the error names, and words in it
+TABLE: list[tuple[dict[str, Any], str, str]] = [
+    # keys
+    ({"arm/lenght": "28 in"}, "arm.lenght", "did you mean 'length'"),
+    ({"arm/length": GONE, "arm/lenght": "28 in"}, "arm.lenght", "did you mean 'length'"),
+    ({"part/mass/centre": 1}, "part.mass.centre", "did you mean 'center'"),
+    ({"part/mass/center/allong": "1 in"}, "part.mass.center.allong", "did you mean 'along'"),
+    ({"world/scatter/sped": "1 %"}, "world.scatter.sped", "did you mean 'speed'"),
+    ({"goal/oriented_beyond/xx": "1 in"}, "goal.oriented_beyond.xx", "did you mean 'x'"),
+    ({"gaol": {}}, "gaol", "did you mean 'goal'"),
+    ({"effects/landings": True}, "effects.landings", "did you mean 'landing'"),
+    ({"arm/length": GONE}, "arm.length", "required key is 'missing'"),
+    ({"part": GONE}, "part", "required"),
+    ({"throw": GONE}, "throw", "required"),
+    ({"part/mass": GONE}, "part.mass", "required"),
+    ({"part/mass/center/side": GONE}, "part.mass.center.side", "required"),
+    ({"cavity": {}}, "cavity", "this version does not have it"),
+    ({"feedback": {"throws": [{}]}}, "feedback", "this version does not have it"),
+    ({"tray": {"rows": 1}}, "tray", "this version does not have it"),
+    # quantities
+    ({"arm/length": 28}, "arm.length", "write it as text with its unit"),
+    ({"arm/length": 28.0}, "arm.length", "write it as text with its unit"),
+    ({"arm/length": "28"}, "arm.length", "add the unit"),
+    ({"arm/length": "28,0 in"}, "arm.length", "commas"),
+    ({"arm/length": "9**9**9 in"}, "arm.length", "'9**9**9 in'"),
+    ({"arm/length": "28 deg"}, "arm.length", "deg is a unit of angle"),
+    ({"arm/length": "28 inches"}, "arm.length", "not known"),
+    ({"arm/length": "1e400 in"}, "arm.length", "size from"),
+    ({"arm/length": "nan in"}, "arm.length", "finite"),
+    ({"arm/length": ["28 in"]}, "arm.length", "a list of 1"),
+    ({"arm/length": {"value": "28 in"}}, "arm.length", "a table"),
+    ({"throw/speed": "158.02 1/s"}, "throw.speed", "'1/s' is not known"),
+    ({"throw/speed": "158.02 in"}, "throw.speed", "in is a unit of length"),
+    ({"throw/speed": float("nan")}, "throw.speed", "nan"),
+    ({"throw/speed": None}, "throw.speed", "None"),
+    ({"world/friction": float("inf")}, "world.friction", "a finite number"),
+    # types
+    ({"part": []}, "part", "a table"),
+    ({"part": "triangle"}, "part", "a table"),
+    ({"part/sides": "5.75 in"}, "part.sides", "a list"),
+    ({"part/mass/center/side": 2.0}, "part.mass.center.side", "whole number"),
+    ({"part/mass/center/side": True}, "part.mass.center.side", "whole number"),
+    ({"part/mass/center/side": "2"}, "part.mass.center.side", "whole number"),
+    ({"part/mass/center/side": 10**5000}, "part.mass.center.side", "an integer of"),
+    ({"name": 3}, "name", "letters"),
+    ({"name": ""}, "name", "letters"),
+    ({"name": "../../etc"}, "name", "letters"),
+    ({"name": "a\nb"}, "name", "letters"),
+    ({"tolerance": ["1 %"]}, "tolerance", "a table"),
+    ({"tolerance": {"throw": {"speed": "1 %"}}}, "tolerance.throw", "quoted"),
+    # shape
+    ({"part/sides": ["1 in", "2 in"]}, "part.sides", "3, a triangle"),
+    ({"part/sides": ["1 in"] * 4}, "part.sides", "vertices"),
+    ({"part/sides/1": "0 in"}, "part.sides[1]", "above 0"),
+    ({"part/sides/1": "-3.6 in"}, "part.sides[1]", "above 0"),
+    ({"part/sides/1": "36 in"}, "part.sides", "triangle inequality"),
+    ({"part/sides/1": "0.999999 in"}, "part.sides", "triangle inequality"),
+    ({"part/sides": GONE}, "part", "neither is given"),
+    ({"part": BOTH | {"mass": {"plate_density": "1 kg/m^2"}}}, "part", "both are given"),
+    # mass
+    ({"part/mass": {}}, "part.mass", "empty"),
+    ({"part/mass/center": GONE}, "part.mass", "only radius_of_gyration"),
+    ({"part/mass/radius_of_gyration": GONE}, "part.mass", "only center"),
+    ({"part/mass/plate_density": "1 kg/m^2"}, "part.mass", "not both"),
+    ({"part/mass": {"points": []}}, "part.mass", "only points"),
+    ({"part/mass/radius_of_gyration": "0 in"}, "part.mass.radius_of_gyration", "above 0"),
+    ({"part/mass/center/side": 3}, "part.mass.center.side", "0 to 2"),
+    ({"part/mass/center/side": -1}, "part.mass.center.side", "from 0"),
+    ({"part/mass/center/above": "-0.1 in"}, "part.mass.center", "outside, 0.1 beyond side 2"),
+    ({"part/mass/center/above": "30 in"}, "part.mass.center", "outside"),
+    ({"part/mass/center/along": "6.6 in"}, "part.mass.center", "outside"),
+    ({"part/mass/center/above": "0 in"}, "part.mass.center", "above side 2"),
+    # arm and throw
+    ({"arm/length": "0 in"}, "arm.length", "above 0"),
+    ({"arm/length": "-28 in"}, "arm.length", "above 0"),
+    ({"arm/length": "4 in"}, "arm.length", "side 2"),
+    ({"throw/kappa": "25 in"}, "throw", "kappa and speed"),
+    ({"throw": {}}, "throw", "neither kappa nor speed"),
+    ({"throw/speed": "0 deg/s"}, "throw.speed", "above 0"),
+    ({"throw/speed": "-158 deg/s"}, "throw.speed", "above 0"),
+    ({"throw/speed": "1e-8 deg/s"}, "throw.speed", "gravity/speed^2"),
+    ({"throw": {"kappa": "0 in"}}, "throw.kappa", "above 0"),
+    ({"throw": {"kappa": "-1 in"}}, "throw.kappa", "above 0"),
+    ({"gravity": GONE}, "throw.speed", "add [gravity]"),
+    ({"gravity/acceleration": "193 in/s^2"}, "gravity", "not both"),
+    ({"gravity": {}}, "gravity", "acceleration or tilt"),
+    ({"gravity": {"acceleration": "0 in/s^2"}}, "gravity.acceleration", "above 0"),
+    ({"gravity": {"acceleration": "193 in"}}, "gravity.acceleration", "in is a unit of length"),
+    ({"gravity/tilt": "0 deg"}, "gravity.tilt", "up to 90 deg"),
+    ({"gravity/tilt": "-30 deg"}, "gravity.tilt", "up to 90 deg"),
+    ({"gravity/tilt": "90.001 deg"}, "gravity.tilt", "up to 90 deg"),
+    ({"model/flight": "small"}, "model.flight", '"small-angle"'),
+    ({"model/flip": "Signed"}, "model.flip", '"signed" or "energy"'),
+    # goal
+    ({"goal": {}}, "goal", "name exactly one"),
+    ({"goal/attracts_all": True}, "goal", "name exactly one"),
+    ({"goal": {"attracts_all": False}}, "goal.attracts_all", "leave the line out"),
+    ({"goal/oriented_beyond/x": 20}, "goal.oriented_beyond.x", "as text"),
+    ({"goal/oriented_beyond/x": "20 deg"}, "goal.oriented_beyond.x", "dimension is wrong"),
+    ({"goal/oriented_beyond/x": "28 in"}, "goal.oriented_beyond.x", "below the arm's length"),
+    ({"goal/oriented_beyond/side": 3}, "goal.oriented_beyond.side", "0 to 2"),
+    ({"goal": {"reaches": {"x": "1 in", "side": 7}}}, "goal.reaches.side", "0 to 2"),
+    (
+        {"goal": {"reaches": {"x": "1 in", "side": 0, "every_orbit": 1}}},
+        "goal.reaches.every_orbit",
+        "true or false",
+    ),
+    ({"goal": {"flip_order": [0, 3]}}, "goal.flip_order[1]", "0 to 2"),
+    ({"goal": {"flip_order": []}}, "goal.flip_order", "at least 1"),
+    # world, effects, tolerance
+    ({"world/friction": "0.9"}, "world.friction", "without a unit"),
+    ({"world/friction": -0.1}, "world.friction", "from 0"),
+    ({"world/restitution": 1.1}, "world.restitution", "from 0 to 1"),
+    ({"world/bounce_threshold": 0.01}, "world.bounce_threshold", "as text"),
+    ({"world/stroke": "90 deg"}, "world.stroke", "below 90 deg"),
+    ({"world/scatter/speed": "-1 %"}, "world.scatter.speed", "from 0"),
+    ({"world/scatter/landing": "1 %"}, "world.scatter.landing", "share"),
+    ({"effects/landing": "yes"}, "effects.landing", "true or false"),
+    ({"effects/spread": "wide"}, "effects.spread", '"bounded" or "gaussian"'),
+    ({"effects/slip": True, "world/friction": GONE}, "effects.slip", "slip needs it: add world.friction"),
+    ({"effects/pivot": True, "world": GONE}, "effects.pivot", "world.friction"),
+    ({"effects/bounce": True, "world/restitution": GONE}, "effects.bounce", "world.restitution"),
+    ({"effects/bounce": True, "world/bounce_threshold": GONE}, "effects.bounce", "world.bounce_threshold"),
+    ({"effects/drive": True, "world/stroke": GONE}, "effects.drive", "world.stroke"),
+    ({"effects/spread": "bounded", "world/scatter": {}}, "effects.spread", "world.scatter"),
+    ({"tolerance": {"throw.sped": "1 %"}}, 'tolerance."throw.sped"', "did you mean 'throw.speed'"),
+    ({"tolerance": {"part.sides[3]": "1 %"}}, 'tolerance."part.sides[3]"', "does not give it"),
+    ({"tolerance": {"throw.speed": "1 in"}}, 'tolerance."throw.speed"', "dimension is wrong"),
+    ({"tolerance": {"throw.speed": "0 %"}}, 'tolerance."throw.speed"', "above 0"),
+]
+
+
+@pytest.mark.parametrize(("changes", "key", "words"), TABLE)
+def test_refuses(changes: dict[str, Any], key: str, words: str, whole: dict[str, Any]) -> None:
+    for place, value in changes.items():
+        changed(whole, place, value)
+    with pytest.raises(SceneError) as caught:
+        load(whole)
+    error = caught.value
+    assert words in str(error)
+    assert error.key == key
+    assert all(str(part) in str(error) for part in (error.key, error.allowed, error.remedy))
+    assert len(str(error)) < 700
+    assert error.__cause__ is None
+
+
+@pytest.mark.parametrize("effect", ["landing", "roll", "pivot", "slip", "bounce", "drive", "contact"])
+def test_effects_that_are_not_built_are_refused(
+    effect: str, whole: dict[str, Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("limitsets.thrower.effects.BUILT", ("spread",))
+    whole["effects"][effect] = True
+    with pytest.raises(SceneError, match=f"{effect}.*this version can simulate: spread") as caught:
+        load(whole)
+    assert caught.value.key == f"effects.{effect}"
+    monkeypatch.setattr("limitsets.thrower.effects.BUILT", (effect,))
+    assert load(whole).effects.on() == (effect,)
+
+
+def test_part_that_tips_over_names_the_side_and_the_lack(plate: dict[str, Any]) -> None:
+    plate["part"]["vertices"] = [["0 cm", "0 cm"], ["2 cm", "0 cm"], ["9 cm", "4 cm"], ["7 cm", "4 cm"]]
+    del plate["part"]["mass"]["points"]
+    with pytest.raises(
+        GeometryError, match=r"cannot rest on side 0: it tips over the right end by 2.5 cm"
+    ) as caught:
+        load(plate)
+    assert caught.value.key == "part.mass"
+
+
+@pytest.mark.parametrize(
+    ("changes", "key", "words"),
+    [
+        ({"part/vertices/2": ["6 cm"]}, "part.vertices[2]", "number of entries is 1; allowed: at least 2"),
+        ({"part/vertices/2/1": "4 s"}, "part.vertices[2].y", "not known"),
+        ({"part/vertices/2": "6 cm"}, "part.vertices[2]", "a list"),
+        ({"part/vertices/2": ["1 cm", "1 cm"]}, "part.vertices", "inward"),
+        (
+            {"part/vertices": [[f"{x}e-200 cm", f"{y}e-200 cm"] for x, y in ["00", "10", "01"]]},
+            "part.vertices",
+            "smaller",
+        ),
+        ({"part/vertices": []}, "part.vertices", "from 3"),
+        ({"part/vertices": [["0 cm", "0 cm"]] * 2000}, "part.vertices", "at most 1000"),
+        ({"part/mass/points/0/x": "7 cm"}, "part.mass.points", "outside, 1 beyond side 3"),
+        ({"part/mass/points/0/mass": "0 g"}, "part.mass.points[0].mass", "above 0"),
+        ({"part/mass/points/0/mass": "1 cm"}, "part.mass.points[0].mass", "dimension is wrong"),
+        ({"part/mass/points/0/z": "1 cm"}, "part.mass.points[0].z", "mass, x, y"),
+        ({"part/mass/plate_density": "0 kg/m^2"}, "part.mass.plate_density", "above 0"),
+        ({"part/mass/plate_density": GONE}, "part.mass", "only points"),
+    ],
+)
+def test_refuses_vertices_and_points(
+    changes: dict[str, Any], key: str, words: str, plate: dict[str, Any]
+) -> None:
+    for place, value in changes.items():
+        changed(plate, place, value)
+    with pytest.raises(SceneError) as caught:
+        load(plate)
+    assert words in str(caught.value)
+    assert caught.value.key == key
+
+
+def test_clockwise_vertices_are_named_so(plate: dict[str, Any]) -> None:
+    plate["part"]["vertices"].reverse()
+    with pytest.raises(GeometryError, match=r"clockwise.*reverse the list"):
+        load(plate)
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        (b"name = ", "the text of the scene is 'not valid'"),
+        (b"name = 'a'\nname = 'b'\n", "not valid"),
+        (b"\xff\xfe\x00", "undecodable at byte 0"),
+        (b"name = 'a\x00b'", "not valid"),
+        (b"x = " + b"[" * 100_000, "too deeply nested"),
+        (b"x = " + b"{a=" * 100_000, "too deeply nested"),
+        (b".".join([b"a"] * 30_000) + b" = 1", "too many points"),
+        (b" . ".join([b'"a,="'] * 30_000) + b" = 1", "too many points"),
+        (b"[" + b".".join([b"a"] * 30_000) + b"]", "too many points"),
+        (b"x = " + b"1" * 100_000, "not valid"),
+        (b"x = [[[[[[[[[[1]]]]]]]]]]", "deeper than"),
+        (b"x = 2020-01-01", "x: this value is 'a date'"),
+        (b"#" * (1 << 20) + b"\n", "at most 1048576 bytes"),
+        (b"", "required key"),
+    ],
+)
+def test_refuses_files(content: bytes, words: str, tmp_path: Path) -> None:
+    file = tmp_path / "bad.toml"
+    file.write_bytes(content)
+    began = time.perf_counter()
+    with pytest.raises(SceneError) as caught:
+        load(file)
+    assert words in str(caught.value)
+    assert caught.value.file == str(file)
+    assert time.perf_counter() - began < 5.0
+
+
+def test_refuses_places_without_a_scene(tmp_path: Path) -> None:
+    for source, words in [
+        (tmp_path / "none.toml", "not there"),
+        (tmp_path, "a folder"),
+        ("paper-desinged", "did you mean 'paper-designed'"),
+        ("", "a folder"),
+        ("a" * 5000, "could not be opened"),
+        ("a\0b", "the scene"),
+        ("\ud800", "the scene"),
+        (3, "a path"),
+        (None, "a path"),
+        (b"paper-designed", "a path"),
+        ({}, "required"),
+        ({3: 4}, "a key"),
+    ]:
+        with pytest.raises(SceneError) as caught:
+            load(source)  # type: ignore[arg-type]
+        assert words in str(caught.value)
+        str(caught.value).encode("utf-8")
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no pipes in folders there")
+def test_a_pipe_is_not_waited_for(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "pipe")
+    with pytest.raises(SceneError, match="not a regular file"):
+        load(tmp_path / "pipe")
+
+
+def test_refuses_to_write_where_it_cannot(tmp_path: Path) -> None:
+    for path in (tmp_path / "none" / "scene.toml", tmp_path, "a\0b"):
+        with pytest.raises(SceneError, match="could not be written"):
+            dump(load("paper-designed"), path)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_structure_that_holds_itself_is_refused(whole: dict[str, Any]) -> None:
+    whole["part"]["mass"] = whole
+    with pytest.raises(SceneError, match="nesting"):
+        load(whole)

@@ -1,0 +1,107 @@
+from decimal import Decimal
+from fractions import Fraction
+
+import pint
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from limitsets.errors import SceneError
+from limitsets.scene.quantities import base_unit
+from limitsets.scene.units import UNITS, convert, parse, written
+
+
+def test_factors_are_those_of_pints_own_registry() -> None:
+    full = pint.UnitRegistry(non_int_type=Fraction)
+    for dimension, units in UNITS.items():
+        for unit in units if dimension != "share" else ():
+            for target in (*units, *(base_unit(dimension, length) for length in UNITS["length"])):
+                factor = full.Quantity(Fraction(1), unit).to(target).magnitude
+                assert convert(parse(f"1 {unit}", dimension), target) == float(factor)
+
+
+@pytest.mark.parametrize(
+    ("text", "dimension", "unit", "value"),
+    [
+        ("5.75 in", "length", "in", 5.75),
+        ("0.1 in", "length", "in", 0.1),
+        ("2.54 cm", "length", "in", 1.0),
+        ("1 ft", "length", "in", 12.0),
+        ("-.5e1 in", "length", "in", -5.0),
+        ("+7. in", "length", "in", 7.0),
+        ("0 m", "length", "in", 0.0),
+        ("1   in", "length", "mm", 25.4),
+        ("180 deg", "angle", "rad", 3.141592653589793),
+        ("360 deg/s", "angular speed", "rad/s", 6.283185307179586),
+        ("9.80665 m/s^2", "acceleration", "in/s^2", 9.80665 / 0.0254),
+        ("1 lb", "mass", "kg", 0.45359237),
+        ("1 kg/m^2", "mass per area", "kg/in^2", 0.00064516),
+        ("1 %", "share", "", 0.01),
+        ("0.7%", "share", "", 0.007),
+    ],
+)
+def test_values(text: str, dimension: str, unit: str, value: float) -> None:
+    assert convert(parse(text, dimension), unit) == value
+
+
+@given(st.floats(1e-12, 1e12), st.sampled_from(UNITS["length"]), st.sampled_from(UNITS["length"]))
+def test_conversions_are_rounded_once(number: float, unit: str, target: str) -> None:
+    metres = {"m": "1", "cm": "0.01", "mm": "0.001", "in": "0.0254", "ft": "0.3048"}
+    exact = Fraction(Decimal(repr(number))) * Fraction(metres[unit]) / Fraction(metres[target])
+    assert convert(parse(written(number, unit), "length"), target) == float(exact)
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("5,75 in", "decimal point"),
+        ("5.75,3 in", "commas"),
+        ("9**9**9 in", "one finite decimal number"),
+        ("1/s", "one finite decimal number"),
+        ("1 1/s", "unit '1/s' is not known"),
+        ("nan in", "finite"),
+        ("inf in", "finite"),
+        ("-Infinity in", "finite"),
+        ("1e400 in", "size from"),
+        ("1e-400 in", "size from"),
+        ("1e9999 in", "one finite"),
+        ("-1e13 in", "choose another unit"),
+        ("5.75", "add the unit"),
+        ("5.75in", "a space between"),
+        ("in", "one finite decimal number"),
+        ("", "one finite decimal number"),
+        ("5.75 inch", "did you mean 'in'"),
+        ("5.75 In", "did you mean 'in'"),
+        ("5.75 parsec", "not known"),
+        ("5.75 deg", "deg is a unit of angle: the dimension is wrong"),
+        ("5.75 in\n", "one finite"),
+        ("5.75\u00a0in", "one finite"),
+        ("\u0665 in", "one finite"),
+        ("1_0 in", "one finite"),
+        ("0x10 in", "one finite"),
+        ("5.75 in in", "not known"),
+        ("1" * 100 + " in", "shorten"),
+        (5.75, "write it as text"),
+        (5, "write it as text"),
+        (True, "write it as text"),
+        (None, "write it as text"),
+        (["5.75 in"], "write it as text"),
+    ],
+)
+def test_refuses(text: object, words: str) -> None:
+    with pytest.raises(SceneError) as caught:
+        parse(text, "length", key="arm.length", file="arm.toml")
+    error = caught.value
+    assert (error.key, error.file) == ("arm.length", "arm.toml")
+    assert words in str(error)
+    assert "m, cm, mm, in, ft" in error.allowed
+
+
+@given(st.text(max_size=80))
+def test_any_text_is_read_or_refused(text: str) -> None:
+    for dimension in UNITS:
+        try:
+            quantity = parse(text, dimension)
+        except SceneError:
+            continue
+        assert quantity.unit in UNITS[dimension]

@@ -1,0 +1,251 @@
+"""End points of limit sets: the printed table, 40-digit orbits of the origins, long orbits, maps on paper."""
+
+import mpmath as mp
+import numpy as np
+import pytest
+
+import limitsets as ls
+from limitsets import maps
+from limitsets.cells import as_domain
+from limitsets.errors import AnswerError
+from limitsets.sets.limit_set import limit_set_of
+
+TABLE = {
+    "paper-initial-small-angle": {
+        0: [(13.449486219312, 20.421069168761)],
+        1: [(18.13120694042, 20.390334647524)],
+        2: [(13.523779592226, 20.393068935673)],
+    },
+    "paper-designed-small-angle": {
+        0: [(12.216914068142, 12.88421238353)],
+        1: [(8.9547723861184, 10.343418249967)],
+        2: [(6.3603646024764, 20.640934683962)],
+    },
+    "paper-initial": {
+        0: [(13.522673689975, 20.915912223359)],
+        1: [(18.994941734574, 19.975954977782), (20.434045200511, 21.554457325114)],
+        2: [(16.262705754072, 21.886351326378)],
+    },
+    "paper-designed": {
+        0: [(15.205338825681, 19.75268801485)],
+        1: [(12.637023572659, 17.439819281769)],
+        2: [(8.9140259080455, 23.383151921158)],
+    },
+}
+UNIT = as_domain([(0.0, 1.0)])
+
+
+def widened(extents, width):
+    return {side: [(lo - width, hi + width) for lo, hi in pairs] for side, pairs in extents.items()}
+
+
+def whole(scene):
+    return {side: [(float(scene.domain.lo[side, 0]), scene.arm_length)] for side in range(3)}
+
+
+def assert_same(found, expected, tolerance):
+    assert {side: len(pairs) for side, pairs in found.items()} == {s: len(p) for s, p in expected.items()}
+    for side, pairs in expected.items():
+        assert np.abs(np.array(found[side]) - np.array(pairs)).max() < tolerance
+
+
+@pytest.mark.parametrize("start", [0.05, 0.5, 2.0, "whole arm"])
+@pytest.mark.parametrize("name", TABLE)
+def test_the_printed_table_from_sets_of_any_size(name, start):
+    scene = ls.load(name)
+    extents = whole(scene) if start == "whole arm" else widened(TABLE[name], start)
+    found = limit_set_of(scene.map, extents, scene.domain)
+    assert found.converged
+    assert not found.leaves
+    assert found.advice is None
+    assert_same(found.extents, TABLE[name], 1e-12)
+    assert all(end.origin.kind == "critical" for end in found.ends)
+
+
+def test_from_the_cells_of_a_graph():
+    scene = ls.load("paper-designed")
+    graph = ls.transitions(scene.map, ls.grid(scene.domain, cells=4096))
+    assert_same(ls.limit_set(graph).extents, TABLE["paper-designed"], 1e-12)
+    assert_same(ls.limit_set(graph, ls.attractors(graph)[0]).extents, TABLE["paper-designed"], 1e-12)
+
+
+# ---------------------------------------------------------------- the same end points at 40 digits, written apart
+
+mp.mp.dps = 40
+SIDES = [mp.mpf(text) for text in ("5.75", "3.6", "6.75")]
+DATA = {
+    "paper-initial-small-angle": ("-1.0", "3.2444722", "1.7898493", "85.2549144"),
+    "paper-designed-small-angle": ("-1.0", "4.4179581", "0.5040259", "48.6228609"),
+    "paper-initial": ("-0.2", "3.9867006", "1.8835981", "33.3605945"),
+    "paper-designed": ("-0.2", "4.2255778", "0.7082490", "25.3778518"),
+}
+
+
+class Part:
+    """A throw at 40 digits, from the decimals of the scene."""
+
+    def __init__(self, name):
+        self.small = "small" in name
+        self.h, along, above, self.kappa = (mp.mpf(text) for text in DATA[name])
+        # Side 2 from (0, 0) to (6.75, 0); the apex joins side 0 (left) and side 1 (right).
+        left, right = mp.mpf(0), SIDES[2]
+        apex_x = (SIDES[0] ** 2 - SIDES[1] ** 2 + SIDES[2] ** 2) / (2 * SIDES[2])
+        apex = (apex_x, mp.sqrt(SIDES[0] ** 2 - apex_x**2))
+        ends = [
+            (apex, (left, mp.mpf(0))),
+            ((right, mp.mpf(0)), apex),
+            ((left, mp.mpf(0)), (right, mp.mpf(0))),
+        ]
+        self.a, self.d = [], []
+        for (px, py), (qx, qy) in ends:
+            length = mp.hypot(qx - px, qy - py)
+            ux, uy = (qx - px) / length, (qy - py) / length
+            self.a.append((along - px) * ux + (above - py) * uy)
+            self.d.append((above - py) * ux - (along - px) * uy)
+        self.rho2 = mp.mpf("1.25") ** 2
+
+    def angle(self, R, i):
+        a, d, kappa = self.a[i], self.d[i], self.kappa
+        if self.small:
+            return 2 * (R - a) / kappa
+        height = lambda p: R - a * mp.sin(p) / p + d * (1 - mp.cos(p)) / p - kappa * p / 2  # noqa: E731
+        return mp.findroot(height, 2 * (R - a) / (kappa - d))
+
+    def margin(self, R, i):
+        a, d, kappa, p = self.a[i], self.d[i], self.kappa, self.angle(R, i)
+        M, ell = self.rho2 + a**2 + d**2, mp.hypot(a, d)
+        if self.small:
+            om = (self.rho2 - a * R + 2 * a**2 + d**2 + d * self.h) / M
+            return M * om**2 / 2 - (kappa * (ell - d) - 2 * a * (R - a))
+        X, H = a * mp.cos(p) - d * mp.sin(p), a * mp.sin(p) + d * mp.cos(p)
+        om = (self.rho2 + X * (R - kappa * p) + H * (self.h + d)) / M
+        return mp.sign(om) * M * om**2 / 2 - mp.sign(X) * kappa * (ell - H)
+
+    def throw(self, R, i, branch):
+        a, d, p = self.a[i], self.d[i], self.angle(R, i)
+        jog = R - self.h * p
+        if not self.small:
+            jog += a * (1 - mp.cos(p)) - d * (p - mp.sin(p))
+        if branch == "jog":
+            return jog, i
+        k = (i + 1) % 3
+        return jog - a - (SIDES[k] - self.a[k]), k
+
+
+@pytest.mark.parametrize("name", TABLE)
+def test_every_end_is_the_orbit_of_its_origin_at_40_digits(name):
+    scene, part = ls.load(name), Part(name)
+    found = limit_set_of(scene.map, widened(TABLE[name], 0.05), scene.domain)
+    printed = [x for side in sorted(TABLE[name]) for pair in TABLE[name][side] for x in pair]
+    for end, table in zip(found.ends, printed, strict=True):
+        x, side = mp.findroot(lambda R, s=end.origin.side: part.margin(R, s), end.origin.x), end.origin.side
+        for branch in end.origin.branches:
+            x, side = part.throw(x, side, branch)
+        assert side == end.side
+        assert abs(x - table) < 1e-12
+        # The estimate speaks of the float map; the scene's lengths, rounded to floats, add about as much again.
+        assert abs(x - end.x) < 8.0 * end.error
+        assert abs(x - end.x) < 2e-13
+
+
+@pytest.mark.parametrize("name", TABLE)
+def test_a_long_orbit_comes_close_to_every_end_from_inside(name):
+    scene = ls.load(name)
+    path = ls.orbit(scene.map, 15.0, 2, 1_000_000)
+    x, sides = path.x[5000:], path.side[5000:]
+    for end in limit_set_of(scene.map, widened(TABLE[name], 0.05), scene.domain).ends:
+        here = x[sides == end.side]
+        gap = np.min(np.abs(here - end.x))
+        assert gap < 2e-3
+    for side, pairs in TABLE[name].items():
+        here = x[sides == side]
+        covered = np.zeros(here.size, dtype=bool)
+        for lo, hi in pairs:
+            covered |= (here >= lo - 1e-11) & (here <= hi + 1e-11)
+        assert covered.all()
+
+
+def test_ends_say_where_they_come_from():
+    scene = ls.load("paper-designed")
+    found = limit_set_of(scene.map, widened(TABLE["paper-designed"], 0.05), scene.domain)
+    assert str(found.ends[3].origin).endswith("on side 2, jog, flip x 2")
+    assert found.ends[3].origin.branches == ("jog", "flip", "flip")
+    assert [(end.side, end.which) for end in found.ends] == [(s, w) for s in range(3) for w in ("lo", "hi")]
+
+
+# ---------------------------------------------------------------- maps with answers on paper
+
+
+def test_doubling_fills_the_circle():
+    found = limit_set_of(maps.Doubling(2.0), {0: [(0.0, 1.0)]}, UNIT)
+    assert found.extents == {0: [(0.0, pytest.approx(1.0, abs=1e-15))]}
+    assert found.converged
+
+
+@pytest.mark.parametrize("r", [3.7, 3.9, 4.0])
+def test_a_logistic_band_ends_at_the_images_of_the_turning_point(r):
+    found = limit_set_of(maps.Logistic(r), {0: [(0.01, 0.999)]}, UNIT)
+    top = r / 4.0
+    (lo, hi), *others = found.extents[0]
+    assert (lo, hi) == (pytest.approx(r * top * (1.0 - top), abs=1e-12), pytest.approx(top, abs=1e-12))
+    assert not others
+
+
+def test_two_bands_of_the_logistic_map():
+    # At r = 3.6 the images of 1/2 bound two bands that the map exchanges.
+    r = 3.6
+    f = [0.5]
+    for _ in range(4):
+        f.append(r * f[-1] * (1.0 - f[-1]))
+    # Started apart from the fixed point 1 - 1/r between them, which repels.
+    found = limit_set_of(maps.Logistic(r), {0: [(0.3, 0.62), (0.77, 0.91)]}, UNIT)
+    assert found.converged
+    assert_same(found.extents, {0: [(f[2], f[4]), (f[3], f[1])]}, 1e-12)
+
+
+def test_an_attracting_orbit_of_period_three_is_three_points():
+    r = 3.83
+    path = ls.orbit(maps.Logistic(r), 0.5, 0, 3000).x[-3:]
+    start = {0: [(float(x) - 1e-3, float(x) + 1e-3) for x in np.sort(path)]}
+    found = limit_set_of(maps.Logistic(r), start, UNIT)
+    assert found.converged
+    assert_same(found.extents, {0: [(x, x) for x in np.sort(path)]}, 1e-11)
+
+
+def test_fixed_points_of_the_cubic_map_from_its_graph():
+    graph = ls.transitions(maps.Cubic(1.5), ls.grid([(-1.2, 1.2)], cells=1024))
+    found = ls.attractors(graph)
+    assert len(found) == 2
+    ends = sorted(x for a in found for pair in ls.limit_set(graph, a).extents[0] for x in pair)
+    root = np.sqrt(0.5)
+    assert ends == pytest.approx([-root, -root, root, root], abs=1e-9)
+    with pytest.raises(AnswerError, match="number of attractors"):
+        ls.limit_set(graph)
+
+
+# ---------------------------------------------------------------- what cannot be answered is said
+
+
+def test_a_set_that_still_moves_is_a_value_with_advice():
+    scene = ls.load("paper-designed")
+    found = limit_set_of(scene.map, whole(scene), scene.domain, most_images=50)
+    assert (found.converged, found.images) == (False, 50)
+    assert "raise most_images" in found.advice
+
+
+def test_what_leaves_is_dropped_and_said():
+    scene = ls.load("paper-designed")
+    far = scene.map._replace(surface_height=-3.0)  # strong outward jogs
+    found = limit_set_of(far, whole(scene), scene.domain)
+    assert found.leaves
+    assert "left the domain" in found.advice or "still move" in found.advice
+
+
+def test_wrong_questions():
+    scene = ls.load("paper-designed")
+    with pytest.raises(AnswerError, match="dimension"):
+        limit_set_of(maps.Henon(), {0: [(0.0, 1.0)]}, as_domain([(-2, 2), (-2, 2)]))
+    with pytest.raises(AnswerError, match="start from"):
+        limit_set_of(scene.map, {0: [(40.0, 50.0)]}, scene.domain)
+    with pytest.raises(AnswerError, match="side of the set"):
+        limit_set_of(scene.map, {3: [(4.0, 5.0)]}, scene.domain)

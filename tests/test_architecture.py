@@ -1,0 +1,129 @@
+"""What the package promises about its own build: who imports whom, what an import costs, which names it shows."""
+
+import ast
+import subprocess
+import sys
+import textwrap
+from pathlib import Path
+
+import pytest
+
+import limitsets
+
+ROOT = Path(__file__).resolve().parents[1]
+PACKAGE = ROOT / "limitsets"
+SOURCES = sorted(PACKAGE.rglob("*.py"))
+LATE = ["numba", "scipy", "networkx", "matplotlib", "pint", "pydantic", "typer", "rich"]
+
+
+def run_python(code: str, cwd: Path = ROOT) -> str:
+    """Run code in a new interpreter, as a user's first lines would be, and return what it prints."""
+    done = subprocess.run(
+        [sys.executable, "-W", "error", "-c", textwrap.dedent(code)],
+        cwd=cwd,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+def imported_names(source: Path) -> set[str]:
+    """Top-level names that a file imports, in whichever way and however late."""
+    names = set()
+    for node in ast.walk(ast.parse(source.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            names |= {alias.name.split(".")[0] for alias in node.names}
+        elif isinstance(node, ast.ImportFrom) and node.module and node.level == 0:
+            names.add(node.module.split(".")[0])
+        elif isinstance(node, ast.Call) and node.args and isinstance(node.args[0], ast.Constant):
+            called = node.func.attr if isinstance(node.func, ast.Attribute) else getattr(node.func, "id", "")
+            if called in ("import_module", "__import__"):
+                names.add(str(node.args[0].value).split(".")[0])
+    return names
+
+
+@pytest.mark.parametrize("source", SOURCES, ids=lambda path: str(path.relative_to(PACKAGE)))
+def test_only_jit_imports_numba(source):
+    numba = {"numba", "llvmlite"} & imported_names(source)
+    assert not numba or source == PACKAGE / "jit.py"
+
+
+def test_import_loads_none_of_the_late_packages():
+    loaded = run_python("import sys, limitsets; print(*sys.modules)").split()
+    assert "limitsets" in loaded
+    assert not set(LATE) & set(loaded)
+
+
+def test_networkx_finds_the_backend_without_importing_it():
+    loaded = run_python("""
+        import sys, networkx
+        assert "limitsets" in networkx.utils.backends.backends, "not installed: run make test"
+        print(*sys.modules)
+    """).split()
+    assert "limitsets" not in loaded
+
+
+def test_import_contracts_hold():
+    code = "from importlinter.cli import lint_imports_command; lint_imports_command(['--no-cache'])"
+    done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
+def test_at_most_thirty_public_names():
+    assert len(limitsets.__all__) == len(set(limitsets.__all__)) <= 30
+    assert set(limitsets.__all__) <= set(dir(limitsets))
+
+
+# A lazy name that is spelt like a module is replaced by that module as soon as something imports it: `limitsets.x` is
+# then one thing at the first touch and another at the second.
+TOUCH = """
+    import importlib, pkgutil, limitsets
+
+    def import_all():
+        for module in pkgutil.walk_packages(limitsets.__path__, "limitsets."):
+            if module.name != "limitsets.__main__":
+                importlib.import_module(module.name)
+
+    def touch():
+        order = list(limitsets.__all__)
+        rounds = [{name: getattr(limitsets, name) for name in names} for names in (order, order[::-1])]
+        for name in order:
+            assert rounds[0][name] is rounds[1][name], name
+        return rounds[0]
+
+    def titles(touched):
+        return sorted(f"{name}: {type(x).__name__} {getattr(x, '__name__', x)}" for name, x in touched.items())
+"""
+
+
+def test_public_names_do_not_depend_on_what_was_imported():
+    modules_first = run_python(TOUCH + "    import_all(); print(*titles(touch()), sep='\\n')")
+    names_first = run_python(
+        TOUCH
+        + """
+    before = touch()
+    import_all()
+    after = touch()
+    for name in before:
+        assert before[name] is after[name], name
+    print(*titles(after), sep='\\n')
+    """
+    )
+    assert modules_first == names_first
+
+
+def python_blocks(page: Path) -> str:
+    """Join a page's python blocks into one program."""
+    blocks = page.read_text(encoding="utf-8").split("```python\n")[1:]
+    return "\n".join(block.split("```")[0] for block in blocks)
+
+
+def test_code_in_the_readme_runs(tmp_path):
+    program = tmp_path / "readme.py"
+    program.write_text(python_blocks(ROOT / "README.md"), encoding="utf-8")
+    done = subprocess.run(
+        [sys.executable, program.name], cwd=tmp_path, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr

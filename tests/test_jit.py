@@ -1,0 +1,408 @@
+"""The cache on disk: an edit of anything a kernel reaches gives the new number; and the flags of the decorators."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import pytest
+
+import limitsets.jit
+from limitsets.jit import generic, kernel, proof_kernel
+
+FUSED = re.compile(r"\bv?fn?m(?:add|sub|la|ls)\w*")
+
+# A small entry kernel, put into the copy of the package.
+PROBE = """
+from limitsets.jit import kernel
+from limitsets.maps.contract import image, on_side
+
+@kernel(entry=True)
+def one(params, x):
+    after, _, code = image(on_side(params, 0), x, 0)
+    return after, code
+"""
+
+# What a user may write, one file or two per way to change a number. The script below runs them all.
+USER_FILES = {
+    "with_helper": """
+from typing import NamedTuple
+import limitsets as ls
+from helper import push
+class WithHelper(NamedTuple):
+    size: float
+def image(params, x, side):
+    return push(params, x), side, 0
+ls.register(WithHelper, image=image)
+""",
+    "helper": """
+from limitsets.jit import kernel
+@kernel
+def push(params, x):
+    return x + params.size
+""",
+    "with_constant": """
+from typing import NamedTuple
+import limitsets as ls
+from constants import GAIN
+class WithConstant(NamedTuple):
+    size: float
+def image(params, x, side):
+    return GAIN * x + params.size, side, 0
+ls.register(WithConstant, image=image)
+""",
+    "constants": "GAIN = 2.0",
+    "with_fields": """
+from typing import NamedTuple
+import limitsets as ls
+from fields import WithFields
+def image(params, x, side):
+    return x + params.push, side, 0
+ls.register(WithFields, image=image)
+""",
+    "fields": """
+from typing import NamedTuple
+class WithFields(NamedTuple):
+    push: float
+    pull: float
+""",
+    "with_part": """
+from typing import NamedTuple
+import limitsets as ls
+from part import Part
+import part_kernel
+class WithPart(NamedTuple):
+    size: float
+def image(params, x, side):
+    return x, side, 0
+def gather(params, side):
+    return Part(params.size)
+ls.register(WithPart, image=image, on_side=gather)
+""",
+    "part": """
+from typing import NamedTuple
+class Part(NamedTuple):
+    size: float
+""",
+    "part_kernel": """
+import limitsets as ls
+from part import Part
+def image(params, x, side):
+    return x * params.size, side, 0
+ls.register(Part, image=image)
+""",
+    "with_generic": """
+from typing import NamedTuple
+import limitsets as ls
+from limitsets.jit import generic
+from method import method
+class WithGeneric(NamedTuple):
+    size: float
+def move(params, x):
+    pass
+move = generic(move)
+def image(params, x, side):
+    return move(params, x), side, 0
+ls.register(WithGeneric, image=image)
+move.on(WithGeneric, method)
+""",
+    "method": """
+def method(params, x):
+    return x + params.size
+""",
+}
+
+HEAD = """
+import json
+from typing import NamedTuple
+import limitsets as ls
+from limitsets import maps
+from limitsets.maps.probe import one
+
+def run(**cases):
+    out = {}
+    for name, (params, x) in cases.items():
+        before = sum(one.stats.cache_hits.values())
+        after, code = one(params, x)
+        out[name] = [after, sum(one.stats.cache_hits.values()) - before]
+    print(json.dumps(out))
+
+leslie = maps.Leslie(young=1.0, old=2.0, crowding=0.0, survival=0.5), (2.0, 3.0)
+henon = maps.Henon(a=0.5, b=4.0), (2.0, 10.0)
+"""
+PACKAGE_ALONE = HEAD + "run(leslie=leslie)"
+EVERYTHING = (
+    HEAD
+    + """
+from with_helper import WithHelper
+from with_constant import WithConstant
+from with_fields import WithFields
+from with_part import WithPart
+from with_generic import WithGeneric
+
+class InScript(NamedTuple):
+    size: float
+def image(params, x, side):
+    return x + params.size, side, 0
+ls.register(InScript, image=image)
+
+run(
+    leslie=leslie, henon=henon, helper=(WithHelper(1.0), 2.0), constant=(WithConstant(1.0), 2.0),
+    fields=(WithFields(push=1.0, pull=5.0), 2.0), part=(WithPart(5.0), 2.0), generic=(WithGeneric(1.0), 2.0),
+    script=(InScript(1.0), 2.0),
+)
+"""
+)
+NOT_KEPT = {"generic", "script"}
+ANSWERS = {
+    "leslie": [2.0 + 2.0 * 3.0, 1.0],  # exp 0 = 1
+    "henon": [1.0 - 0.5 * 2.0**2 + 10.0, 8.0],
+    "helper": 3.0,
+    "constant": 5.0,
+    "fields": 3.0,
+    "part": 10.0,
+    "generic": 3.0,
+    "script": 3.0,
+}
+# Edits (folder, file, old text, new text), and the answers after them.
+EXP = "(1.0 + (r + r * r * tail))"
+EDITS = [
+    ("maps", "textbook/exponential.py", EXP, EXP.replace("1.0", "3.0")),
+    ("maps", "textbook/henon.py", "    a: float = 1.4\n    b: float", "    b: float = 1.4\n    a: float"),
+    ("user", "helper.py", "x + params.size", "x - params.size"),
+    ("user", "constants.py", "2.0", "3.0"),
+    ("user", "fields.py", "    push: float\n    pull: float", "    pull: float\n    push: float"),
+    ("user", "part_kernel.py", "x * params.size", "x + params.size"),
+    ("user", "method.py", "x + params.size", "x - params.size"),
+]
+ANSWERS_AFTER = {
+    **ANSWERS,  # swapped fields are no other map
+    "leslie": [3.0 * 8.0, 1.0],
+    "helper": 1.0,
+    "constant": 7.0,
+    "part": 7.0,
+    "generic": 1.0,
+}
+
+
+class Place:
+    """A copy of the package, a folder of a user's files, and a cache."""
+
+    def __init__(self, folder: Path) -> None:
+        self.copy, self.user, self.cache = folder / "copy", folder / "user", folder / "cache"
+        self.maps = self.copy / "limitsets" / "maps"
+
+    def fill(self) -> None:
+        source = Path(limitsets.jit.__file__).parent
+        shutil.copytree(source / "maps", self.maps, ignore=shutil.ignore_patterns("__pycache__"))
+        for file in ("errors.py", "jit.py"):
+            shutil.copy(source / file, self.maps.parent / file)
+        (self.maps.parent / "__init__.py").write_text("from limitsets.maps import register\n")
+        (self.maps / "probe.py").write_text(PROBE)
+        self.user.mkdir()
+        for name, text in USER_FILES.items():
+            (self.user / f"{name}.py").write_text(text)
+
+    def edit(self, back: bool = False) -> None:
+        for folder, file, old, new in EDITS:
+            path = (self.maps if folder == "maps" else self.user) / file
+            text, (was, shall) = path.read_text(), (new, old) if back else (old, new)
+            assert was in text
+            path.write_text(text.replace(was, shall))
+
+    def run(self, script: str) -> dict[str, Any]:
+        """Run a script in a new process: name of the map -> [image, whether the code came from the disk]."""
+        file = self.user / "script.py"
+        file.write_text(script)
+        # No bytecode: Python tells two versions of a file apart by second and size alone.
+        env = {
+            **os.environ,
+            "PYTHONPATH": str(self.copy),
+            "NUMBA_CACHE_DIR": str(self.cache),
+            "PYTHONDONTWRITEBYTECODE": "1",
+        }
+        done = subprocess.run(
+            [sys.executable, str(file)], env=env, cwd=self.user, capture_output=True, text=True, check=False
+        )
+        assert done.returncode == 0, done.stderr
+        found: dict[str, Any] = json.loads(done.stdout)
+        return found
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("cache") / "place"
+
+
+@pytest.fixture(scope="module")
+def life(folder: Path) -> dict[str, dict[str, Any]]:
+    """Everything in four processes: first, again, edited, and edited back."""
+    place = Place(folder)
+    place.fill()
+    runs = {"first": place.run(EVERYTHING), "again": place.run(EVERYTHING)}
+    place.edit()
+    runs["edited"] = place.run(EVERYTHING)
+    place.edit(back=True)
+    runs["back"] = place.run(EVERYTHING)
+    return runs
+
+
+@pytest.mark.parametrize("name", ANSWERS)
+def test_a_first_process_compiles_and_a_second_one_loads(life: dict[str, Any], name: str) -> None:
+    assert life["first"][name] == [ANSWERS[name], 0]
+    assert life["again"][name] == [ANSWERS[name], 0 if name in NOT_KEPT else 1]
+
+
+@pytest.mark.parametrize("name", ANSWERS)
+def test_an_edit_gives_the_new_number(life: dict[str, Any], name: str) -> None:
+    assert life["edited"][name] == [ANSWERS_AFTER[name], 0]
+
+
+@pytest.mark.parametrize("name", ANSWERS)
+def test_an_edit_undone_gives_the_old_number_from_the_disk(life: dict[str, Any], name: str) -> None:
+    assert life["back"][name] == life["again"][name]
+
+
+@pytest.fixture
+def place(folder: Path, life: dict[str, Any], tmp_path: Path) -> Place:
+    """A copy of the place after all that; its code is found because the digest of the same text is the same."""
+    shutil.copytree(folder, tmp_path / "place")
+    return Place(tmp_path / "place")
+
+
+def test_an_edit_of_a_room_without_kernels_keeps_the_code(place: Place) -> None:
+    room = place.maps.parent / "plot"
+    room.mkdir()
+    (room / "colours.py").write_text("RED = 1\n")
+    assert place.run(PACKAGE_ALONE)["leslie"] == [ANSWERS["leslie"], 1]
+
+
+@pytest.mark.parametrize("when", ["before the import", "after the import"])
+def test_a_cache_that_cannot_be_written(place: Place, when: str) -> None:
+    # A file stands where the folder should be; rights would not stop root.
+    cache = str(place.cache)
+    replace = f"import shutil\nshutil.rmtree({cache!r})\nopen({cache!r}, 'w').close()\n"
+    early, late = (replace, "") if when == "before the import" else ("", replace)
+    found = place.run(early + HEAD + late + "run(leslie=leslie)")
+    assert found["leslie"] == [ANSWERS["leslie"], 0]
+
+
+def test_a_file_cut_short_is_written_anew(place: Place) -> None:
+    for ending in (".nbi", ".nbc"):
+        for file in place.cache.rglob("*" + ending):
+            file.write_bytes(file.read_bytes()[:-20])
+        assert place.run(PACKAGE_ALONE)["leslie"] == [ANSWERS["leslie"], 0]
+    assert place.run(PACKAGE_ALONE)["leslie"] == [ANSWERS["leslie"], 1]
+
+
+def test_each_signature_has_its_own_files_and_old_digests_go(place: Place) -> None:
+    for k in range(12):
+        old = place.cache / "limitsets" / f"digest{k}"
+        old.mkdir(parents=True)
+        os.utime(old, (1000 + k, 1000 + k))
+    (place.maps / "codes.py").write_text((place.maps / "codes.py").read_text() + "\n")
+    place.run(HEAD + "run(leslie=leslie, henon=henon)")
+    # Two processes that write one index at once could file the code of one signature under the other.
+    newest = max((place.cache / "limitsets").iterdir(), key=lambda path: path.stat().st_mtime)
+    assert len(list(newest.glob("*.nbi"))) == len(list(newest.glob("*.nbc"))) == 2
+    kept = {path.name for path in (place.cache / "limitsets").iterdir()}
+    assert len(kept) == limitsets.jit.KEPT_DIGESTS
+    assert "digest11" in kept
+    assert "digest0" not in kept
+
+
+# ---------------------------------------------------------------- the flags
+
+
+def multiply_add(a: Any, b: Any, c: Any, out: Any) -> None:
+    for k in range(out.size):
+        out[k] = a[k] * b[k] + c[k]
+
+
+class Weight(NamedTuple):
+    size: float
+
+
+def weigh(params: Any, x: float, y: float) -> Any:
+    """Stub of a generic function."""
+
+
+def _weigh(params: Weight, x: float, y: float) -> float:
+    return params.size * x + y
+
+
+def weigh_for_proofs(params: Any, x: float, y: float) -> Any:
+    """Stub of a generic function."""
+
+
+weigh = generic(weigh)
+weigh_for_proofs = generic(weigh_for_proofs, proof=True)
+weigh.on(Weight, _weigh)  # type: ignore[attr-defined]
+weigh_for_proofs.on(Weight, _weigh)  # type: ignore[attr-defined]
+
+
+def weigh_all(params: Weight, x: Any, out: Any) -> None:
+    for k in range(out.size):
+        out[k] = weigh(params, x[k], x[k])
+
+
+def weigh_all_for_proofs(params: Weight, x: Any, out: Any) -> None:
+    for k in range(out.size):
+        out[k] = weigh_for_proofs(params, x[k], x[k])
+
+
+def machine_code(compiled: Any) -> str:
+    return "\n".join(compiled.inspect_asm().values())
+
+
+def test_only_estimates_are_contracted() -> None:
+    # (1 + e)(1 - e) - 1 = -e^2, which only one rounding keeps.
+    e = 2.0**-30
+    a, b, c, out = np.full(9, 1.0 + e), np.full(9, 1.0 - e), np.full(9, -1.0), np.empty(9)
+    exact, estimate = proof_kernel(multiply_add), kernel(multiply_add)
+    exact(a, b, c, out)
+    assert (out == 0.0).all()
+    estimate(a, b, c, out)
+    assert not FUSED.search(machine_code(exact))
+    if FUSED.search(machine_code(estimate)):
+        assert (out == -(e**2)).all()
+
+
+def test_a_generic_for_proofs_stays_uncontracted_inside_an_estimate() -> None:
+    x, out = np.linspace(0.0, 1.0, 9), np.empty(9)
+    exact, estimate = kernel(weigh_all_for_proofs), kernel(weigh_all)
+    exact(Weight(0.1), x, out)
+    expected = np.float64(0.1) * x + x
+    assert (out == expected).all()
+    estimate(Weight(0.1), x, out)
+    assert not FUSED.search(machine_code(exact))
+    assert bool(FUSED.search(machine_code(estimate))) == bool(
+        FUSED.search(machine_code(_compiled_estimate())),
+    )
+
+
+def _compiled_estimate() -> Any:
+    """An estimate that is contracted wherever this processor can."""
+    compiled = kernel(multiply_add)
+    numbers = np.ones(9)
+    compiled(numbers, numbers, numbers, numbers.copy())
+    return compiled
+
+
+def test_a_small_kernel_leaves_no_file_and_an_entry_has_the_package_cache() -> None:
+    from limitsets.maps import drivers
+
+    assert type(kernel(multiply_add)._cache).__name__ == "NullCache"
+    if limitsets.jit._CACHE is not None:
+        assert type(drivers._images._cache) is limitsets.jit._CACHE
+
+
+def test_numba_still_has_the_internals_the_cache_overrides() -> None:
+    assert limitsets.jit._source_cache(Path("anywhere")) is not None
