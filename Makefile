@@ -4,7 +4,6 @@
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
 PY := .venv/bin/python
-ROOMS := $(subst /,.,$(patsubst %/__init__.py,%,$(wildcard limitsets/*/__init__.py)))
 SCENE ?= paper-designed
 
 # For pip inside `python -m build` too, where the build backend is installed; newer pip reads the second name there.
@@ -39,7 +38,7 @@ bench: .venv/bench.stamp  ## the benchmarks, with their rivals in the same run
 	$(PY) -m pytest tests/bench -s
 
 docs: .venv/dev.stamp  ## the reference, from the docstrings, into docs/api
-	$(PY) -m pdoc --docformat numpy --output-directory docs/api limitsets limitsets.errors limitsets.jit $(ROOMS)
+	$(PY) docs/build.py
 
 studies: .venv/dev.stamp  ## run every study again, writing its figures and numbers
 	set -e; for study in studies/*/study.py; do $(PY) $$study; done

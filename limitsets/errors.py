@@ -52,7 +52,10 @@ class LimitsetsError(Exception):
 
     def __reduce__(self) -> tuple[object, ...]:
         """Rebuild from the parts, so that an error crosses process borders whole."""
-        return (_rebuild, (type(self), self.thing, self.value, self.allowed, self.remedy, self.key, self.file))
+        return (
+            _rebuild,
+            (type(self), self.thing, self.value, self.allowed, self.remedy, self.key, self.file),
+        )
 
 
 def _rebuild(

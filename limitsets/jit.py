@@ -138,9 +138,7 @@ def _reached(function: Callable[..., Any], seen: dict[str, bytes], named: set[ty
         _reached_value(f"{mark}:{name}", value, names, seen, named)
 
 
-def _reached_value(
-    mark: str, value: Any, names: set[str], seen: dict[str, bytes], named: set[type]
-) -> None:
+def _reached_value(mark: str, value: Any, names: set[str], seen: dict[str, bytes], named: set[type]) -> None:
     """Collect what a kernel reaches through one global name."""
     if isinstance(value, (bool, int, float, complex, str, bytes, type(None), np.generic)):
         seen[mark] = repr(value).encode()
@@ -371,7 +369,9 @@ def named_tuple_class(numba_type: Any) -> type | None:
     return getattr(numba_type, "instance_class", None) if isinstance(numba_type, types.BaseTuple) else None
 
 
-def generic(stub: F, *, proof: bool = False, default: Callable[..., Any] | None = None) -> F:
+def generic(
+    stub: F, *, proof: bool = False, inlined: bool = True, default: Callable[..., Any] | None = None
+) -> F:
     """Make a function whose method is chosen by the class of its first argument.
 
     Parameters
@@ -380,6 +380,8 @@ def generic(stub: F, *, proof: bool = False, default: Callable[..., Any] | None 
         A module-level function that names the arguments; its body is never compiled.
     proof : bool
         Compile the methods without contraction.
+    inlined : bool
+        False for a method that is rarely called: it then costs the loops around it no compile time.
     default : callable, optional
         The method of every class that has none of its own.
 
@@ -387,8 +389,7 @@ def generic(stub: F, *, proof: bool = False, default: Callable[..., Any] | None 
     -------
     callable
         The stub, with an attribute `on`: ``stub.on(Class, method)`` adds a module-level method.  For a plain tuple
-        of equal entries the key is its length instead.  In compiled code the choice is made at compile time and
-        the method is inlined.
+        of equal entries the key is its length instead.  In compiled code the choice is made at compile time.
 
     Notes
     -----
@@ -396,7 +397,7 @@ def generic(stub: F, *, proof: bool = False, default: Callable[..., Any] | None 
     in a closure: numba does not cache such code (numba issues 2065, 2952, 6264).
     """
     methods: dict[Any, Callable[..., Any]] = {}
-    options = {**(_PROOF if proof else _ESTIMATE), "forceinline": True}
+    options = {**(_PROOF if proof else _ESTIMATE), "forceinline": inlined}
     options.pop("nopython")
     options.pop("no_cfunc_wrapper")
 

@@ -397,11 +397,11 @@ def _compiled_estimate() -> Any:
 
 
 def test_a_small_kernel_leaves_no_file_and_an_entry_has_the_package_cache() -> None:
-    from limitsets.maps import drivers
-
-    assert type(kernel(multiply_add)._cache).__name__ == "NullCache"
+    small: Any = kernel(multiply_add)
+    entry: Any = kernel(entry=True)(multiply_add)
+    assert type(small._cache).__name__ == "NullCache"
     if limitsets.jit._CACHE is not None:
-        assert type(drivers._images._cache) is limitsets.jit._CACHE
+        assert type(entry._cache) is limitsets.jit._CACHE
 
 
 def test_numba_still_has_the_internals_the_cache_overrides() -> None:

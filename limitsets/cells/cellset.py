@@ -56,7 +56,9 @@ class CellSet:
 
     def _other(self, other: CellSet) -> NDArray[np.bool_]:
         if other.grid is not self.grid:
-            raise GridError("the other set", "cells of another grid", "cells of the same grid", "build it on this grid")
+            raise GridError(
+                "the other set", "cells of another grid", "cells of the same grid", "build it on this grid"
+            )
         return other.mask
 
     def __or__(self, other: CellSet) -> CellSet:
@@ -106,10 +108,9 @@ class CellSet:
         """
         found: dict[int, list[tuple[float, float]]] = {}
         for side in range(self.grid.sides):
-            mask = self.mask[self.grid.of_side(side)]
-            if self.grid.dimension > 1:
-                mask = mask.reshape(tuple(self.grid.shape[side])).any(axis=tuple(range(1, self.grid.dimension)))
-            border = np.flatnonzero(np.diff(np.concatenate([[0], mask.astype(np.int8), [0]])))
+            rows = self.mask[self.grid.of_side(side)].reshape(int(self.grid.shape[side, 0]), -1)
+            met = np.any(rows, axis=1).astype(np.int8)
+            border = np.flatnonzero(np.diff(np.concatenate([[0], met, [0]])))
             edges = self.grid.edges[side][0]
             if border.size:
                 found[side] = [(float(edges[a]), float(edges[b])) for a, b in border.reshape(-1, 2)]
@@ -121,6 +122,8 @@ class CellSet:
         for side in range(self.grid.sides):
             block = self.mask[self.grid.of_side(side)].reshape(tuple(self.grid.shape[side]))
             for axis in range(self.grid.dimension):
-                block = np.repeat(block, int(fine.shape[side, axis] // self.grid.shape[side, axis]), axis=axis)
+                block = np.repeat(
+                    block, int(fine.shape[side, axis] // self.grid.shape[side, axis]), axis=axis
+                )
             mask[fine.of_side(side)] = block.ravel()
         return CellSet(fine, mask)

@@ -49,14 +49,19 @@ class Domain:
                 "pass one row per side",
             )
         if not (np.isfinite(lo).all() and np.isfinite(hi).all() and (lo < hi).all()):
-            raise GridError("the domain", (lo.tolist(), hi.tolist()), "finite boxes with lo < hi", "correct the corners")
+            raise GridError(
+                "the domain", (lo.tolist(), hi.tolist()), "finite boxes with lo < hi", "correct the corners"
+            )
         object.__setattr__(self, "lo", lo)
         object.__setattr__(self, "hi", hi)
         if self.anchor is not None:
             anchor = np.array(self.anchor, dtype=np.float64)
             if lo.shape[1] != 1 or anchor.shape != (lo.shape[0],) or not (anchor < lo[:, 0]).all():
                 raise GridError(
-                    "the anchor", anchor.tolist(), "one number below lo per side, in one dimension", "correct the anchor"
+                    "the anchor",
+                    anchor.tolist(),
+                    "one number below lo per side, in one dimension",
+                    "correct the anchor",
                 )
             object.__setattr__(self, "anchor", anchor)
 

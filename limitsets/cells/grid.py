@@ -169,12 +169,17 @@ def _graded(lo: float, hi: float, anchor: float, cells: int) -> NDArray[np.float
 def _counts(cells: Any, depth: int | None, dimension: int) -> tuple[int, ...]:
     if depth is not None:
         if not isinstance(depth, int) or depth < 1:
-            raise GridError("the depth of the grid", depth, "an integer from 1", "pass depth=16, or cells=...")
+            raise GridError(
+                "the depth of the grid", depth, "an integer from 1", "pass depth=16, or cells=..."
+            )
         return tuple(2 ** ((depth + dimension - 1 - axis) // dimension) for axis in range(dimension))
     counts = tuple(cells) if isinstance(cells, Sequence | np.ndarray) else (cells,) * dimension
     if len(counts) != dimension or not all(isinstance(n, int | np.integer) and n >= 1 for n in counts):
         raise GridError(
-            "the number of cells", cells, f"an integer from 1, or {dimension} of them", "pass cells=1024, or one per axis"
+            "the number of cells",
+            cells,
+            f"an integer from 1, or {dimension} of them",
+            "pass cells=1024, or one per axis",
         )
     return tuple(int(n) for n in counts)
 
@@ -221,23 +226,31 @@ def grid(
     if grading is not None and grading not in words:
         raise GridError("the grading", grading, " or ".join(words), "correct the word")
     if grading == "graded" and region.anchor is None:
-        raise GridError("the grading", grading, "uniform, for a domain without anchor", "give the domain an anchor")
+        raise GridError(
+            "the grading", grading, "uniform, for a domain without anchor", "give the domain an anchor"
+        )
     if math.prod(counts) * region.sides > MOST_CELLS:
         raise GridError(
-            "the number of cells", math.prod(counts) * region.sides, f"at most {MOST_CELLS}", "ask for fewer cells"
+            "the number of cells",
+            math.prod(counts) * region.sides,
+            f"at most {MOST_CELLS}",
+            "ask for fewer cells",
         )
     graded = region.anchor is not None and grading != "uniform"
     sides = []
     for side in range(region.sides):
         if graded and region.anchor is not None:
             lo, hi, anchor = float(region.lo[side, 0]), float(region.hi[side, 0]), float(region.anchor[side])
-            axes = (_graded(lo, hi, anchor, counts[0]),)
+            axes: tuple[NDArray[np.float64], ...] = (_graded(lo, hi, anchor, counts[0]),)
         else:
             pairs = zip(region.lo[side], region.hi[side], counts, strict=True)
             axes = tuple(np.linspace(lo, hi, n + 1) for lo, hi, n in pairs)
         if not all((np.diff(axis) > 0).all() for axis in axes):
             raise GridError(
-                "the number of cells", counts, "cells wider than the spacing of floating-point numbers", "ask for fewer"
+                "the number of cells",
+                counts,
+                "cells wider than the spacing of floating-point numbers",
+                "ask for fewer",
             )
         sides.append(axes)
     return Grid(region, tuple(sides))

@@ -47,7 +47,9 @@ class Components:
 
 
 @kernel(entry=True)
-def _strong(r: Ranges, rank: Any, label: Any, order: Any, path: Any, boxes: Any, rows: Any, waiting: Any) -> int:
+def _strong(
+    r: Ranges, rank: Any, label: Any, order: Any, path: Any, boxes: Any, rows: Any, waiting: Any
+) -> Any:
     """Fill `label` and `order`; the number of components.
 
     `rank` is 0 for a cell not yet met, the smallest visiting number known to be reachable while it is open, and
@@ -67,7 +69,8 @@ def _strong(r: Ranges, rank: Any, label: Any, order: Any, path: Any, boxes: Any,
             cell = path[depth]
             best = rank[cell]
             child = -1
-            box, row = np.int64(boxes[depth]), np.int64(rows[depth])
+            box: Any = np.int64(boxes[depth])
+            row: Any = np.int64(rows[depth])
             last = r.first[cell + 1]
             while box < last and child < 0:
                 count, run = box_rows(r, box), np.int64(r.run[box])

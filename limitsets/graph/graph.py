@@ -73,7 +73,7 @@ class TransitionGraph:
         return iter(range(len(self)))
 
     def __contains__(self, node: object) -> bool:
-        return isinstance(node, int | np.integer) and 0 <= node < len(self)
+        return isinstance(node, int | np.integer) and 0 <= int(node) < len(self)
 
     def __repr__(self) -> str:
         return f"TransitionGraph({type(self.map).__name__}, {self.n_cells} cells, {self.method})"
@@ -108,7 +108,9 @@ class TransitionGraph:
             For a number that is no node.
         """
         if node not in self:
-            raise AnswerError("the node", node, f"an integer from 0 to {len(self) - 1}", "pass the number of a cell")
+            raise AnswerError(
+                "the node", node, f"an integer from 0 to {len(self) - 1}", "pass the number of a cell"
+            )
         if node >= self.n_cells:
             return np.array([node])
         r = self.ranges

@@ -80,18 +80,20 @@ def build(
 
 
 @kernel
-def box_rows(r: Ranges, box: int) -> int:
-    """Number of runs of a box."""
+def box_rows(r: Ranges, box: Any) -> Any:
+    """Count the runs of a box."""
     return np.int64(r.rows[box]) * np.int64(r.planes[box])
 
 
 @kernel
-def row_start(r: Ranges, box: int, row: int) -> int:
+def row_start(r: Ranges, box: Any, row: Any) -> Any:
     """First cell of a run."""
     rows = np.int64(r.rows[box])
     if row < rows:
         return r.start[box] + row * r.row_stride[r.side[box]]
-    return r.start[box] + (row % rows) * r.row_stride[r.side[box]] + (row // rows) * r.plane_stride[r.side[box]]
+    return (
+        r.start[box] + (row % rows) * r.row_stride[r.side[box]] + (row // rows) * r.plane_stride[r.side[box]]
+    )
 
 
 @kernel

@@ -58,7 +58,9 @@ def _leaves(r: Ranges, label: Any, cells: Any) -> bool:
     return False
 
 
-def _destinations(bits: NDArray[Any], names: dict[int, int], so_far: NDArray[np.int32] | None) -> NDArray[np.int32]:
+def _destinations(
+    bits: NDArray[Any], names: dict[int, int], so_far: NDArray[np.int32] | None
+) -> NDArray[np.int32]:
     """Destinations after one more sweep: `names` gives what each bit that counts stands for."""
     nothing = np.int32(-(2**31))
     if bits.dtype == np.uint8:
@@ -67,7 +69,7 @@ def _destinations(bits: NDArray[Any], names: dict[int, int], so_far: NDArray[np.
         for bit, name in names.items():
             table[(count == 1) & (np.arange(256) >> bit & 1 == 1)] = name
         table[np.asarray(count) == 0] = nothing
-        now = table[bits]
+        now: NDArray[np.int32] = table[bits]
     else:
         relevant = bits & np.uint64(sum(1 << bit for bit in names))
         now = np.where(relevant == 0, nothing, np.int32(codes.UNDECIDED)).astype(np.int32)
@@ -75,11 +77,16 @@ def _destinations(bits: NDArray[Any], names: dict[int, int], so_far: NDArray[np.
             now[relevant == np.uint64(1 << bit)] = name
     if so_far is None:
         return now
-    both = np.where(now == nothing, so_far, np.where((so_far == nothing) | (so_far == now), now, codes.UNDECIDED))
-    return both.astype(np.int32)
+    both = np.where(
+        now == nothing, so_far, np.where((so_far == nothing) | (so_far == now), now, codes.UNDECIDED)
+    )
+    merged: NDArray[np.int32] = both.astype(np.int32)
+    return merged
 
 
-def survey(r: Ranges, components: Components, exits: dict[str, int], sets: Sequence[NDArray[np.int32]]) -> Survey:
+def survey(
+    r: Ranges, components: Components, exits: dict[str, int], sets: Sequence[NDArray[np.int32]]
+) -> Survey:
     """Sweep the graph, up to 56 recurrent components at a time.
 
     Parameters
@@ -107,8 +114,8 @@ def survey(r: Ranges, components: Components, exits: dict[str, int], sets: Seque
     for begin in range(0, max(k, 1), SETS_PER_SWEEP):
         chunk = sets[begin : begin + SETS_PER_SWEEP]
         bits = len(chunk) + len(exits)
-        kind = np.uint8 if bits <= 8 else np.uint64
-        marks = r.exits.astype(kind) << kind(len(chunk))
+        kind: Any = np.uint8 if bits <= 8 else np.uint64
+        marks: Any = r.exits.astype(kind) << kind(len(chunk))
         for b, cells in enumerate(chunk):
             marks[cells] |= kind(1 << b)
         marks = reach(r, components, marks)

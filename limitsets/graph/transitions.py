@@ -8,16 +8,17 @@ import numpy as np
 
 from limitsets.cells import Grid
 from limitsets.errors import AnswerError
-from limitsets.graph.assemble import Target, boxes_of_side
+from limitsets.graph.assemble import boxes_of_side
 from limitsets.graph.graph import TransitionGraph
 from limitsets.graph.images import METHODS
 from limitsets.graph.ranges import build
+from limitsets.graph.target import Target
 from limitsets.maps import kind_of
 
 __all__ = ["transitions"]
 
 
-def transitions(map: Any, grid: Grid, method: str | None = None, **options: Any) -> TransitionGraph:
+def transitions(map: Any, grid: Grid, method: str | None = None, **options: Any) -> TransitionGraph:  # noqa: A002  # `map` is the word of the field and of the other calls
     """Who can go where in one step.
 
     Parameters
@@ -54,17 +55,23 @@ def transitions(map: Any, grid: Grid, method: str | None = None, **options: Any)
     kind = kind_of(map)
     if kind.dimension != grid.dimension:
         raise AnswerError(
-            "the dimension of the grid", grid.dimension, f"{kind.dimension}, that of {kind.name}", "cut another domain"
+            "the dimension of the grid",
+            grid.dimension,
+            f"{kind.dimension}, that of {kind.name}",
+            "cut another domain",
         )
     chosen = method or ("end-points" if grid.dimension == 1 else "corners-padded")
     if chosen not in METHODS:
         raise AnswerError("the image method", chosen, ", ".join(METHODS), "correct the word")
     target = Target.of(grid, kind.exits)
     parts = [
-        boxes_of_side(map, grid, side, target, METHODS[chosen](grid, side, **options)) for side in range(grid.sides)
+        boxes_of_side(map, grid, side, target, METHODS[chosen](grid, side, **options))
+        for side in range(grid.sides)
     ]
     if len(parts) == 1:
-        cell, side, lo, hi, exits = (getattr(parts[0], name) for name in ("cell", "side", "lo", "hi", "exits"))
+        cell, side, lo, hi, exits = (
+            getattr(parts[0], name) for name in ("cell", "side", "lo", "hi", "exits")
+        )
     else:
         cell = np.concatenate([part.cell + grid.offset[k] for k, part in enumerate(parts)])
         side, lo, hi, exits = (

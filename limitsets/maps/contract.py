@@ -85,7 +85,7 @@ image = generic(image)
 image_on = generic(image_on)
 image_box = generic(image_box, proof=True)
 on_side = generic(on_side, default=_same)
-fallback = generic(fallback, default=_no_fallback)
+fallback = generic(fallback, inlined=False, default=_no_fallback)
 margin = generic(margin)
 displacement = generic(displacement)
 
@@ -178,10 +178,15 @@ def register(
     array([0.2, 0.4, 0.8, 0.4])
     """
     if not (isinstance(cls, type) and issubclass(cls, tuple) and hasattr(cls, "_fields")):
-        raise MapError("the class of parameters", cls, "a NamedTuple class", "write class Params(NamedTuple): ...")
+        raise MapError(
+            "the class of parameters", cls, "a NamedTuple class", "write class Params(NamedTuple): ..."
+        )
     if cls in _KINDS:
         raise MapError(
-            "the class of parameters", cls.__name__, "a class not registered before", "give the new map a new class"
+            "the class of parameters",
+            cls.__name__,
+            "a class not registered before",
+            "give the new map a new class",
         )
     if dimension not in (1, 2, 3):
         raise MapError("the dimension of the map", dimension, "1, 2 or 3", "pass dimension=1, 2 or 3")
@@ -197,9 +202,16 @@ def register(
     kernels = {name: f for name, f in given.items() if f is not None}
     for name, function in kernels.items():
         plain = getattr(function, "py_func", function)
-        if not callable(plain) or getattr(plain, "__closure__", None) or getattr(plain, "__name__", "") == "<lambda>":
+        if (
+            not callable(plain)
+            or getattr(plain, "__closure__", None)
+            or getattr(plain, "__name__", "") == "<lambda>"
+        ):
             raise MapError(
-                f"the kernel {name}", function, "a function defined at module level", "move it out of the function"
+                f"the kernel {name}",
+                function,
+                "a function defined at module level",
+                "move it out of the function",
             )
     cover_foreign_class(cls, list(kernels.values()))
     for name, function in kernels.items():
@@ -221,7 +233,10 @@ def kind_of(params: Any) -> MapKind:
     kind = _KINDS.get(type(params))
     if kind is None:
         raise MapError(
-            "the map", type(params).__name__, "parameters of a registered class", "register it with limitsets.register"
+            "the map",
+            type(params).__name__,
+            "parameters of a registered class",
+            "register it with limitsets.register",
         )
     return kind
 
@@ -247,5 +262,8 @@ def coerce(params: Any) -> Any:
     if isinstance(params, (np.ndarray, list)):
         return np.array(params, dtype=np.float64, order="C")
     raise MapError(
-        "a parameter of the map", params, "a number, an array, a NamedTuple of such, or None", "convert it first"
+        "a parameter of the map",
+        params,
+        "a number, an array, a NamedTuple of such, or None",
+        "convert it first",
     )

@@ -60,7 +60,7 @@ for _n, _get, _set in ((1, _pick1, _put1), (2, _pick2, _put2), (3, _pick3, _put3
 
 
 @kernel
-def step(params: Any, x: Any, side: int) -> Any:
+def step(params: Any, x: Any, side: Any) -> Any:
     """One step of any map, the sure way where the fast one cannot vouch for its answer."""
     after, side_after, code = image(params, x, side)
     if code == codes.UNSETTLED:
@@ -69,7 +69,7 @@ def step(params: Any, x: Any, side: int) -> Any:
 
 
 @kernel(entry=True)
-def _images(params: Any, side: int, xs: Any, after: Any, side_after: Any, code_after: Any) -> int:
+def _images(params: Any, side: int, xs: Any, after: Any, side_after: Any, code_after: Any) -> Any:
     here = on_side(params, side)
     for k in range(xs[0].size):
         x, to, code = image(here, pick(xs, k), side)
@@ -103,7 +103,7 @@ def _slopes(params: Any, sides: Any, branches: Any, x: Any, out: Any) -> None:
 
 
 @kernel(entry=True)
-def _orbit(params: Any, xs: Any, sides: Any, code_after: Any) -> int:
+def _orbit(params: Any, xs: Any, sides: Any, code_after: Any) -> Any:
     """Fill an orbit from its first state; the number of steps made before an exit."""
     for k in range(code_after.size):
         x, side, code = step(params, pick(xs, k), sides[k])
@@ -118,7 +118,7 @@ def _orbit(params: Any, xs: Any, sides: Any, code_after: Any) -> int:
 @kernel(entry=True)
 def _advance(params: Any, count: int, xs: Any, sides: Any, code_after: Any, steps: Any) -> None:
     for k in range(steps.size):
-        x, side, code = pick(xs, k), np.int64(sides[k]), 0
+        x, side, code = pick(xs, k), sides[k], 0
         made = 0
         while made < count and code >= 0:
             x, side, code = step(params, x, side)
@@ -141,7 +141,10 @@ def columns(x: ArrayLike, dimension: int) -> tuple[NDArray[np.float64], ...]:
         states = states.reshape(states.shape[0], 1) if states.ndim == 1 else states
     if states.ndim != 2 or states.shape[1] != dimension:
         raise MapError(
-            "the shape of the states", states.shape, f"(n, {dimension}), or (n,) in one dimension", "reshape them"
+            "the shape of the states",
+            states.shape,
+            f"(n, {dimension}), or (n,) in one dimension",
+            "reshape them",
         )
     return tuple(np.ascontiguousarray(states[:, k]) for k in range(dimension))
 
@@ -202,7 +205,9 @@ def images(params: Any, x: ArrayLike, side: int) -> Images:
     return Images(rows(after), side_after, code, again / max(count, 1))
 
 
-def images_on(params: Any, x: ArrayLike, side: int, branch: int) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+def images_on(
+    params: Any, x: ArrayLike, side: int, branch: int
+) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     """Images of many states on one side if they all took one branch: ``(x', side')``."""
     xs = columns(x, kind_of(params).dimension)
     after = tuple(np.empty(xs[0].size) for _ in xs)

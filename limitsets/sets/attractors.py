@@ -65,7 +65,9 @@ def _visits(side: NDArray[np.int64]) -> tuple[tuple[int, ...] | None, dict[int, 
     if change.size == 0:
         return (int(side[0]),), {}
     visited, jogs = side[change[:-1]], np.diff(change) - 1
-    per_side = {int(s): (int(jogs[visited == s].min()), int(jogs[visited == s].max())) for s in np.unique(visited)}
+    per_side = {
+        int(s): (int(jogs[visited == s].min()), int(jogs[visited == s].max())) for s in np.unique(visited)
+    }
     sides = side[change]
     after: dict[int, set[int]] = {}
     for one, two in zip(sides[:-1].tolist(), sides[1:].tolist(), strict=True):
@@ -73,7 +75,9 @@ def _visits(side: NDArray[np.int64]) -> tuple[tuple[int, ...] | None, dict[int, 
     if not after or any(len(options) > 1 for options in after.values()):
         return None, per_side
     cycle = [min(after)]
-    while (following := next(iter(after.get(cycle[-1], {cycle[0]})))) != cycle[0] and len(cycle) <= len(after):
+    while (following := next(iter(after.get(cycle[-1], {cycle[0]})))) != cycle[0] and len(cycle) <= len(
+        after
+    ):
         cycle.append(following)
     return tuple(cycle), per_side
 

@@ -72,12 +72,17 @@ def basins(graph: TransitionGraph, found: tuple[Attractor, ...]) -> Basins:
     known = graph.survey()
     if any(a.cells.grid is not graph.grid for a in found) or len(found) != int(known.attracting.sum()):
         raise AnswerError(
-            "the attractors", f"{len(found)} of another graph", "those of this graph", "call attractors(graph)"
+            "the attractors",
+            f"{len(found)} of another graph",
+            "those of this graph",
+            "call attractors(graph)",
         )
     weight = graph.grid.measure
     total = float(weight.sum())
     labels = known.destination
-    share = np.bincount(labels - codes.UNDECIDED, weights=weight, minlength=len(found) - codes.UNDECIDED) / total
+    share = (
+        np.bincount(labels - codes.UNDECIDED, weights=weight, minlength=len(found) - codes.UNDECIDED) / total
+    )
     by_code = {code: float(share[code - codes.UNDECIDED]) for code in range(codes.UNDECIDED, len(found))}
     return Basins(
         graph.grid,

@@ -31,7 +31,7 @@ Extents = Mapping[int, Iterable[tuple[float, float]]]
 EPS = 2.0**-52
 # Near a_i of the throw an orbit takes some 1200 throws to get away from 1e-9 of the arm; beyond this the map is no
 # longer expanding there and a set that still moves is said to move.
-MOST_IMAGES = 20_000
+MOST_ITERATIONS = 20_000
 
 
 class HasExtents(Protocol):
@@ -108,7 +108,7 @@ class LimitSet:
         The intervals, ascending; a side without any is left out.
     ends : tuple of End
         Their ends in the same order.
-    images : int
+    iterations : int
         How many images were taken.
     converged : bool
         Whether the ends no longer move.
@@ -120,7 +120,7 @@ class LimitSet:
 
     extents: dict[int, list[tuple[float, float]]]
     ends: tuple[End, ...]
-    images: int
+    iterations: int
     converged: bool
     leaves: bool
     advice: str | None
@@ -295,7 +295,12 @@ def _origin(names: tuple[str, ...], track: _Track) -> Origin:
 
 
 def limit_set_of(
-    params: Any, extents: Extents, domain: Sides, *, tolerance: float = 1e-12, most_images: int = MOST_IMAGES
+    params: Any,
+    extents: Extents,
+    domain: Sides,
+    *,
+    tolerance: float = 1e-12,
+    most_iterations: int = MOST_ITERATIONS,
 ) -> LimitSet:
     """Intersect the forward images of a set of intervals; see `limit_set`.
 
@@ -309,7 +314,7 @@ def limit_set_of(
         Where the map is looked at; what leaves it is dropped.
     tolerance : float
         The ends are taken to rest when two images in turn move none of them by more, relative to its size.
-    most_images : int
+    most_iterations : int
         Images after which to give up.
 
     Returns
@@ -342,13 +347,15 @@ def limit_set_of(
     names = kind_of(params).branches
     sets = _start(params, extents, domain)
     rested, count, leaves = 0, 0, False
-    while rested < 2 and count < most_images and sets:
+    while rested < 2 and count < most_iterations and sets:
         new, out = machine.image(sets)
         rested = rested + 1 if _same(sets, new, tolerance) else 0
         sets, count, leaves = new, count + 1, leaves or out
     advice = None
     if rested < 2:
-        advice = f"the ends still move after {count} images: start from one attractor, or raise most_images"
+        advice = (
+            f"the ends still move after {count} images: start from one attractor, or raise most_iterations"
+        )
     elif leaves:
         advice = "part of the set left the domain and was dropped: start from attracting cells, or enlarge the domain"
     found = [

@@ -13,7 +13,7 @@ with the misprints corrected as listed in docs/model.md.
 """
 
 from limitsets.thrower.params import Energy, Exact, Signed, SmallAngle, SmallAngle2, Throw, throw_map
-from limitsets.thrower.trace import Flight, Trace, fly, trace
+from limitsets.thrower.trace import Flight, Trace, fly, impact_angles, trace
 
 __all__ = [
     "Energy",
@@ -25,6 +25,7 @@ __all__ = [
     "Throw",
     "Trace",
     "fly",
+    "impact_angles",
     "throw_map",
     "trace",
 ]

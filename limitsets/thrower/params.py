@@ -184,11 +184,19 @@ def throw_map(
     sides = [np.array(np.atleast_1d(values), dtype=np.float64) for values in (a, d, length, corner)]
     if len({values.shape for values in sides}) != 1 or sides[0].ndim != 1 or sides[0].size < 3:
         shapes = [values.shape for values in sides]
-        raise MapError("the sides", shapes, "arrays of equal length, three sides at least", "give one entry per side")
-    numbers = [float(value) for value in (kappa, surface_height, arm_length, radius_of_gyration)]
+        raise MapError(
+            "the sides", shapes, "arrays of equal length, three sides at least", "give one entry per side"
+        )
+    numbers = tuple(float(value) for value in (kappa, surface_height, arm_length, radius_of_gyration))
     if not (all(np.isfinite(values).all() for values in sides) and np.isfinite(numbers).all()):
         raise MapError("a parameter of the throw", "nan or inf", "finite numbers", "correct it")
-    for name, value in (("kappa", numbers[0]), ("arm_length", numbers[2]), ("radius_of_gyration", numbers[3])):
+    for name, value in (
+        ("kappa", numbers[0]),
+        ("arm_length", numbers[2]),
+        ("radius_of_gyration", numbers[3]),
+    ):
         if not value > 0:
             raise MapError(name, value, "a number > 0", "correct it")
-    return Throw(FLIGHTS[flight](), FLIPS[flip](), *numbers, *sides)
+    kind: Any = Throw  # mypy does not follow unpacked fields
+    built: Throw = kind(FLIGHTS[flight](), FLIPS[flip](), *numbers, *sides)
+    return built

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from limitsets.errors import MapError
 from limitsets.jit import kernel
@@ -17,7 +17,7 @@ from limitsets.thrower.impact import strike
 from limitsets.thrower.params import Throw, gather
 from limitsets.thrower.throw import outcome, settle
 
-__all__ = ["Flight", "Trace", "fly", "trace"]
+__all__ = ["Flight", "Trace", "fly", "impact_angles", "trace"]
 
 _gather = kernel(gather)
 
@@ -95,7 +95,9 @@ class Flight:
 
 def _check_side(params: Throw, side: int) -> None:
     if not 0 <= side < params.a.size:
-        raise MapError("the side", side, f"an integer from 0 to {params.a.size - 1}", "name a side of the part")
+        raise MapError(
+            "the side", side, f"an integer from 0 to {params.a.size - 1}", "name a side of the part"
+        )
 
 
 def trace(params: Throw, x: float, side: int, count: int = 1) -> Trace:
@@ -139,6 +141,44 @@ def trace(params: Throw, x: float, side: int, count: int = 1) -> Trace:
     other &= ~outside
     turned = (path.side[1:] - path.side[:-1]) % params.a.size
     return Trace(path.x, path.side, path.code, phi, shift, turned, other, path.stopped)
+
+
+def impact_angles(params: Throw, x: ArrayLike, side: int) -> NDArray[np.float64]:
+    """Angles by which the part has turned when it lands, for many starts on one side.
+
+    Parameters
+    ----------
+    params : Throw
+        The throw map.
+    x : array_like, shape (n,)
+        Where the part rests [scene's unit].
+    side : int
+        On which side.
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        Angles [rad]; nan outside the model.
+
+    Raises
+    ------
+    MapError
+        For a side the part has not.
+
+    Examples
+    --------
+    >>> import limitsets as ls
+    >>> from limitsets.thrower import impact_angles
+    >>> impact_angles(ls.load("paper-designed").map, [8.0, 1.0], 2).round(6)
+    array([0.311437,      nan])
+    """
+    _check_side(params, side)
+    starts = np.ascontiguousarray(x, dtype=np.float64)
+    count = starts.size
+    phi, shift, other = np.empty(count), np.empty(count), np.empty(count, np.bool_)
+    _details(params, starts, np.full(count, side, dtype=np.int64), phi, shift, other)
+    inside = (starts > params.a[side]) & (phi > 0.0) & (phi <= params.flight.full_turn)
+    return np.where(inside, phi, math.nan)
 
 
 def fly(params: Throw, x: float, side: int) -> Flight:

@@ -47,7 +47,9 @@ def test_condensation(graph, plain, given):
     components = list(nx.strongly_connected_components(plain)) if given else None
     ours = nx.condensation(graph, scc=components)
     oracle = nx.condensation(plain, scc=components)
-    assert same(nx.get_node_attributes(ours, "members").values(), nx.get_node_attributes(oracle, "members").values())
+    assert same(
+        nx.get_node_attributes(ours, "members").values(), nx.get_node_attributes(oracle, "members").values()
+    )
     assert all(node in ours.nodes[ours.graph["mapping"][node]]["members"] for node in plain)
 
     def edges(dense):
@@ -71,7 +73,9 @@ def test_a_node_that_is_none_is_networkx_own_error(graph):
 
 
 def test_the_rest_of_networkx_by_conversion(graph, plain):
-    assert nx.number_weakly_connected_components(graph.to_networkx()) == nx.number_weakly_connected_components(plain)
+    assert nx.number_weakly_connected_components(
+        graph.to_networkx()
+    ) == nx.number_weakly_connected_components(plain)
     before = nx.config.fallback_to_nx
     try:
         nx.config.fallback_to_nx = True

@@ -62,15 +62,21 @@ def test_the_product_map_recurs_at_its_four_fixed_points_in_diamond_order(cells)
 
 def test_a_line_of_fixed_points_is_covered():
     """F = (x, y/2): the x axis attracts, and each of its cells is recurrent."""
-    graph = ls.transitions(ls.maps.Linear2(1.0, 0.0, 0.0, 0.5), ls.grid([(-1, 1), (-1, 1)], cells=32), method="corners")
+    graph = ls.transitions(
+        ls.maps.Linear2(1.0, 0.0, 0.0, 0.5), ls.grid([(-1, 1), (-1, 1)], cells=32), method="corners"
+    )
     recurrent = graph.recurrent_set()
-    axis = CellSet.of(graph.grid, graph.grid.index(np.stack([graph.grid.edges[0][0], np.zeros(33)], axis=1), 0))
+    axis = CellSet.of(
+        graph.grid, graph.grid.index(np.stack([graph.grid.edges[0][0], np.zeros(33)], axis=1), 0)
+    )
     assert axis <= recurrent
 
 
 def test_the_unstable_set_of_a_saddle_covers_its_axis():
     """diag(0.5, 2): what can be reached from the fixed point's cell covers the y axis."""
-    graph = ls.transitions(ls.maps.Linear2(0.5, 0.0, 0.0, 2.0), ls.grid([(-1, 1), (-1, 1)], cells=33), method="corners")
+    graph = ls.transitions(
+        ls.maps.Linear2(0.5, 0.0, 0.0, 2.0), ls.grid([(-1, 1), (-1, 1)], cells=33), method="corners"
+    )
     (origin,) = graph.grid.index([[0.0, 0.0]], 0)
     reached = [n for n in nx.descendants(graph, int(origin)) if n < graph.n_cells]
     middles = graph.grid.centres(0)
@@ -86,7 +92,9 @@ def test_two_states_share_the_square(method):
     share = ls.basins(graph, found)
     assert len(found) == 2
     # a method that looks at corners sees both branches in the cells along x = 0, one column or two of 32
-    assert share.attractors == pytest.approx((0.5, 0.5), abs=0.0 if method in ("centres", "random") else 1 / 32)
+    assert share.attractors == pytest.approx(
+        (0.5, 0.5), abs=0.0 if method in ("centres", "random") else 1 / 32
+    )
     assert sum(share.attractors) + share.undecided_between == pytest.approx(1.0, abs=1e-12)
 
 

@@ -20,7 +20,10 @@ def graphs(draw):
     """Random boxes: one to three dimensions, one to three sides, several boxes, empty images, ways out."""
     dimension = draw(st.integers(1, 3))
     sides = draw(st.integers(1, 3))
-    sizes = [tuple(draw(st.integers(1, 4 if dimension > 1 else 12)) for _ in range(dimension)) for _ in range(sides)]
+    sizes = [
+        tuple(draw(st.integers(1, 4 if dimension > 1 else 12)) for _ in range(dimension))
+        for _ in range(sides)
+    ]
     domain = ls.grid([(0, 1)] * dimension, cells=1).domain
     edges = tuple(tuple(np.linspace(0, 1, n + 1) for n in size) for size in sizes)
     grid = type(ls.grid(domain))(domain, edges)
@@ -112,7 +115,9 @@ def test_destinations_agree_with_networkx(graph):
         set(cells.tolist()) for cells, good in zip(recurrent, found.attracting, strict=True) if good
     ]
     assert sorted(map(sorted, attractors)) == sorted(
-        sorted(part) for part in ends if min(part) < graph.n_cells and (len(part) > 1 or plain.has_edge(*2 * tuple(part)))
+        sorted(part)
+        for part in ends
+        if min(part) < graph.n_cells and (len(part) > 1 or plain.has_edge(*2 * tuple(part)))
     )
     for cell in range(graph.n_cells):
         reachable = nx.descendants(plain, cell) | {cell}

@@ -228,9 +228,9 @@ def test_fixed_points_of_the_cubic_map_from_its_graph():
 
 def test_a_set_that_still_moves_is_a_value_with_advice():
     scene = ls.load("paper-designed")
-    found = limit_set_of(scene.map, whole(scene), scene.domain, most_images=50)
-    assert (found.converged, found.images) == (False, 50)
-    assert "raise most_images" in found.advice
+    found = limit_set_of(scene.map, whole(scene), scene.domain, most_iterations=50)
+    assert (found.converged, found.iterations) == (False, 50)
+    assert "raise most_iterations" in found.advice
 
 
 def test_what_leaves_is_dropped_and_said():

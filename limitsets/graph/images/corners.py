@@ -24,7 +24,10 @@ def corners(grid: Grid, side: int, **_: Any) -> Samples:
     axes = grid.edges[side]
     sizes = [edges.size for edges in axes]
     strides = tuple(int(np.prod(sizes[k + 1 :])) for k in range(len(sizes)))
-    offsets = [sum(s * c for s, c in zip(strides, corner, strict=True)) for corner in product((0, 1), repeat=len(axes))]
+    offsets = [
+        sum(s * c for s, c in zip(strides, corner, strict=True))
+        for corner in product((0, 1), repeat=len(axes))
+    ]
     return Samples(axes, strides, np.array(offsets, np.int64))
 
 

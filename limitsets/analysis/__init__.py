@@ -1,0 +1,12 @@
+"""From a scene to all answers at once: what `limitsets analyse` shows.
+
+The answers themselves are made in `limitsets.sets` and below; here they are asked for in turn, timed, held against the
+scene's goal and written as JSON.
+"""
+
+from limitsets.analysis.analyse import Analysis, analyse
+from limitsets.analysis.asked import Answered
+from limitsets.analysis.flags import other_vertex_first, overlap
+from limitsets.analysis.words import scene_of, to_json
+
+__all__ = ["Analysis", "Answered", "analyse", "other_vertex_first", "overlap", "scene_of", "to_json"]

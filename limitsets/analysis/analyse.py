@@ -1,0 +1,216 @@
+"""All answers about a scene, in one call."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from limitsets.analysis.asked import Answered, answer
+from limitsets.analysis.flags import other_vertex_first
+from limitsets.errors import AnswerError
+
+if TYPE_CHECKING:
+    import networkx as nx
+
+    from limitsets.cells import CellSet, Grid
+    from limitsets.graph import TransitionGraph
+    from limitsets.maps.critical import CriticalPoint
+    from limitsets.scene import Scene
+    from limitsets.sets import Attractor, Basins, Cycle, LimitSet
+
+__all__ = ["Analysis", "analyse"]
+
+Extents = dict[int, list[tuple[float, float]]]
+Progress = Callable[[str, int, int], None]
+
+# 512 to 2048 cells per side are where the last set of spurious cells goes in the paper's four scenes; twice that.
+CELLS = 4096
+
+
+@dataclass(frozen=True, eq=False)
+class Analysis:
+    """What is known about a scene; nothing here is proved.
+
+    Attributes
+    ----------
+    scene : Scene
+        The scene.
+    grid : Grid
+        The cells.
+    graph : TransitionGraph
+        Who can go where, from sampled images.
+    attractors : tuple of Attractor
+        Where the throws lead.
+    basins : Basins
+        From which starts.
+    limit_sets : tuple of LimitSet
+        One per attractor: its end points.
+    critical_points : dict of int to tuple of CriticalPoint
+        Per side, where the decision between jog and flip changes.
+    cycles : tuple of Cycle
+        Periodic orbits, as many as were asked for.
+    morse : networkx.DiGraph
+        Recurrent components and their order.
+    goal : Answered or None
+        The scene's goal and whether it holds.
+    other_vertex_first : dict of int to list of (lo, hi)
+        Per side the starts at which an assumption of the model is broken [scene's unit].
+    spurious : tuple of CellSet
+        Recurrent cells that vanish on refinement.
+    timings : dict of str to float
+        Per step, in seconds.
+    """
+
+    scene: Scene
+    grid: Grid
+    graph: TransitionGraph
+    attractors: tuple[Attractor, ...]
+    basins: Basins
+    limit_sets: tuple[LimitSet, ...]
+    critical_points: dict[int, tuple[CriticalPoint, ...]]
+    cycles: tuple[Cycle, ...]
+    morse: nx.DiGraph[int]
+    goal: Answered | None
+    other_vertex_first: Extents
+    spurious: tuple[CellSet, ...]
+    timings: dict[str, float]
+
+    @property
+    def second_pass(self) -> float:
+        """Share of the sampled throws that went to the slow, sure search for the impact."""
+        return self.graph.second_pass
+
+    @property
+    def extents(self) -> tuple[Extents, ...]:
+        """Per attractor its intervals: of the limit set where its end points are known, else of the cells."""
+        return tuple(
+            limit.extents if limit.converged else attractor.extents
+            for limit, attractor in zip(self.limit_sets, self.attractors, strict=True)
+        )
+
+    @property
+    def extents_from(self) -> tuple[str, ...]:
+        """Per attractor what `extents` are: "end points" or "cells"."""
+        return tuple("end points" if limit.converged else "cells" for limit in self.limit_sets)
+
+    def to_json(self) -> dict[str, Any]:
+        """Give it as plain tables for JSON (`limitsets.analysis.to_json`)."""
+        from limitsets.analysis.words import to_json
+
+        return to_json(self)
+
+
+class _Steps:
+    """Time each step and say which one has begun."""
+
+    def __init__(self, count: int, progress: Progress | None) -> None:
+        self.count, self.progress, self.timings = count, progress, dict[str, float]()
+
+    @contextmanager
+    def step(self, name: str) -> Iterator[None]:
+        if self.progress is not None:
+            self.progress(name, len(self.timings), self.count)
+        begin = time.perf_counter()
+        yield
+        self.timings[name] = time.perf_counter() - begin
+
+
+def analyse(
+    scene: str | Path | Mapping[str, Any] | Scene,
+    cells: int = CELLS,
+    *,
+    throws: int = 200_000,
+    cycles: int = 0,
+    progress: Progress | None = None,
+) -> Analysis:
+    """Find where the throws of a scene lead.
+
+    Parameters
+    ----------
+    scene : str, Path, mapping or Scene
+        A scene, or what `limitsets.load` reads.
+    cells : int
+        Cells per side; they shrink towards the inner end of each side.
+    throws : int
+        Length of the orbit on which jogs, flips and the Lyapunov exponent are counted.
+    cycles : int
+        Look for all periodic orbits up to this period in each attractor; 0 looks for none.
+    progress : callable, optional
+        Called as ``progress(step, done, of)`` before each step.
+
+    Returns
+    -------
+    Analysis
+        Attractors, basins, limit sets, critical points, the goal's verdict.
+
+    Raises
+    ------
+    SceneError
+        For a scene that cannot be read.
+    GridError
+        For a number of cells that cannot be.
+    AnswerError
+        For a number of throws or a period that cannot be.
+
+    Examples
+    --------
+    >>> import limitsets as ls
+    >>> found = ls.analyse("paper-designed")
+    >>> found.goal.holds, round(found.goal.threshold, 3)  # beyond 20 in every part lies on side 2
+    (True, 19.753)
+    """
+    from limitsets.cells import grid
+    from limitsets.graph import morse_graph, transitions
+    from limitsets.maps import critical_points
+    from limitsets.scene import Scene, load
+    from limitsets.sets import attractors, basins, limit_set, spurious
+    from limitsets.sets import cycles as cycles_of
+
+    if cycles < 0:
+        raise AnswerError("the longest period", cycles, "an integer from 0", "pass cycles=0 for none")
+    steps = _Steps(9 + (cycles > 0), progress)
+    with steps.step("scene"):
+        chosen = scene if isinstance(scene, Scene) else load(scene)
+    with steps.step("transitions"):
+        graph = transitions(chosen.map, grid(chosen.domain, cells=cells))
+    with steps.step("attractors"):
+        found = attractors(graph, throws=throws)
+    with steps.step("basins"):
+        shares = basins(graph, found)
+    with steps.step("limit sets"):
+        limits = tuple(limit_set(graph, attractor) for attractor in found)
+    with steps.step("critical points"):
+        critical = critical_points(chosen.map, chosen.domain)
+    orbits: tuple[Cycle, ...] = ()
+    if cycles:
+        with steps.step("cycles"):
+            orbits = tuple(cycle for attractor in found for cycle in cycles_of(graph, cycles, attractor))
+    with steps.step("Morse graph"):
+        morse = morse_graph(graph)
+        false_sets = spurious(graph)
+    with steps.step("goal"):
+        extents = [
+            limit.extents if limit.converged else each.extents for limit, each in zip(limits, found, strict=True)
+        ]
+        asked = None if chosen.goal is None else answer(chosen.goal, graph, found, shares, extents)
+    with steps.step("assumptions"):
+        flags = other_vertex_first(chosen)
+    return Analysis(
+        chosen,
+        graph.grid,
+        graph,
+        found,
+        shares,
+        limits,
+        critical,
+        orbits,
+        morse,
+        asked,
+        flags,
+        false_sets,
+        steps.timings,
+    )

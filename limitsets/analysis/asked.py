@@ -1,0 +1,102 @@
+"""The scene's goal, asked of what was found."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from limitsets.goals import Goal, OrientedBeyond, Reaches, Verdict, evaluate
+
+if TYPE_CHECKING:
+    from limitsets.graph import TransitionGraph
+    from limitsets.sets import Attractor, Basins
+
+__all__ = ["Answered", "answer"]
+
+Extents = Mapping[int, Sequence[tuple[float, float]]]
+
+
+@dataclass(frozen=True)
+class Answered:
+    """A goal and what the analysis says to it.
+
+    Attributes
+    ----------
+    goal : Goal
+        What was asked.
+    holds : bool or None
+        None where this analysis cannot tell.
+    threshold : float or None
+        Where the goal begins or ceases to hold, see `limitsets.goals.Verdict`; None where there is no such number.
+    how : str
+        "sampled": read off sampled cells, no proof.
+    """
+
+    goal: Goal
+    holds: bool | None
+    threshold: float | None
+    how: str = "sampled"
+
+
+def _may_leave(graph: TransitionGraph) -> float:
+    """Share of the starts from which some path leaves the arm."""
+    from limitsets.graph.components import reach
+
+    leads_out = reach(graph.ranges, graph.components(), graph.ranges.exits) != 0
+    weight = graph.grid.measure
+    return float(weight[leads_out].sum() / weight.sum())
+
+
+def _after_any_throw(graph: TransitionGraph) -> Extents:
+    """Where a part can rest after one throw or more: the image of the whole domain holds all later images."""
+    from limitsets.sets.limit_set import limit_set_of
+
+    domain = graph.grid.domain
+    whole = {side: [(float(domain.lo[side, 0]), float(domain.hi[side, 0]))] for side in range(domain.sides)}
+    return limit_set_of(graph.map, whole, domain, most_images=1).extents
+
+
+def answer(
+    goal: Goal, graph: TransitionGraph, attractors: Sequence[Attractor], basins: Basins, extents: Sequence[Extents]
+) -> Answered:
+    """Ask a goal.
+
+    Parameters
+    ----------
+    goal : Goal
+        From the scene.
+    graph : TransitionGraph
+        Transitions of the scene's map.
+    attractors : sequence of Attractor
+        What was found.
+    basins : Basins
+        Which starts go where.
+    extents : sequence of mapping
+        Per attractor its best known extents [scene's unit].
+
+    Returns
+    -------
+    Answered
+    """
+    orders = {attractor.flip_order for attractor in attractors}
+    order = next(iter(orders)) if len(orders) == 1 else None
+    leaving = _may_leave(graph) if goal.from_anywhere or not attractors else 0.0
+    wanted = [_after_any_throw(graph)] if goal.from_anywhere else list(extents)
+    asked = [
+        evaluate(goal, each, flip_order=order, fractions=basins.attractors, leaving=leaving) for each in wanted or [{}]
+    ]
+    # A part beyond x, and an orbit that gets there: the first goal asks for all limit sets, the second for each.
+    verdict = max(asked, key=_threshold) if isinstance(goal, OrientedBeyond) else min(asked, key=_threshold)
+    holds = verdict.holds
+    if isinstance(goal, OrientedBeyond) and not any(wanted):
+        holds = None  # nothing stays on the arm: the sentence would hold of nothing
+    if isinstance(goal, Reaches) and holds and not goal.from_anywhere and _may_leave(graph) > 0:
+        holds = None  # some starts leave before they get there
+    threshold = verdict.threshold if verdict.threshold is not None and math.isfinite(verdict.threshold) else None
+    return Answered(goal, holds, threshold)
+
+
+def _threshold(verdict: Verdict) -> float:
+    return 0.0 if verdict.threshold is None else verdict.threshold

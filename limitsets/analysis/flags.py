@@ -1,0 +1,91 @@
+"""Where an assumption of the model is broken: a flag beside the answers, never a state of the map."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from limitsets.scene import Scene
+
+__all__ = ["other_vertex_first", "overlap"]
+
+Extents = Mapping[int, Sequence[tuple[float, float]]]
+
+SAMPLES = 4096
+
+
+def where(true: Callable[[NDArray[np.float64]], NDArray[np.bool_]], x: NDArray[np.float64]) -> list[tuple[float, float]]:
+    """Intervals on which a condition holds, seen at samples, their ends bisected down to adjacent floats."""
+    seen = true(x)
+    changes = np.flatnonzero(seen[1:] != seen[:-1])
+    lo, hi, before = x[changes], x[changes + 1], seen[changes]
+    while True:
+        middle = lo + 0.5 * (hi - lo)
+        if not ((middle > lo) & (middle < hi)).any():
+            break
+        same = true(middle) == before
+        lo, hi = np.where(same, middle, lo), np.where(same, hi, middle)
+    # The end of a true stretch is the last float where the condition holds.
+    ends = np.where(before, lo, hi).tolist()
+    if seen[0]:
+        ends.insert(0, float(x[0]))
+    if seen[-1]:
+        ends.append(float(x[-1]))
+    return list(zip(ends[::2], ends[1::2], strict=True))
+
+
+def other_vertex_first(scene: Scene) -> dict[int, list[tuple[float, float]]]:
+    """Find the starts from which another vertex than the left one would land first.
+
+    The part has then turned by more than the exterior angle at its left vertex, and the model's formulas speak of a
+    landing that does not take place.
+
+    Parameters
+    ----------
+    scene : Scene
+        The scene.
+
+    Returns
+    -------
+    dict of int to list of (lo, hi)
+        Per side of the part the intervals of `scene.domain`, ascending [scene's unit]; an empty list where it never
+        happens.  Between 4096 samples a narrower interval may be missed.
+
+    Examples
+    --------
+    >>> import limitsets as ls
+    >>> from limitsets.analysis import other_vertex_first
+    >>> [(side, round(lo, 4)) for side, parts in other_vertex_first(ls.load("paper-designed")).items() for lo, _ in parts]
+    [(0, 20.1517), (1, 26.4235)]
+    """
+    from limitsets.thrower import impact_angles
+
+    found = {}
+    for side in range(len(scene.sides)):
+        corner = float(scene.sides.corner[side])
+        x = np.linspace(float(scene.domain.lo[side, 0]), float(scene.domain.hi[side, 0]), SAMPLES)
+        found[side] = where(lambda at, k=side, angle=corner: impact_angles(scene.map, at, k) > angle, x)  # type: ignore[misc]
+    return found
+
+
+def overlap(some: Extents, others: Extents) -> dict[int, list[tuple[float, float]]]:
+    """Intersect two sets of intervals per side; sides without any are left out.
+
+    Examples
+    --------
+    >>> from limitsets.analysis import overlap
+    >>> overlap({0: [(1.0, 3.0)]}, {0: [(2.0, 5.0)], 1: [(0.0, 1.0)]})
+    {0: [(2.0, 3.0)]}
+    """
+    found = {}
+    for side, intervals in some.items():
+        parts = [
+            (max(a, lo), min(b, hi)) for a, b in intervals for lo, hi in others.get(side, ()) if max(a, lo) <= min(b, hi)
+        ]
+        if parts:
+            found[side] = parts
+    return found

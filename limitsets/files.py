@@ -1,0 +1,51 @@
+"""Files that are replaced whole: a crash or Ctrl-C while they are written leaves the old ones as they were."""
+
+from __future__ import annotations
+
+import shutil
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+__all__ = ["replaced"]
+
+
+@contextmanager
+def replaced(folder: str | Path) -> Iterator[Path]:
+    """Write files into a draft folder first; they go into place, one rename each, once all of them are written.
+
+    The draft lies inside `folder`, which is made if it is not there: a rename never crosses to another disk.
+
+    Parameters
+    ----------
+    folder : str or Path
+        Where the files belong.
+
+    Yields
+    ------
+    Path
+        The draft folder; whatever files stand in it at the end are moved.
+
+    Raises
+    ------
+    OSError
+        The folder cannot be made or written.
+
+    Examples
+    --------
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     with replaced(folder) as draft:
+    ...         _ = (draft / "numbers.txt").write_text("1 2 3")
+    ...     (Path(folder) / "numbers.txt").read_text()
+    '1 2 3'
+    """
+    place = Path(folder)
+    place.mkdir(parents=True, exist_ok=True)
+    draft = Path(tempfile.mkdtemp(prefix=".draft-", dir=place))
+    try:
+        yield draft
+        for file in sorted(draft.iterdir()):
+            file.replace(place / file.name)
+    finally:
+        shutil.rmtree(draft, ignore_errors=True)

@@ -1,0 +1,84 @@
+"""Boxes of target cells on their way to becoming ranges."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from limitsets.graph.target import Target, place
+from limitsets.jit import kernel
+
+__all__ = ["Boxes", "leaving", "merged", "placed"]
+
+
+@dataclass(frozen=True, eq=False)
+class Boxes:
+    """Boxes of cells of one side: `cell` (local, ascending), `side`, `lo`, `hi` of shape (n, dimension), `exits`."""
+
+    cell: NDArray[np.int64]
+    side: NDArray[np.int32]
+    lo: NDArray[np.int32]
+    hi: NDArray[np.int32]
+    exits: NDArray[np.uint8]
+    second_pass: float
+
+
+@kernel(entry=True)
+def _place_hulls(
+    target: Target, side: Any, lo: Any, hi: Any, pad: int, k: Any, m: Any, exits: Any, met: Any
+) -> None:
+    for box in range(side.size):
+        out, meets = 0, True
+        for axis in range(lo.shape[1]):
+            k[box, axis], m[box, axis], leaves = place(
+                target, np.int64(side[box]), axis, lo[box, axis], hi[box, axis], pad, np.int64(0)
+            )
+            if leaves >= 0:
+                out |= 1 << leaves
+            meets &= m[box, axis] >= k[box, axis]
+        exits[box], met[box] = out, meets
+
+
+def placed(
+    target: Target, cell: NDArray[np.int64], side: NDArray[np.int64], lo: Any, hi: Any, pad: int, inside: bool
+) -> Boxes:
+    """Boxes of the given hulls; `inside`: they are forced images, which do not count as leaving."""
+    count, dimension = lo.shape
+    k, m = np.empty((count, dimension), np.int32), np.empty((count, dimension), np.int32)
+    exits, met = np.empty(count, np.uint8), np.empty(count, np.bool_)
+    _place_hulls(target, side, np.ascontiguousarray(lo), np.ascontiguousarray(hi), pad, k, m, exits, met)
+    leaves = np.zeros(count, np.uint8) if inside else exits
+    return Boxes(cell[met], side[met].astype(np.int32), k[met], m[met], _per_cell(cell, leaves), 0.0)
+
+
+def _per_cell(cell: NDArray[np.int64], exits: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    found = np.zeros(int(cell.max(initial=-1)) + 1, np.uint8)
+    np.bitwise_or.at(found, cell, exits)
+    return found
+
+
+def leaving(target: Target, cell: NDArray[np.int64], code: NDArray[np.int64], dimension: int) -> Boxes:
+    """Mark the exits that codes name, without boxes."""
+    bits = (1 << target.sink_of_code[-code]).astype(np.uint8)
+    nothing, none = np.empty(0, np.int64), np.empty((0, dimension), np.int32)
+    return Boxes(nothing, nothing.astype(np.int32), none, none, _per_cell(cell, bits), 0.0)
+
+
+def merged(parts: list[Boxes], n: int, second: float) -> Boxes:
+    """Boxes of all parts, by cell."""
+    cell = np.concatenate([part.cell for part in parts])
+    order = np.argsort(cell, kind="stable")
+    exits = np.zeros(n, np.uint8)
+    for part in parts:
+        exits[: part.exits.size] |= part.exits
+    return Boxes(
+        cell[order],
+        np.concatenate([part.side for part in parts])[order],
+        np.concatenate([part.lo for part in parts])[order],
+        np.concatenate([part.hi for part in parts])[order],
+        exits,
+        second,
+    )

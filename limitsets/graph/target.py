@@ -1,0 +1,102 @@
+"""The grid that images land on, and which of its closed cells an interval meets."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from limitsets.cells import Grid
+from limitsets.jit import kernel
+from limitsets.maps import codes
+
+__all__ = ["Target", "place"]
+
+
+class Target(NamedTuple):
+    """The grid that images land on, as kernels take it."""
+
+    edges: NDArray[np.float64]  # all axes of all sides, one after the other
+    begin: NDArray[np.int64]  # (n_sides, dimension): where an axis begins in `edges`
+    cells: NDArray[np.int64]  # (n_sides, dimension)
+    per_length: NDArray[np.float64]  # cells per length of a uniform axis, 0 on a graded one
+    sink_below: int
+    sink_above: int
+    sink_of_code: NDArray[np.int64]  # exit number of code -k at [k]
+
+    @classmethod
+    def of(cls, grid: Grid, exits: dict[str, int]) -> Target:
+        """Flatten a grid."""
+        axes = [edges for side in grid.edges for edges in side]
+        begin = np.concatenate([[0], np.cumsum([axis.size for axis in axes])[:-1]])
+        graded = grid.domain.anchor is not None
+        rate = [0.0 if graded else (axis.size - 1) / (axis[-1] - axis[0]) for axis in axes]
+        sink = np.zeros(8, dtype=np.int64)
+        numbers = {code: number for number, code in enumerate(exits.values())}
+        for code, number in numbers.items():
+            sink[-code] = number
+        below = numbers.get(codes.INWARD, numbers.get(codes.OUTSIDE, 0))
+        above = numbers.get(codes.OUTWARD, 0)
+        shape = (grid.sides, grid.dimension)
+        return cls(
+            np.concatenate(axes),
+            begin.reshape(shape),
+            grid.shape,
+            np.array(rate).reshape(shape),
+            below,
+            above,
+            sink,
+        )
+
+
+@kernel
+def first_meeting(target: Target, side: Any, axis: Any, x: Any, hint: Any) -> Any:
+    """Smallest position whose closed cell reaches x or beyond; the number of cells if none does."""
+    begin, n = target.begin[side, axis], target.cells[side, axis]
+    rate = target.per_length[side, axis]
+    k: Any = np.int64(hint)
+    if rate > 0.0:
+        u = (x - target.edges[begin]) * rate
+        k = np.int64(min(max(u, 0.0), n - 1.0))
+    k = min(max(k, 0), n - 1)
+    while k > 0 and target.edges[begin + k] >= x:
+        k -= 1
+    while k < n and target.edges[begin + k + 1] < x:
+        k += 1
+    return k
+
+
+@kernel
+def last_meeting(target: Target, side: Any, axis: Any, x: Any, hint: Any) -> Any:
+    """Largest position whose closed cell begins at x or before; -1 if none does."""
+    begin, n = target.begin[side, axis], target.cells[side, axis]
+    rate = target.per_length[side, axis]
+    k: Any = np.int64(hint)
+    if rate > 0.0:
+        u = (x - target.edges[begin]) * rate
+        k = np.int64(min(max(u, 0.0), n - 1.0))
+    k = min(max(k, 0), n - 1)
+    while k < n - 1 and target.edges[begin + k + 1] <= x:
+        k += 1
+    while k >= 0 and target.edges[begin + k] > x:
+        k -= 1
+    return k
+
+
+@kernel
+def place(
+    target: Target, side: Any, axis: Any, lo: Any, hi: Any, pad: int, hint: Any
+) -> tuple[Any, Any, Any]:
+    """Positions that [lo, hi] meets along one axis, and the exit it reaches past (-1: none)."""
+    begin, n = target.begin[side, axis], target.cells[side, axis]
+    leaves = -1
+    if lo < target.edges[begin]:
+        leaves = target.sink_below
+    if hi > target.edges[begin + n]:
+        leaves = target.sink_above
+    k = first_meeting(target, side, axis, lo, hint)
+    m = last_meeting(target, side, axis, hi, k)
+    if m >= k:
+        k, m = max(k - pad, 0), min(m + pad, n - 1)
+    return k, m, leaves

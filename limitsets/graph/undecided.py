@@ -1,0 +1,146 @@
+"""Images of cells on which the branch changes.
+
+In one dimension a cell is cut where the branch changes and each piece gets its image.  Otherwise the cell gets the
+image of every branch that one of its points takes, from all its points: together with the closed cells that is the
+closed relation, which holds the limits from both sides.  Ways out are taken from real images only; the image of a
+whole cell under a forced branch is clipped to the domain.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from limitsets.graph.boxes import Boxes, leaving, placed
+from limitsets.graph.images import Samples
+from limitsets.graph.target import Target
+from limitsets.jit import kernel
+from limitsets.maps import codes, images_on, kind_of
+from limitsets.maps.contract import on_side
+from limitsets.maps.drivers import step
+
+__all__ = ["every_branch", "split"]
+
+# Pieces that one cell may be cut into; a seventh would need cells far too coarse for anything.
+MOST_PIECES = 6
+
+# A forced image this close to a real one, relative to the domain's size, comes from the same branch.
+SAME_IMAGE = 1e-9
+
+
+@kernel(entry=True)
+def _pieces(
+    params: Any, side: int, lo: Any, hi: Any, most: int, x: Any, side_after: Any, code_after: Any
+) -> None:
+    """Cut [lo, hi] where the branch changes: images of the ends of up to `most` pieces, in the order met."""
+    here = on_side(params, side)
+    for cell in range(lo.size):
+        left = lo[cell]
+        end, to_end, code_end = step(here, hi[cell], side)
+        for piece in range(most):
+            x[cell, piece, 0], side_after[cell, piece], code_after[cell, piece] = step(here, left, side)
+            if code_after[cell, piece] == code_end and side_after[cell, piece] == to_end:
+                x[cell, piece, 1] = end
+                break
+            a, b = left, hi[cell]
+            while True:
+                middle = 0.5 * (a + b)
+                if not a < middle < b:
+                    break
+                _, to, code = step(here, middle, side)
+                if code == code_after[cell, piece] and to == side_after[cell, piece]:
+                    a = middle
+                else:
+                    b = middle
+            x[cell, piece, 1], _, _ = step(here, a, side)
+            left = b
+
+
+def split(params: Any, side: int, target: Target, samples: Samples, cells: NDArray[np.int64]) -> list[Boxes]:
+    """Images of the pieces of undecided cells in one dimension."""
+    edges = samples.axes[0]
+    shape = (cells.size, MOST_PIECES)
+    x = np.full((*shape, 2), np.nan)
+    to: NDArray[np.int64] = np.zeros(shape, np.int64)
+    code: NDArray[np.int64] = np.full(shape, codes.UNSETTLED, np.int64)
+    _pieces(params, side, edges[cells], edges[cells + 1], MOST_PIECES, x, to, code)
+    owner = np.repeat(cells, MOST_PIECES)
+    code, to, ends = code.reshape(-1), to.reshape(-1), x.reshape(-1, 2)
+    real = (code > codes.OUTSIDE_MODEL) & np.isfinite(ends).all(axis=1)
+    found = [
+        placed(
+            target,
+            owner[real],
+            to[real],
+            ends[real].min(axis=1, keepdims=True),
+            ends[real].max(axis=1, keepdims=True),
+            samples.pad,
+            inside=False,
+        )
+    ]
+    gone = (code < 0) & (code != codes.UNSETTLED)
+    return [*found, leaving(target, owner[gone], code[gone], 1)]
+
+
+def every_branch(
+    params: Any,
+    side: int,
+    target: Target,
+    samples: Samples,
+    cells: NDArray[np.int64],
+    numbers: NDArray[np.int64],
+    seen: Any,
+) -> list[Boxes]:
+    """Images of undecided cells: under every branch that one of their points takes, from all their points.
+
+    Without forced images (a map that has only `image`) each branch is given the points that take it.
+    """
+    kind = kind_of(params)
+    after, to, code = seen
+    size = max(float(np.ptp(target.edges)), 1.0)
+    real = np.stack([values[numbers] for values in after], axis=-1)  # (cells, points, dimension)
+    to, code = to[numbers].astype(np.int64), code[numbers].astype(np.int64)
+    landed = (code > codes.OUTSIDE_MODEL) & np.isfinite(real).all(axis=-1)
+    found = []
+    owner = np.repeat(cells, numbers.shape[1])
+    gone = ((code < 0) | ~landed).ravel()
+    named = np.where(code < 0, code, codes.OUTSIDE).ravel()
+    found.append(leaving(target, owner[gone], named[gone], real.shape[-1]))
+    # Points that land beyond the domain leave, whichever box they end up in.
+    flat = landed.ravel()
+    points = real.reshape(-1, real.shape[-1])[flat]
+    alone = placed(target, owner[flat], to.ravel()[flat], points, points, 0, inside=False)
+    found.append(Boxes(alone.cell[:0], alone.side[:0], alone.lo[:0], alone.hi[:0], alone.exits, 0.0))
+    if kind.has_image_on:
+        starts = np.stack(samples.points(), axis=-1)[numbers].reshape(-1, real.shape[-1])
+        for branch in range(len(kind.branches)):
+            forced, forced_to = images_on(
+                params, starts if real.shape[-1] > 1 else starts[:, 0], side, branch
+            )
+            forced, forced_to = forced.reshape(real.shape), forced_to.reshape(to.shape)
+            close = (np.abs(forced - real) <= SAME_IMAGE * size).all(axis=-1) & (forced_to == to)
+            taken = ((code == branch) | ((code < 0) & landed & close)).any(axis=1)
+            taken &= np.isfinite(forced).all(axis=(1, 2))
+            hull = forced[taken]
+            found.append(
+                placed(
+                    target,
+                    cells[taken],
+                    forced_to[taken, 0],
+                    hull.min(axis=1),
+                    hull.max(axis=1),
+                    samples.pad,
+                    True,
+                )
+            )
+        return found
+    for key in {(int(c), int(t)) for c, t in zip(code[landed], to[landed], strict=True)}:
+        mine = landed & (code == key[0]) & (to == key[1])
+        some = mine.any(axis=1)
+        lo = np.where(mine[..., None], real, np.inf).min(axis=1)[some]
+        hi = np.where(mine[..., None], real, -np.inf).max(axis=1)[some]
+        sides = np.full(int(some.sum()), key[1])
+        found.append(placed(target, cells[some], sides, lo, hi, samples.pad, True))
+    return found

@@ -1,0 +1,270 @@
+"""One throw, every model of flight and criterion of the flip, against 50 digits on random parts."""
+
+from __future__ import annotations
+
+import math
+from functools import cache
+from typing import Any
+
+import numpy as np
+import pytest
+
+from limitsets import maps
+from limitsets.maps import drivers
+from limitsets.thrower import Throw, fly, throw_map, trace
+from tests.thrower import reference
+from tests.thrower.reference import Facts
+
+FLIGHTS = ("exact", "small-angle", "small-angle-2")
+FLIPS = ("signed", "energy")
+MODELS = [(flight, flip) for flight in FLIGHTS for flip in FLIPS]
+KAPPA = ("below d", "between", "above ell")
+# Closer to the edge between two outcomes than this (relative), rounding decides.
+TIE = 1e-9
+
+
+@cache
+def random_scenes(flight: str, flip: str) -> list[tuple[str, Facts, int, float]]:
+    """Random parts and starts, as many for each of the three kinds of kappa."""
+    rng = np.random.default_rng(7)
+    found = []
+    for k in range(150):
+        n = int(rng.integers(3, 6))
+        a, d = rng.uniform(0.2, 5.0, n), rng.uniform(0.1, 4.0, n)
+        side = int(rng.integers(n))
+        ell = math.hypot(a[side], d[side])
+        kind = KAPPA[k % 3]
+        if kind == "below d":
+            kappa = float(rng.uniform(0.3, 0.98) * d[side])
+        elif kind == "between":
+            kappa = float(rng.uniform(d[side], ell))
+        else:
+            kappa = float(ell * math.exp(rng.uniform(0.01, 3.0)))
+        # From 1e-6 to beyond the last start that lands within a full turn.
+        x = float(a[side] + 10.0 ** rng.uniform(-6.0, math.log10(1.1 * math.pi * kappa)))
+        numbers = {
+            "a": a,
+            "d": d,
+            "length": a + rng.uniform(0.2, 5.0, n),
+            "corner": np.full(n, 2.0 * math.pi / n),
+            "radius_of_gyration": float(rng.uniform(0.3, 2.0)),
+            "kappa": kappa,
+            "surface_height": float(rng.uniform(-2.0, 1.0)),
+            "arm_length": 30.0,
+            "flight": flight,
+            "flip": flip,
+        }
+        found.append((kind, Facts(numbers), side, x))
+    return found
+
+
+@cache
+def answers(flight: str, flip: str) -> list[reference.Throw | None]:
+    return [reference.throw(facts, side, x) for _, facts, side, x in random_scenes(flight, flip)]
+
+
+def cases(model: tuple[str, str]) -> list[tuple[str, Facts, Throw, int, float, reference.Throw | None]]:
+    scenes = random_scenes(*model)
+    return [
+        (kind, facts, throw_map(**facts.numbers), side, x, answer)
+        for (kind, facts, side, x), answer in zip(scenes, answers(*model), strict=True)
+    ]
+
+
+def tied(facts: Facts, answer: reference.Throw) -> bool:
+    scale = answer.kinetic + abs(answer.potential)
+    a = facts.a[answer.side]
+    edges = (answer.x - a, answer.x - facts.arm_length)
+    return bool(abs(answer.margin) < TIE * scale) or any(abs(edge) < TIE for edge in edges)
+
+
+def test_the_sample_holds_every_kind() -> None:
+    exact = cases(("exact", "signed"))
+    codes = {answer.code for *_, answer in exact if answer is not None}
+    assert codes == {maps.JOG, maps.FLIP, maps.INWARD, maps.OUTWARD}
+    assert any(answer is None for *_, answer in exact)
+    several = [reference.roots_in_turn(facts, side, x) for _, facts, _, side, x, _ in exact]
+    assert sum(count >= 2 for count in several) >= 10
+    for model in MODELS:
+        ties = sum(answer is not None and tied(facts, answer) for _, facts, _, _, _, answer in cases(model))
+        assert ties <= 1
+
+
+@pytest.mark.parametrize("model", MODELS, ids="-".join)
+def test_outcome(model: tuple[str, str]) -> None:
+    for kind, facts, params, side, x, answer in cases(model):
+        found = maps.images(params, [x], side)
+        what = (kind, side, x)
+        if answer is None:
+            assert (found.code[0], found.side[0], found.x[0]) == (maps.OUTSIDE_MODEL, side, x), what
+        elif not tied(facts, answer):
+            assert (found.code[0], found.side[0]) == (answer.code, answer.side), what
+            assert found.x[0] == pytest.approx(float(answer.x), rel=1e-12, abs=1e-12), what
+
+
+@pytest.mark.parametrize("model", MODELS, ids="-".join)
+def test_flight_and_impact(model: tuple[str, str]) -> None:
+    for kind, facts, params, side, x, answer in cases(model):
+        found = fly(params, x, side)
+        what = (kind, side, x)
+        if answer is None:
+            continue
+        kappa, omega = float(facts.kappa), float(answer.omega)
+        assert found.phi == pytest.approx(float(answer.phi), rel=1e-11), what
+        assert found.omega == pytest.approx(omega, rel=1e-10, abs=1e-10), what
+        assert found.kinetic == pytest.approx(float(answer.kinetic), rel=1e-10, abs=1e-10), what
+        barrier = float(-answer.potential if answer.past else answer.potential)
+        assert found.barrier == pytest.approx(barrier, rel=1e-10, abs=1e-10 * kappa), what
+
+
+@pytest.mark.parametrize("model", MODELS, ids="-".join)
+def test_displacement_keeps_its_digits(model: tuple[str, str]) -> None:
+    for kind, facts, params, side, x, answer in cases(model):
+        if answer is None or tied(facts, answer):
+            continue
+        found = trace(params, x, side, 1)
+        if found.stopped != "stalled":
+            assert found.displacement[0] == pytest.approx(float(answer.displacement), rel=1e-10), (
+                kind,
+                side,
+                x,
+            )
+            assert found.turned[0] == (answer.side - side) % len(facts.a)
+
+
+def slope(params: Throw, side: int, branch: int, x: float) -> float:
+    out = np.empty(1)
+    drivers._slopes(params, np.array([side]), np.array([branch]), np.array([x]), out)
+    return float(out[0])
+
+
+@pytest.mark.parametrize("flight", FLIGHTS)
+@pytest.mark.parametrize("branch", [maps.JOG, maps.FLIP])
+def test_forced_branches_and_their_slopes(flight: str, branch: int) -> None:
+    for kind, facts, params, side, x, answer in cases((flight, "signed"))[::2]:
+        if answer is None:
+            continue
+        what = (kind, side, x)
+        after, side_after = maps.images_on(params, [x], side, branch)
+        place = reference.land(facts, side, reference.mpf(x), answer.phi, branch == maps.FLIP)
+        assert after[0] == pytest.approx(float(place), rel=1e-12, abs=1e-12), what
+        assert side_after[0] == ((side + 1) % len(facts.a) if branch == maps.FLIP else side)
+        expected = float(reference.slope(facts, side, x, answer.phi, branch == maps.FLIP))
+        assert slope(params, side, branch, x) == pytest.approx(expected, rel=1e-8, abs=1e-8), what
+
+
+# ---------------------------------------------------------------- the ends of the model
+
+
+@pytest.mark.parametrize("flight", FLIGHTS)
+@pytest.mark.parametrize("reach", [1e-2, 1e-5, 1e-9, 1e-13, 0.0])
+def test_relative_accuracy_close_to_the_vertex(flight: str, reach: float) -> None:
+    facts = reference.paper("designed", flight=flight)
+    params = throw_map(**facts.numbers)
+    for side in range(3):
+        a = facts.numbers["a"][side]
+        x = a + reach if reach else math.nextafter(a, math.inf)
+        answer = reference.throw(facts, side, x)
+        assert answer is not None
+        assert answer.code == maps.JOG
+        assert fly(params, x, side).phi == pytest.approx(float(answer.phi), rel=1e-14)
+        found = drivers._displacement(params, x, side)
+        assert found == pytest.approx(float(answer.displacement), rel=1e-13)
+        assert found > 0.0
+
+
+def test_an_orbit_that_rounding_holds_is_stalled_and_no_fixed_point() -> None:
+    params = throw_map(**reference.paper("designed").numbers)
+    x = math.nextafter(params.a[0], math.inf)
+    path = maps.orbit(params, x, 0, 100)
+    assert path.stopped == "stalled"
+    assert path.x.tolist() == [x]
+    assert path.code.size == 0
+    # At h = 0.2 the jogs of side 0 have a true fixed point near 4.64: an orbit there goes on.
+    still = throw_map(**reference.paper("designed", surface_height=0.2).numbers)
+    lo, hi = 4.0, 5.0
+    for _ in range(200):
+        middle = 0.5 * (lo + hi)
+        lo, hi = (middle, hi) if drivers._displacement(still, middle, 0) < 0.0 else (lo, middle)
+    assert lo == pytest.approx(4.64, abs=0.005)
+
+
+@pytest.mark.parametrize("flip", FLIPS)
+def test_an_impact_beyond_a_full_turn_is_outside_the_model(flip: str) -> None:
+    facts = reference.paper("designed", kappa=5.0, arm_length=1e6, flip=flip)
+    params = throw_map(**facts.numbers)
+    # f(2 pi) = 2 pi (x - pi kappa); kappa > ell, so there is one root.
+    for side in range(3):
+        edge = math.pi * 5.0
+        found = maps.images(params, [edge * (1 - 1e-9), edge * (1 + 1e-9), 1e3, 1e200], side)
+        assert found.code[0] != maps.OUTSIDE_MODEL
+        assert found.code[1:].tolist() == [maps.OUTSIDE_MODEL] * 3
+        assert found.x[1:].tolist() == [edge * (1 + 1e-9), 1e3, 1e200]
+        assert (found.side[1:] == side).all()
+
+
+@pytest.mark.parametrize("model", MODELS, ids="-".join)
+@pytest.mark.parametrize("kappa", [0.3, 2.5, 25.0])
+def test_starts_that_are_none(model: tuple[str, str], kappa: float) -> None:
+    params = throw_map(**reference.paper("designed", flight=model[0], flip=model[1], kappa=kappa).numbers)
+    for side in range(3):
+        starts = [params.a[side], params.a[side] - 1.0, 0.0, -5.0, -math.inf, math.nan, math.inf]
+        assert (maps.images(params, starts, side).code == maps.OUTSIDE_MODEL).all()
+
+
+def test_the_second_pass() -> None:
+    for name in ("initial", "designed"):
+        params = throw_map(**reference.paper(name).numbers)
+        for side in range(3):
+            reach = np.geomspace(1e-12, params.arm_length - params.a[side], 20_000)
+            assert maps.images(params, params.a[side] + reach, side).second_pass == 0.0
+    several = throw_map(**reference.paper("designed", kappa=1.0).numbers)
+    assert maps.images(several, [5.0, 6.0], 0).second_pass == 1.0
+    small = throw_map(**reference.paper("designed-small", kappa=1.0).numbers)
+    assert maps.images(small, [5.0, 6.0], 0).second_pass == 0.0
+
+
+def test_grazing_switches_between_roots() -> None:
+    # kappa < ell: the height touches the arm early, or misses it and comes down much later.
+    facts = Facts(
+        {
+            "a": [4.0, 1.0, 1.0],
+            "d": [0.1, 1.0, 1.0],
+            "length": [6.0, 2.0, 2.0],
+            "corner": [2.0, 2.0, 2.0],
+            "radius_of_gyration": 1.0,
+            "kappa": 1.0,
+            "surface_height": -0.1,
+            "arm_length": 30.0,
+            "flight": "exact",
+            "flip": "signed",
+        }
+    )
+    params = throw_map(**facts.numbers)
+    kinds: dict[int, list[float]] = {}
+    for x in np.linspace(4.001, 6.5, 40):
+        count = reference.roots_in_turn(facts, 0, float(x))
+        answer = reference.impact(facts, 0, float(x))
+        found = fly(params, float(x), 0).phi
+        kinds.setdefault(count, []).append(found)
+        if answer is None:
+            assert maps.images(params, [x], 0).code[0] == maps.OUTSIDE_MODEL
+        else:
+            assert found == pytest.approx(float(answer), rel=1e-10)
+    assert len(kinds) >= 2
+
+
+def test_wrong_parameters_are_refused() -> None:
+    numbers: dict[str, Any] = reference.paper("designed").numbers
+    for change, allowed in (
+        ({"flight": "medium"}, "exact"),
+        ({"flip": "sometimes"}, "signed"),
+        ({"kappa": 0.0}, "> 0"),
+        ({"arm_length": -1.0}, "> 0"),
+        ({"a": [1.0, 2.0]}, "equal length"),
+        ({"d": [1.0, math.nan, 1.0]}, "finite"),
+    ):
+        with pytest.raises(maps.contract.MapError, match=allowed):
+            throw_map(**{**numbers, **change})
+    with pytest.raises(maps.contract.MapError, match="0 to 2"):
+        trace(throw_map(**numbers), 8.0, 3)
