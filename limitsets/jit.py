@@ -310,7 +310,9 @@ _CACHE = _source_cache(_folder) if _folder is not None else None
 
 def _compile(function: F, options: dict[str, Any], entry: bool) -> F:
     dispatcher = numba.jit(**options, forceinline=not entry)(function)
-    if entry and _CACHE is not None and hasattr(dispatcher, "_cache"):
+    # The folder's name vouches for the package's own files only: a loop defined elsewhere is not kept.
+    inside = PACKAGE in Path(function.__code__.co_filename).resolve().parents
+    if entry and inside and _CACHE is not None and hasattr(dispatcher, "_cache"):
         dispatcher._cache = _CACHE(function)
     return dispatcher  # type: ignore[no-any-return]  # a dispatcher is called like the function
 
