@@ -14,4 +14,8 @@ for name in limitsets.__all__:
 rooms = [f"limitsets.{module.name}" for module in iter_modules(limitsets.__path__)]
 shown = {f"limitsets.{name}" for name in limitsets.__all__} | {"limitsets.__main__"}
 pdoc.render.configure(docformat="numpy")
-pdoc.pdoc("limitsets", *(room for room in rooms if room not in shown), output_directory=Path(__file__).parent / "api")
+pdoc.pdoc(
+    "limitsets",
+    *(room for room in rooms if room not in shown),
+    output_directory=Path(__file__).parent / "api",
+)

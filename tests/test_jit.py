@@ -16,6 +16,7 @@ import pytest
 
 import limitsets.jit
 from limitsets.jit import generic, kernel, proof_kernel
+from limitsets.maps import drivers
 
 FUSED = re.compile(r"\bv?fn?m(?:add|sub|la|ls)\w*")
 
@@ -396,12 +397,12 @@ def _compiled_estimate() -> Any:
     return compiled
 
 
-def test_a_small_kernel_leaves_no_file_and_an_entry_has_the_package_cache() -> None:
-    small: Any = kernel(multiply_add)
-    entry: Any = kernel(entry=True)(multiply_add)
-    assert type(small._cache).__name__ == "NullCache"
+def test_only_entries_of_the_package_are_kept() -> None:
+    compiled: list[Any] = [kernel(entry=True)(multiply_add), drivers.step, drivers._images]
+    caches = [type(one._cache) for one in compiled]
+    assert [cache.__name__ for cache in caches[:2]] == ["NullCache", "NullCache"]
     if limitsets.jit._CACHE is not None:
-        assert type(entry._cache) is limitsets.jit._CACHE
+        assert caches[2] is limitsets.jit._CACHE
 
 
 def test_numba_still_has_the_internals_the_cache_overrides() -> None:

@@ -14,9 +14,11 @@ from limitsets.maps.codes import (
     UNDECIDED,
 )
 from limitsets.maps.contract import MapKind, coerce, kind_of, register
-from limitsets.maps.critical import CriticalPoint, critical_points, turning_points
+from limitsets.maps.critical import CriticalPoint, critical_points
 from limitsets.maps.drivers import Images, Orbit, advance, images, images_on, orbit
+from limitsets.maps.forced import along
 from limitsets.maps.lyapunov import Lyapunov, lyapunov
+from limitsets.maps.pieces import Piece, TurningPoint, monotone_pieces, turning_points
 
 # One line for each textbook map; `as` makes the name public.
 from limitsets.maps.textbook.baker import Baker as Baker
@@ -47,7 +49,10 @@ __all__ = [
     "Lyapunov",
     "MapKind",
     "Orbit",
+    "Piece",
+    "TurningPoint",
     "advance",
+    "along",
     "coerce",
     "critical_points",
     "domain_of",
@@ -55,6 +60,7 @@ __all__ = [
     "images_on",
     "kind_of",
     "lyapunov",
+    "monotone_pieces",
     "orbit",
     "register",
     "turning_points",

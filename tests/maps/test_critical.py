@@ -11,7 +11,8 @@ import limitsets as ls
 from limitsets import maps
 from limitsets.cells import Domain, as_domain
 from limitsets.errors import AnswerError
-from limitsets.maps.critical import along, critical_points, margins, monotone_pieces, turning_points
+from limitsets.maps import along, critical_points, monotone_pieces, turning_points
+from limitsets.maps.critical import margins
 from limitsets.thrower import Energy, Exact, Signed, SmallAngle, throw_map
 
 CRITERIA = [(SmallAngle, Energy), (SmallAngle, Signed), (Exact, Energy), (Exact, Signed)]

@@ -10,7 +10,7 @@ import limitsets as ls
 from limitsets import maps
 from limitsets.cells import CellSet, as_domain
 from limitsets.errors import AnswerError
-from limitsets.sets.cycles import cycles_from, cycles_of
+from limitsets.sets import cycles_from, cycles_of
 
 UNIT = as_domain([(0.0, 1.0)])
 ALL = {0: [(0.0, 1.0)]}

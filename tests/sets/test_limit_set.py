@@ -8,7 +8,7 @@ import limitsets as ls
 from limitsets import maps
 from limitsets.cells import as_domain
 from limitsets.errors import AnswerError
-from limitsets.sets.limit_set import limit_set_of
+from limitsets.sets import limit_set_of
 
 TABLE = {
     "paper-initial-small-angle": {

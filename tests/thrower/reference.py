@@ -59,7 +59,7 @@ def impact(facts: Facts, side: int, x: float) -> mpf | None:
         phi = 2 * (at - a) / (kappa - (d if facts.flight == "small-angle-2" else 0))
         return phi if 0 < phi <= 2 * mp.pi else None
 
-    values = scan(facts, side, x)
+    values = scan(facts, side, float(x))
     below = np.flatnonzero(values <= 0.0)
     end = int(below[0]) if below.size else values.size
     # A dip between two points of the scan may touch the arm before that.
@@ -67,7 +67,7 @@ def impact(facts: Facts, side: int, x: float) -> mpf | None:
         np.flatnonzero((values[1:-1] < values[:-2]) & (values[1:-1] <= values[2:]) & (values[1:-1] < 1e-5))
         + 1
     )
-    for k in dips[dips < end]:
+    for k in dips[(dips < end) & (SCAN[dips] > 2e-3)]:
         lo, hi = mpf(SCAN[k - 1]), mpf(SCAN[k + 1])
         lowest = mp.findroot(
             lambda phi: mp.diff(lambda p: height(a, d, kappa, at, p) / p, phi), (lo + hi) / 2

@@ -8,8 +8,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from mpmath import mpf
 
 from limitsets import maps
+from limitsets.errors import MapError
 from limitsets.maps import drivers
 from limitsets.thrower import Throw, fly, throw_map, trace
 from tests.thrower import reference
@@ -28,7 +30,7 @@ def random_scenes(flight: str, flip: str) -> list[tuple[str, Facts, int, float]]
     """Random parts and starts, as many for each of the three kinds of kappa."""
     rng = np.random.default_rng(7)
     found = []
-    for k in range(150):
+    for k in range(120):
         n = int(rng.integers(3, 6))
         a, d = rng.uniform(0.2, 5.0, n), rng.uniform(0.1, 4.0, n)
         side = int(rng.integers(n))
@@ -50,7 +52,7 @@ def random_scenes(flight: str, flip: str) -> list[tuple[str, Facts, int, float]]
             "radius_of_gyration": float(rng.uniform(0.3, 2.0)),
             "kappa": kappa,
             "surface_height": float(rng.uniform(-2.0, 1.0)),
-            "arm_length": 30.0,
+            "arm_length": float(rng.uniform(6.0, 30.0)),
             "flight": flight,
             "flip": flip,
         }
@@ -102,9 +104,9 @@ def test_outcome(model: tuple[str, str]) -> None:
             assert found.x[0] == pytest.approx(float(answer.x), rel=1e-12, abs=1e-12), what
 
 
-@pytest.mark.parametrize("model", MODELS, ids="-".join)
-def test_flight_and_impact(model: tuple[str, str]) -> None:
-    for kind, facts, params, side, x, answer in cases(model):
+@pytest.mark.parametrize("flight", FLIGHTS)
+def test_flight_and_impact(flight: str) -> None:
+    for kind, facts, params, side, x, answer in cases((flight, "signed")):
         found = fly(params, x, side)
         what = (kind, side, x)
         if answer is None:
@@ -117,9 +119,9 @@ def test_flight_and_impact(model: tuple[str, str]) -> None:
         assert found.barrier == pytest.approx(barrier, rel=1e-10, abs=1e-10 * kappa), what
 
 
-@pytest.mark.parametrize("model", MODELS, ids="-".join)
-def test_displacement_keeps_its_digits(model: tuple[str, str]) -> None:
-    for kind, facts, params, side, x, answer in cases(model):
+@pytest.mark.parametrize("flight", FLIGHTS)
+def test_displacement_keeps_its_digits(flight: str) -> None:
+    for kind, facts, params, side, x, answer in cases((flight, "signed")):
         if answer is None or tied(facts, answer):
             continue
         found = trace(params, x, side, 1)
@@ -146,7 +148,7 @@ def test_forced_branches_and_their_slopes(flight: str, branch: int) -> None:
             continue
         what = (kind, side, x)
         after, side_after = maps.images_on(params, [x], side, branch)
-        place = reference.land(facts, side, reference.mpf(x), answer.phi, branch == maps.FLIP)
+        place = reference.land(facts, side, mpf(x), answer.phi, branch == maps.FLIP)
         assert after[0] == pytest.approx(float(place), rel=1e-12, abs=1e-12), what
         assert side_after[0] == ((side + 1) % len(facts.a) if branch == maps.FLIP else side)
         expected = float(reference.slope(facts, side, x, answer.phi, branch == maps.FLIP))
@@ -186,7 +188,7 @@ def test_an_orbit_that_rounding_holds_is_stalled_and_no_fixed_point() -> None:
     for _ in range(200):
         middle = 0.5 * (lo + hi)
         lo, hi = (middle, hi) if drivers._displacement(still, middle, 0) < 0.0 else (lo, middle)
-    assert lo == pytest.approx(4.64, abs=0.005)
+    assert 4.64 <= lo < 4.65
 
 
 @pytest.mark.parametrize("flip", FLIPS)
@@ -264,7 +266,7 @@ def test_wrong_parameters_are_refused() -> None:
         ({"a": [1.0, 2.0]}, "equal length"),
         ({"d": [1.0, math.nan, 1.0]}, "finite"),
     ):
-        with pytest.raises(maps.contract.MapError, match=allowed):
+        with pytest.raises(MapError, match=allowed):
             throw_map(**{**numbers, **change})
-    with pytest.raises(maps.contract.MapError, match="0 to 2"):
+    with pytest.raises(MapError, match="0 to 2"):
         trace(throw_map(**numbers), 8.0, 3)

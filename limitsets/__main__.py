@@ -1,0 +1,8 @@
+"""``python -m limitsets``."""
+
+import sys
+
+from limitsets.cli import main
+
+if __name__ == "__main__":
+    sys.exit(main())

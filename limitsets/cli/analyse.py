@@ -1,0 +1,61 @@
+"""`limitsets analyse`: where the throws lead, as a report."""
+
+from __future__ import annotations
+
+import json as json_words
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from limitsets.cli.output import Json, Scene, progress, table
+
+if TYPE_CHECKING:
+    from limitsets.analysis import Analysis
+
+__all__ = ["analyse"]
+
+MOST_CELLS = 10_000_000
+
+
+def analyse(
+    scene: Scene,
+    cells: Annotated[int, typer.Option("--cells", min=1, max=MOST_CELLS, metavar="N", help="Cells per side.")] = 4096,
+    out: Annotated[
+        Path | None,
+        typer.Option("--out", "-o", metavar="DIR", help="Folder of the report, ./NAME-analysis by default."),
+    ] = None,
+    json: Json = False,
+) -> None:
+    """Find limit sets, basins and critical points, and write report.md, analysis.json and figures."""
+    with progress() as tell:
+        from limitsets.analysis import analyse as run
+
+        analysis = run(scene, cells, progress=tell)
+        from limitsets.report import write
+
+        folder = out if out is not None else Path(f"{analysis.scene.name}-analysis")
+        files = write(analysis, folder, progress=tell)
+    if json:
+        print(json_words.dumps(analysis.to_json(), indent=2, allow_nan=False))
+    else:
+        _text(analysis)
+        typer.echo(f"report: {files[0]}")
+
+
+def _text(analysis: Analysis) -> None:
+    from limitsets.report.tables import count, intervals, percent
+
+    unit = analysis.scene.unit
+    if not analysis.attractors:
+        typer.echo("no start was found to stay on the arm")
+    for k, (attractor, extents) in enumerate(zip(analysis.attractors, analysis.extents, strict=True)):
+        typer.echo(f"limit set {k}: from {percent(analysis.basins.attractors[k])} of all starts")
+        rows = [
+            [side, intervals(parts), count(*attractor.jogs_per_visit.get(side, (0, 0)))]
+            for side, parts in extents.items()
+        ]
+        table(["side", f"x [{unit}]", "jogs per visit"], rows)
+    if analysis.goal is not None:
+        verdict = {True: "holds", False: "does not hold", None: "not decided"}[analysis.goal.holds]
+        typer.echo(f"goal {analysis.goal.goal.kind}: {verdict} ({analysis.goal.how}, not proved)")

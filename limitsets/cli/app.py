@@ -1,0 +1,45 @@
+"""The commands and the options they share."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from limitsets.cli.analyse import analyse
+from limitsets.cli.plot import plot
+from limitsets.cli.scenes import scenes
+from limitsets.cli.throw import throw
+
+__all__ = ["app"]
+
+app = typer.Typer(
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+    rich_markup_mode=None,
+)
+
+
+def _version(wanted: bool) -> None:
+    if wanted:
+        from limitsets import __version__
+
+        typer.echo(f"limitsets {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def limitsets(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version and stop.")
+    ] = False,
+) -> None:
+    """Where do the throws lead?  Limit sets, attractors and basins of a throw-and-catch parts feeder.
+
+    SCENE is the name of a built-in scene or the path of a TOML file.
+    """
+
+
+for command in (scenes, analyse, throw, plot):
+    app.command()(command)

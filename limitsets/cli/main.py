@@ -1,0 +1,83 @@
+"""Around every command: whatever goes wrong ends in one line on stderr and an exit code, never in a traceback."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Sequence
+
+from limitsets.errors import LimitsetsError
+
+__all__ = ["main"]
+
+BAD_INPUT, INTERRUPTED = 2, 130
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line.
+
+    Parameters
+    ----------
+    arguments : sequence of str, optional
+        Instead of those of the process.
+
+    Returns
+    -------
+    int
+        The exit code.
+
+    Examples
+    --------
+    >>> main(["scenes", "--json", "--out", "/dev/null/x"])  # the reason goes to stderr
+    2
+    """
+    try:
+        for stream in (sys.stdout, sys.stderr):
+            if hasattr(stream, "reconfigure"):
+                stream.reconfigure(errors="replace")  # a terminal that lacks a sign is no reason to stop
+        code = _run(arguments)
+        sys.stdout.flush()
+    except KeyboardInterrupt:
+        return _end("interrupted", INTERRUPTED)
+    except BrokenPipeError:
+        # The reader has had enough; what is still buffered must not fail again when Python exits.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0
+    except LimitsetsError as error:
+        return _end(str(error), BAD_INPUT)
+    except OSError as error:
+        place = f"{error.filename}: " if error.filename else ""
+        return _end(f"{place}{error.strerror or error}", BAD_INPUT)
+    except MemoryError:
+        return _end("not enough memory: ask for fewer cells or throws", BAD_INPUT)
+    except Exception as error:  # noqa: BLE001 - a bug; `python -X dev -m limitsets` shows where
+        if sys.flags.dev_mode:
+            raise
+        return _end(f"this is a bug in limitsets: {type(error).__name__}: {error}", BAD_INPUT)
+    return code
+
+
+def _end(reason: str, code: int) -> int:
+    try:
+        print("limitsets:", " ".join(reason.split()), file=sys.stderr, flush=True)
+    except OSError:
+        pass  # nobody is left to tell
+    return code
+
+
+def _run(arguments: Sequence[str] | None) -> int:
+    import typer
+
+    from limitsets.cli.app import app
+
+    usage_error = typer.BadParameter.__mro__[1]
+    refused = usage_error.__mro__[1]
+    words = list(sys.argv[1:] if arguments is None else arguments)
+    try:
+        code = app(words or ["--help"], prog_name="limitsets", standalone_mode=False)
+    except typer.Abort:
+        raise KeyboardInterrupt from None
+    except refused as error:
+        hint = "" if not isinstance(error, usage_error) else "; limitsets --help lists what there is"
+        return _end(f"{error.format_message().rstrip('.')}{hint}", BAD_INPUT)  # type: ignore[attr-defined]
+    return code if isinstance(code, int) else 0

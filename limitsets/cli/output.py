@@ -1,0 +1,96 @@
+"""What commands write: JSON or tables on stdout, files that are replaced whole, progress on stderr."""
+
+from __future__ import annotations
+
+import json
+import sys
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from limitsets.errors import LimitsetsError
+
+__all__ = ["Json", "Out", "Scene", "answer", "progress", "saved", "table"]
+
+Scene = Annotated[str, typer.Argument(help="A built-in name (see: limitsets scenes) or a TOML file.")]
+Json = Annotated[bool, typer.Option("--json", help="Print JSON, and nothing else, on stdout.")]
+Out = Annotated[Path | None, typer.Option("--out", "-o", metavar="FILE", help="Write the JSON to this file as well.")]
+
+# What takes longer than this says what it is doing.
+PATIENCE = 2.0
+
+
+def table(heads: Sequence[str], rows: Sequence[Sequence[object]]) -> None:
+    """Print a table, wide enough for its text where nobody looks at it on a terminal."""
+    from rich.box import SIMPLE_HEAD
+    from rich.console import Console
+    from rich.markup import escape
+    from rich.table import Table
+
+    grid = Table(box=SIMPLE_HEAD, pad_edge=False)
+    for head in heads:
+        grid.add_column(escape(head), no_wrap=not sys.stdout.isatty())
+    for row in rows:
+        grid.add_row(*(escape(str(cell)) for cell in row))
+    Console(width=None if sys.stdout.isatty() else 200).print(grid)
+
+
+@contextmanager
+def saved(file: Path) -> Iterator[Path]:
+    """Write one file whole: a draft to write to, which takes its place at the end."""
+    from limitsets.files import replaced
+
+    if file.is_dir():
+        raise LimitsetsError("the output file", str(file), "a file", "this is a folder: name a file in it")
+    try:
+        with replaced(file.parent) as draft:
+            yield draft / file.name
+    except OSError as error:
+        reason = error.strerror or str(error)
+        raise LimitsetsError(
+            "the output file", str(file), "a place that can be written", f"it could not be: {reason}"
+        ) from None
+
+
+def answer(record: Any, as_json: bool, out: Path | None, text: Callable[[], None]) -> None:
+    """Give an answer as JSON or as text, and write it to a file where one is named."""
+    words = json.dumps(record, indent=2, allow_nan=False)
+    if out is not None:
+        with saved(out) as draft:
+            draft.write_text(words + "\n", encoding="utf-8", newline="\n")
+    if as_json:
+        print(words)
+    else:
+        text()
+
+
+@contextmanager
+def progress() -> Iterator[Callable[[str, int, int], None]]:
+    """Show steps on stderr: a bar on a terminal, elsewhere a line now and then once two seconds have passed."""
+    if not sys.stderr.isatty():
+        last = time.monotonic()
+
+        def tell(step: str, done: int, of: int) -> None:
+            nonlocal last
+            if time.monotonic() - last > PATIENCE:
+                last = time.monotonic()
+                print(f"limitsets: {step} ({done + 1} of {of})", file=sys.stderr, flush=True)
+
+        yield tell
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+    columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task("reading")
+
+        def show(step: str, done: int, of: int) -> None:
+            note = " (a first run compiles: up to half a minute)" if step == "transitions" else ""
+            bar.update(task, description=step + note, completed=done, total=of)
+
+        yield show

@@ -1,0 +1,74 @@
+"""`limitsets plot`: one figure."""
+
+from __future__ import annotations
+
+import json as json_words
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from limitsets.cli.output import Json, Scene, progress, saved
+from limitsets.errors import LimitsetsError
+
+if TYPE_CHECKING:
+    from limitsets.analysis import Analysis
+
+__all__ = ["plot"]
+
+FORMATS = (".png", ".svg", ".pdf")
+DPI = 150
+
+
+class Kind(StrEnum):
+    """What to draw."""
+
+    LIMIT_SET = "limit-set"
+    MAP = "map"
+    BASINS = "basins"
+    MORSE = "morse"
+    FLIGHT = "flight"
+
+
+def plot(
+    scene: Scene,
+    kind: Annotated[Kind, typer.Argument(help="What to draw.")],
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            "--out", "-o", metavar="FILE", help=f"File ({', '.join(FORMATS)}), ./NAME-KIND.png by default."
+        ),
+    ] = None,
+    cells: Annotated[int, typer.Option("--cells", min=1, max=10_000_000, metavar="N", help="Cells per side.")] = 4096,
+    x: Annotated[str | None, typer.Option("--x", metavar="X", help="For flight: where the part rests.")] = None,
+    side: Annotated[int | None, typer.Option("--side", metavar="I", help="For flight: on which side.")] = None,
+    json: Json = False,
+) -> None:
+    """Draw one figure of a scene."""
+    if out is not None and out.suffix.lower() not in FORMATS:
+        raise LimitsetsError("the figure's file", str(out), f"a name that ends in {', '.join(FORMATS)}", "rename it")
+    if (x is None) != (side is None) or (x is not None and kind is not Kind.FLIGHT):
+        raise LimitsetsError(
+            "the throw to draw", "half given" if kind is Kind.FLIGHT else "given", "--x and --side with flight", "give both"
+        )
+    with progress() as tell:
+        from limitsets.analysis import analyse as run
+
+        analysis = run(scene, cells, progress=tell)
+        file = out if out is not None else Path(f"{analysis.scene.name}-{kind}.png")
+        _draw(analysis, kind, file, x, side)
+    if json:
+        print(json_words.dumps({"figure": str(file)}))
+    else:
+        typer.echo(f"figure: {file}")
+
+
+def _draw(analysis: Analysis, kind: Kind, file: Path, x: str | None, side: int | None) -> None:
+    from limitsets.cli.throw import position
+    from limitsets.report.write import figure
+
+    throw = None if x is None or side is None else (position(analysis.scene, x), side)
+    drawn = figure(analysis, str(kind), throw)
+    with saved(file) as draft:
+        drawn.savefig(draft, dpi=DPI)

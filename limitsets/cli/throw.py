@@ -1,0 +1,98 @@
+"""`limitsets throw`: single throws, with what is worth knowing of each."""
+
+from __future__ import annotations
+
+import math
+import re
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from limitsets.cli.output import Json, Out, Scene, answer, table
+from limitsets.errors import LimitsetsError
+
+if TYPE_CHECKING:
+    from limitsets.scene import Scene as SceneOf
+    from limitsets.thrower import Trace
+
+__all__ = ["position", "throw"]
+
+MOST_THROWS = 1_000_000
+_BARE = re.compile(r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]{1,3})?")
+
+
+def position(scene: SceneOf, text: str) -> float:
+    """Read x: with a unit, or a bare number in the scene's unit.
+
+    Raises
+    ------
+    LimitsetsError
+        No number, a unit of something else, or a place beyond the arm's end.
+    """
+    from limitsets.scene.units import convert, parse
+
+    value = float(text) if _BARE.fullmatch(text.strip()) else convert(parse(text, "length", key="--x"), scene.unit)
+    if not (math.isfinite(value) and value <= scene.arm_length):
+        allowed = f"a place on the arm, up to {scene.arm_length:g} {scene.unit}"
+        raise LimitsetsError("x", text, allowed, "start where a part can rest", key="--x")
+    return value
+
+
+def throw(
+    scene: Scene,
+    x: Annotated[str, typer.Option("--x", metavar="X", help="Where the part rests: 8, or '20 cm'.")],
+    side: Annotated[int, typer.Option("--side", metavar="I", help="On which side.")],
+    count: Annotated[int, typer.Option("--count", min=1, max=MOST_THROWS, metavar="N", help="How many throws.")] = 1,
+    json: Json = False,
+    out: Out = None,
+) -> None:
+    """Throw a part, and say what each throw does; ends at the first exit."""
+    from limitsets.scene import load
+    from limitsets.thrower import trace
+
+    chosen = load(scene)
+    path = trace(chosen.map, position(chosen, x), side, count)
+    records = _records(path)
+
+    def text() -> None:
+        rows = [[0, f"{path.x[0]:.6f}", int(path.side[0]), "start", "", "", ""]]
+        rows += [_row(number, record) for number, record in enumerate(records, start=1)]
+        unit = chosen.unit
+        table(["throw", f"x [{unit}]", "side", "status", "turned by", f"displacement [{unit}]", "flag"], rows)
+
+    answer(records, json, out, text)
+    if path.stopped == "stalled":
+        typer.echo("limitsets: stalled: the displacement is too small to change x any more; no fixed point", err=True)
+
+
+def _number(value: float) -> float | None:
+    return float(value) if math.isfinite(value) else None
+
+
+def _records(path: Trace) -> list[dict[str, Any]]:
+    from limitsets.maps import codes
+
+    return [
+        {
+            "x": _number(path.x[k + 1]),
+            "side": int(path.side[k + 1]),
+            "status": codes.NAMES[int(path.code[k])],
+            "phi": _number(path.phi[k]),
+            "displacement": _number(path.displacement[k]),
+            "other_vertex_first": bool(path.other_vertex_first[k]),
+        }
+        for k in range(path.code.size)
+    ]
+
+
+def _row(number: int, record: dict[str, Any]) -> list[Any]:
+    phi, shift = record["phi"], record["displacement"]
+    return [
+        number,
+        f"{record['x']:.6f}",
+        record["side"],
+        record["status"],
+        "-" if phi is None else f"{math.degrees(phi):.3f} deg",
+        "-" if shift is None else f"{shift:+.6g}",
+        "another vertex lands first" if record["other_vertex_first"] else "",
+    ]

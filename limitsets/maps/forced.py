@@ -1,0 +1,66 @@
+"""Steps along forced branches: where a state would go, and with what slope, whatever branch the map would take.
+
+The one-sided limit at a change of branch is a step on a forced branch, and so is a composed map whose itinerary is
+given: end points of limit sets and cycles are built on nothing else.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from limitsets.jit import kernel
+from limitsets.maps.contract import image_on
+
+__all__ = ["along"]
+
+
+@kernel(entry=True)
+def _along(params: Any, x: Any, sides: Any, branches: Any, after: Any, side_after: Any, slope: Any) -> None:
+    """Force steps: row k of `branches` for start k, or the one row for all."""
+    for k in range(x.size):
+        row = k if branches.shape[0] > 1 else 0
+        at, side, product = x[k], sides[k], 1.0
+        for j in range(branches.shape[1]):
+            at, side, factor = image_on(params, at, side, branches[row, j])
+            product *= factor
+        after[k] = at
+        side_after[k] = side
+        slope[k] = product
+
+
+def along(
+    params: Any, x: ArrayLike, side: ArrayLike, branches: ArrayLike
+) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.float64]]:
+    """Send states along forced branches.
+
+    Parameters
+    ----------
+    params : NamedTuple
+        A one-dimensional map with `image_on`.
+    x : array_like, shape (n,)
+        States.
+    side : int or array_like of int, shape (n,)
+        Their sides.
+    branches : array_like of int, shape (m,) or (n, m)
+        The branches to take one after the other, for all states or for each.
+
+    Returns
+    -------
+    x, side, slope : ndarray, shape (n,)
+        Where they end, and the derivative of the whole with respect to the start.
+
+    Examples
+    --------
+    >>> from limitsets import maps
+    >>> maps.along(maps.Doubling(2.0), [0.5], 0, [0, 1])  # from below 1/2 to 1, which stays
+    (array([1.]), array([0]), array([4.]))
+    """
+    starts = np.ascontiguousarray(x, dtype=np.float64)
+    sides = np.array(np.broadcast_to(np.asarray(side, dtype=np.int64), starts.shape))
+    words = np.ascontiguousarray(np.atleast_2d(np.asarray(branches, dtype=np.int64)))
+    after, side_after, slope = np.empty(starts.size), np.empty(starts.size, np.int64), np.empty(starts.size)
+    _along(params, starts, sides, words, after, side_after, slope)
+    return after, side_after, slope

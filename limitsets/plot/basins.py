@@ -1,0 +1,161 @@
+"""Basins: strips per side in one dimension, pictures of the plane in two."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from matplotlib.colors import BoundaryNorm, ListedColormap
+from matplotlib.patches import Patch, Rectangle
+
+from limitsets.cells import Grid
+from limitsets.errors import AnswerError
+from limitsets.maps import codes
+from limitsets.plot import style
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+    from matplotlib.typing import ColorType
+
+    from limitsets.scene import Scene
+    from limitsets.sets import Basins
+
+__all__ = ["basins"]
+
+# Lightness falls, so that neighbours differ in grey as well; hatches tell them apart in strips.
+ATTRACTORS = ("#CFE5F5", "#F0B429", "#5FB59B", "#B5548A", "#3F4E96", "#8C7A3A")
+HATCHES = ("", "///", "...", "\\\\\\", "xxx", "+++")
+OUT: dict[int, tuple[str, str, str]] = {
+    codes.INWARD: ("#6E6E6E", "ooo", "leaves inward"),
+    codes.OUTWARD: ("#3A3A3A", "", "leaves outward"),
+    codes.OUTSIDE_MODEL: ("#A8A8A8", "***", "outside the model"),
+    codes.UNDECIDED: ("#FFFFFF", "|||||", "undecided"),
+}
+
+
+def basins(source: Scene | Grid, shares: Basins, found: Any = None) -> Figure:
+    """Draw from where each attractor is reached.
+
+    Parameters
+    ----------
+    source : Scene or Grid
+        What the basins belong to; a scene gives names and units.
+    shares : Basins
+        From `limitsets.basins`, in one or two dimensions.
+    found : attractors, limit sets, one of them, or an Analysis, optional
+        Drawn as dark bars inside their basins (one dimension).
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+
+    Raises
+    ------
+    AnswerError
+        For basins in three dimensions.
+
+    Examples
+    --------
+    >>> import limitsets as ls
+    >>> analysis = ls.analyse("paper-designed")
+    >>> len(ls.plot.basins(analysis.scene, analysis.basins).axes)
+    1
+    """
+    grid = shares.grid
+    if grid.dimension > 2:
+        raise AnswerError("the dimension of the basins", grid.dimension, "1 or 2", "draw a section of them yourself")
+    name = "" if isinstance(source, Grid) else f" of {source.name}"
+    unit = "" if isinstance(source, Grid) else f" [{source.unit}]"
+    if grid.dimension == 1:
+        figure = _strips(shares, [] if found is None else style.extents_of(found), unit)
+    else:
+        figure = _plane(shares)
+    figure.suptitle(f"Basins{name}: where a start ends up", fontsize=style.TEXT + 1.5)
+    handles = _legend(shares, found is not None and grid.dimension == 1)
+    figure.legend(handles=handles, loc="outside lower center", ncols=min(3, len(handles)), fontsize=style.SMALL, frameon=False)
+    return figure
+
+
+def _look(label: int) -> tuple[str, str]:
+    if label < 0:
+        return OUT[label][:2]
+    return ATTRACTORS[label % len(ATTRACTORS)], HATCHES[label % len(HATCHES)]
+
+
+def _strips(shares: Basins, sets: list[style.Extents], unit: str) -> Figure:
+    grid = shares.grid
+    figure, (axes,) = style.canvas(9.0, 0.72 * grid.sides + 1.7)
+    for side in range(grid.sides):
+        edges, labels = grid.edges[side][0], shares.labels[grid.of_side(side)]
+        border = np.concatenate([[0], np.flatnonzero(np.diff(labels)) + 1, [labels.size]])
+        for first, last in zip(border[:-1], border[1:], strict=True):
+            _strip(axes, float(edges[first]), float(edges[last]), side, int(labels[first]))
+        for extents in sets:
+            for lo, hi in extents.get(side, ()):
+                bar = Rectangle((lo, -side - 0.07), hi - lo, 0.14, facecolor=style.INK, lw=0, zorder=3, gid="attractor")
+                axes.add_patch(bar)
+    axes.set_yticks([-side for side in range(grid.sides)], [f"side {side}" for side in range(grid.sides)])
+    axes.set_ylim(-grid.sides + 0.5, 0.5)
+    lo, hi = float(grid.domain.lo.min()), float(grid.domain.hi.max())
+    axes.set_xlim(lo - 0.01 * (hi - lo), hi + 0.01 * (hi - lo))
+    axes.set_xlabel(f"x of the start{unit}")
+    axes.tick_params(axis="y", length=0)
+    for border_line in ("left", "right", "top"):
+        axes.spines[border_line].set_visible(False)
+    return figure
+
+
+def _strip(axes: Axes, lo: float, hi: float, side: int, label: int) -> None:
+    face, hatch = _look(label)
+    axes.add_patch(
+        Rectangle(
+            (lo, -side - 0.32), hi - lo, 0.64, facecolor=face, hatch=hatch, edgecolor="#444444", lw=0.4, gid=f"label {label}"
+        )
+    )
+
+
+def _plane(shares: Basins) -> Figure:
+    grid = shares.grid
+    figure, panels = style.canvas(4.6 * grid.sides + 0.6, 5.2, 1, grid.sides)
+    kinds = sorted(set(shares.labels.tolist()))
+    colours: list[ColorType] = [_look(kind)[0] for kind in kinds]
+    number = np.searchsorted(kinds, shares.labels)
+    norm = BoundaryNorm(np.arange(len(kinds) + 1) - 0.5, len(kinds))
+    for side, axes in enumerate(panels):
+        picture = number[grid.of_side(side)].reshape(tuple(grid.shape[side]))
+        axes.pcolormesh(*grid.edges[side], picture.T, cmap=ListedColormap(colours), norm=norm, rasterized=True)
+        axes.set_xlabel("$x_0$")
+        axes.set_ylabel("$x_1$")
+        if grid.sides > 1:
+            axes.set_title(f"side {side}", fontsize=style.TEXT)
+    return figure
+
+
+def _legend(shares: Basins, bars: bool) -> list[Patch]:
+    handles = []
+    present = set(shares.labels.tolist())
+    hatched = shares.grid.dimension == 1
+    for k, share in enumerate(shares.attractors[: len(ATTRACTORS)]):
+        face, hatch = _look(k)
+        text = f"to attractor {k}: {_percent(share)} of all starts"
+        handles.append(Patch(facecolor=face, hatch=hatch if hatched else "", edgecolor="#444444", lw=0.4, label=text))
+    parts = {codes.UNDECIDED: shares.undecided_between}
+    names = {"inward": codes.INWARD, "outward": codes.OUTWARD, "outside-model": codes.OUTSIDE_MODEL}
+    parts |= {names.get(name, codes.OUTSIDE): share for name, share in shares.exits.items()}
+    for label, share in sorted(parts.items(), reverse=True):
+        if label in present:
+            face, hatch, text = OUT[label]
+            text = f"{text}: {_percent(share)}"
+            handles.append(Patch(facecolor=face, hatch=hatch if hatched else "", edgecolor="#444444", lw=0.4, label=text))
+    if bars:
+        handles.append(Patch(facecolor=style.INK, label="the attractor itself"))
+    return handles
+
+
+def _percent(share: float) -> str:
+    """Round to a tenth, but never to all or nothing."""
+    percent = 100 * share
+    if percent >= 100 - 1e-9 or percent == 0:
+        return f"{percent:.0f} %"
+    return "> 99.9 %" if percent > 99.9 else "< 0.1 %" if percent < 0.1 else f"{percent:.1f} %"

@@ -1,0 +1,201 @@
+"""One throw: the part in the air, and how it comes to rest (Fig. 3 of the paper)."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch, Polygon
+from numpy.typing import NDArray
+
+from limitsets.errors import AnswerError
+from limitsets.geometry import side_ends
+from limitsets.maps import codes
+from limitsets.plot import style
+from limitsets.thrower import fly, trace
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from limitsets.scene import Scene
+
+__all__ = ["flight"]
+
+Array = NDArray[np.float64]
+
+SHOWN = 3  # outlines in the air, and as many on the way from the impact to rest
+AIR, LANDED = "#0072B2", "#C04A00"
+
+
+def flight(scene: Scene, x: float, side: int) -> Figure:
+    """Draw one throw: above the flight up to the impact, below the way from there to rest.
+
+    Parameters
+    ----------
+    scene : Scene
+        The scene.
+    x : float
+        Where the part rests before the throw [scene's unit].
+    side : int
+        On which side.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+
+    Raises
+    ------
+    AnswerError
+        For a start from which there is no flight.
+    MapError
+        For a side that the part has not.
+
+    Examples
+    --------
+    >>> import limitsets as ls
+    >>> figure = ls.plot.flight(ls.load("paper-designed"), 21.0, 2)
+    >>> [axes.get_title(loc="left") for axes in figure.axes][1]
+    'After the impact: a flip, 21.00 to 14.37 in, onto side 0'
+    """
+    seen = trace(scene.map, x, side, 1)
+    phi = fly(scene.map, x, side).phi
+    if seen.code.size == 0 or seen.code[0] == codes.OUTSIDE_MODEL or not math.isfinite(phi):
+        least = float(scene.sides.a[side])
+        raise AnswerError("x of the throw", x, f"more than {least:.6g} on side {side}", "start where a throw lifts the part")
+    after, side_after = float(seen.x[1]), int(seen.side[1])
+    air = [_in_air(scene, x, side, angle) for angle in np.linspace(0.0, phi, SHOWN + 2)]
+    rolled = _to_rest(scene, air[-1], (side, side_after), after, phi)
+    everything = np.concatenate([*air, *rolled])
+    lo, hi = float(everything[:, 0].min()), float(everything[:, 0].max())
+    height = float(everything[:, 1].max() - min(0.0, scene.surface_height))
+    figure, (above, below) = _canvas(hi - lo + 2.0, height + 1.4)
+    for axes in (above, below):
+        _arm(axes, scene, lo - 1.0, hi + 1.0)
+        axes.set_aspect("equal")
+        axes.set_xlim(lo - 1.0, hi + 1.0)
+        axes.set_ylim(min(0.0, scene.surface_height) - 0.9, float(everything[:, 1].max()) + 0.5)
+        axes.label_outer()
+        axes.set_xlabel(f"distance from the joint [{scene.unit}]")
+    above.set_ylabel(f"height over the joint [{scene.unit}]")
+    below.set_ylabel(above.get_ylabel() if below.get_subplotspec().is_first_col() else "")  # type: ignore[union-attr]
+    above.set_xlabel(below.get_xlabel() if above.get_subplotspec().is_last_row() else "")  # type: ignore[union-attr]
+    _flight(above, scene, x, side, phi, air)
+    _landing(below, scene, rolled, after, side_after)
+    _titles(above, below, scene, (x, side), (after, side_after), phi, int(seen.code[0]))
+    gap = "" if scene.flight == "exact" else " (small-angle formulas: the vertex need not be on the arm at the impact)"
+    figure.suptitle(f"One throw of {scene.name}{gap}", fontsize=style.TEXT + 1.5)
+    figure.legend(handles=_legend(scene.flight == "exact"), loc="outside lower center", ncols=3, fontsize=style.SMALL, frameon=False)
+    return figure
+
+
+def _canvas(width: float, height: float) -> tuple[Figure, list[Axes]]:
+    """Two panels of one extent: beside each other where the picture is tall, else one above the other."""
+    if height > 0.6 * width:
+        tall = min(8.0, max(3.4, 4.6 * height / width))
+        return style.canvas(10.4, tall + 1.6, 1, 2, sharex=True, sharey=True)
+    return style.canvas(9.0, 2 * max(1.6, 8.2 * height / width) + 1.9, 2, 1, sharex=True, sharey=True)
+
+
+def _outline(scene: Scene, side: int) -> Array:
+    """Vertices about the centre of mass with `side` at the bottom, its left end first."""
+    left, right = side_ends(len(scene.vertices), side)
+    about = scene.vertices - np.asarray(scene.centre)
+    turned = _turned(about, -math.atan2(*(about[right] - about[left])[::-1]))
+    return np.roll(turned, -left, axis=0)
+
+
+def _turned(points: Array, angle: float) -> Array:
+    cosine, sine = math.cos(angle), math.sin(angle)
+    return points @ np.array([[cosine, sine], [-sine, cosine]])
+
+
+def _centre(scene: Scene, x: float, side: int, phi: float) -> Array:
+    """Centre of mass in flight after the part has turned by phi (docs/model.md, flight)."""
+    h, d, kappa = scene.surface_height, float(scene.sides.d[side]), scene.kappa
+    return np.array([x - (h + d) * phi, h + d + x * phi - 0.5 * kappa * phi * phi])
+
+
+def _in_air(scene: Scene, x: float, side: int, phi: float) -> Array:
+    return _turned(_outline(scene, side), phi) + _centre(scene, x, side, phi)
+
+
+def _to_rest(scene: Scene, landed: Array, sides: tuple[int, int], after: float, phi: float) -> list[Array]:
+    """Outlines from the impact to rest, turned about the struck vertex, which is the first.
+
+    The last one is where the map says.  By the small-angle formulas the struck vertex is not on the arm, and there is no
+    turning about it that would lead there.
+    """
+    side, side_after = sides
+    at_rest = np.array([after, scene.surface_height + float(scene.sides.d[side_after])])
+    rest = _outline(scene, side_after) + at_rest
+    if scene.flight != "exact":
+        return [landed, rest]
+    turn = -phi if side_after == side else float(scene.sides.corner[side]) - phi
+    pivot = landed[0]
+    return [*(_turned(landed - pivot, angle) + pivot for angle in np.linspace(0.0, turn, SHOWN + 1)[:-1]), rest]
+
+
+def _arm(axes: Axes, scene: Scene, lo: float, hi: float) -> None:
+    h = scene.surface_height
+    axes.plot([lo, min(hi, scene.arm_length)], [h, h], color=style.INK, lw=2.2, solid_capstyle="butt", zorder=1, gid="arm")
+    axes.fill_between([lo, min(hi, scene.arm_length)], h, h - 0.35, facecolor="#d9d9d9", hatch="////", edgecolor="#9a9a9a", lw=0)
+    if lo <= 0 <= hi:
+        axes.plot([0], [0], marker="o", ms=9, mfc="white", mec=style.INK, zorder=2, gid="joint")
+    for border in ("right", "top"):
+        axes.spines[border].set_visible(False)
+
+
+def _part(axes: Axes, corners: Array, **look: Any) -> None:
+    axes.add_patch(Polygon(corners, closed=True, **look))
+
+
+def _flight(axes: Axes, scene: Scene, x: float, side: int, phi: float, air: list[Array]) -> None:
+    _part(axes, air[0], facecolor="#dcdcdc", edgecolor=style.INK, lw=1.6, zorder=2, gid="start")
+    for k, corners in enumerate(air[1:-1]):
+        # Later ones cover earlier ones in part, as a photograph with a strobe would show them.
+        look = {"edgecolor": AIR, "lw": 1.0, "ls": (0, (3, 2))}
+        _part(axes, corners, facecolor=(0.86, 0.92, 0.97, 0.72), zorder=3 + 0.1 * k, gid="in the air", **look)
+    _part(axes, air[-1], facecolor=(0.72, 0.84, 0.93, 0.8), edgecolor=AIR, lw=2.2, zorder=4, gid="impact")
+    path = np.array([_centre(scene, x, side, angle) for angle in np.linspace(0.0, phi, 80)])
+    axes.plot(path[:, 0], path[:, 1], color=style.INK, lw=1.1, ls="-.", zorder=5, gid="path")
+    stops = np.array([_centre(scene, x, side, angle) for angle in np.linspace(0.0, phi, len(air))])
+    axes.plot(stops[:, 0], stops[:, 1], "o", ms=4, mfc="white", mec=style.INK, zorder=6, gid="centre of mass")
+    axes.plot(*air[-1][0], marker="v", ms=9, color=LANDED, zorder=7, gid="struck vertex")
+
+
+def _landing(axes: Axes, scene: Scene, rolled: list[Array], after: float, side: int) -> None:
+    _part(axes, rolled[-1], facecolor=(0.86, 0.86, 0.86, 0.85), edgecolor=style.INK, lw=1.6, zorder=2, gid="rest")
+    _part(axes, rolled[0], facecolor=(0.72, 0.84, 0.93, 0.8), edgecolor=AIR, lw=2.2, zorder=1.5, gid="impact")
+    for corners in rolled[1:-1]:
+        _part(axes, corners, facecolor="none", edgecolor=LANDED, lw=1.0, ls=":", zorder=3, gid="turning")
+    axes.plot(*rolled[0][0], marker="v", ms=9, color=LANDED, zorder=7, gid="struck vertex")
+    axes.plot(after, scene.surface_height + float(scene.sides.d[side]), "o", ms=4, mfc="white", mec=style.INK, zorder=6, gid="rest")
+
+
+def _titles(
+    above: Axes, below: Axes, scene: Scene, start: tuple[float, int], end: tuple[float, int], phi: float, code: int
+) -> None:
+    (x, side), (after, side_after) = start, end
+    text = f"In the air: from x = {x:.2f} {scene.unit} on side {side}, turning by {math.degrees(phi):.1f}°"
+    above.set_title(text, fontsize=style.TEXT, loc="left")
+    how = "flip" if side_after != side else "jog"
+    where = f"onto side {side_after}" if side_after != side else f"still on side {side}"
+    note = {codes.OUTWARD: "; off the arm's end", codes.INWARD: "; into the joint"}.get(code, "")
+    text = f"After the impact: a {how}, {x:.2f} to {after:.2f} {scene.unit}, {where}{note}"
+    below.set_title(text, fontsize=style.TEXT, loc="left")
+
+
+def _legend(turns: bool) -> list[Any]:
+    handles: list[Any] = [
+        Patch(facecolor="#dcdcdc", edgecolor=style.INK, lw=1.6, label="at rest, before and after"),
+        Patch(facecolor="#dbebf7", edgecolor=AIR, ls=(0, (3, 2)), label="in the air"),
+        Patch(facecolor="#b8d6ed", edgecolor=AIR, lw=2.2, label="at the impact"),
+        Line2D([], [], color=style.INK, ls="-.", marker="o", mfc="white", ms=4, label="path of the centre of mass"),
+        Line2D([], [], color=LANDED, marker="v", ms=8, ls="", label="struck vertex"),
+    ]
+    if turns:
+        handles.append(Line2D([], [], color=LANDED, ls=":", label="turning to rest"))
+    return handles

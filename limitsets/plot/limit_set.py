@@ -1,0 +1,231 @@
+"""The limit set side by side, with throws as arrows (Figs. 4 and 6 of the paper)."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from matplotlib.lines import Line2D
+from matplotlib.patches import FancyArrowPatch, Patch, Polygon, Rectangle
+from matplotlib.path import Path
+
+from limitsets.goals import OrientedBeyond
+from limitsets.maps import FLIP as FLIPS
+from limitsets.maps import Orbit, images
+from limitsets.maps.critical import critical_points
+from limitsets.plot import style
+from limitsets.plot.style import Extents
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from limitsets.scene import Scene
+
+__all__ = ["limit_set"]
+
+BAR = 0.085  # half the height of a bar; lanes are 1 apart
+HOP = 0.36  # height of a jog's arc
+SAMPLES = 400
+
+
+def limit_set(scene: Scene, found: Any, *, axes: Axes | None = None) -> Figure:
+    """Draw where a part comes to rest on each side, and how throws carry it on.
+
+    One lane per side; the first is repeated below the last, so that every flip goes down by one lane.  Bars are the
+    limit set.  Grey bands show where the flipping part of each bar goes, arcs and arrows the throws of one orbit.
+
+    Parameters
+    ----------
+    scene : Scene
+        The scene.
+    found : attractors, limit sets, one of them, or an Analysis
+        What to draw: anything with `extents`.
+    axes : matplotlib.axes.Axes, optional
+        Axes to draw into, without a legend; otherwise a new figure is made.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+
+    Raises
+    ------
+    AnswerError
+        For something without extents.
+
+    Examples
+    --------
+    >>> import limitsets as ls
+    >>> analysis = ls.analyse("paper-designed")
+    >>> figure = ls.plot.limit_set(analysis.scene, analysis.limit_sets)
+    >>> [label.get_text() for label in figure.axes[0].get_yticklabels()]
+    ['side 0', 'side 1', 'side 2', 'side 0\\nagain']
+    """
+    sets = style.extents_of(found)
+    count = len(scene.sides)
+    alone = axes is None
+    if axes is None:
+        figure, (axes,) = style.canvas(9.0, 1.02 * (count + 1) + 1.3)
+    _lanes(axes, scene)
+    for number, extents in enumerate(sets):
+        _bars(axes, extents, number, count)
+        _bands(axes, scene, extents)
+        path = style.stretch(scene, extents)
+        if path is not None:
+            _throws(axes, path)
+    marked = _critical(axes, scene)
+    _goal(axes, scene)
+    _frame(axes, scene, sets, marked)
+    axes.set_title(f"Limit set of {scene.name}: where the part comes to rest", fontsize=style.TEXT + 1.5, loc="left")
+    if alone:
+        figure.legend(handles=_legend(scene, len(sets)), loc="outside lower center", ncols=4, fontsize=style.SMALL, frameon=False)
+    return axes.get_figure(root=True)  # type: ignore[return-value]
+
+
+def _lanes(axes: Axes, scene: Scene) -> None:
+    count = len(scene.sides)
+    for lane in range(count + 1):
+        a = float(scene.sides.a[lane % count])
+        axes.plot([a, scene.arm_length], [-lane, -lane], color=style.FAINT, lw=0.8, zorder=1)
+    axes.set_yticks(
+        [-lane for lane in range(count + 1)], [*(f"side {side}" for side in range(count)), "side 0\nagain"]
+    )
+
+
+def _bars(axes: Axes, extents: Extents, number: int, count: int) -> None:
+    face, hatch = style.SETS[number % len(style.SETS)]
+    for side, parts in extents.items():
+        for lo, hi in parts:
+            for lane in {side, count if side == 0 else side}:
+                ghost = lane == count
+                axes.add_patch(
+                    Rectangle(
+                        (lo, -lane - BAR),
+                        hi - lo,
+                        2 * BAR,
+                        facecolor="white" if ghost else face,
+                        hatch="" if ghost else hatch,
+                        edgecolor=style.INK,
+                        lw=1.0,
+                        ls=":" if ghost else "-",
+                        zorder=3,
+                        gid="limit set again" if ghost else "limit set",
+                    )
+                )
+
+
+def _bands(axes: Axes, scene: Scene, extents: Extents) -> None:
+    """Shade from each stretch of a bar that flips to where it lands."""
+    for side, parts in extents.items():
+        for lo, hi in parts:
+            x = np.linspace(lo, hi, SAMPLES)
+            there = images(scene.map, x, side)
+            flips = np.flatnonzero(there.code == FLIPS)
+            for run in np.split(flips, np.flatnonzero(np.diff(flips) > 1) + 1):
+                if run.size > 1:
+                    top, bottom = -side - BAR, -side - 1 + BAR
+                    corners = [(x[run[0]], top), (x[run[-1]], top)]
+                    corners += [(there.x[run[-1]], bottom), (there.x[run[0]], bottom)]
+                    axes.add_patch(Polygon(corners, facecolor="#e9e9e9", edgecolor="#cfcfcf", lw=0.6, zorder=0))
+
+
+def _throws(axes: Axes, path: Orbit) -> None:
+    wide = 0.06 * float(np.ptp(path.x)) or 1.0
+    for x, to, side, code in zip(path.x[:-1], path.x[1:], path.side[:-1], path.code, strict=True):
+        if code == FLIPS:
+            arrow = FancyArrowPatch(
+                (x, -side - BAR),
+                (to, -side - 1 + BAR),
+                arrowstyle="-|>",
+                mutation_scale=9,
+                shrinkA=0,
+                shrinkB=0,
+                color=style.FLIP,
+                lw=1.2,
+                ls=style.FLIP_LINE,
+                zorder=4,
+                gid="flip",
+            )
+        elif code >= 0:
+            y, middle = -side + BAR, 0.5 * (x + to)
+            top = y + HOP * min(1.0, max(0.3, abs(to - x) / wide))
+            arc = Path([(x, y), (middle, top), (to, y)], [Path.MOVETO, Path.CURVE3, Path.CURVE3])
+            head = "-|>" if abs(to - x) > 0.25 * wide else "-"  # shorter hops than this would be all head
+            arrow = FancyArrowPatch(
+                path=arc, arrowstyle=head, mutation_scale=6, color=style.JOG, lw=1.1, zorder=4, gid="jog"
+            )
+        else:
+            continue
+        axes.add_patch(arrow)
+    axes.plot([path.x[0]], [-path.side[0] + BAR], "o", ms=5, mfc="white", mec=style.INK, zorder=5, gid="start")
+
+
+def _critical(axes: Axes, scene: Scene) -> list[float]:
+    marked = []
+    for side, points in critical_points(scene.map, scene.domain).items():
+        for number, point in enumerate(points):
+            axes.plot([point.x] * 2, [-side - 0.2, -side + 0.2], color=style.INK, lw=1.6, zorder=6, gid="critical point")
+            name = f"$r_{side}$" + "'" * number
+            axes.annotate(
+                f"{name} = {point.x:.2f}",
+                (point.x, -side - 0.2),
+                xytext=(-3, -1),
+                textcoords="offset points",
+                ha="right",
+                va="top",
+                fontsize=style.SMALL,
+                zorder=7,
+                bbox={"boxstyle": "square,pad=0.1", "fc": "white", "ec": "none", "alpha": 0.85},
+            )
+            marked.append(point.x)
+    return marked
+
+
+def _goal(axes: Axes, scene: Scene) -> None:
+    if isinstance(scene.goal, OrientedBeyond):
+        axes.axvline(scene.goal.x, color=style.GOAL, lw=1.3, ls=(0, (1, 1.5)), zorder=2, gid="goal")
+
+
+def _frame(axes: Axes, scene: Scene, sets: list[Extents], marked: list[float]) -> None:
+    """Limits, labels, and the intervals in figures beside each lane."""
+    count = len(scene.sides)
+    ends = [x for extents in sets for parts in extents.values() for pair in parts for x in pair] + marked
+    if isinstance(scene.goal, OrientedBeyond):
+        ends.append(scene.goal.x)
+    lo, hi = min(ends, default=0.0), max(ends, default=scene.arm_length)
+    margin = 0.06 * (hi - lo)
+    axes.set_xlim(lo - 1.8 * margin, min(hi + margin, scene.arm_length) if hi < scene.arm_length else hi)
+    axes.set_ylim(-count - 0.35, 0.62)
+    axes.set_xlabel(f"x of the centre of mass from the joint [{scene.unit}]")
+    axes.tick_params(axis="y", length=0)
+    for border in ("left", "right", "top"):
+        axes.spines[border].set_visible(False)
+    for side in range(count):
+        parts = [pair for extents in sets for pair in extents.get(side, ())]
+        axes.annotate(
+            f"{style.interval_text(parts)} {scene.unit}" if parts else "never",
+            (1.0, -side),
+            xycoords=("axes fraction", "data"),
+            xytext=(4, 0),
+            textcoords="offset points",
+            va="center",
+            fontsize=style.SMALL,
+        )
+
+
+def _legend(scene: Scene, sets: int) -> list[Any]:
+    handles: list[Any] = [
+        Patch(facecolor=face, hatch=hatch, edgecolor=style.INK, label="limit set" if sets == 1 else f"limit set {k}")
+        for k, (face, hatch) in enumerate(style.SETS[:sets])
+    ]
+    handles += [
+        Line2D([], [], color=style.JOG, label="jog (stays on its side)"),
+        Line2D([], [], color=style.FLIP, ls=style.FLIP_LINE, label="flip (to the next side)"),
+        Patch(facecolor="#e9e9e9", edgecolor="#cfcfcf", label="where the flipping part lands"),
+        Line2D([], [], color=style.INK, marker="o", mfc="white", ms=5, ls="", label="start of the orbit shown"),
+        Line2D([], [], color=style.INK, marker="|", ms=10, mew=1.6, ls="", label="critical point"),
+    ]
+    if isinstance(scene.goal, OrientedBeyond):
+        label = f"goal: side {scene.goal.side} beyond {scene.goal.x:g} {scene.unit}"
+        handles.append(Line2D([], [], color=style.GOAL, lw=1.3, ls=(0, (1, 1.5)), label=label))
+    return handles

@@ -1,0 +1,141 @@
+"""The Morse graph: recurrent sets in layers, each above those it leads to."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import networkx as nx
+from matplotlib.patches import FancyArrowPatch
+
+from limitsets.graph import TransitionGraph, morse_graph
+from limitsets.plot import style
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+__all__ = ["morse"]
+
+# More nodes than this cannot be told apart: the attracting and the largest are drawn, the title says how many are not.
+MOST = 12
+Place = tuple[float, float]
+
+
+def morse(graph: nx.DiGraph[int] | TransitionGraph, name: str = "") -> Figure:
+    """Draw recurrent components and the order among them.
+
+    Parameters
+    ----------
+    graph : networkx.DiGraph or TransitionGraph
+        From `limitsets.morse_graph`, or the transition graph itself.
+    name : str
+        Whose it is, for the title.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+
+    Examples
+    --------
+    >>> import limitsets as ls
+    >>> graph = ls.transitions(ls.maps.TwoState(1.0), ls.grid([(-2, 2), (-2, 2)], cells=32), method="centres")
+    >>> "2 attracting" in ls.plot.morse(graph).axes[0].get_title(loc="left")
+    True
+    """
+    whole = morse_graph(graph) if isinstance(graph, TransitionGraph) else graph
+    drawn = _condensed(whole)
+    place = _places(drawn)
+    depth = round(max((y for _, y in place.values()), default=0))
+    widest = max((sum(1 for _, y in place.values() if y == layer) for layer in range(depth + 1)), default=1)
+    few = len(place) <= 6
+    wide, tall = 3.0 if few else 1.4, max(0.7, min(1.45, 9.0 / (depth + 1)))
+    figure, (axes,) = style.canvas(min(16.0, max(7.0, wide * widest + 1.0)), tall * (depth + 1) + 1.2)
+    for one, other in drawn.edges:
+        _arrow(axes, place[one], place[other], dotted=isinstance(other, str))
+    for node, (x, y) in place.items():
+        _node(axes, node, drawn.nodes[node], x, y, few=few)
+    axes.set_xlim(-0.5 * max(widest, 2) - 0.1, 0.5 * max(widest, 2) + 0.1)
+    axes.set_ylim(-0.72, depth + 0.55)
+    axes.set_axis_off()
+    axes.set_title(_title(whole, drawn, name), fontsize=style.TEXT + 1, loc="left")
+    figure.supxlabel(
+        "Arrows lead down the order. Areas grow with the number of cells; a double border: attracting.",
+        fontsize=style.SMALL,
+    )
+    return figure
+
+
+def _condensed(whole: nx.DiGraph[int]) -> nx.DiGraph[Any]:
+    """Keep at most `MOST` nodes and the order among them; ways out become nodes named after them."""
+    rank = sorted(whole.nodes, key=lambda node: (-whole.nodes[node]["attracting"], -whole.nodes[node]["cells"]))
+    kept = set(rank[:MOST])
+    order: nx.DiGraph[Any] = nx.DiGraph()
+    order.add_nodes_from((node, whole.nodes[node]) for node in sorted(kept))
+    for node in kept:
+        order.add_edges_from((node, other) for other in nx.descendants(whole, node) & kept)
+        order.add_edges_from((node, way) for way in whole.nodes[node]["exits"])
+    drawn = nx.transitive_reduction(order)
+    drawn.add_nodes_from(order.nodes(data=True))
+    return drawn
+
+
+def _places(drawn: nx.DiGraph[Any]) -> dict[Any, Place]:
+    """Height: the longest way down; across: side by side, in the middle of what they lead to."""
+    height: dict[Any, int] = {}
+    for node in reversed(list(nx.topological_sort(drawn))):
+        height[node] = max((height[other] + 1 for other in drawn.successors(node)), default=0)
+    place: dict[Any, Place] = {}
+    for layer in range(max(height.values(), default=0) + 1):
+        row = [node for node in drawn if height[node] == layer]
+
+        def pull(node: Any) -> float:
+            below = [place[other][0] for other in drawn.successors(node)]
+            return sum(below) / len(below) if below else 0.0
+
+        row.sort(key=pull)
+        for k, node in enumerate(row):
+            place[node] = (k - 0.5 * (len(row) - 1), float(layer))
+    return place
+
+
+def _radius(cells: int, largest: int = 200_000) -> float:
+    """Radius in points: the area grows with the root of the number of cells, so that small sets stay visible."""
+    return 7.0 + 17.0 * float(min(cells, largest) / largest) ** 0.25
+
+
+def _node(axes: Axes, node: Any, data: dict[str, Any], x: float, y: float, *, few: bool) -> None:
+    if isinstance(node, str):
+        axes.plot([x], [y], "s", ms=16, mfc="white", mec=style.FAINT, ls="none", gid="exit")
+        axes.annotate(f"leaves:\n{node}", (x, y), xytext=(0, -13), textcoords="offset points", ha="center", va="top", fontsize=style.SMALL)
+        return
+    size = 2 * _radius(data["cells"])
+    face = style.SETS[0][0] if data["attracting"] else "white"
+    axes.plot([x], [y], "o", ms=size, mfc=face, mec=style.INK, mew=1.2, ls="none", gid="attracting" if data["attracting"] else "recurrent")
+    if data["attracting"]:
+        axes.plot([x], [y], "o", ms=size + 6, mfc="none", mec=style.INK, mew=1.2, ls="none", gid="border")
+    axes.annotate(str(node), (x, y), ha="center", va="center", fontsize=style.SMALL)
+    lines = [f"{data['cells']} cell{'' if data['cells'] == 1 else 's'}"]
+    if few:
+        lines += [
+            f"side {side}: {', '.join(f'{lo:z.2f} to {hi:z.2f}' for lo, hi in parts[:2])}{' ...' if len(parts) > 2 else ''}"
+            for side, parts in data["extents"].items()
+        ]
+    axes.annotate(
+        "\n".join(lines), (x, y), xytext=(size / 2 + 7, 0), textcoords="offset points", va="center", fontsize=style.SMALL
+    )
+
+
+def _arrow(axes: Axes, start: Place, end: Place, *, dotted: bool) -> None:
+    axes.add_patch(
+        FancyArrowPatch(
+            start, end, arrowstyle="-|>", mutation_scale=11, shrinkA=13, shrinkB=16, color="#555555", lw=1.0, ls=":" if dotted else "-"
+        )
+    )
+
+
+def _title(whole: nx.DiGraph[int], drawn: nx.DiGraph[Any], name: str) -> str:
+    attracting = sum(data["attracting"] for _, data in whole.nodes(data=True))
+    sets = whole.number_of_nodes()
+    text = f"Morse graph{f' of {name}' if name else ''}: {sets} recurrent set{'' if sets == 1 else 's'}, {attracting} attracting"
+    hidden = sets - sum(not isinstance(node, str) for node in drawn)
+    return f"{text}\n({hidden} of the smallest are not drawn)" if hidden else text

@@ -1,0 +1,124 @@
+"""Write the report's files, all of them or none."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from limitsets import plot
+from limitsets.errors import LimitsetsError
+from limitsets.files import replaced
+from limitsets.maps import FLIP
+from limitsets.plot.style import stretch
+from limitsets.report.page import page
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from limitsets.analysis import Analysis
+
+__all__ = ["FIGURES", "figure", "write"]
+
+Progress = Callable[[str, int, int], None]
+
+DPI = 150
+FIGURES = ("limit-set", "map", "basins", "morse", "flight")
+
+
+def _typical_throw(analysis: Analysis) -> tuple[float, int]:
+    """Choose a throw to draw: the first flip of an orbit on the limit set, or one from the middle of the arm."""
+    scene = analysis.scene
+    for extents in analysis.extents[:1]:
+        path = stretch(scene, extents)
+        if path is not None and path.code.size:
+            k = int((path.code == FLIP).argmax())
+            return float(path.x[k]), int(path.side[k])
+    return 0.5 * (float(scene.sides.a[0]) + scene.arm_length), 0
+
+
+def figure(analysis: Analysis, kind: str, throw: tuple[float, int] | None = None) -> Figure:
+    """Draw one figure of an analysis.
+
+    Parameters
+    ----------
+    analysis : Analysis
+        From `limitsets.analyse`.
+    kind : str
+        One of `FIGURES`.
+    throw : (float, int), optional
+        For "flight": x and side of the throw to draw; one is chosen otherwise.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+
+    Raises
+    ------
+    LimitsetsError
+        For another kind.
+    """
+    scene, sets = analysis.scene, analysis.extents
+    if kind == "limit-set":
+        return plot.limit_set(scene, sets)
+    if kind == "map":
+        return plot.map(scene, sets)
+    if kind == "basins":
+        return plot.basins(scene, analysis.basins, sets)
+    if kind == "morse":
+        return plot.morse(analysis.morse, scene.name)
+    if kind == "flight":
+        return plot.flight(scene, *(throw or _typical_throw(analysis)))
+    raise LimitsetsError("the kind of figure", kind, ", ".join(FIGURES), "correct the word")
+
+
+def write(analysis: Analysis, folder: str | Path, *, progress: Progress | None = None) -> list[Path]:
+    """Write report.md, analysis.json and the figures into a folder.
+
+    Files that are there are replaced once all new ones are written, each in one step.
+
+    Parameters
+    ----------
+    analysis : Analysis
+        From `limitsets.analyse`.
+    folder : str or Path
+        Where to; made if it is not there.
+    progress : callable, optional
+        Called as ``progress(file, done, of)`` before each file.
+
+    Returns
+    -------
+    list of Path
+        The files.
+
+    Raises
+    ------
+    LimitsetsError
+        The folder cannot be written.
+
+    Examples
+    --------
+    >>> import tempfile, limitsets as ls
+    >>> from limitsets.report import write
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     [path.name for path in write(ls.analyse("paper-designed"), folder)][:2]
+    ['report.md', 'analysis.json']
+    """
+    figures = {kind: f"{kind}.png" for kind in FIGURES}
+    names = ["report.md", "analysis.json", *figures.values()]
+    try:
+        with replaced(folder) as draft:
+            for number, (kind, name) in enumerate(figures.items()):
+                if progress is not None:
+                    progress(name, number, len(names))
+                figure(analysis, kind).savefig(draft / name, dpi=DPI)
+            record = json.dumps(analysis.to_json(), indent=2, allow_nan=False)
+            (draft / "analysis.json").write_text(record + "\n", encoding="utf-8", newline="\n")
+            (draft / "report.md").write_text(page(analysis, figures), encoding="utf-8", newline="\n")
+    except OSError as error:
+        reason = error.strerror or str(error)
+        raise LimitsetsError(
+            "the folder of the report", str(folder), "a folder that can be written", f"it could not be: {reason}"
+        ) from None
+    return [Path(folder) / name for name in names]

@@ -1,0 +1,204 @@
+"""Long orbits of the textbook maps: attractors, periods, Lyapunov exponents that books and papers state."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+import pytest
+
+from limitsets import maps
+from limitsets.errors import MapError
+
+
+def end_of_orbit(params: Any, x: Any, skip: int, count: int) -> np.ndarray:
+    """States number skip to skip + count."""
+    return maps.orbit(params, x, 0, skip + count).x[skip:]
+
+
+def period(x: np.ndarray, within: float = 1e-6) -> int | None:
+    """Smallest shift after which all states repeat."""
+    for p in range(1, 65):
+        if np.abs(x[p:] - x[:-p]).max() < within:
+            return p
+    return None
+
+
+# ---------------------------------------------------------------- Lyapunov exponents
+
+TURN = math.sqrt(3.0) / 2.0
+EXPONENTS = {
+    "doubling": (maps.Doubling(), 0.3, 10_000, math.log(2.0), 1e-12),
+    "beta": (maps.Doubling(1.7), 0.3, 10_000, math.log(1.7), 1e-12),
+    "rotation": (maps.Rotation(), 0.3, 10_000, 0.0, 0.0),
+    "contraction": (maps.Contraction(-0.7, 0.1), 0.3, 10_000, math.log(0.7), 1e-12),
+    # sin^2 turns it into the doubling map.
+    "logistic": (maps.Logistic(4.0), 0.3, 1_000_000, math.log(2.0), 1e-3),
+    # The slope over a period is r^2 (1 - 2 x)(1 - 2 y) = 4 + 2 r - r^2.
+    "logistic, period 2": (
+        maps.Logistic(3.2),
+        0.3,
+        10_000,
+        0.5 * math.log(abs(4.0 + 2 * 3.2 - 3.2**2)),
+        1e-9,
+    ),
+    "baker": (maps.Baker(), (0.3, 0.4), 10_000, math.log(2.0), 1e-9),
+    "henon": (maps.Henon(), (0.1, 0.1), 1_000_000, 0.4192, 1e-3),
+    # Fixed point (0, 0), slope 1/2.
+    "product": (maps.Product(), (0.3, 0.5), 10_000, -math.log(2.0), 1e-9),
+    # Rotation by 30 degrees, times 0.9.
+    "spiral": (maps.Linear2(0.9 * TURN, -0.45, 0.45, 0.9 * TURN), (1.0, 0.0), 10_000, math.log(0.9), 1e-3),
+}
+
+
+@pytest.mark.parametrize("name", EXPONENTS)
+def test_lyapunov_exponent(name: str) -> None:
+    params, x, count, expected, within = EXPONENTS[name]
+    found = maps.lyapunov(params, x, 0, count)
+    assert found.exponent == pytest.approx(expected, abs=within)
+    assert (found.steps, found.stopped) == (count, None)
+
+
+class Rotor(NamedTuple):
+    """Three coordinates: a shear of the first two, and a contraction."""
+
+    stretch: float
+
+
+def rotor(params: Rotor, x: Any, side: int) -> Any:
+    return (params.stretch * x[0] + x[1], 0.5 * x[1], 0.25 * x[2]), side, 0
+
+
+def rotor_on(params: Rotor, x: Any, side: int, branch: int) -> Any:
+    slope = ((params.stretch, 1.0, 0.0), (0.0, 0.5, 0.0), (0.0, 0.0, 0.25))
+    return (params.stretch * x[0] + x[1], 0.5 * x[1], 0.25 * x[2]), side, slope
+
+
+class Bare(NamedTuple):
+    """A map without slopes."""
+
+    size: float
+
+
+def bare(params: Bare, x: float, side: int) -> Any:
+    return params.size * x, side, 0
+
+
+maps.register(Rotor, image=rotor, image_on=rotor_on, dimension=3)
+maps.register(Bare, image=bare)
+
+
+def test_lyapunov_exponent_in_three_dimensions() -> None:
+    found = maps.lyapunov(Rotor(0.8), (1.0, 1.0, 1.0), 0, 5000)
+    assert found.exponent == pytest.approx(math.log(0.8), abs=1e-6)
+
+
+def test_a_slope_of_zero_gives_minus_infinity() -> None:
+    found = maps.lyapunov(maps.Logistic(2.0), 0.5, 0, 100, skip=0)
+    assert (found.exponent, found.steps, found.stopped) == (-math.inf, 1, None)
+    assert maps.lyapunov(maps.TwoState(), (1.0, 1.0), 0, 100).exponent == -math.inf
+
+
+def test_an_orbit_that_leaves_says_so() -> None:
+    # From (1, 1) the y coordinate doubles until it overflows: 2^1023 is the last number.
+    found = maps.lyapunov(maps.Linear2(), (1.0, 1.0), 0, 5000, skip=10)
+    assert found.exponent == pytest.approx(math.log(2.0), abs=1e-6)
+    assert (found.steps, found.stopped) == (1013, "outside")
+    early = maps.lyapunov(maps.Linear2(), (1.0, 1.0), 0, 5000, skip=2000)
+    assert (early.exponent, early.steps, early.stopped) == (None, 0, "outside")
+    assert maps.lyapunov(maps.Linear2(), (1.0, 1.0), 0, 0, skip=0) == maps.Lyapunov(None, 0, None)
+
+
+def test_the_sum_neither_overflows_nor_underflows() -> None:
+    for slope in (1e-90, 1e90, 1e-150, 1e150):
+        # 0 is fixed whatever the slope.
+        found = maps.lyapunov(maps.Contraction(slope, 0.0), 0.0, 0, 1000)
+        assert found.exponent == pytest.approx(math.log(slope), rel=1e-12)
+
+
+def test_wrong_questions_are_refused() -> None:
+    for arguments, allowed in (
+        ((Bare(1.0), 0.5, 0, 10), "image_on"),
+        ((maps.Henon(), 0.5, 0, 10), "2 finite numbers"),
+        ((maps.Logistic(), math.nan, 0, 10), "1 finite numbers"),
+        ((maps.Logistic(), 0.5, -1, 10), "from 0"),
+        ((maps.Logistic(), 0.5, 0, -1), "from 0"),
+        ((maps.Logistic(), 0.5, 0, 10, -1), "from 0"),
+    ):
+        with pytest.raises(MapError, match=allowed):
+            maps.lyapunov(*arguments)
+
+
+# ---------------------------------------------------------------- attractors and periods
+
+
+def test_logistic_orbits() -> None:
+    two = end_of_orbit(maps.Logistic(3.2), 0.3, 2000, 100)
+    assert period(two) == 2
+    # The two states are the roots of r^2 x^2 - r (r + 1) x + r + 1.
+    root = math.sqrt((3.2 + 1.0) * (3.2 - 3.0))
+    assert np.unique(two.round(12)) == pytest.approx([(4.2 - root) / 6.4, (4.2 + root) / 6.4], abs=1e-12)
+    assert period(end_of_orbit(maps.Logistic(3.83), 0.3, 5000, 100)) == 3
+
+
+def test_cubic_attractors_and_edge() -> None:
+    starts = np.linspace(-1.2, 1.2, 24)
+    x, _, _, steps = maps.advance(maps.Cubic(1.5), starts, 0, 500)
+    # Beyond sqrt(1.5) the sign would change; the first image of these starts keeps to one side.
+    assert (steps == 500).all()
+    assert np.abs(x) == pytest.approx(math.sqrt(0.5), abs=1e-12)
+    assert (np.sign(x) == np.sign(starts)).all()
+    assert maps.orbit(maps.Cubic(1.5), 0.0, 0, 5).x.tolist() == [0.0] * 6
+
+
+def test_share_of_henon_starts_that_stay() -> None:
+    # 1000 x 1000 midpoints: the edge of the set moves the share by less than 1e-3.
+    axis = -2.0 + (np.arange(1000) + 0.5) * 4e-3
+    starts = np.stack(np.meshgrid(axis, axis), axis=-1).reshape(-1, 2)
+    _, _, _, steps = maps.advance(maps.Henon(), starts, 0, 500)
+    assert (steps == 500).mean() == pytest.approx(0.432, abs=0.002)
+
+
+def test_henon_chaos_and_its_window() -> None:
+    assert (
+        maps.lyapunov(maps.Henon(1.2266, 0.3), (0.1, 0.1), 0, 500_000, skip=20_000).exponent or 0.0
+    ) > 0.05
+    for a in (1.2267, 1.23, 1.24, 1.25):
+        assert period(end_of_orbit(maps.Henon(a, 0.3), (0.1, 0.1), 100_000, 200)) == 7
+        assert (maps.lyapunov(maps.Henon(a, 0.3), (0.1, 0.1), 0, 10_000, skip=100_000).exponent or 1.0) < 0.0
+
+
+def test_leslie_attractor_has_period_three() -> None:
+    assert period(end_of_orbit(maps.Leslie(), (10.0, 10.0), 5000, 60)) == 3
+
+
+@pytest.mark.parametrize(("r", "states"), [(1.0, {-1.0, 1.0}), (0.5, {-0.5, 0.5}), (0.49, {0.0})])
+def test_two_states(r: float, states: set[float]) -> None:
+    rng = np.random.default_rng(5)
+    x, *_ = maps.advance(maps.TwoState(r), rng.uniform(-2.0, 2.0, (2000, 2)), 0, 3)
+    assert {abs(v) * math.copysign(1.0, v) if v else 0.0 for v in x[:, 0].tolist()} == states
+    assert (x[:, 0] == x[:, 1]).all()
+    if r == 1.0:
+        assert (x[:, 0] > 0.0).mean() == pytest.approx(0.5, abs=0.05)
+
+
+def test_three_states() -> None:
+    x = [-3.0, -1.0 - 1e-12, -1.0, 0.3, 1.0, 1.0 + 1e-12, 3.0]
+    assert maps.advance(maps.ThreeState(), x, 0, 5)[0].tolist() == [-2.0, -2.0, 0.0, 0.0, 0.0, 2.0, 2.0]
+
+
+def test_product_orbits_run_to_the_corner() -> None:
+    starts = [(0.99, 0.5), (1.0, 0.5), (0.5, 1.0), (1.0, 1.0)]
+    x, *_ = maps.advance(maps.Product(), starts, 0, 200)
+    assert x == pytest.approx(np.array([(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (1.0, 1.0)]), abs=1e-12)
+    assert maps.orbit(maps.Product(), (1.1, 0.5), 0, 50).stopped == "outside"
+
+
+def test_the_baker_map_keeps_areas() -> None:
+    # Each of 16 x 16 equal cells gets as many of the images of a fine lattice.
+    axis = (np.arange(256) + 0.5) / 256
+    lattice = np.stack(np.meshgrid(axis, axis), axis=-1).reshape(-1, 2)
+    after = maps.images(maps.Baker(), lattice, 0).x
+    counts, *_ = np.histogram2d(after[:, 0], after[:, 1], bins=16, range=[[0, 1], [0, 1]])
+    assert (counts == 256).all()
