@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import shutil
 import tempfile
 from collections.abc import Iterator
@@ -30,7 +31,7 @@ def replaced(folder: str | Path) -> Iterator[Path]:
     Raises
     ------
     OSError
-        The folder cannot be made or written.
+        The folder cannot be made or written, or one of the names is taken by something that is not a regular file.
 
     Examples
     --------
@@ -45,7 +46,12 @@ def replaced(folder: str | Path) -> Iterator[Path]:
     draft = Path(tempfile.mkdtemp(prefix=".draft-", dir=place))
     try:
         yield draft
-        for file in sorted(draft.iterdir()):
+        drafts = sorted(draft.iterdir())
+        for file in drafts:
+            target = place / file.name
+            if target.exists() and not target.is_file():  # a folder, a pipe, a device: not ours to rename over
+                raise FileExistsError(errno.EEXIST, "not a regular file", str(target))
+        for file in drafts:
             file.replace(place / file.name)
     finally:
         shutil.rmtree(draft, ignore_errors=True)

@@ -51,11 +51,19 @@ def _may_leave(graph: TransitionGraph) -> float:
 
 def _after_any_throw(graph: TransitionGraph) -> Extents:
     """Where a part can rest after one throw or more: the image of the whole domain holds all later images."""
-    from limitsets.sets.limit_set import limit_set_of
+    from limitsets.maps.critical import along, monotone_pieces
 
     domain = graph.grid.domain
-    whole = {side: [(float(domain.lo[side, 0]), float(domain.hi[side, 0]))] for side in range(domain.sides)}
-    return limit_set_of(graph.map, whole, domain, most_images=1).extents
+    found: dict[int, list[tuple[float, float]]] = {}
+    for side, pieces in monotone_pieces(graph.map, domain).items():
+        for piece in pieces:
+            ends, sides, _ = along(graph.map, [piece.lo, piece.hi], side, [piece.branch])
+            to = int(sides[0])
+            lo = max(float(ends.min()), float(domain.lo[to, 0]))
+            hi = min(float(ends.max()), float(domain.hi[to, 0]))
+            if lo <= hi:
+                found.setdefault(to, []).append((lo, hi))
+    return found
 
 
 def answer(

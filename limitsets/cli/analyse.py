@@ -29,12 +29,16 @@ def analyse(
 ) -> None:
     """Find limit sets, basins and critical points, and write report.md, analysis.json and figures."""
     with progress() as tell:
+        from limitsets.scene import load
+
+        chosen = load(scene)
+        folder = out if out is not None else Path(f"{chosen.name}-analysis")
+        from limitsets.report.write import require_place, write
+
+        require_place(folder)
         from limitsets.analysis import analyse as run
 
-        analysis = run(scene, cells, progress=tell)
-        from limitsets.report import write
-
-        folder = out if out is not None else Path(f"{analysis.scene.name}-analysis")
+        analysis = run(chosen, cells, progress=tell)
         files = write(analysis, folder, progress=tell)
     if json:
         print(json_words.dumps(analysis.to_json(), indent=2, allow_nan=False))

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import io
 import os
 import sys
 from collections.abc import Sequence
+from pathlib import Path
 
 from limitsets.errors import LimitsetsError
 
@@ -32,16 +34,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
     2
     """
     try:
-        for stream in (sys.stdout, sys.stderr):
-            if hasattr(stream, "reconfigure"):
-                stream.reconfigure(errors="replace")  # a terminal that lacks a sign is no reason to stop
+        _ready_streams()
         code = _run(arguments)
         sys.stdout.flush()
     except KeyboardInterrupt:
         return _end("interrupted", INTERRUPTED)
-    except BrokenPipeError:
+    except (BrokenPipeError, SystemExit) as error:
+        if not isinstance(error if isinstance(error, OSError) else error.__context__, BrokenPipeError):
+            raise
         # The reader has had enough; what is still buffered must not fail again when Python exits.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
         return 0
     except LimitsetsError as error:
         return _end(str(error), BAD_INPUT)
@@ -55,6 +57,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
             raise
         return _end(f"this is a bug in limitsets: {type(error).__name__}: {error}", BAD_INPUT)
     return code
+
+
+def _ready_streams() -> None:
+    """Let no closed stream, and no sign that a terminal lacks, stop a command."""
+    sys.stdout = sys.stdout or Path(os.devnull).open("w")  # noqa: SIM115 - it lives as long as the process
+    sys.stderr = sys.stderr or Path(os.devnull).open("w")  # noqa: SIM115
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="replace")
 
 
 def _end(reason: str, code: int) -> int:
@@ -80,4 +91,6 @@ def _run(arguments: Sequence[str] | None) -> int:
     except refused as error:
         hint = "" if not isinstance(error, usage_error) else "; limitsets --help lists what there is"
         return _end(f"{error.format_message().rstrip('.')}{hint}", BAD_INPUT)  # type: ignore[attr-defined]
+    if code == INTERRUPTED:  # typer's word for Ctrl-C
+        raise KeyboardInterrupt
     return code if isinstance(code, int) else 0

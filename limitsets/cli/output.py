@@ -16,7 +16,7 @@ from limitsets.errors import LimitsetsError
 
 __all__ = ["Json", "Out", "Scene", "answer", "progress", "saved", "table"]
 
-Scene = Annotated[str, typer.Argument(help="A built-in name (see: limitsets scenes) or a TOML file.")]
+Scene = Annotated[str, typer.Argument(metavar="SCENE", help="A built-in name (see: limitsets scenes) or a TOML file.")]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON, and nothing else, on stdout.")]
 Out = Annotated[Path | None, typer.Option("--out", "-o", metavar="FILE", help="Write the JSON to this file as well.")]
 
@@ -44,8 +44,8 @@ def saved(file: Path) -> Iterator[Path]:
     """Write one file whole: a draft to write to, which takes its place at the end."""
     from limitsets.files import replaced
 
-    if file.is_dir():
-        raise LimitsetsError("the output file", str(file), "a file", "this is a folder: name a file in it")
+    if file.exists() and not file.is_file():
+        raise LimitsetsError("the output file", str(file), "a regular file", "it is a folder or a device; name a file")
     try:
         with replaced(file.parent) as draft:
             yield draft / file.name

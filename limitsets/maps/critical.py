@@ -19,7 +19,13 @@ from limitsets.maps.contract import kind_of, margin, on_side
 from limitsets.maps.drivers import images
 from limitsets.maps.search import Array, Codes, hidden, inserted, located, sign_code
 
-__all__ = ["CriticalPoint", "branches_of_side", "critical_points", "margins", "require_one_dimension"]
+__all__ = [
+    "CriticalPoint",
+    "branches_of_side",
+    "critical_points",
+    "margins",
+    "require_one_dimension",
+]
 
 SAMPLES = 4096
 

@@ -97,12 +97,6 @@ def _images_on(params: Any, side: int, branch: int, xs: Any, after: Any, side_af
 
 
 @kernel(entry=True)
-def _slopes(params: Any, sides: Any, branches: Any, x: Any, out: Any) -> None:
-    for k in range(x.size):
-        _, _, out[k] = image_on(params, x[k], sides[k], branches[k])
-
-
-@kernel(entry=True)
 def _orbit(params: Any, xs: Any, sides: Any, code_after: Any) -> Any:
     """Fill an orbit from its first state; the number of steps made before an exit."""
     for k in range(code_after.size):

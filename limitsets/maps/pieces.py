@@ -15,7 +15,7 @@ from limitsets.errors import AnswerError
 from limitsets.maps.contract import kind_of
 from limitsets.maps.critical import SAMPLES, Sides, branches_of_side, require_one_dimension
 from limitsets.maps.forced import along
-from limitsets.maps.search import Array, bisected, hidden, inserted, located, sign_code
+from limitsets.maps.search import Array, Flags, bisected, hidden, inserted, located, sign_code
 
 __all__ = ["Piece", "TurningPoint", "monotone_pieces", "turning_points"]
 
@@ -72,9 +72,10 @@ def _jumps(branch: _Branch, x: Array) -> Array:
     usual = (np.abs(np.diff(slope)) + 0.01 * np.abs(slope[1:])) * step + JUMP * JUMP * np.abs(y[1:])
     k = np.flatnonzero(off > usual)
 
-    def larger_above(lo: Array, middle: Array, hi: Array) -> Any:
+    def larger_above(lo: Array, middle: Array, hi: Array) -> Flags:
         y_lo, y_mid, y_hi = (branch.image(at) for at in (lo, middle, hi))
-        return np.abs(y_mid - y_lo) <= np.abs(y_hi - y_mid)
+        flags: Flags = np.abs(y_mid - y_lo) <= np.abs(y_hi - y_mid)
+        return flags
 
     lo, hi = bisected(x[k], x[k + 1], larger_above)
     y_lo, y_hi = branch.image(lo), branch.image(hi)

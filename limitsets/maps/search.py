@@ -7,16 +7,18 @@ a pair of samples of one sign have an extremum towards zero between them: golden
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from limitsets.maps import codes
 
-__all__ = ["Array", "Codes", "bisected", "hidden", "inserted", "located", "sign_code"]
+__all__ = ["Array", "Codes", "Flags", "bisected", "hidden", "inserted", "located", "sign_code"]
 
 Array = NDArray[np.float64]
 Codes = NDArray[np.int64]
+Flags = NDArray[np.bool_]
 
 # Golden section: 0.618^50 = 4e-11 of two sample spacings, where the top of a parabola is flat to rounding.
 NARROWINGS = 50
@@ -33,9 +35,7 @@ def inserted(x: Array, extra: Array) -> Array:
     return np.unique(np.concatenate([x, extra]))
 
 
-def bisected(
-    lo: Array, hi: Array, is_above: Callable[[Array, Array, Array], NDArray[np.bool_]]
-) -> tuple[Array, Array]:
+def bisected(lo: Array, hi: Array, is_above: Callable[[Array, Array, Array], Flags]) -> tuple[Array, Array]:
     """Halve brackets until their ends are adjacent floats.
 
     Parameters
@@ -59,6 +59,12 @@ def bisected(
         lo, hi = np.where(inside & above, middle, lo), np.where(inside & ~above, middle, hi)
 
 
+def _still(code_of: Callable[[Array], Codes], before: Codes, _lo: Array, middle: Array, _hi: Array) -> Flags:
+    """Whether the code in the middle is still the one below, so that its change lies above."""
+    flags: Flags = code_of(middle) == before
+    return flags
+
+
 def located(code_of: Callable[[Array], Codes], x: Array) -> tuple[Array, Codes]:
     """Refine samples until every change of code stands between adjacent floats: samples, and their codes."""
     code = code_of(x)
@@ -66,8 +72,7 @@ def located(code_of: Callable[[Array], Codes], x: Array) -> tuple[Array, Codes]:
         k = np.flatnonzero((code[1:] != code[:-1]) & (np.nextafter(x[:-1], np.inf) < x[1:]))
         if k.size == 0:
             return x, code
-        before = code[k]
-        lo, hi = bisected(x[k], x[k + 1], lambda _lo, middle, _hi, before=before: code_of(middle) == before)
+        lo, hi = bisected(x[k], x[k + 1], partial(_still, code_of, code[k]))
         x = inserted(x, np.concatenate([lo, hi]))
         code = code_of(x)
 

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 __all__ = ["basins"]
 
 # Lightness falls, so that neighbours differ in grey as well; hatches tell them apart in strips.
-ATTRACTORS = ("#CFE5F5", "#F0B429", "#5FB59B", "#B5548A", "#3F4E96", "#8C7A3A")
+ATTRACTORS = ("#CFE5F5", "#F0B429", "#5FB59B", "#B5548A", "#3F4E96", "#7A5C1E")
 HATCHES = ("", "///", "...", "\\\\\\", "xxx", "+++")
 OUT: dict[int, tuple[str, str, str]] = {
     codes.INWARD: ("#6E6E6E", "ooo", "leaves inward"),

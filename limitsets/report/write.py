@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
 
     from limitsets.analysis import Analysis
 
-__all__ = ["FIGURES", "figure", "write"]
+__all__ = ["FIGURES", "figure", "require_place", "write"]
 
 Progress = Callable[[str, int, int], None]
 
@@ -73,6 +74,25 @@ def figure(analysis: Analysis, kind: str, throw: tuple[float, int] | None = None
     raise LimitsetsError("the kind of figure", kind, ", ".join(FIGURES), "correct the word")
 
 
+def require_place(folder: str | Path) -> None:
+    """Refuse a folder that plainly cannot be written, before anything is computed for it.
+
+    Raises
+    ------
+    LimitsetsError
+        It, or the nearest of its parents that is there, is no folder or may not be written.
+    """
+    nearest = next(path for path in (Path(folder), *Path(folder).absolute().parents) if path.exists())
+    if not nearest.is_dir():
+        raise _refusal(folder, f"{nearest} is not a folder")
+    if not os.access(nearest, os.W_OK):
+        raise _refusal(folder, f"{nearest} may not be written")
+
+
+def _refusal(folder: str | Path, reason: str) -> LimitsetsError:
+    return LimitsetsError("the folder of the report", str(folder), "a folder that can be written", reason)
+
+
 def write(analysis: Analysis, folder: str | Path, *, progress: Progress | None = None) -> list[Path]:
     """Write report.md, analysis.json and the figures into a folder.
 
@@ -117,8 +137,5 @@ def write(analysis: Analysis, folder: str | Path, *, progress: Progress | None =
             (draft / "analysis.json").write_text(record + "\n", encoding="utf-8", newline="\n")
             (draft / "report.md").write_text(page(analysis, figures), encoding="utf-8", newline="\n")
     except OSError as error:
-        reason = error.strerror or str(error)
-        raise LimitsetsError(
-            "the folder of the report", str(folder), "a folder that can be written", f"it could not be: {reason}"
-        ) from None
+        raise _refusal(folder, f"it could not be: {error.strerror or error}") from None
     return [Path(folder) / name for name in names]

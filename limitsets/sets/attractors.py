@@ -136,7 +136,7 @@ def attractors(graph: TransitionGraph, throws: int = 200_000) -> tuple[Attractor
     >>> scene = ls.load("paper-designed")
     >>> found = ls.attractors(ls.transitions(scene.map, ls.grid(scene.domain, cells=4096)))
     >>> found[0].flip_order, found[0].jogs_per_visit[2]
-    ((0, 1, 2), (4, 8))
+    ((0, 1, 2), (3, 11))
     """
     if throws < 1:
         raise AnswerError("the number of throws", throws, "an integer from 1", "pass throws=200_000")

@@ -98,7 +98,7 @@ def cut(interval: Interval, bottom: Track, top: Track) -> Interval | None:
 
 
 def _chosen(outer: Track, other: Track) -> Track:
-    """The outer of two ends; of two that agree the one that says more.
+    """Choose the outer of two ends; of two that agree, the one that says more.
 
     An end that does not come from N says more than one that does, and one with a smaller error (a shorter way) more
     than one with a larger.

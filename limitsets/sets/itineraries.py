@@ -15,11 +15,11 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from limitsets.maps.critical import Sides
 from limitsets.maps.forced import along
 from limitsets.maps.pieces import monotone_pieces
+from limitsets.maps.search import Flags
 from limitsets.sets.cycle import NEAR, Array, Ints
 from limitsets.sets.intervals import EPS, Extents
 
@@ -121,9 +121,7 @@ def solved(alphabet: Alphabet, letters: Ints, lo: Array, hi: Array, target: Arra
     return x
 
 
-def _fits(
-    alphabet: Alphabet, words: Words, to: Ints, low: Array, high: Array
-) -> tuple[NDArray[np.bool_], Ints]:
+def _fits(alphabet: Alphabet, words: Words, to: Ints, low: Array, high: Array) -> tuple[Flags, Ints]:
     """Which letters may follow which word, and the letter each word has one repetition back.
 
     G sends X(w) to [low, high], which has to meet the letter; and a letter less than the one a repetition back would

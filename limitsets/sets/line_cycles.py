@@ -11,12 +11,11 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from limitsets.maps.critical import Sides
 from limitsets.maps.drivers import images
 from limitsets.maps.forced import along
-from limitsets.maps.search import bisected
+from limitsets.maps.search import Flags, bisected
 from limitsets.sets.cycle import NEAR, Array, Cycle, Cycles, Ints, distinct, require_period
 from limitsets.sets.intervals import EPS, Extents
 from limitsets.sets.itineraries import Alphabet, Words, alphabet_of, grown, letters_alone, solved
@@ -36,8 +35,9 @@ def _tops(alphabet: Alphabet, letters: Ints, x: Array, f: Array, rate: Array) ->
     row, k = np.nonzero(one_sign & turns & to_zero)
     before = rate[row, k] > 0
 
-    def not_yet(_lo: Array, middle: Array, _hi: Array) -> NDArray[np.bool_]:
-        return (alphabet.follow(letters[row], middle)[2] > 1.0) == before
+    def not_yet(_lo: Array, middle: Array, _hi: Array) -> Flags:
+        flags: Flags = (alphabet.follow(letters[row], middle)[2] > 1.0) == before
+        return flags
 
     return row, k, bisected(x[row, k], x[row, k + 1], not_yet)[0]
 

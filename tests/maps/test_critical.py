@@ -93,19 +93,6 @@ def test_three_changes_in_a_row_of_the_exact_energy_model():
     assert [p.kind for p in points] == ["jog->flip", "flip->jog", "jog->flip"]
 
 
-@pytest.mark.parametrize("name", ["paper-initial-small-angle", "paper-designed-small-angle", "paper-initial"])
-def test_closed_form_of_the_small_angle_energy_model(name):
-    # With z = om+: M z^2 / 2 = kappa (ell - d) - 2 a (r - a) and M z = A - a r, from the energy balance.
-    scene = ls.load(name)
-    part = scene.map._replace(arm_length=80.0, flight=SmallAngle(), flip=Energy())
-    found = critical_points(part, up_to_80(scene))
-    for side, (a, d) in enumerate(zip(part.a, part.d, strict=True)):
-        ell, rho = math.hypot(a, d), part.radius_of_gyration
-        M, A = rho**2 + ell**2, rho**2 + 2.0 * a**2 + d**2 + d * part.surface_height
-        z = 2.0 - math.sqrt(4.0 - (2.0 / M) * (2.0 * A - 2.0 * a**2 - part.kappa * (ell - d)))
-        assert found[side][0].x == pytest.approx((A - M * z) / a, rel=1e-12)
-
-
 def test_decision_changes_between_adjacent_floats():
     scene = ls.load("paper-designed")
     for side, points in critical_points(scene.map, scene.domain).items():

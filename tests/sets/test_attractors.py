@@ -1,6 +1,4 @@
-"""Attractors, basins and ways out: numbers from theory and from the paper's scenes."""
-
-import math
+"""Attractors, basins and ways out: what cells, labels and visits say (the paper's scenes: tests/test_paper.py)."""
 
 import numpy as np
 import pytest
@@ -10,44 +8,6 @@ from limitsets.cells import Domain
 from limitsets.errors import AnswerError
 from limitsets.maps import INWARD, UNDECIDED
 from limitsets.sets.attractors import _visits
-
-SCENES = ["paper-initial-small-angle", "paper-designed-small-angle", "paper-initial", "paper-designed"]
-
-
-@pytest.fixture(scope="module", params=SCENES)
-def scene(request):
-    return ls.load(request.param)
-
-
-def test_each_paper_scene_has_one_attractor_and_everything_leads_to_it(scene):
-    graph = ls.transitions(scene.map, ls.grid(scene.domain, cells=4096))
-    found = ls.attractors(graph, throws=1000)
-    share = ls.basins(graph, found)
-    assert len(found) == 1
-    assert (share.labels == 0).all()
-    assert share.attractors == (pytest.approx(1.0, abs=1e-12),)
-    assert share.undecided_between == 0.0
-    assert set(share.exits.values()) == {0.0}
-    assert found[0].in_cells == 1.0
-
-
-def test_the_lyapunov_exponent_of_constant_slopes_is_their_logarithm():
-    for name in SCENES[:2]:
-        scene = ls.load(name)
-        graph = ls.transitions(scene.map, ls.grid(scene.domain, cells=2048))
-        theory = math.log(1.0 + 2.0 * abs(scene.map.surface_height) / scene.map.kappa)
-        assert ls.attractors(graph, throws=1000)[0].lyapunov == pytest.approx(theory, rel=1e-12)
-
-
-@pytest.mark.parametrize(
-    ("name", "exponent", "flips"), [("paper-initial", 0.099, 0.1998), ("paper-designed", 0.206, 0.3191)]
-)
-def test_long_orbits_of_the_exact_scenes(name, exponent, flips):
-    scene = ls.load(name)
-    found = ls.attractors(ls.transitions(scene.map, ls.grid(scene.domain, cells=2048)), throws=1_000_000)[0]
-    assert found.lyapunov == pytest.approx(exponent, abs=1e-3)
-    assert found.flips_per_throw == pytest.approx(flips, abs=5e-4)
-    assert found.flip_order == (0, 1, 2)
 
 
 @pytest.mark.parametrize(("h", "border"), [(0.1, (3.16, 3.19, 4.81)), (0.2, (4.64, 4.55, 5.39))])

@@ -11,14 +11,11 @@ from limitsets import maps
 from limitsets.cells import CellSet, as_domain
 from limitsets.errors import AnswerError
 from limitsets.sets import cycles_from, cycles_of
+from tests.test_paper import LIMIT_SETS
 
 UNIT = as_domain([(0.0, 1.0)])
 ALL = {0: [(0.0, 1.0)]}
-DESIGNED = {
-    0: [(15.205338825681, 19.75268801485)],
-    1: [(12.637023572659, 17.439819281769)],
-    2: [(8.9140259080455, 23.383151921158)],
-}
+DESIGNED = LIMIT_SETS["paper-designed"]
 
 
 def returning(found, p):

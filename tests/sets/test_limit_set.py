@@ -1,6 +1,5 @@
-"""End points of limit sets: the printed table, 40-digit orbits of the origins, long orbits, maps on paper."""
+"""End points of limit sets: from sets of any size, 40-digit orbits of the origins, maps on paper."""
 
-import mpmath as mp
 import numpy as np
 import pytest
 
@@ -9,29 +8,9 @@ from limitsets import maps
 from limitsets.cells import as_domain
 from limitsets.errors import AnswerError
 from limitsets.sets import limit_set_of
+from tests.sets.part import Part
+from tests.test_paper import LIMIT_SETS
 
-TABLE = {
-    "paper-initial-small-angle": {
-        0: [(13.449486219312, 20.421069168761)],
-        1: [(18.13120694042, 20.390334647524)],
-        2: [(13.523779592226, 20.393068935673)],
-    },
-    "paper-designed-small-angle": {
-        0: [(12.216914068142, 12.88421238353)],
-        1: [(8.9547723861184, 10.343418249967)],
-        2: [(6.3603646024764, 20.640934683962)],
-    },
-    "paper-initial": {
-        0: [(13.522673689975, 20.915912223359)],
-        1: [(18.994941734574, 19.975954977782), (20.434045200511, 21.554457325114)],
-        2: [(16.262705754072, 21.886351326378)],
-    },
-    "paper-designed": {
-        0: [(15.205338825681, 19.75268801485)],
-        1: [(12.637023572659, 17.439819281769)],
-        2: [(8.9140259080455, 23.383151921158)],
-    },
-}
 UNIT = as_domain([(0.0, 1.0)])
 
 
@@ -50,95 +29,35 @@ def assert_same(found, expected, tolerance):
 
 
 @pytest.mark.parametrize("start", [0.05, 0.5, 2.0, "whole arm"])
-@pytest.mark.parametrize("name", TABLE)
-def test_the_printed_table_from_sets_of_any_size(name, start):
+@pytest.mark.parametrize("name", LIMIT_SETS)
+def test_the_table_from_sets_of_any_size(name, start):
     scene = ls.load(name)
-    extents = whole(scene) if start == "whole arm" else widened(TABLE[name], start)
+    extents = whole(scene) if start == "whole arm" else widened(LIMIT_SETS[name], start)
     found = limit_set_of(scene.map, extents, scene.domain)
     assert found.converged
     assert not found.leaves
     assert found.advice is None
-    assert_same(found.extents, TABLE[name], 1e-12)
+    assert_same(found.extents, LIMIT_SETS[name], 1e-12)
     assert all(end.origin.kind == "critical" for end in found.ends)
 
 
 def test_from_the_cells_of_a_graph():
     scene = ls.load("paper-designed")
     graph = ls.transitions(scene.map, ls.grid(scene.domain, cells=4096))
-    assert_same(ls.limit_set(graph).extents, TABLE["paper-designed"], 1e-12)
-    assert_same(ls.limit_set(graph, ls.attractors(graph)[0]).extents, TABLE["paper-designed"], 1e-12)
+    assert_same(ls.limit_set(graph).extents, LIMIT_SETS["paper-designed"], 1e-12)
+    assert_same(ls.limit_set(graph, ls.attractors(graph)[0]).extents, LIMIT_SETS["paper-designed"], 1e-12)
 
 
-# ---------------------------------------------------------------- the same end points at 40 digits, written apart
-
-mp.mp.dps = 40
-SIDES = [mp.mpf(text) for text in ("5.75", "3.6", "6.75")]
-DATA = {
-    "paper-initial-small-angle": ("-1.0", "3.2444722", "1.7898493", "85.2549144"),
-    "paper-designed-small-angle": ("-1.0", "4.4179581", "0.5040259", "48.6228609"),
-    "paper-initial": ("-0.2", "3.9867006", "1.8835981", "33.3605945"),
-    "paper-designed": ("-0.2", "4.2255778", "0.7082490", "25.3778518"),
-}
+# ---------------------------------------------------------------- the same end points at 40 digits
 
 
-class Part:
-    """A throw at 40 digits, from the decimals of the scene."""
-
-    def __init__(self, name):
-        self.small = "small" in name
-        self.h, along, above, self.kappa = (mp.mpf(text) for text in DATA[name])
-        # Side 2 from (0, 0) to (6.75, 0); the apex joins side 0 (left) and side 1 (right).
-        left, right = mp.mpf(0), SIDES[2]
-        apex_x = (SIDES[0] ** 2 - SIDES[1] ** 2 + SIDES[2] ** 2) / (2 * SIDES[2])
-        apex = (apex_x, mp.sqrt(SIDES[0] ** 2 - apex_x**2))
-        ends = [
-            (apex, (left, mp.mpf(0))),
-            ((right, mp.mpf(0)), apex),
-            ((left, mp.mpf(0)), (right, mp.mpf(0))),
-        ]
-        self.a, self.d = [], []
-        for (px, py), (qx, qy) in ends:
-            length = mp.hypot(qx - px, qy - py)
-            ux, uy = (qx - px) / length, (qy - py) / length
-            self.a.append((along - px) * ux + (above - py) * uy)
-            self.d.append((above - py) * ux - (along - px) * uy)
-        self.rho2 = mp.mpf("1.25") ** 2
-
-    def angle(self, R, i):
-        a, d, kappa = self.a[i], self.d[i], self.kappa
-        if self.small:
-            return 2 * (R - a) / kappa
-        height = lambda p: R - a * mp.sin(p) / p + d * (1 - mp.cos(p)) / p - kappa * p / 2  # noqa: E731
-        return mp.findroot(height, 2 * (R - a) / (kappa - d))
-
-    def margin(self, R, i):
-        a, d, kappa, p = self.a[i], self.d[i], self.kappa, self.angle(R, i)
-        M, ell = self.rho2 + a**2 + d**2, mp.hypot(a, d)
-        if self.small:
-            om = (self.rho2 - a * R + 2 * a**2 + d**2 + d * self.h) / M
-            return M * om**2 / 2 - (kappa * (ell - d) - 2 * a * (R - a))
-        X, H = a * mp.cos(p) - d * mp.sin(p), a * mp.sin(p) + d * mp.cos(p)
-        om = (self.rho2 + X * (R - kappa * p) + H * (self.h + d)) / M
-        return mp.sign(om) * M * om**2 / 2 - mp.sign(X) * kappa * (ell - H)
-
-    def throw(self, R, i, branch):
-        a, d, p = self.a[i], self.d[i], self.angle(R, i)
-        jog = R - self.h * p
-        if not self.small:
-            jog += a * (1 - mp.cos(p)) - d * (p - mp.sin(p))
-        if branch == "jog":
-            return jog, i
-        k = (i + 1) % 3
-        return jog - a - (SIDES[k] - self.a[k]), k
-
-
-@pytest.mark.parametrize("name", TABLE)
+@pytest.mark.parametrize("name", LIMIT_SETS)
 def test_every_end_is_the_orbit_of_its_origin_at_40_digits(name):
     scene, part = ls.load(name), Part(name)
-    found = limit_set_of(scene.map, widened(TABLE[name], 0.05), scene.domain)
-    printed = [x for side in sorted(TABLE[name]) for pair in TABLE[name][side] for x in pair]
+    found = limit_set_of(scene.map, widened(LIMIT_SETS[name], 0.05), scene.domain)
+    printed = [x for side in sorted(LIMIT_SETS[name]) for pair in LIMIT_SETS[name][side] for x in pair]
     for end, table in zip(found.ends, printed, strict=True):
-        x, side = mp.findroot(lambda R, s=end.origin.side: part.margin(R, s), end.origin.x), end.origin.side
+        x, side = part.critical_point(end.origin.side, end.origin.x), end.origin.side
         for branch in end.origin.branches:
             x, side = part.throw(x, side, branch)
         assert side == end.side
@@ -148,26 +67,9 @@ def test_every_end_is_the_orbit_of_its_origin_at_40_digits(name):
         assert abs(x - end.x) < 2e-13
 
 
-@pytest.mark.parametrize("name", TABLE)
-def test_a_long_orbit_comes_close_to_every_end_from_inside(name):
-    scene = ls.load(name)
-    path = ls.orbit(scene.map, 15.0, 2, 1_000_000)
-    x, sides = path.x[5000:], path.side[5000:]
-    for end in limit_set_of(scene.map, widened(TABLE[name], 0.05), scene.domain).ends:
-        here = x[sides == end.side]
-        gap = np.min(np.abs(here - end.x))
-        assert gap < 2e-3
-    for side, pairs in TABLE[name].items():
-        here = x[sides == side]
-        covered = np.zeros(here.size, dtype=bool)
-        for lo, hi in pairs:
-            covered |= (here >= lo - 1e-11) & (here <= hi + 1e-11)
-        assert covered.all()
-
-
 def test_ends_say_where_they_come_from():
     scene = ls.load("paper-designed")
-    found = limit_set_of(scene.map, widened(TABLE["paper-designed"], 0.05), scene.domain)
+    found = limit_set_of(scene.map, widened(LIMIT_SETS["paper-designed"], 0.05), scene.domain)
     assert str(found.ends[3].origin).endswith("on side 2, jog, flip x 2")
     assert found.ends[3].origin.branches == ("jog", "flip", "flip")
     assert [(end.side, end.which) for end in found.ends] == [(s, w) for s in range(3) for w in ("lo", "hi")]

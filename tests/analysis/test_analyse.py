@@ -1,0 +1,256 @@
+"""All answers at once: the paper's scenes, parts with more sides, goals of every kind, and the JSON form."""
+
+import json
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import limitsets as ls
+from limitsets.analysis import other_vertex_first, overlap, scene_of
+from limitsets.errors import AnswerError, GridError, SceneError
+from limitsets.thrower import impact_angles
+
+HERE = Path(__file__).parent
+PAPER = ["paper-designed", "paper-designed-small-angle", "paper-initial", "paper-initial-small-angle"]
+MORE = [HERE / "four-sides.toml", HERE / "five-sides.toml"]
+
+
+@lru_cache(maxsize=16)
+def analysed(source, cells=4096):
+    return ls.analyse(source, cells)
+
+
+def changed(name, **tables):
+    return {**ls.load(name).as_dict(), **tables}
+
+
+def from_far(**changes):
+    """Weak throws with a high arm: nothing stays on it."""
+    return ls.load(HERE / "five-sides.toml").with_values({"throw.kappa": 60.0, "arm.surface_height": -0.5, **changes})
+
+
+@pytest.mark.parametrize("name", PAPER)
+@pytest.mark.parametrize("cells", [2048, 4096])
+def test_the_paper_scenes_have_one_attractor_that_takes_all(name, cells):
+    found = analysed(name, cells)
+    assert len(found.attractors) == 1
+    assert found.basins.attractors[0] == pytest.approx(1.0, abs=1e-9)
+    assert found.spurious == ()
+    assert found.extents_from == ("end points",)
+    assert found.attractors[0].flip_order == (0, 1, 2)
+    assert found.second_pass < 0.01
+
+
+@pytest.mark.parametrize(
+    ("name", "holds", "threshold"),
+    [
+        ("paper-designed", True, 19.75268801485),
+        ("paper-designed-small-angle", True, 12.88421238353),
+        ("paper-initial", False, 21.554457325114),
+        ("paper-initial-small-angle", False, 20.421069168761),
+    ],
+)
+def test_the_goal_and_its_sharp_threshold(name, holds, threshold):
+    goal = analysed(name).goal
+    assert goal.holds is holds
+    assert goal.threshold == pytest.approx(threshold, abs=1e-9)
+    assert goal.how == "sampled"
+
+
+@pytest.mark.parametrize(
+    ("name", "borders"),
+    [("paper-designed", {0: 20.1517, 1: 26.4235}), ("paper-initial", {0: 26.9141})],
+)
+def test_other_vertex_first(name, borders):
+    scene = ls.load(name)
+    found = other_vertex_first(scene)
+    assert set(found) == {0, 1, 2}
+    for side, parts in found.items():
+        if side not in borders:
+            assert parts == []
+            continue
+        ((lo, hi),) = parts
+        assert lo == pytest.approx(borders[side], abs=1e-4)
+        assert hi == scene.arm_length
+        at, below = impact_angles(scene.map, [lo, np.nextafter(lo, 0.0)], side)
+        assert below <= scene.sides.corner[side] < at
+    assert overlap(found, analysed(name).extents[0]) == {}
+
+
+def test_other_vertex_first_agrees_with_single_throws():
+    from limitsets.thrower import trace
+
+    scene = ls.load(HERE / "five-sides.toml")
+    found = other_vertex_first(scene)
+    assert any(found.values())
+    for side in range(5):
+        for x in np.linspace(10.0, 70.0, 25):
+            inside = any(lo <= x <= hi for lo, hi in found[side])
+            assert inside == trace(scene.map, x, side).other_vertex_first[0]
+
+
+@pytest.mark.parametrize("path", MORE, ids=lambda path: path.stem)
+def test_more_sides(path):
+    found = analysed(path)
+    count = len(found.scene.sides)
+    assert count == {"four-sides": 4, "five-sides": 5}[path.stem]
+    assert found.attractors[0].flip_order == tuple(range(count))
+    assert set(found.extents[0]) == set(range(count))
+    assert set(found.critical_points) == set(found.other_vertex_first) == set(range(count))
+    total = sum(found.basins.attractors) + sum(found.basins.exits.values()) + found.basins.undecided_between
+    assert total == pytest.approx(1.0, abs=1e-9)
+    orbit = ls.orbit(found.scene.map, *_inside(found), 5000)
+    for side, parts in found.extents[0].items():
+        x = orbit.x[orbit.side == side]
+        assert all(any(lo - 1e-9 <= value <= hi + 1e-9 for lo, hi in parts) for value in x)
+
+
+def _inside(found):
+    lo, hi = found.extents[0][0][0]
+    return 0.5 * (lo + hi), 0
+
+
+def test_coarse_cells_are_told():
+    found = analysed("paper-initial", 512)
+    assert len(found.spurious) > 1000
+    assert found.extents[0][0] == [pytest.approx((13.522673689975, 20.915912223359), abs=1e-9)]
+
+
+def test_nothing_stays():
+    found = ls.analyse(from_far())
+    assert found.attractors == found.limit_sets == found.extents == ()
+    assert found.basins.exits["inward"] == pytest.approx(1.0, abs=1e-9)
+    assert found.goal.holds is None  # "beyond 40 cm side 1" is said of nothing
+    assert json.loads(json.dumps(found.to_json(), allow_nan=False))["goal"]["threshold"] is None
+
+
+# ---------------------------------------------------------------- goals
+
+
+@pytest.mark.parametrize(
+    ("goal", "holds", "threshold"),
+    [
+        ({"attracts_all": True}, True, None),
+        ({"flip_order": [1, 2, 0]}, True, None),
+        ({"flip_order": [0, 2, 1]}, False, None),
+        ({"stays_on_arm": True}, True, None),
+        ({"stays_on_arm": True, "from_anywhere": True}, True, None),
+        ({"reaches": {"x": "23 in", "side": 2}}, True, 23.383151921158),
+        ({"reaches": {"x": "24 in", "side": 2}}, False, 23.383151921158),
+        ({"reaches": {"x": "23 in", "side": 2, "every_orbit": True}}, None, 23.383151921158),
+        ({"oriented_beyond": {"x": "19.7 in", "side": 2}}, False, 19.75268801485),
+    ],
+)
+def test_goals_of_every_kind(goal, holds, threshold):
+    found = ls.analyse(changed("paper-designed", goal=goal)).goal
+    assert found.holds is holds
+    assert found.threshold == (None if threshold is None else pytest.approx(threshold, abs=1e-9))
+
+
+def test_a_goal_from_anywhere_counts_what_transients_reach():
+    goal = {"oriented_beyond": {"x": "20 in", "side": 2}, "from_anywhere": True}
+    found = ls.analyse(changed("paper-designed", goal=goal))
+    reached = -np.inf
+    for side in range(3):
+        lo, hi = float(found.scene.domain.lo[side, 0]), float(found.scene.domain.hi[side, 0])
+        images = ls.maps.images(found.scene.map, np.linspace(lo, hi, 20_001), side)
+        other = (images.code >= 0) & (images.side != 2)
+        reached = max(reached, images.x[other].max(initial=-np.inf))
+    assert found.goal.holds is False
+    assert found.goal.threshold == pytest.approx(reached, abs=1e-9)
+
+
+def test_starts_that_leave_count_against_staying():
+    goal = {"stays_on_arm": True, "from_anywhere": True}
+    assert ls.analyse({**ls.load(MORE[0]).as_dict(), "goal": goal}).goal.holds is False
+    assert ls.analyse({**from_far().as_dict(), "goal": {"stays_on_arm": True}}).goal.holds is False
+
+
+# ---------------------------------------------------------------- JSON
+
+WORDS = {
+    "scene", "units", "cells", "critical_points", "attractors", "basins", "cycles", "goal", "other_vertex_first",
+    "spurious", "second_pass", "timings",
+}  # fmt: skip
+
+
+def numbers_in(record):
+    if isinstance(record, dict):
+        assert all(isinstance(key, str) for key in record)
+        record = list(record.values())
+    if isinstance(record, list):
+        for each in record:
+            yield from numbers_in(each)
+    else:
+        yield record
+
+
+@pytest.mark.parametrize("source", [*PAPER, *MORE], ids=str)
+def test_json(source):
+    found = analysed(source)
+    record = json.loads(json.dumps(found.to_json(), allow_nan=False))
+    assert set(record) == WORDS
+    assert scene_of(record) == found.scene
+    sides = {str(side) for side in range(len(found.scene.sides))}
+    assert set(record["critical_points"]) == set(record["other_vertex_first"]) == sides
+    for points in record["critical_points"].values():
+        assert all(set(point) == {"x", "kind"} and point["kind"] in ("jog->flip", "flip->jog") for point in points)
+        assert [point["x"] for point in points] == sorted(point["x"] for point in points)
+    (attractor,) = record["attractors"]
+    assert {"extents", "flip_order", "jogs_per_visit", "flips_per_throw", "lyapunov"} <= set(attractor)
+    assert attractor["extents_from"] == "end points"
+    assert attractor["extents"] == {
+        str(side): [list(pair) for pair in parts] for side, parts in found.extents[0].items()
+    }
+    assert set(record["basins"]) == {"attractors", "undecided_between", "inward", "outward", "outside_model"}
+    if record["goal"] is not None:
+        assert set(record["goal"]) == {"kind", "holds", "threshold", "how"}
+    assert all(value is None or isinstance(value, str | bool | int | float) for value in numbers_in(record))
+
+
+def test_a_lyapunov_exponent_that_is_no_number_is_null():
+    from dataclasses import replace
+
+    found = analysed("paper-designed")
+    odd = replace(found, attractors=(replace(found.attractors[0], lyapunov=-np.inf),))
+    assert odd.to_json()["attractors"][0]["lyapunov"] is None
+
+
+def test_cycles_repel():
+    found = ls.analyse("paper-designed", cycles=10)
+    record = found.to_json()["cycles"]
+    assert len(record) == len(found.cycles) > 0
+    assert all(abs(cycle["multiplier"]) > 1 and len(cycle["x"]) == cycle["period"] <= 10 for cycle in record)
+
+
+# ---------------------------------------------------------------- calls
+
+
+def test_progress_and_timings_name_the_same_steps():
+    seen = []
+    found = ls.analyse("paper-designed", progress=lambda step, done, of: seen.append((step, done, of)))
+    assert [step for step, _, _ in seen] == list(found.timings)
+    assert [done for _, done, _ in seen] == list(range(len(seen)))
+    assert {of for _, _, of in seen} == {len(seen)}
+
+
+def test_a_scene_a_name_a_path_and_a_structure_are_the_same():
+    scene = ls.load("paper-initial")
+    several = [ls.analyse(source, 2048) for source in (scene, "paper-initial", scene.as_dict())]
+    assert len({json.dumps(found.to_json()["attractors"]) for found in several}) == 1
+
+
+@pytest.mark.parametrize(
+    ("error", "call"),
+    [
+        (SceneError, lambda: ls.analyse("no-such-scene")),
+        (GridError, lambda: ls.analyse("paper-designed", 0)),
+        (AnswerError, lambda: ls.analyse("paper-designed", throws=0)),
+        (AnswerError, lambda: ls.analyse("paper-designed", cycles=-1)),
+    ],
+)
+def test_wrong_calls(error, call):
+    with pytest.raises(error):
+        call()

@@ -1,0 +1,283 @@
+"""The command line: exit codes, what goes to which stream, JSON words, and files that stay whole."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+import limitsets as ls
+from limitsets.cli import main
+
+SCENES = Path(__file__).parents[1] / "analysis"
+COMMAND = [sys.executable, "-W", "error", "-m", "limitsets"]
+
+
+@pytest.fixture(autouse=True)
+def here(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+
+
+def run(capfd, *words):
+    code = main(words)
+    out, err = capfd.readouterr()
+    return code, out, err
+
+
+def start(*words, **options):
+    return subprocess.Popen(
+        [*COMMAND, *words], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, **options
+    )
+
+
+# ---------------------------------------------------------------- bad input
+
+BAD = [
+    ["nonsense"],
+    ["--bogus"],
+    ["analyse"],
+    ["analyse", "nope.toml"],
+    ["analyse", "paper-designd"],
+    ["analyse", ""],
+    ["analyse", "."],
+    ["analyse", "broken.toml"],
+    ["analyse", "paper-designed", "--cells", "0"],
+    ["analyse", "paper-designed", "--cells", "many"],
+    ["analyse", "paper-designed", "--cells", "99999999999"],
+    ["analyse", "paper-designed", "--error", "1e-6"],
+    ["analyse", "paper-designed", "--cells", "64", "--out", "file"],
+    ["analyse", "paper-designed", "--cells", "64", "--out", "file/below"],
+    ["throw", "paper-designed", "--x", "8"],
+    ["throw", "paper-designed", "--side", "2"],
+    ["throw", "paper-designed", "--x", "8", "--side", "3"],
+    ["throw", "paper-designed", "--x", "8", "--side", "-1"],
+    ["throw", "paper-designed", "--x", "8 kg", "--side", "2"],
+    ["throw", "paper-designed", "--x", "8,5", "--side", "2"],
+    ["throw", "paper-designed", "--x", "nan", "--side", "2"],
+    ["throw", "paper-designed", "--x", "inf", "--side", "2"],
+    ["throw", "paper-designed", "--x", "1e400", "--side", "2"],
+    ["throw", "paper-designed", "--x", "", "--side", "2"],
+    ["throw", "paper-designed", "--x", "28.1", "--side", "2"],
+    ["throw", "paper-designed", "--x", "8", "--side", "2", "--count", "0"],
+    ["throw", "paper-designed", "--x", "8", "--side", "2", "--count", "9999999999"],
+    ["throw", "paper-designed", "--x", "8", "--side", "2", "--out", "."],
+    ["throw", "paper-designed", "--x", "8", "--side", "2", "--out", "/dev/full"],
+    ["plot", "paper-designed"],
+    ["plot", "paper-designed", "blob"],
+    ["plot", "paper-designed", "map", "--out", "map.bmp"],
+    ["plot", "paper-designed", "map", "--x", "8", "--side", "2"],
+    ["plot", "paper-designed", "flight", "--x", "8"],
+    ["plot", "paper-designed", "flight", "--x", "1", "--side", "2"],
+    ["plot", "paper-designed", "flight", "--x", "8", "--side", "2", "--out", "file/map.png"],
+    ["scenes", "--out", "file/scenes.json"],
+]
+
+
+@pytest.mark.parametrize("words", BAD, ids=" ".join)
+def test_bad_input_is_one_line_and_exit_2(capfd, words):
+    Path("file").write_text("mine")
+    Path("broken.toml").write_text("name = ")
+    code, out, err = run(capfd, *words)
+    assert code == 2
+    assert out == ""
+    assert err.startswith("limitsets: ")
+    assert err.count("\n") == 1
+    assert "Traceback" not in err
+    assert "bug" not in err
+    assert Path("file").read_text() == "mine"
+
+
+def test_a_bug_is_one_line_too(capfd, monkeypatch):
+    import limitsets.scene
+
+    monkeypatch.setattr(limitsets.scene, "scenes", lambda: 1 / 0)
+    code, out, err = run(capfd, "scenes")
+    assert (code, out) == (2, "")
+    assert err == "limitsets: this is a bug in limitsets: ZeroDivisionError: division by zero\n"
+
+
+@pytest.mark.parametrize("fault", [MemoryError, PermissionError(13, "Permission denied", "x.png"), OSError("odd")])
+def test_faults_of_the_machine(capfd, monkeypatch, fault):
+    import limitsets.scene
+
+    def fails():
+        raise fault
+
+    monkeypatch.setattr(limitsets.scene, "scenes", fails)
+    code, _, err = run(capfd, "scenes")
+    assert code == 2
+    assert err.count("\n") == 1
+
+
+# ---------------------------------------------------------------- answers
+
+
+def test_scenes(capfd):
+    code, out, err = run(capfd, "scenes", "--json")
+    assert (code, err) == (0, "")
+    assert [record["name"] for record in json.loads(out)] == ls.scenes()
+    code, out, _ = run(capfd, "scenes")
+    assert code == 0
+    assert all(name in out for name in ls.scenes())
+
+
+def test_throw(capfd):
+    code, out, err = run(capfd, "throw", "paper-designed", "--x", "8", "--side", "2", "--count", "3", "--json")
+    assert (code, err) == (0, "")
+    record = json.loads(out)
+    assert [each["x"] for each in record] == pytest.approx([8.262013, 8.557124, 8.891802], abs=1e-6)
+    words = {"x", "side", "status", "phi", "displacement", "other_vertex_first"}
+    assert all(set(each) == words for each in record)
+    assert record[0]["phi"] == pytest.approx(0.311437, abs=1e-6)
+    assert [each["status"] for each in record] == ["jog"] * 3
+    _, same, _ = run(capfd, "throw", "paper-designed", "--x", "20.32 cm", "--side", "2", "--count", "3", "--json")
+    assert json.loads(same) == record
+    _, text, _ = run(capfd, "throw", "paper-designed", "--x", "8", "--side", "2")
+    assert "x [in]" in text
+    assert "8.262013" in text
+
+
+def test_throw_ends_at_the_first_exit(capfd):
+    _, out, _ = run(capfd, "throw", "paper-designed", "--x", "-3", "--side", "2", "--count", "9", "--json")
+    (record,) = json.loads(out)
+    assert record == {
+        "x": -3.0, "side": 2, "status": "outside-model", "phi": None, "displacement": None, "other_vertex_first": False
+    }  # fmt: skip
+    scene = ls.load("paper-designed").with_values({"arm.surface_height": -3.0})
+    ls.dump(scene, "high.toml")
+    _, out, _ = run(capfd, "throw", "high.toml", "--x", "20", "--side", "0", "--count", "99", "--json")
+    assert [each["status"] for each in json.loads(out)][-1] == "outward"
+
+
+def test_throw_that_stalls_says_so(capfd):
+    start_x = str(ls.load("paper-designed").sides.a[0] * (1 + 1e-15))
+    code, out, err = run(capfd, "throw", "paper-designed", "--x", start_x, "--side", "0", "--count", "5", "--json")
+    assert code == 0
+    assert json.loads(out) == []
+    assert "stalled" in err
+
+
+def test_throw_and_flags(capfd):
+    _, out, _ = run(capfd, "throw", "paper-designed", "--x", "21", "--side", "0", "--json")
+    assert json.loads(out)[0]["other_vertex_first"] is True
+    _, out, _ = run(capfd, "throw", "paper-designed", "--x", "21", "--side", "0")
+    assert "another vertex lands first" in out
+
+
+def test_out_writes_the_same_json(capfd):
+    _, out, _ = run(capfd, "throw", "paper-designed", "--x", "8", "--side", "2", "--json", "-o", "throws.json")
+    assert json.loads(Path("throws.json").read_text()) == json.loads(out)
+    assert os.listdir() == ["throws.json"]
+
+
+@pytest.mark.parametrize("source", ["paper-designed", SCENES / "four-sides.toml", SCENES / "five-sides.toml"], ids=str)
+def test_analyse(capfd, source):
+    code, out, err = run(capfd, "analyse", str(source), "--json")
+    assert code == 0
+    assert all(line.startswith("limitsets: ") for line in err.splitlines())  # how far it is, if it takes long
+    name = Path(source).stem
+    folder = Path(f"{name}-analysis")
+    assert {path.name for path in folder.iterdir()} >= {"report.md", "analysis.json", "limit-set.png"}
+    assert json.loads(out) == json.loads((folder / "analysis.json").read_text())
+    assert json.loads(out)["scene"]["name"] == name
+
+
+def test_analyse_in_words(capfd):
+    code, out, err = run(capfd, "analyse", "paper-initial", "-o", "here", "--cells", "2048")
+    assert code == 0
+    assert "18.995 to 19.976, 20.434 to 21.554" in out
+    assert "goal oriented_beyond: does not hold (sampled, not proved)" in out
+    assert f"report: {Path('here') / 'report.md'}" in out
+
+
+@pytest.mark.parametrize("kind", ["limit-set", "map", "basins", "morse", "flight"])
+def test_plot(capfd, kind):
+    code, out, _ = run(capfd, "plot", str(SCENES / "five-sides.toml"), kind, "-o", "other.svg", "--json")
+    assert code == 0
+    assert json.loads(out) == {"figure": "other.svg"}
+    assert "<svg" in Path("other.svg").read_text()
+
+
+def test_plot_where_nothing_is_said(capfd):
+    code, out, _ = run(capfd, "plot", "paper-designed", "morse")
+    assert (code, out) == (0, "figure: paper-designed-morse.png\n")
+    assert Path("paper-designed-morse.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_plot_of_a_chosen_flight(capfd):
+    code, _, _ = run(capfd, "plot", "paper-designed", "flight", "--x", "38.1 cm", "--side", "1", "-o", "one.pdf")
+    assert code == 0
+    assert Path("one.pdf").read_bytes().startswith(b"%PDF")
+
+
+def test_version_and_help(capfd):
+    code, out, _ = run(capfd, "--version")
+    assert (code, out) == (0, f"limitsets {ls.__version__}\n")
+    for words in (["--help"], ["analyse", "-h"], []):
+        code, out, err = run(capfd, *words)
+        assert (code, err) == (0, "")
+        assert "Usage: limitsets" in out
+
+
+# ---------------------------------------------------------------- as a process
+
+
+def test_help_loads_no_room():
+    code = (
+        "import sys; from limitsets.cli import main; main(['--help']); "
+        "print(*(m for m in sys.modules if m.split('.')[0] in {'numpy', 'numba', 'scipy', 'matplotlib', 'networkx', 'pint', "
+        "'pydantic_core'}))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.splitlines()[-1].split() in ([], ["pydantic_core"]) or "Usage" in done.stdout.splitlines()[-1]
+    assert "numpy" not in done.stdout.splitlines()[-1]
+
+
+def test_exit_codes_and_streams_of_a_process():
+    process = start("scenes", "--json")
+    out, err = process.communicate()
+    assert (process.returncode, err) == (0, "")
+    assert len(json.loads(out)) >= 4
+    process = start("analyse", "nope")
+    out, err = process.communicate()
+    assert (process.returncode, out) == (2, "")
+    assert err.count("\n") == 1
+
+
+def test_a_reader_that_goes_away():
+    process = start("throw", "paper-designed", "--x", "8", "--side", "2", "--count", "20000", "--json")
+    process.stdout.readline()
+    process.stdout.close()
+    assert process.wait() == 0
+    assert process.stderr.read() == ""
+    process.stderr.close()
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="no /dev/full here")
+def test_a_full_disk():
+    with Path("/dev/full").open("w") as full:
+        done = subprocess.run([*COMMAND, "scenes"], stdout=full, stderr=subprocess.PIPE, text=True, check=False)
+    assert done.returncode == 2
+    assert done.stderr == "limitsets: No space left on device\n"
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="signals")
+def test_ctrl_c_leaves_the_old_files_whole(tmp_path):
+    folder = tmp_path / "report"
+    folder.mkdir()
+    (folder / "report.md").write_text("old")
+    (folder / "map.png").write_text("old")
+    process = start("analyse", "paper-designed", "-o", str(folder))
+    deadline = time.monotonic() + 120
+    while not list(folder.glob(".draft-*")) and time.monotonic() < deadline and process.poll() is None:
+        time.sleep(0.005)
+    process.send_signal(signal.SIGINT)
+    _, err = process.communicate()
+    assert process.returncode == 130
+    assert "Traceback" not in err
+    assert err.splitlines()[-1] == "limitsets: interrupted"
+    assert {path.name: path.read_text() for path in folder.iterdir()} == {"report.md": "old", "map.png": "old"}

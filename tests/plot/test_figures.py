@@ -1,0 +1,327 @@
+"""Figures by their content: what the artists hold against the answers, and whether texts stay apart."""
+
+import itertools
+import subprocess
+import sys
+from functools import lru_cache
+from pathlib import Path
+
+import networkx as nx
+import numpy as np
+import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.colors import to_rgb
+
+import limitsets as ls
+from limitsets import plot
+from limitsets.errors import AnswerError, MapError
+from limitsets.plot.style import SETS, extents_of, stretch
+from limitsets.thrower import fly
+
+SCENES = Path(__file__).parents[1] / "analysis"
+SOURCES = ["paper-designed", "paper-designed-small-angle", "paper-initial", SCENES / "four-sides.toml", SCENES / "five-sides.toml"]
+by_name = pytest.mark.parametrize("source", SOURCES, ids=lambda source: Path(source).stem)
+
+
+@lru_cache(maxsize=8)
+def analysed(source):
+    return ls.analyse(source)
+
+
+def named(axes, gid):
+    return [artist for artist in axes.get_children() if artist.get_gid() == gid]
+
+
+def drawn(figure):
+    FigureCanvasAgg(figure).draw()
+    return figure
+
+
+def luminance(colour):
+    return float(np.dot(to_rgb(colour), (0.299, 0.587, 0.114)))
+
+
+# ---------------------------------------------------------------- limit set
+
+
+@by_name
+def test_limit_set(source):
+    found = analysed(source)
+    count = len(found.scene.sides)
+    figure = plot.limit_set(found.scene, found.limit_sets)
+    (axes,) = figure.axes
+    bars = sorted((-round(bar.get_y()), bar.get_x(), bar.get_x() + bar.get_width()) for bar in named(axes, "limit set"))
+    wanted = sorted((side, lo, hi) for side, parts in found.extents[0].items() for lo, hi in parts)
+    assert bars == [pytest.approx(each) for each in wanted]
+    assert len(named(axes, "limit set again")) == len(found.extents[0][0])
+    path = stretch(found.scene, found.extents[0])
+    assert len(named(axes, "flip")) == int((path.code == ls.maps.FLIP).sum())
+    assert len(named(axes, "jog")) == int((path.code == ls.maps.JOG).sum())
+    marks = sorted((-round(float(np.mean(mark.get_ydata()))), mark.get_xdata()[0]) for mark in named(axes, "critical point"))
+    assert marks == [(side, point.x) for side, points in found.critical_points.items() for point in points]
+    assert [label.get_text() for label in axes.get_yticklabels()][:count] == [f"side {side}" for side in range(count)]
+    assert axes.get_ylim()[0] < -count
+    assert found.scene.unit in axes.get_xlabel()
+    assert found.scene.name in axes.get_title(loc="left")
+    assert len(named(axes, "goal")) == (found.scene.goal is not None)
+
+
+def test_flips_go_down_one_lane_to_where_the_map_says():
+    found = analysed("paper-designed")
+    (axes,) = plot.limit_set(found.scene, found).axes
+    path = stretch(found.scene, found.extents[0])
+    flips = path.code == ls.maps.FLIP
+    arrows = [arrow._posA_posB for arrow in named(axes, "flip")]
+    assert [start[0] for start, _ in arrows] == pytest.approx(path.x[:-1][flips])
+    assert [end[0] for _, end in arrows] == pytest.approx(path.x[1:][flips])
+    assert all(0.7 < start[1] - end[1] < 1.0 for start, end in arrows)
+
+
+def test_a_stretch_begins_with_an_arrival_and_is_a_whole_round():
+    found = analysed("paper-designed")
+    path = stretch(found.scene, found.extents[0], throws=12)
+    assert path.side[0] == path.side[-1] == 0
+    assert path.code.size >= 12
+    assert ls.orbit(found.scene.map, path.x[0], 0, path.code.size).x == pytest.approx(path.x)
+
+
+def test_what_can_be_drawn():
+    found = analysed("paper-designed")
+    assert extents_of(found) == list(found.extents)
+    assert extents_of(found.limit_sets[0]) == [found.limit_sets[0].extents]
+    assert extents_of(found.attractors) == [found.attractors[0].extents]
+    assert extents_of(found.extents[0]) == [found.extents[0]]
+    for wrong in (3, "designed", [1, 2]):
+        with pytest.raises(AnswerError):
+            plot.limit_set(found.scene, wrong)
+
+
+def test_axes_of_ones_own():
+    from matplotlib.figure import Figure
+
+    mine = Figure()
+    axes = mine.subplots()
+    found = analysed("paper-initial")
+    assert plot.limit_set(found.scene, found, axes=axes) is mine
+    assert mine.legends == []
+
+
+def test_no_limit_set():
+    scene = ls.load(SCENES / "five-sides.toml").with_values({"throw.kappa": 60.0, "arm.surface_height": -0.5})
+    found = ls.analyse(scene)
+    for figure in (
+        plot.limit_set(scene, found),
+        plot.map(scene, found),
+        plot.basins(scene, found.basins, found),
+        plot.morse(found.morse, scene.name),
+    ):
+        drawn(figure)
+
+
+# ---------------------------------------------------------------- map
+
+
+@by_name
+def test_map(source):
+    found = analysed(source)
+    scene, count = found.scene, len(found.scene.sides)
+    figure = plot.map(scene, found)
+    panels = [axes for axes in figure.axes if axes.axison]
+    assert len(panels) == count
+    for side, axes in enumerate(panels):
+        for name, code in (("jog", ls.maps.JOG), ("flip", ls.maps.FLIP)):
+            (line,) = named(axes, name)
+            x, y = np.asarray(line.get_xdata()), np.asarray(line.get_ydata())
+            there = ls.maps.images(scene.map, x, side)
+            assert (np.isfinite(y) == (there.code == code)).all()
+            assert y[np.isfinite(y)] == pytest.approx(there.x[there.code == code])
+        assert [mark.get_xdata()[0] for mark in named(axes, "critical point")] == [p.x for p in found.critical_points[side]]
+        assert len(named(axes, "limit set")) == len(found.extents[0].get(side, ()))
+        assert len(named(axes, "other vertex first")) == len(found.other_vertex_first[side])
+        jog, flip = named(axes, "jog")[0], named(axes, "flip")[0]
+        assert jog.get_linestyle() != flip.get_linestyle()
+    path = stretch(scene, found.extents[0], throws=10)
+    cobweb = sum(len(named(axes, "cobweb")) for axes in panels)
+    assert cobweb == path.code.size
+    assert sum(len(named(axes, "departure")) for axes in panels) == int((path.code == ls.maps.FLIP).sum())
+
+
+def test_map_alone_shows_the_whole_arm():
+    scene = ls.load("paper-initial")
+    figure = plot.map(scene)
+    assert figure.axes[0].get_xlim() == (0.0, 28.0)
+    assert not named(figure.axes[0], "cobweb")
+
+
+# ---------------------------------------------------------------- basins
+
+
+@by_name
+def test_basins_in_strips(source):
+    found = analysed(source)
+    (axes,) = plot.basins(found.scene, found.basins, found).axes
+    total = float(found.grid.measure.sum())
+    for label in set(found.basins.labels.tolist()):
+        width = sum(strip.get_width() for strip in named(axes, f"label {label}"))
+        weight = found.grid.measure[found.basins.labels == label].sum()
+        assert width / total == pytest.approx(weight / total, abs=1e-12)
+    assert len(named(axes, "attractor")) == sum(len(parts) for parts in found.extents[0].values())
+
+
+def test_basins_in_the_plane():
+    graph = ls.transitions(ls.maps.TwoState(1.0), ls.grid([(-2, 2), (-2, 2)], cells=32), method="centres")
+    shares = ls.basins(graph, ls.attractors(graph))
+    figure = plot.basins(graph.grid, shares)
+    (axes,) = figure.axes
+    picture = np.asarray(axes.collections[0].get_array()).reshape(32, 32)
+    assert (picture[:, :16] == picture[0, 0]).all()
+    assert (picture[:, 16:] == picture[0, -1]).all()
+    assert picture[0, 0] != picture[0, -1]
+    texts = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert texts == ["to attractor 0: 50.0 % of all starts", "to attractor 1: 50.0 % of all starts"]
+
+
+def test_basins_in_space_are_refused():
+    graph = ls.transitions(ls.maps.Product(), ls.grid(ls.maps.domain_of(ls.maps.Product()), cells=4))
+    if graph.grid.dimension < 3:
+        pytest.skip("no map of three dimensions at hand")
+    with pytest.raises(AnswerError):
+        plot.basins(graph.grid, ls.basins(graph, ls.attractors(graph)))
+
+
+def test_sets_differ_in_grey():
+    from limitsets.plot.basins import ATTRACTORS, HATCHES
+
+    grey = [luminance(colour) for colour in ATTRACTORS]
+    assert min(abs(a - b) for a, b in itertools.combinations(grey, 2)) > 0.05
+    assert len(set(HATCHES)) == len(HATCHES)
+    assert len({hatch for _, hatch in SETS}) == len(SETS)
+
+
+# ---------------------------------------------------------------- Morse graph
+
+
+def chain(length):
+    graph = nx.DiGraph()
+    for k in range(length):
+        graph.add_node(k, cells=k + 1, attracting=k == 0, extents={0: [(0.0, 1.0)]}, exits=["inward"] if k == 3 else [])
+    graph.add_edges_from((k + 1, k) for k in range(length - 1))
+    return graph
+
+
+def test_morse_nodes_edges_and_ways_out():
+    (axes,) = plot.morse(chain(5), "a chain").axes
+    assert len(named(axes, "attracting")) == len(named(axes, "border")) == 1
+    assert len(named(axes, "recurrent")) == 4
+    assert len(named(axes, "exit")) == 1
+    height = {text.get_text(): text.xy[1] for text in axes.texts if text.get_text().isdigit()}
+    assert [height[str(k)] for k in range(5)] == sorted(height.values())
+    small, large = named(axes, "recurrent")[0], named(axes, "recurrent")[-1]
+    assert small.get_markersize() < large.get_markersize()
+
+
+def test_morse_of_very_many_sets_draws_some_and_says_so():
+    (axes,) = plot.morse(chain(300)).axes
+    assert "300 recurrent sets, 1 attracting" in axes.get_title(loc="left")
+    assert "288 of the smallest are not drawn" in axes.get_title(loc="left")
+    assert len(named(axes, "attracting")) == 1
+    assert max(axes.figure.get_size_inches()) < 12
+
+
+# ---------------------------------------------------------------- flight
+
+
+@pytest.mark.parametrize(
+    ("source", "x", "side"),
+    [
+        ("paper-designed", 23.0, 2),
+        ("paper-designed", 8.0, 2),
+        ("paper-initial", 21.0, 1),
+        (SCENES / "four-sides.toml", 14.0, 0),
+        (SCENES / "five-sides.toml", 29.0, 0),
+        (SCENES / "five-sides.toml", 31.0, 0),
+    ],
+)
+def test_flight(source, x, side):
+    scene = ls.load(source)
+    figure = plot.flight(scene, x, side)
+    above, below = figure.axes
+    (start,), (impact,), (rest,) = named(above, "start"), named(above, "impact"), named(below, "rest")[:1]
+    h, sides = scene.surface_height, scene.sides
+    corners = start.get_xy()[:-1]
+    assert sorted(corners[:, 1])[:2] == pytest.approx([h, h], abs=1e-12)
+    assert corners[:, 0].min() <= x - sides.a[side] + 1e-9
+    landed = impact.get_xy()[:-1]
+    assert landed[:, 1].min() == pytest.approx(h, abs=1e-9)  # the vertex is on the arm, and nothing below it
+    assert landed[0, 1] == pytest.approx(h, abs=1e-9)
+    (path,) = named(above, "path")
+    after = ls.orbit(scene.map, x, side, 1)
+    to = int(after.side[1])
+    at_rest = rest.get_xy()[:-1]
+    assert sorted(at_rest[:, 1])[:2] == pytest.approx([h, h], abs=1e-9)
+    assert path.get_xdata()[0] == x
+    turned = at_rest[0] if to == side else at_rest[np.argmin(np.hypot(*(at_rest - landed[0]).T))]
+    assert turned == pytest.approx(landed[0], abs=1e-9)  # it turned about the struck vertex
+    lengths = np.sort(np.hypot(*np.diff(np.vstack([landed, landed[:1]]), axis=0).T))
+    assert lengths == pytest.approx(np.sort(sides.length), abs=1e-9)
+    title = below.get_title(loc="left")
+    assert f"{after.x[1]:.2f}" in title
+    assert ("a flip" if to != side else "a jog") in title
+    assert f"{np.degrees(fly(scene.map, x, side).phi):.1f}" in above.get_title(loc="left")
+
+
+def test_flight_by_small_angles_says_that_it_leaves_a_gap():
+    scene = ls.load("paper-designed-small-angle")
+    figure = plot.flight(scene, 20.5, 2)
+    assert "small-angle" in figure.get_suptitle()
+    assert not named(figure.axes[1], "turning")
+
+
+def test_flight_that_is_none():
+    scene = ls.load("paper-designed")
+    with pytest.raises(AnswerError):
+        plot.flight(scene, 1.0, 2)
+    with pytest.raises(MapError):
+        plot.flight(scene, 10.0, 3)
+
+
+# ---------------------------------------------------------------- all of them
+
+
+def every_figure(source):
+    found = analysed(source)
+    scene = found.scene
+    path = stretch(scene, found.extents[0])
+    yield plot.limit_set(scene, found)
+    yield plot.map(scene, found)
+    yield plot.map(scene)
+    yield plot.basins(scene, found.basins, found)
+    yield plot.morse(found.morse, scene.name)
+    for code in (ls.maps.JOG, ls.maps.FLIP):
+        k = int((path.code == code).argmax())
+        yield plot.flight(scene, float(path.x[k]), int(path.side[k]))
+
+
+@by_name
+def test_legends_titles_and_axes_stay_apart_and_inside(source):
+    for figure in every_figure(source):
+        drawn(figure)
+        renderer = figure.canvas.get_renderer()
+        axes = [each.get_tightbbox(renderer) for each in figure.axes if each.axison]
+        others = [legend.get_window_extent(renderer) for legend in figure.legends]
+        if figure._suptitle is not None:
+            others.append(figure._suptitle.get_window_extent(renderer))
+        for box in others:
+            assert not any(box.overlaps(area) for area in axes), figure.get_suptitle()
+        width, height = figure.canvas.get_width_height()
+        for box in [*axes, *others]:
+            assert box.x0 >= -1
+            assert box.y0 >= -1
+            assert box.x1 <= width + 1
+            assert box.y1 <= height + 1
+
+
+def test_pyplot_is_never_imported():
+    code = "import sys, limitsets as ls; ls.plot.map(ls.load('paper-designed')); print('matplotlib.pyplot' in sys.modules)"
+    done = subprocess.run([sys.executable, "-W", "error", "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.split() == ["False"]

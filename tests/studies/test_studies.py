@@ -1,0 +1,74 @@
+"""Every study runs, and says what it is expected to say."""
+
+import importlib.util
+import json
+from pathlib import Path
+
+import pytest
+
+STUDIES = Path(__file__).resolve().parents[2] / "studies"
+
+
+def load_study(name):
+    spec = importlib.util.spec_from_file_location(f"study_{name}", STUDIES / name / "study.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.mark.parametrize("folder", sorted(path.name for path in STUDIES.iterdir() if path.is_dir()))
+def test_a_study_has_its_parts(folder):
+    names = {path.name for path in (STUDIES / folder).iterdir()}
+    assert {"study.py", "README.md", "expected.json"} <= names
+    figures = [name for name in names if name.endswith(".png")]
+    text = (STUDIES / folder / "README.md").read_text(encoding="utf-8")
+    assert "**Question.**" in text
+    assert "**Answer.**" in text
+    assert figures
+    assert all(f"({name})" in text for name in figures)
+
+
+@pytest.fixture(scope="module")
+def four_scenes(tmp_path_factory):
+    study = load_study("01_four_scenes")
+    out = tmp_path_factory.mktemp("four-scenes")
+    return study, study.main(seed=3, out=out), out
+
+
+def test_four_scenes_as_expected(four_scenes):
+    _, numbers, out = four_scenes
+    expected = json.loads((STUDIES / "01_four_scenes" / "expected.json").read_text(encoding="utf-8"))
+    assert set(numbers) == set(expected)
+    assert (out / "limit-sets.png").stat().st_size > 20_000
+    for name, wanted in expected.items():
+        found = numbers[name]
+        assert found["attractors"] == 1
+        assert found["share_of_starts"] == pytest.approx(1.0, abs=1e-9)
+        assert set(found["extents"]) == set(wanted["extents"])
+        for side, parts in wanted["extents"].items():
+            assert found["extents"][side] == [pytest.approx(pair, abs=1e-9) for pair in parts]
+        assert found["jogs_possible"] == wanted["jogs_possible"]
+        for key in ("flips_per_throw", "lyapunov", "ln_small_angle_slope"):
+            value, tolerance = wanted[key]
+            assert found[key] == pytest.approx(value, abs=tolerance), (name, key)
+
+
+def test_four_scenes_two_ways(four_scenes):
+    _, numbers, _ = four_scenes
+    for name, found in numbers.items():
+        assert found["jogs_counted"] == found["jogs_possible"], name
+        for side, (lo, hi) in found["seen_on_orbit"].items():
+            first, last = found["extents"][side][0][0], found["extents"][side][-1][1]
+            assert first - 1e-9 <= lo < first + 0.01, (name, side)
+            assert last - 0.01 < hi <= last + 1e-9, (name, side)
+        if name.endswith("small-angle"):
+            assert found["lyapunov"] == pytest.approx(found["ln_small_angle_slope"], rel=1e-9)
+
+
+def test_the_table_in_the_readme_is_what_the_study_prints(four_scenes):
+    study, numbers, _ = four_scenes
+    text = (STUDIES / "01_four_scenes" / "README.md").read_text(encoding="utf-8")
+    printed = study.table(numbers).splitlines()
+    intervals = [line.split("|")[3:5] for line in printed[2:]]
+    shown = [line.split("|")[3:5] for line in text.splitlines() if line.startswith("| ")][1:]
+    assert shown == intervals
