@@ -49,7 +49,9 @@ def replaced(folder: str | Path) -> Iterator[Path]:
         drafts = sorted(draft.iterdir())
         for file in drafts:
             target = place / file.name
-            if target.exists() and not target.is_file():  # a folder, a pipe, a device: not ours to rename over
+            if (
+                target.exists() and not target.is_file()
+            ):  # a folder, a pipe, a device: not ours to rename over
                 raise FileExistsError(errno.EEXIST, "not a regular file", str(target))
         for file in drafts:
             file.replace(place / file.name)

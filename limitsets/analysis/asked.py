@@ -51,7 +51,7 @@ def _may_leave(graph: TransitionGraph) -> float:
 
 def _after_any_throw(graph: TransitionGraph) -> Extents:
     """Where a part can rest after one throw or more: the image of the whole domain holds all later images."""
-    from limitsets.maps.critical import along, monotone_pieces
+    from limitsets.maps import along, monotone_pieces
 
     domain = graph.grid.domain
     found: dict[int, list[tuple[float, float]]] = {}
@@ -67,7 +67,11 @@ def _after_any_throw(graph: TransitionGraph) -> Extents:
 
 
 def answer(
-    goal: Goal, graph: TransitionGraph, attractors: Sequence[Attractor], basins: Basins, extents: Sequence[Extents]
+    goal: Goal,
+    graph: TransitionGraph,
+    attractors: Sequence[Attractor],
+    basins: Basins,
+    extents: Sequence[Extents],
 ) -> Answered:
     """Ask a goal.
 
@@ -93,7 +97,8 @@ def answer(
     leaving = _may_leave(graph) if goal.from_anywhere or not attractors else 0.0
     wanted = [_after_any_throw(graph)] if goal.from_anywhere else list(extents)
     asked = [
-        evaluate(goal, each, flip_order=order, fractions=basins.attractors, leaving=leaving) for each in wanted or [{}]
+        evaluate(goal, each, flip_order=order, fractions=basins.attractors, leaving=leaving)
+        for each in wanted or [{}]
     ]
     # A part beyond x, and an orbit that gets there: the first goal asks for all limit sets, the second for each.
     verdict = max(asked, key=_threshold) if isinstance(goal, OrientedBeyond) else min(asked, key=_threshold)
@@ -102,7 +107,9 @@ def answer(
         holds = None  # nothing stays on the arm: the sentence would hold of nothing
     if isinstance(goal, Reaches) and holds and not goal.from_anywhere and _may_leave(graph) > 0:
         holds = None  # some starts leave before they get there
-    threshold = verdict.threshold if verdict.threshold is not None and math.isfinite(verdict.threshold) else None
+    threshold = (
+        verdict.threshold if verdict.threshold is not None and math.isfinite(verdict.threshold) else None
+    )
     return Answered(goal, holds, threshold)
 
 

@@ -13,12 +13,14 @@ if TYPE_CHECKING:
 
 __all__ = ["other_vertex_first", "overlap"]
 
-Extents = Mapping[int, Sequence[tuple[float, float]]]
+Array = NDArray[np.float64]
+Interval = tuple[float, float]
+Extents = Mapping[int, Sequence[Interval]]
 
 SAMPLES = 4096
 
 
-def where(true: Callable[[NDArray[np.float64]], NDArray[np.bool_]], x: NDArray[np.float64]) -> list[tuple[float, float]]:
+def where(true: Callable[[Array], NDArray[np.bool_]], x: Array) -> list[Interval]:
     """Intervals on which a condition holds, seen at samples, their ends bisected down to adjacent floats."""
     seen = true(x)
     changes = np.flatnonzero(seen[1:] != seen[:-1])
@@ -59,7 +61,8 @@ def other_vertex_first(scene: Scene) -> dict[int, list[tuple[float, float]]]:
     --------
     >>> import limitsets as ls
     >>> from limitsets.analysis import other_vertex_first
-    >>> [(side, round(lo, 4)) for side, parts in other_vertex_first(ls.load("paper-designed")).items() for lo, _ in parts]
+    >>> found = other_vertex_first(ls.load("paper-designed"))
+    >>> [(side, round(lo, 4)) for side, parts in found.items() for lo, _ in parts]
     [(0, 20.1517), (1, 26.4235)]
     """
     from limitsets.thrower import impact_angles
@@ -68,7 +71,11 @@ def other_vertex_first(scene: Scene) -> dict[int, list[tuple[float, float]]]:
     for side in range(len(scene.sides)):
         corner = float(scene.sides.corner[side])
         x = np.linspace(float(scene.domain.lo[side, 0]), float(scene.domain.hi[side, 0]), SAMPLES)
-        found[side] = where(lambda at, k=side, angle=corner: impact_angles(scene.map, at, k) > angle, x)  # type: ignore[misc]
+
+        def beyond(at: Array, side: int = side, corner: float = corner) -> NDArray[np.bool_]:
+            return impact_angles(scene.map, at, side) > corner
+
+        found[side] = where(beyond, x)
     return found
 
 
@@ -84,7 +91,10 @@ def overlap(some: Extents, others: Extents) -> dict[int, list[tuple[float, float
     found = {}
     for side, intervals in some.items():
         parts = [
-            (max(a, lo), min(b, hi)) for a, b in intervals for lo, hi in others.get(side, ()) if max(a, lo) <= min(b, hi)
+            (max(a, lo), min(b, hi))
+            for a, b in intervals
+            for lo, hi in others.get(side, ())
+            if max(a, lo) <= min(b, hi)
         ]
         if parts:
             found[side] = parts

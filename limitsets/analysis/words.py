@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from limitsets.analysis.analyse import Analysis
+    from limitsets.analysis.run import Analysis
     from limitsets.scene import Scene
 
 __all__ = ["scene_of", "to_json"]
@@ -19,7 +19,9 @@ def _number(value: float | None) -> float | None:
 
 
 def _extents(extents: Mapping[int, Sequence[tuple[float, float]]]) -> dict[str, list[list[float]]]:
-    return {str(side): [[float(lo), float(hi)] for lo, hi in parts] for side, parts in sorted(extents.items())}
+    return {
+        str(side): [[float(lo), float(hi)] for lo, hi in parts] for side, parts in sorted(extents.items())
+    }
 
 
 def to_json(analysis: Analysis) -> dict[str, Any]:
@@ -69,22 +71,33 @@ def to_json(analysis: Analysis) -> dict[str, Any]:
         ],
         "goal": None
         if goal is None
-        else {"kind": goal.goal.kind, "holds": goal.holds, "threshold": _number(goal.threshold), "how": goal.how},
+        else {
+            "kind": goal.goal.kind,
+            "holds": goal.holds,
+            "threshold": _number(goal.threshold),
+            "how": goal.how,
+        },
         "other_vertex_first": _extents(analysis.other_vertex_first),
-        "spurious": [{"cells": len(cells), "extents": _extents(cells.extents())} for cells in analysis.spurious],
+        "spurious": [
+            {"cells": len(cells), "extents": _extents(cells.extents())} for cells in analysis.spurious
+        ],
         "second_pass": _number(analysis.second_pass),
         "timings": {step: round(seconds, 6) for step, seconds in analysis.timings.items()},
     }
 
 
 def _attractors(analysis: Analysis) -> list[dict[str, Any]]:
-    known = zip(analysis.attractors, analysis.limit_sets, analysis.extents, analysis.extents_from, strict=True)
+    known = zip(
+        analysis.attractors, analysis.limit_sets, analysis.extents, analysis.extents_from, strict=True
+    )
     return [
         {
             "extents": _extents(extents),
             "extents_from": source,
             "flip_order": None if attractor.flip_order is None else list(attractor.flip_order),
-            "jogs_per_visit": {str(side): list(pair) for side, pair in sorted(attractor.jogs_per_visit.items())},
+            "jogs_per_visit": {
+                str(side): list(pair) for side, pair in sorted(attractor.jogs_per_visit.items())
+            },
             "flips_per_throw": _number(attractor.flips_per_throw),
             "lyapunov": _number(attractor.lyapunov),
             "throws": attractor.throws,

@@ -20,7 +20,9 @@ MOST_CELLS = 10_000_000
 
 def analyse(
     scene: Scene,
-    cells: Annotated[int, typer.Option("--cells", min=1, max=MOST_CELLS, metavar="N", help="Cells per side.")] = 4096,
+    cells: Annotated[
+        int, typer.Option("--cells", min=1, max=MOST_CELLS, metavar="N", help="Cells per side.")
+    ] = 4096,
     out: Annotated[
         Path | None,
         typer.Option("--out", "-o", metavar="DIR", help="Folder of the report, ./NAME-analysis by default."),
@@ -33,7 +35,7 @@ def analyse(
 
         chosen = load(scene)
         folder = out if out is not None else Path(f"{chosen.name}-analysis")
-        from limitsets.report.write import require_place, write
+        from limitsets.report.writing import require_place, write
 
         require_place(folder)
         from limitsets.analysis import analyse as run

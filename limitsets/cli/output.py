@@ -16,9 +16,13 @@ from limitsets.errors import LimitsetsError
 
 __all__ = ["Json", "Out", "Scene", "answer", "progress", "saved", "table"]
 
-Scene = Annotated[str, typer.Argument(metavar="SCENE", help="A built-in name (see: limitsets scenes) or a TOML file.")]
+Scene = Annotated[
+    str, typer.Argument(metavar="SCENE", help="A built-in name (see: limitsets scenes) or a TOML file.")
+]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON, and nothing else, on stdout.")]
-Out = Annotated[Path | None, typer.Option("--out", "-o", metavar="FILE", help="Write the JSON to this file as well.")]
+Out = Annotated[
+    Path | None, typer.Option("--out", "-o", metavar="FILE", help="Write the JSON to this file as well.")
+]
 
 # What takes longer than this says what it is doing.
 PATIENCE = 2.0
@@ -45,7 +49,9 @@ def saved(file: Path) -> Iterator[Path]:
     from limitsets.files import replaced
 
     if file.exists() and not file.is_file():
-        raise LimitsetsError("the output file", str(file), "a regular file", "it is a folder or a device; name a file")
+        raise LimitsetsError(
+            "the output file", str(file), "a regular file", "it is a folder or a device; name a file"
+        )
     try:
         with replaced(file.parent) as draft:
             yield draft / file.name

@@ -40,18 +40,25 @@ def plot(
             "--out", "-o", metavar="FILE", help=f"File ({', '.join(FORMATS)}), ./NAME-KIND.png by default."
         ),
     ] = None,
-    cells: Annotated[int, typer.Option("--cells", min=1, max=10_000_000, metavar="N", help="Cells per side.")] = 4096,
-    x: Annotated[str | None, typer.Option("--x", metavar="X", help="For flight: where the part rests.")] = None,
-    side: Annotated[int | None, typer.Option("--side", metavar="I", help="For flight: on which side.")] = None,
+    cells: Annotated[
+        int, typer.Option("--cells", min=1, max=10_000_000, metavar="N", help="Cells per side.")
+    ] = 4096,
+    x: Annotated[
+        str | None, typer.Option("--x", metavar="X", help="For flight: where the part rests.")
+    ] = None,
+    side: Annotated[
+        int | None, typer.Option("--side", metavar="I", help="For flight: on which side.")
+    ] = None,
     json: Json = False,
 ) -> None:
     """Draw one figure of a scene."""
     if out is not None and out.suffix.lower() not in FORMATS:
-        raise LimitsetsError("the figure's file", str(out), f"a name that ends in {', '.join(FORMATS)}", "rename it")
-    if (x is None) != (side is None) or (x is not None and kind is not Kind.FLIGHT):
         raise LimitsetsError(
-            "the throw to draw", "half given" if kind is Kind.FLIGHT else "given", "--x and --side with flight", "give both"
+            "the figure's file", str(out), f"a name that ends in {', '.join(FORMATS)}", "rename it"
         )
+    if (x is None) != (side is None) or (x is not None and kind is not Kind.FLIGHT):
+        value = "half given" if kind is Kind.FLIGHT else "given"
+        raise LimitsetsError("the throw to draw", value, "--x and --side, for a flight", "give both or none")
     with progress() as tell:
         from limitsets.analysis import analyse as run
 
@@ -66,7 +73,7 @@ def plot(
 
 def _draw(analysis: Analysis, kind: Kind, file: Path, x: str | None, side: int | None) -> None:
     from limitsets.cli.throw import position
-    from limitsets.report.write import figure
+    from limitsets.report.writing import figure
 
     throw = None if x is None or side is None else (position(analysis.scene, x), side)
     drawn = figure(analysis, str(kind), throw)

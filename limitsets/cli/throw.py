@@ -31,7 +31,11 @@ def position(scene: SceneOf, text: str) -> float:
     """
     from limitsets.scene.units import convert, parse
 
-    value = float(text) if _BARE.fullmatch(text.strip()) else convert(parse(text, "length", key="--x"), scene.unit)
+    value = (
+        float(text)
+        if _BARE.fullmatch(text.strip())
+        else convert(parse(text, "length", key="--x"), scene.unit)
+    )
     if not (math.isfinite(value) and value <= scene.arm_length):
         allowed = f"a place on the arm, up to {scene.arm_length:g} {scene.unit}"
         raise LimitsetsError("x", text, allowed, "start where a part can rest", key="--x")
@@ -42,7 +46,9 @@ def throw(
     scene: Scene,
     x: Annotated[str, typer.Option("--x", metavar="X", help="Where the part rests: 8, or '20 cm'.")],
     side: Annotated[int, typer.Option("--side", metavar="I", help="On which side.")],
-    count: Annotated[int, typer.Option("--count", min=1, max=MOST_THROWS, metavar="N", help="How many throws.")] = 1,
+    count: Annotated[
+        int, typer.Option("--count", min=1, max=MOST_THROWS, metavar="N", help="How many throws.")
+    ] = 1,
     json: Json = False,
     out: Out = None,
 ) -> None:
@@ -62,7 +68,9 @@ def throw(
 
     answer(records, json, out, text)
     if path.stopped == "stalled":
-        typer.echo("limitsets: stalled: the displacement is too small to change x any more; no fixed point", err=True)
+        typer.echo(
+            "limitsets: stalled: the displacement is too small to change x any more; no fixed point", err=True
+        )
 
 
 def _number(value: float) -> float | None:

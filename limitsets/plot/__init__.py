@@ -3,15 +3,16 @@
     figure = limitsets.plot.limit_set(scene, found)
     figure.savefig("limit-set.png")
 
-One file per family; `style.py` holds what they share.  Colours are told apart by colour-blind readers, and nothing is told
-by colour alone: lines have styles, areas hatches, points markers.  No window, no pyplot: figures are made with the object
-interface and drawn by Agg wherever that is the backend.
+One file per family; `style.py` holds what they share.  Colours can be told apart by colour-blind readers, and nothing
+is told by colour alone: lines have styles, areas hatches, points markers.  No window and no pyplot: figures are made
+with the object interface.  A file never bears the name of a function of the room: `plot.map` would be a module to
+whoever imports that file last.
 """
 
-from limitsets.plot.basins import basins
-from limitsets.plot.flight import flight
-from limitsets.plot.limit_set import limit_set
-from limitsets.plot.map import map  # noqa: A004 - ls.plot.map is the word for it
-from limitsets.plot.morse import morse
+from limitsets.plot.basin import basins
+from limitsets.plot.flights import flight
+from limitsets.plot.limit_sets import limit_set
+from limitsets.plot.maps import map  # noqa: A004 - ls.plot.map is the word for it
+from limitsets.plot.morse_graphs import morse
 
 __all__ = ["basins", "flight", "limit_set", "map", "morse"]

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
     from limitsets.scene import Scene
 
-__all__ = ["Extents", "canvas", "extents_of", "interval_text", "orbit_on", "stretch"]
+__all__ = ["Extents", "canvas", "extents_of", "interval_text", "legend", "orbit_on", "stretch", "title"]
 
 Extents: TypeAlias = Mapping[int, Sequence[tuple[float, float]]]
 
@@ -43,7 +43,9 @@ SMALL, TEXT = 8.5, 10.0
 TRANSIENT = 2000
 
 
-def canvas(width: float, height: float, rows: int = 1, columns: int = 1, **options: Any) -> tuple[Figure, list[Axes]]:
+def canvas(
+    width: float, height: float, rows: int = 1, columns: int = 1, **options: Any
+) -> tuple[Figure, list[Axes]]:
     """Make a figure of `rows` times `columns` axes [inches]; the axes row by row."""
     figure = Figure(figsize=(width, height), layout=ConstrainedLayoutEngine(h_pad=0.1, w_pad=0.06), dpi=110)
     grid = figure.subplots(rows, columns, squeeze=False, **options)
@@ -57,15 +59,19 @@ def extents_of(found: Any) -> list[Extents]:
         return [extents]
     if isinstance(extents, Iterable) and not isinstance(extents, str):
         parts = [getattr(one, "extents", one) for one in extents]
-        if all(isinstance(part, Mapping) for part in parts):
-            return parts
-    raise AnswerError("what to draw", type(found).__name__, "attractors, limit sets or an analysis", "pass one of these")
+        known = [part for part in parts if isinstance(part, Mapping)]
+        if len(known) == len(parts):
+            return known
+    raise AnswerError(
+        "what to draw", type(found).__name__, "attractors, limit sets or an analysis", "pass one of these"
+    )
 
 
 def orbit_on(scene: Scene, extents: Extents, count: int) -> Orbit | None:
     """Follow an orbit on an attractor; None where there is none to follow."""
     widest = max(
-        ((hi - lo, side, 0.5 * (lo + hi)) for side, parts in extents.items() for lo, hi in parts), default=None
+        ((hi - lo, side, 0.5 * (lo + hi)) for side, parts in extents.items() for lo, hi in parts),
+        default=None,
     )
     if widest is None:
         return None
@@ -103,6 +109,17 @@ def stretch(scene: Scene, extents: Extents, throws: int = 12, most: int = 90) ->
     later = arrivals[arrivals >= begin + throws]
     end = min(int(later[0]) if later.size else begin + throws, begin + most, path.code.size)
     return Orbit(path.x[begin : end + 1], path.side[begin : end + 1], path.code[begin:end], None)
+
+
+def legend(figure: Figure, handles: Sequence[Any], columns: int) -> None:
+    """Put a legend below all axes."""
+    columns = min(columns, max(len(handles), 1))
+    figure.legend(handles=handles, loc="outside lower center", ncols=columns, fontsize=SMALL, frameon=False)
+
+
+def title(figure: Figure, text: str) -> None:
+    """Put a title above all axes."""
+    figure.suptitle(text, fontsize=TEXT + 1.5)
 
 
 def interval_text(parts: Sequence[tuple[float, float]], most: int = 2) -> str:

@@ -4,7 +4,7 @@ The page is for someone who builds a feeder: what comes to rest where, how far t
 assumed.  Numbers are read from the analysis, never computed anew here.
 """
 
-from limitsets.report.page import page
-from limitsets.report.write import write
+from limitsets.report.pages import page
+from limitsets.report.writing import write
 
 __all__ = ["page", "write"]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from itertools import pairwise
 
 __all__ = ["bands", "count", "intervals", "number", "percent", "table"]
 
@@ -19,11 +20,11 @@ def table(heads: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
     |---|---|
     | 0 | 1.5 |
     """
-    lines = [heads, ["---"] * len(heads), *rows]
-    return "\n".join(
-        "|" + "|".join(line) + "|" if line[0] == "---" else "| " + " | ".join(str(cell) for cell in line) + " |"
-        for line in lines
-    )
+
+    def line(cells: Sequence[object]) -> str:
+        return "| " + " | ".join(str(cell) for cell in cells) + " |"
+
+    return "\n".join([line(heads), "|" + "---|" * len(heads), *(line(row) for row in rows)])
 
 
 def number(value: float | None, digits: int = 3) -> str:
@@ -84,7 +85,7 @@ def bands(extents: Extents) -> list[tuple[float, float, tuple[int, ...]]]:
     """
     cuts = sorted({x for parts in extents.values() for pair in parts for x in pair})
     found = []
-    for lo, hi in zip(cuts[:-1], cuts[1:], strict=True):
+    for lo, hi in pairwise(cuts):
         middle = 0.5 * (lo + hi)
         sides = tuple(sorted(s for s, parts in extents.items() if any(a <= middle <= b for a, b in parts)))
         if sides:

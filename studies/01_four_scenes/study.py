@@ -1,6 +1,6 @@
 """Limit sets of the paper's four scenes: a scene and a seed in, numbers and a figure out.
 
-    python studies/01_four_scenes/study.py [--seed 0] [--out FOLDER]
+Run it as ``python studies/01_four_scenes/study.py [--seed 0] [--out FOLDER]``.
 """
 
 from __future__ import annotations
@@ -35,7 +35,9 @@ def counted_jogs(path: Any) -> dict[str, list[int]]:
     """Least and largest number of jogs on one visit, counted on an orbit."""
     change = np.flatnonzero(np.diff(path.side)) + 1
     side, jogs = path.side[change[:-1]], np.diff(change) - 1
-    return {str(s): [int(jogs[side == s].min()), int(jogs[side == s].max())] for s in np.unique(side).tolist()}
+    return {
+        str(s): [int(jogs[side == s].min()), int(jogs[side == s].max())] for s in np.unique(side).tolist()
+    }
 
 
 def possible_jogs(scene: Any, extents: dict[int, list[tuple[float, float]]]) -> dict[str, list[int]]:
@@ -72,7 +74,10 @@ def run(name: str, seed: int = 0) -> dict[str, Any]:
         "share_of_starts": analysis.basins.attractors[0],
         "extents": {str(side): [list(pair) for pair in parts] for side, parts in extents.items()},
         "seen_on_orbit": {
-            str(side): [float(path.x[path.side == side].min()), float(path.x[path.side == side].max())] for side in extents
+            str(side): [
+                float(end) for end in (path.x[path.side == side].min(), path.x[path.side == side].max())
+            ]
+            for side in extents
         },
         "jogs_possible": possible_jogs(scene, extents),
         "jogs_counted": counted_jogs(path),
@@ -85,7 +90,10 @@ def run(name: str, seed: int = 0) -> dict[str, Any]:
 def table(numbers: dict[str, dict[str, Any]]) -> str:
     """Write the numbers as a Markdown table, one line per scene and side."""
     lines = [
-        "| scene | side | limit set [in] | jogs per visit | flips per throw | Lyapunov exponent | ln(1 + 2\\|h\\|/kappa) |",
+        (
+            "| scene | side | limit set [in] | jogs per visit | flips per throw | Lyapunov exponent "
+            "| ln(1 + 2\\|h\\|/kappa) |"
+        ),
         "|---|---|---|---|---|---|---|",
     ]
     for name, found in numbers.items():
@@ -95,8 +103,12 @@ def table(numbers: dict[str, dict[str, Any]]) -> str:
             jogs = str(least) if least == most else f"{least} to {most}"
             rest = ["", "", ""]
             if side == "0":
-                rest = [f"{found[key]:.4f}" for key in ("flips_per_throw", "lyapunov", "ln_small_angle_slope")]
-            lines.append("| " + " | ".join([name if side == "0" else "", side, intervals, jogs, *rest]) + " |")
+                rest = [
+                    f"{found[key]:.4f}" for key in ("flips_per_throw", "lyapunov", "ln_small_angle_slope")
+                ]
+            lines.append(
+                "| " + " | ".join([name if side == "0" else "", side, intervals, jogs, *rest]) + " |"
+            )
     return "\n".join(lines)
 
 

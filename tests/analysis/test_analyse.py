@@ -28,7 +28,9 @@ def changed(name, **tables):
 
 def from_far(**changes):
     """Weak throws with a high arm: nothing stays on it."""
-    return ls.load(HERE / "five-sides.toml").with_values({"throw.kappa": 60.0, "arm.surface_height": -0.5, **changes})
+    return ls.load(HERE / "five-sides.toml").with_values(
+        {"throw.kappa": 60.0, "arm.surface_height": -0.5, **changes}
+    )
 
 
 @pytest.mark.parametrize("name", PAPER)
@@ -196,7 +198,9 @@ def test_json(source):
     sides = {str(side) for side in range(len(found.scene.sides))}
     assert set(record["critical_points"]) == set(record["other_vertex_first"]) == sides
     for points in record["critical_points"].values():
-        assert all(set(point) == {"x", "kind"} and point["kind"] in ("jog->flip", "flip->jog") for point in points)
+        assert all(
+            set(point) == {"x", "kind"} and point["kind"] in ("jog->flip", "flip->jog") for point in points
+        )
         assert [point["x"] for point in points] == sorted(point["x"] for point in points)
     (attractor,) = record["attractors"]
     assert {"extents", "flip_order", "jogs_per_visit", "flips_per_throw", "lyapunov"} <= set(attractor)

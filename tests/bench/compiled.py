@@ -25,7 +25,7 @@ Answer = tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.int64]]
 
 
 class _Side(ctypes.Structure):
-    _fields_ = [(name, ctypes.c_double) for name in NUMBERS] + [(name, ctypes.c_int64) for name in INTEGERS]  # noqa: RUF012
+    _fields_ = [(name, ctypes.c_double) for name in NUMBERS] + [(name, ctypes.c_int64) for name in INTEGERS]
 
 
 def compiler() -> str | None:
@@ -43,7 +43,9 @@ def throws_in_c(
         subprocess.run([str(compiler()), *FLAGS, contraction, "-o", library, SOURCE, "-lm"], check=True)
     run: Any = getattr(ctypes.CDLL(str(library)), function)
     run.restype = None
-    side = _Side(*(float(getattr(part, name)) for name in NUMBERS), *(int(getattr(part, name)) for name in INTEGERS))
+    side = _Side(
+        *(float(getattr(part, name)) for name in NUMBERS), *(int(getattr(part, name)) for name in INTEGERS)
+    )
     answer = np.empty(x.size), np.empty(x.size, np.int64), np.empty(x.size, np.int64)
     pointers = [ctypes.c_void_p(values.ctypes.data) for values in (x, *answer)]
     count = ctypes.c_int64(x.size)

@@ -20,7 +20,9 @@ ROWS = pytest.StashKey[list[Row]]()
 
 
 def pytest_addoption(parser):
-    parser.addoption("--bench-table", default=".benchmarks/table.json", help="where the table of the benchmarks goes")
+    parser.addoption(
+        "--bench-table", default=".benchmarks/table.json", help="where the table of the benchmarks goes"
+    )
 
 
 def pytest_configure(config):
@@ -37,7 +39,11 @@ def _machine() -> str:
     model = platform.processor() or platform.machine()
     info = Path("/proc/cpuinfo")
     if info.is_file():
-        names = [line.split(":", 1)[1].strip() for line in info.read_text().splitlines() if line.startswith("model name")]
+        names = [
+            line.split(":", 1)[1].strip()
+            for line in info.read_text().splitlines()
+            if line.startswith("model name")
+        ]
         model = names[0] if names else model
     return f"{model}, {os.cpu_count()} cores, Python {platform.python_version()}"
 

@@ -42,7 +42,9 @@ class Turns:
     answers: dict[str, Any]
 
 
-def take_turns(benchmark: Any, ours: Callable[[], Any], rivals: dict[str, Callable[[], Any]], rounds: int) -> Turns:
+def take_turns(
+    benchmark: Any, ours: Callable[[], Any], rivals: dict[str, Callable[[], Any]], rounds: int
+) -> Turns:
     """Rivals, ours, rivals, ours, ...: whatever else the machine does hits both.
 
     pytest-benchmark times ours, so that its own reports and comparisons work; the rivals run in its set-up.
@@ -112,9 +114,14 @@ def as_text(rows: list[Row]) -> list[str]:
         ratio = "" if row.ratio is None else f"{row.reads} {_number(row.ratio)}"
         spread = f"{_number(row.low)} - {_number(row.high)}"
         holds = "" if row.holds is None else "yes" if row.holds else "NO"
-        lines.append((row.what, f"{_number(row.ours)} {row.unit}", row.rival, theirs, ratio, spread, row.asked, holds))
+        lines.append(
+            (row.what, f"{_number(row.ours)} {row.unit}", row.rival, theirs, ratio, spread, row.asked, holds)
+        )
     widths = [max(len(line[k]) for line in lines) for k in range(len(lines[0]))]
-    text = ["  ".join(cell.ljust(width) for cell, width in zip(line, widths, strict=True)).rstrip() for line in lines]
+    text = [
+        "  ".join(cell.ljust(width) for cell, width in zip(line, widths, strict=True)).rstrip()
+        for line in lines
+    ]
     return [text[0], "-" * max(map(len, text)), *text[1:]]
 
 

@@ -23,7 +23,9 @@ ROUNDS = {16: 15, 18: 7, 20: 5}
 
 def by_us(depth):
     """Everything asked for: the graph, and its answer."""
-    graph = ls.transitions(ls.maps.Leslie(), ls.grid(list(zip(LO, HI, strict=True)), depth=depth), method="corners-padded")
+    graph = ls.transitions(
+        ls.maps.Leslie(), ls.grid(list(zip(LO, HI, strict=True)), depth=depth), method="corners-padded"
+    )
     morse = ls.morse_graph(graph)
     destination = graph.survey().destination
     sizes = [morse.nodes[k]["cells"] for k in morse]
@@ -54,7 +56,9 @@ def test_leslie(benchmark, depth, table):
         to_order.append(answer.seconds_to_order)
         return answer
 
-    turns = take_turns(benchmark, lambda: by_us(depth), {CMGDB: cmgdb, SCIPY: lambda: by_scipy(depth)}, ROUNDS[depth])
+    turns = take_turns(
+        benchmark, lambda: by_us(depth), {CMGDB: cmgdb, SCIPY: lambda: by_scipy(depth)}, ROUNDS[depth]
+    )
     graph, ours = turns.answer
     theirs, scipy = turns.answers[CMGDB], turns.answers[SCIPY]
     assert ours.components == scipy.components == theirs.components
@@ -74,4 +78,11 @@ def test_leslie(benchmark, depth, table):
         adaptive = by_cmgdb(depth, adaptive=True)
         assert sorted(adaptive.components) == sorted(ours.components)
         # On cells of mixed sizes the order comes out coarser: another answer, so no rival, but its time is told.
-        table.append(limit("for information: CMGDB halving only what recurs, no basins", adaptive.seconds_to_order, "s", None))
+        table.append(
+            limit(
+                "for information: CMGDB halving only what recurs, no basins",
+                adaptive.seconds_to_order,
+                "s",
+                None,
+            )
+        )

@@ -34,7 +34,10 @@ def test_attracting_components(benchmark, build, table):
         fresh = replace(graph)  # the same ranges, nothing computed yet
         return list(nx.attracting_components(fresh))
 
-    rivals = {PLAIN: lambda: list(nx.attracting_components(plain)), KEPT: lambda: list(nx.attracting_components(graph))}
+    rivals = {
+        PLAIN: lambda: list(nx.attracting_components(plain)),
+        KEPT: lambda: list(nx.attracting_components(graph)),
+    }
     turns = take_turns(benchmark, cold, rivals, 7)
     for name in rivals:
         assert sorted(map(sorted, turns.answer)) == sorted(map(sorted, turns.answers[name]))

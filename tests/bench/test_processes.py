@@ -37,7 +37,10 @@ def test_import(benchmark, tmp_path, table):
     bare = [sys.executable, "-c", "pass"]
     ours = [sys.executable, "-c", "import limitsets"]
     nearest = [sys.executable, "-c", "import numpy"]
-    rivals = {"python -c pass": lambda: timed(bare, tmp_path), "python -c 'import numpy'": lambda: timed(nearest, tmp_path)}
+    rivals = {
+        "python -c pass": lambda: timed(bare, tmp_path),
+        "python -c 'import numpy'": lambda: timed(nearest, tmp_path),
+    }
     turns = take_turns(benchmark, lambda: timed(ours, tmp_path), rivals, 25)
     bare_seconds = turns.rivals["python -c pass"]
     table += [

@@ -21,7 +21,11 @@ REPEATS = 5  # per round: what the others left in the cache matters for the firs
 LO, HI = 8.9140259080455, 23.383151921158  # the limit set of paper-designed on side 2
 
 PER = COUNT * REPEATS
-VECTORISED, UNCONTRACTED, LIBM = "C, vectorised, contraction", "C, vectorised, no contraction", "C, libm and Newton"
+VECTORISED, UNCONTRACTED, LIBM = (
+    "C, vectorised, contraction",
+    "C, vectorised, no contraction",
+    "C, libm and Newton",
+)
 
 
 def repeated(run):

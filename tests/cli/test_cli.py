@@ -1,7 +1,6 @@
 """The command line: exit codes, what goes to which stream, JSON words, and files that stay whole."""
 
 import json
-import os
 import signal
 import subprocess
 import sys
@@ -100,7 +99,9 @@ def test_a_bug_is_one_line_too(capfd, monkeypatch):
     assert err == "limitsets: this is a bug in limitsets: ZeroDivisionError: division by zero\n"
 
 
-@pytest.mark.parametrize("fault", [MemoryError, PermissionError(13, "Permission denied", "x.png"), OSError("odd")])
+@pytest.mark.parametrize(
+    "fault", [MemoryError, PermissionError(13, "Permission denied", "x.png"), OSError("odd")]
+)
 def test_faults_of_the_machine(capfd, monkeypatch, fault):
     import limitsets.scene
 
@@ -126,7 +127,9 @@ def test_scenes(capfd):
 
 
 def test_throw(capfd):
-    code, out, err = run(capfd, "throw", "paper-designed", "--x", "8", "--side", "2", "--count", "3", "--json")
+    code, out, err = run(
+        capfd, "throw", "paper-designed", "--x", "8", "--side", "2", "--count", "3", "--json"
+    )
     assert (code, err) == (0, "")
     record = json.loads(out)
     assert [each["x"] for each in record] == pytest.approx([8.262013, 8.557124, 8.891802], abs=1e-6)
@@ -134,7 +137,9 @@ def test_throw(capfd):
     assert all(set(each) == words for each in record)
     assert record[0]["phi"] == pytest.approx(0.311437, abs=1e-6)
     assert [each["status"] for each in record] == ["jog"] * 3
-    _, same, _ = run(capfd, "throw", "paper-designed", "--x", "20.32 cm", "--side", "2", "--count", "3", "--json")
+    _, same, _ = run(
+        capfd, "throw", "paper-designed", "--x", "20.32 cm", "--side", "2", "--count", "3", "--json"
+    )
     assert json.loads(same) == record
     _, text, _ = run(capfd, "throw", "paper-designed", "--x", "8", "--side", "2")
     assert "x [in]" in text
@@ -155,7 +160,9 @@ def test_throw_ends_at_the_first_exit(capfd):
 
 def test_throw_that_stalls_says_so(capfd):
     start_x = str(ls.load("paper-designed").sides.a[0] * (1 + 1e-15))
-    code, out, err = run(capfd, "throw", "paper-designed", "--x", start_x, "--side", "0", "--count", "5", "--json")
+    code, out, err = run(
+        capfd, "throw", "paper-designed", "--x", start_x, "--side", "0", "--count", "5", "--json"
+    )
     assert code == 0
     assert json.loads(out) == []
     assert "stalled" in err
@@ -169,12 +176,16 @@ def test_throw_and_flags(capfd):
 
 
 def test_out_writes_the_same_json(capfd):
-    _, out, _ = run(capfd, "throw", "paper-designed", "--x", "8", "--side", "2", "--json", "-o", "throws.json")
+    _, out, _ = run(
+        capfd, "throw", "paper-designed", "--x", "8", "--side", "2", "--json", "-o", "throws.json"
+    )
     assert json.loads(Path("throws.json").read_text()) == json.loads(out)
-    assert os.listdir() == ["throws.json"]
+    assert [path.name for path in Path().iterdir()] == ["throws.json"]
 
 
-@pytest.mark.parametrize("source", ["paper-designed", SCENES / "four-sides.toml", SCENES / "five-sides.toml"], ids=str)
+@pytest.mark.parametrize(
+    "source", ["paper-designed", SCENES / "four-sides.toml", SCENES / "five-sides.toml"], ids=str
+)
 def test_analyse(capfd, source):
     code, out, err = run(capfd, "analyse", str(source), "--json")
     assert code == 0
@@ -187,7 +198,7 @@ def test_analyse(capfd, source):
 
 
 def test_analyse_in_words(capfd):
-    code, out, err = run(capfd, "analyse", "paper-initial", "-o", "here", "--cells", "2048")
+    code, out, _ = run(capfd, "analyse", "paper-initial", "-o", "here", "--cells", "2048")
     assert code == 0
     assert "18.995 to 19.976, 20.434 to 21.554" in out
     assert "goal oriented_beyond: does not hold (sampled, not proved)" in out
@@ -209,7 +220,9 @@ def test_plot_where_nothing_is_said(capfd):
 
 
 def test_plot_of_a_chosen_flight(capfd):
-    code, _, _ = run(capfd, "plot", "paper-designed", "flight", "--x", "38.1 cm", "--side", "1", "-o", "one.pdf")
+    code, _, _ = run(
+        capfd, "plot", "paper-designed", "flight", "--x", "38.1 cm", "--side", "1", "-o", "one.pdf"
+    )
     assert code == 0
     assert Path("one.pdf").read_bytes().startswith(b"%PDF")
 
@@ -227,14 +240,11 @@ def test_version_and_help(capfd):
 
 
 def test_help_loads_no_room():
-    code = (
-        "import sys; from limitsets.cli import main; main(['--help']); "
-        "print(*(m for m in sys.modules if m.split('.')[0] in {'numpy', 'numba', 'scipy', 'matplotlib', 'networkx', 'pint', "
-        "'pydantic_core'}))"
-    )
+    code = "import sys; from limitsets.cli import main; main(['--help']); print(*sys.modules)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout.splitlines()[-1].split() in ([], ["pydantic_core"]) or "Usage" in done.stdout.splitlines()[-1]
-    assert "numpy" not in done.stdout.splitlines()[-1]
+    loaded = {name.split(".")[0] for name in done.stdout.splitlines()[-1].split()}
+    assert "typer" in loaded
+    assert not {"numpy", "numba", "scipy", "matplotlib", "networkx", "pint"} & loaded
 
 
 def test_exit_codes_and_streams_of_a_process():
@@ -260,7 +270,9 @@ def test_a_reader_that_goes_away():
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="no /dev/full here")
 def test_a_full_disk():
     with Path("/dev/full").open("w") as full:
-        done = subprocess.run([*COMMAND, "scenes"], stdout=full, stderr=subprocess.PIPE, text=True, check=False)
+        done = subprocess.run(
+            [*COMMAND, "scenes"], stdout=full, stderr=subprocess.PIPE, text=True, check=False
+        )
     assert done.returncode == 2
     assert done.stderr == "limitsets: No space left on device\n"
 
@@ -280,4 +292,7 @@ def test_ctrl_c_leaves_the_old_files_whole(tmp_path):
     assert process.returncode == 130
     assert "Traceback" not in err
     assert err.splitlines()[-1] == "limitsets: interrupted"
-    assert {path.name: path.read_text() for path in folder.iterdir()} == {"report.md": "old", "map.png": "old"}
+    assert {path.name: path.read_text() for path in folder.iterdir()} == {
+        "report.md": "old",
+        "map.png": "old",
+    }

@@ -32,10 +32,16 @@ def test_everything_is_written(source, tmp_path):
     found = analysed(source)
     seen = []
     files = write(found, tmp_path / "deep" / "down", progress=lambda name, done, of: seen.append(name))
-    assert {path.name for path in files} == FILES == {path.name for path in (tmp_path / "deep" / "down").iterdir()}
+    assert (
+        {path.name for path in files}
+        == FILES
+        == {path.name for path in (tmp_path / "deep" / "down").iterdir()}
+    )
     assert set(seen) <= FILES
     text = files[0].read_text(encoding="utf-8")
-    assert set(re.findall(r"!\[[^\]]+\]\(([^)]+)\)", text)) == {name for name in FILES if name.endswith(".png")}
+    assert set(re.findall(r"!\[[^\]]+\]\(([^)]+)\)", text)) == {
+        name for name in FILES if name.endswith(".png")
+    }
     assert all(path.read_bytes().startswith(b"\x89PNG") for path in files if path.suffix == ".png")
     record = json.loads(files[1].read_text(encoding="utf-8"))
     assert record == json.loads(json.dumps(found.to_json()))

@@ -26,7 +26,8 @@ def test_runs(path, tmp_path):
         from nbclient import NotebookClient
 
         notebook = nbformat.read(path, as_version=4)
-        client = NotebookClient(notebook, timeout=300, kernel_name="python3", resources={"metadata": {"path": tmp_path}})
+        place = {"metadata": {"path": tmp_path}}
+        client = NotebookClient(notebook, timeout=300, kernel_name="python3", resources=place)
         asyncio.run(client.async_execute())
     outputs = [output for cell in notebook.cells if cell.cell_type == "code" for output in cell.outputs]
     assert not [output for output in outputs if output.output_type == "error"]

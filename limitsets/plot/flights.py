@@ -58,13 +58,14 @@ def flight(scene: Scene, x: float, side: int) -> Figure:
     >>> import limitsets as ls
     >>> figure = ls.plot.flight(ls.load("paper-designed"), 21.0, 2)
     >>> [axes.get_title(loc="left") for axes in figure.axes][1]
-    'After the impact: a flip, 21.00 to 14.37 in, onto side 0'
+    'After the impact: a flip, 21.00 to 16.55 in, onto side 0'
     """
     seen = trace(scene.map, x, side, 1)
     phi = fly(scene.map, x, side).phi
     if seen.code.size == 0 or seen.code[0] == codes.OUTSIDE_MODEL or not math.isfinite(phi):
         least = float(scene.sides.a[side])
-        raise AnswerError("x of the throw", x, f"more than {least:.6g} on side {side}", "start where a throw lifts the part")
+        allowed = f"more than {least:.6g} on side {side}"
+        raise AnswerError("x of the throw", x, allowed, "start where a throw lifts the part")
     after, side_after = float(seen.x[1]), int(seen.side[1])
     air = [_in_air(scene, x, side, angle) for angle in np.linspace(0.0, phi, SHOWN + 2)]
     rolled = _to_rest(scene, air[-1], (side, side_after), after, phi)
@@ -85,9 +86,13 @@ def flight(scene: Scene, x: float, side: int) -> Figure:
     _flight(above, scene, x, side, phi, air)
     _landing(below, scene, rolled, after, side_after)
     _titles(above, below, scene, (x, side), (after, side_after), phi, int(seen.code[0]))
-    gap = "" if scene.flight == "exact" else " (small-angle formulas: the vertex need not be on the arm at the impact)"
-    figure.suptitle(f"One throw of {scene.name}{gap}", fontsize=style.TEXT + 1.5)
-    figure.legend(handles=_legend(scene.flight == "exact"), loc="outside lower center", ncols=3, fontsize=style.SMALL, frameon=False)
+    gap = (
+        ""
+        if scene.flight == "exact"
+        else " (small-angle formulas: the vertex need not be on the arm at the impact)"
+    )
+    style.title(figure, f"One throw of {scene.name}{gap}")
+    style.legend(figure, _legend(scene.flight == "exact"), 3)
     return figure
 
 
@@ -103,13 +108,16 @@ def _outline(scene: Scene, side: int) -> Array:
     """Vertices about the centre of mass with `side` at the bottom, its left end first."""
     left, right = side_ends(len(scene.vertices), side)
     about = scene.vertices - np.asarray(scene.centre)
-    turned = _turned(about, -math.atan2(*(about[right] - about[left])[::-1]))
-    return np.roll(turned, -left, axis=0)
+    along = about[right] - about[left]
+    turned = _turned(about, -math.atan2(float(along[1]), float(along[0])))
+    rolled: Array = np.roll(turned, -left, axis=0)
+    return rolled
 
 
 def _turned(points: Array, angle: float) -> Array:
     cosine, sine = math.cos(angle), math.sin(angle)
-    return points @ np.array([[cosine, sine], [-sine, cosine]])
+    turned: Array = points @ np.array([[cosine, sine], [-sine, cosine]])
+    return turned
 
 
 def _centre(scene: Scene, x: float, side: int, phi: float) -> Array:
@@ -125,8 +133,8 @@ def _in_air(scene: Scene, x: float, side: int, phi: float) -> Array:
 def _to_rest(scene: Scene, landed: Array, sides: tuple[int, int], after: float, phi: float) -> list[Array]:
     """Outlines from the impact to rest, turned about the struck vertex, which is the first.
 
-    The last one is where the map says.  By the small-angle formulas the struck vertex is not on the arm, and there is no
-    turning about it that would lead there.
+    The last one is where the map says.  By the small-angle formulas the struck vertex is not on the arm, and no turning
+    about it leads there.
     """
     side, side_after = sides
     at_rest = np.array([after, scene.surface_height + float(scene.sides.d[side_after])])
@@ -135,13 +143,16 @@ def _to_rest(scene: Scene, landed: Array, sides: tuple[int, int], after: float, 
         return [landed, rest]
     turn = -phi if side_after == side else float(scene.sides.corner[side]) - phi
     pivot = landed[0]
-    return [*(_turned(landed - pivot, angle) + pivot for angle in np.linspace(0.0, turn, SHOWN + 1)[:-1]), rest]
+    return [
+        *(_turned(landed - pivot, angle) + pivot for angle in np.linspace(0.0, turn, SHOWN + 1)[:-1]),
+        rest,
+    ]
 
 
 def _arm(axes: Axes, scene: Scene, lo: float, hi: float) -> None:
-    h = scene.surface_height
-    axes.plot([lo, min(hi, scene.arm_length)], [h, h], color=style.INK, lw=2.2, solid_capstyle="butt", zorder=1, gid="arm")
-    axes.fill_between([lo, min(hi, scene.arm_length)], h, h - 0.35, facecolor="#d9d9d9", hatch="////", edgecolor="#9a9a9a", lw=0)
+    h, ends = scene.surface_height, [lo, min(hi, scene.arm_length)]
+    axes.plot(ends, [h, h], color=style.INK, lw=2.2, solid_capstyle="butt", zorder=1, gid="arm")
+    axes.fill_between(ends, h, h - 0.35, facecolor="#d9d9d9", hatch="////", edgecolor="#9a9a9a", lw=0)
     if lo <= 0 <= hi:
         axes.plot([0], [0], marker="o", ms=9, mfc="white", mec=style.INK, zorder=2, gid="joint")
     for border in ("right", "top"):
@@ -167,16 +178,31 @@ def _flight(axes: Axes, scene: Scene, x: float, side: int, phi: float, air: list
 
 
 def _landing(axes: Axes, scene: Scene, rolled: list[Array], after: float, side: int) -> None:
-    _part(axes, rolled[-1], facecolor=(0.86, 0.86, 0.86, 0.85), edgecolor=style.INK, lw=1.6, zorder=2, gid="rest")
+    _part(
+        axes,
+        rolled[-1],
+        facecolor=(0.86, 0.86, 0.86, 0.85),
+        edgecolor=style.INK,
+        lw=1.6,
+        zorder=2,
+        gid="rest",
+    )
     _part(axes, rolled[0], facecolor=(0.72, 0.84, 0.93, 0.8), edgecolor=AIR, lw=2.2, zorder=1.5, gid="impact")
     for corners in rolled[1:-1]:
         _part(axes, corners, facecolor="none", edgecolor=LANDED, lw=1.0, ls=":", zorder=3, gid="turning")
     axes.plot(*rolled[0][0], marker="v", ms=9, color=LANDED, zorder=7, gid="struck vertex")
-    axes.plot(after, scene.surface_height + float(scene.sides.d[side]), "o", ms=4, mfc="white", mec=style.INK, zorder=6, gid="rest")
+    height = scene.surface_height + float(scene.sides.d[side])
+    axes.plot(after, height, "o", ms=4, mfc="white", mec=style.INK, zorder=6, gid="centre at rest")
 
 
 def _titles(
-    above: Axes, below: Axes, scene: Scene, start: tuple[float, int], end: tuple[float, int], phi: float, code: int
+    above: Axes,
+    below: Axes,
+    scene: Scene,
+    start: tuple[float, int],
+    end: tuple[float, int],
+    phi: float,
+    code: int,
 ) -> None:
     (x, side), (after, side_after) = start, end
     text = f"In the air: from x = {x:.2f} {scene.unit} on side {side}, turning by {math.degrees(phi):.1f}°"
@@ -193,7 +219,16 @@ def _legend(turns: bool) -> list[Any]:
         Patch(facecolor="#dcdcdc", edgecolor=style.INK, lw=1.6, label="at rest, before and after"),
         Patch(facecolor="#dbebf7", edgecolor=AIR, ls=(0, (3, 2)), label="in the air"),
         Patch(facecolor="#b8d6ed", edgecolor=AIR, lw=2.2, label="at the impact"),
-        Line2D([], [], color=style.INK, ls="-.", marker="o", mfc="white", ms=4, label="path of the centre of mass"),
+        Line2D(
+            [],
+            [],
+            color=style.INK,
+            ls="-.",
+            marker="o",
+            mfc="white",
+            ms=4,
+            label="path of the centre of mass",
+        ),
         Line2D([], [], color=LANDED, marker="v", ms=8, ls="", label="struck vertex"),
     ]
     if turns:

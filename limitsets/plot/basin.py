@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -24,8 +25,9 @@ if TYPE_CHECKING:
 __all__ = ["basins"]
 
 # Lightness falls, so that neighbours differ in grey as well; hatches tell them apart in strips.
-ATTRACTORS = ("#CFE5F5", "#F0B429", "#5FB59B", "#B5548A", "#3F4E96", "#7A5C1E")
+ATTRACTORS = ("#CFE5F5", "#F0B429", "#5FB59B", "#B5548A", "#3F4E96", "#2B2A1E")
 HATCHES = ("", "///", "...", "\\\\\\", "xxx", "+++")
+EDGE: dict[str, Any] = {"edgecolor": "#444444", "lw": 0.4}
 OUT: dict[int, tuple[str, str, str]] = {
     codes.INWARD: ("#6E6E6E", "ooo", "leaves inward"),
     codes.OUTWARD: ("#3A3A3A", "", "leaves outward"),
@@ -64,16 +66,18 @@ def basins(source: Scene | Grid, shares: Basins, found: Any = None) -> Figure:
     """
     grid = shares.grid
     if grid.dimension > 2:
-        raise AnswerError("the dimension of the basins", grid.dimension, "1 or 2", "draw a section of them yourself")
+        raise AnswerError(
+            "the dimension of the basins", grid.dimension, "1 or 2", "draw a section of them yourself"
+        )
     name = "" if isinstance(source, Grid) else f" of {source.name}"
     unit = "" if isinstance(source, Grid) else f" [{source.unit}]"
     if grid.dimension == 1:
         figure = _strips(shares, [] if found is None else style.extents_of(found), unit)
     else:
         figure = _plane(shares)
-    figure.suptitle(f"Basins{name}: where a start ends up", fontsize=style.TEXT + 1.5)
+    style.title(figure, f"Basins{name}: where a start ends up")
     handles = _legend(shares, found is not None and grid.dimension == 1)
-    figure.legend(handles=handles, loc="outside lower center", ncols=min(3, len(handles)), fontsize=style.SMALL, frameon=False)
+    style.legend(figure, handles, 3)
     return figure
 
 
@@ -89,11 +93,13 @@ def _strips(shares: Basins, sets: list[style.Extents], unit: str) -> Figure:
     for side in range(grid.sides):
         edges, labels = grid.edges[side][0], shares.labels[grid.of_side(side)]
         border = np.concatenate([[0], np.flatnonzero(np.diff(labels)) + 1, [labels.size]])
-        for first, last in zip(border[:-1], border[1:], strict=True):
+        for first, last in pairwise(border.tolist()):
             _strip(axes, float(edges[first]), float(edges[last]), side, int(labels[first]))
         for extents in sets:
             for lo, hi in extents.get(side, ()):
-                bar = Rectangle((lo, -side - 0.07), hi - lo, 0.14, facecolor=style.INK, lw=0, zorder=3, gid="attractor")
+                bar = Rectangle(
+                    (lo, -side - 0.07), hi - lo, 0.14, facecolor=style.INK, lw=0, zorder=3, gid="attractor"
+                )
                 axes.add_patch(bar)
     axes.set_yticks([-side for side in range(grid.sides)], [f"side {side}" for side in range(grid.sides)])
     axes.set_ylim(-grid.sides + 0.5, 0.5)
@@ -108,11 +114,8 @@ def _strips(shares: Basins, sets: list[style.Extents], unit: str) -> Figure:
 
 def _strip(axes: Axes, lo: float, hi: float, side: int, label: int) -> None:
     face, hatch = _look(label)
-    axes.add_patch(
-        Rectangle(
-            (lo, -side - 0.32), hi - lo, 0.64, facecolor=face, hatch=hatch, edgecolor="#444444", lw=0.4, gid=f"label {label}"
-        )
-    )
+    look: dict[str, Any] = {"facecolor": face, "hatch": hatch, **EDGE}
+    axes.add_patch(Rectangle((lo, -side - 0.32), hi - lo, 0.64, gid=f"label {label}", **look))
 
 
 def _plane(shares: Basins) -> Figure:
@@ -124,7 +127,9 @@ def _plane(shares: Basins) -> Figure:
     norm = BoundaryNorm(np.arange(len(kinds) + 1) - 0.5, len(kinds))
     for side, axes in enumerate(panels):
         picture = number[grid.of_side(side)].reshape(tuple(grid.shape[side]))
-        axes.pcolormesh(*grid.edges[side], picture.T, cmap=ListedColormap(colours), norm=norm, rasterized=True)
+        axes.pcolormesh(
+            *grid.edges[side], picture.T, cmap=ListedColormap(colours), norm=norm, rasterized=True
+        )
         axes.set_xlabel("$x_0$")
         axes.set_ylabel("$x_1$")
         if grid.sides > 1:
@@ -139,7 +144,7 @@ def _legend(shares: Basins, bars: bool) -> list[Patch]:
     for k, share in enumerate(shares.attractors[: len(ATTRACTORS)]):
         face, hatch = _look(k)
         text = f"to attractor {k}: {_percent(share)} of all starts"
-        handles.append(Patch(facecolor=face, hatch=hatch if hatched else "", edgecolor="#444444", lw=0.4, label=text))
+        handles.append(Patch(facecolor=face, hatch=hatch if hatched else "", label=text, **EDGE))
     parts = {codes.UNDECIDED: shares.undecided_between}
     names = {"inward": codes.INWARD, "outward": codes.OUTWARD, "outside-model": codes.OUTSIDE_MODEL}
     parts |= {names.get(name, codes.OUTSIDE): share for name, share in shares.exits.items()}
@@ -147,7 +152,7 @@ def _legend(shares: Basins, bars: bool) -> list[Patch]:
         if label in present:
             face, hatch, text = OUT[label]
             text = f"{text}: {_percent(share)}"
-            handles.append(Patch(facecolor=face, hatch=hatch if hatched else "", edgecolor="#444444", lw=0.4, label=text))
+            handles.append(Patch(facecolor=face, hatch=hatch if hatched else "", label=text, **EDGE))
     if bars:
         handles.append(Patch(facecolor=style.INK, label="the attractor itself"))
     return handles

@@ -194,7 +194,8 @@ def analyse(
         false_sets = spurious(graph)
     with steps.step("goal"):
         extents = [
-            limit.extents if limit.converged else each.extents for limit, each in zip(limits, found, strict=True)
+            limit.extents if limit.converged else each.extents
+            for limit, each in zip(limits, found, strict=True)
         ]
         asked = None if chosen.goal is None else answer(chosen.goal, graph, found, shares, extents)
     with steps.step("assumptions"):

@@ -13,7 +13,7 @@ from limitsets.errors import LimitsetsError
 from limitsets.files import replaced
 from limitsets.maps import FLIP
 from limitsets.plot.style import stretch
-from limitsets.report.page import page
+from limitsets.report.pages import page
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -11,8 +11,7 @@ from matplotlib.path import Path
 
 from limitsets.goals import OrientedBeyond
 from limitsets.maps import FLIP as FLIPS
-from limitsets.maps import Orbit, images
-from limitsets.maps.critical import critical_points
+from limitsets.maps import Orbit, critical_points, images
 from limitsets.plot import style
 from limitsets.plot.style import Extents
 
@@ -30,7 +29,7 @@ SAMPLES = 400
 
 
 def limit_set(scene: Scene, found: Any, *, axes: Axes | None = None) -> Figure:
-    """Draw where a part comes to rest on each side, and how throws carry it on.
+    r"""Draw where a part comes to rest on each side, and how throws carry it on.
 
     One lane per side; the first is repeated below the last, so that every flip goes down by one lane.  Bars are the
     limit set.  Grey bands show where the flipping part of each bar goes, arcs and arrows the throws of one orbit.
@@ -59,7 +58,7 @@ def limit_set(scene: Scene, found: Any, *, axes: Axes | None = None) -> Figure:
     >>> analysis = ls.analyse("paper-designed")
     >>> figure = ls.plot.limit_set(analysis.scene, analysis.limit_sets)
     >>> [label.get_text() for label in figure.axes[0].get_yticklabels()]
-    ['side 0', 'side 1', 'side 2', 'side 0\\nagain']
+    ['side 0', 'side 1', 'side 2', 'side 0\nagain']
     """
     sets = style.extents_of(found)
     count = len(scene.sides)
@@ -76,9 +75,11 @@ def limit_set(scene: Scene, found: Any, *, axes: Axes | None = None) -> Figure:
     marked = _critical(axes, scene)
     _goal(axes, scene)
     _frame(axes, scene, sets, marked)
-    axes.set_title(f"Limit set of {scene.name}: where the part comes to rest", fontsize=style.TEXT + 1.5, loc="left")
+    axes.set_title(
+        f"Limit set of {scene.name}: where the part comes to rest", fontsize=style.TEXT + 1.5, loc="left"
+    )
     if alone:
-        figure.legend(handles=_legend(scene, len(sets)), loc="outside lower center", ncols=4, fontsize=style.SMALL, frameon=False)
+        style.legend(figure, _legend(scene, len(sets)), 4)
     return axes.get_figure(root=True)  # type: ignore[return-value]
 
 
@@ -126,7 +127,9 @@ def _bands(axes: Axes, scene: Scene, extents: Extents) -> None:
                     top, bottom = -side - BAR, -side - 1 + BAR
                     corners = [(x[run[0]], top), (x[run[-1]], top)]
                     corners += [(there.x[run[-1]], bottom), (there.x[run[0]], bottom)]
-                    axes.add_patch(Polygon(corners, facecolor="#e9e9e9", edgecolor="#cfcfcf", lw=0.6, zorder=0))
+                    axes.add_patch(
+                        Polygon(corners, facecolor="#e9e9e9", edgecolor="#cfcfcf", lw=0.6, zorder=0)
+                    )
 
 
 def _throws(axes: Axes, path: Orbit) -> None:
@@ -157,14 +160,23 @@ def _throws(axes: Axes, path: Orbit) -> None:
         else:
             continue
         axes.add_patch(arrow)
-    axes.plot([path.x[0]], [-path.side[0] + BAR], "o", ms=5, mfc="white", mec=style.INK, zorder=5, gid="start")
+    axes.plot(
+        [path.x[0]], [-path.side[0] + BAR], "o", ms=5, mfc="white", mec=style.INK, zorder=5, gid="start"
+    )
 
 
 def _critical(axes: Axes, scene: Scene) -> list[float]:
     marked = []
     for side, points in critical_points(scene.map, scene.domain).items():
         for number, point in enumerate(points):
-            axes.plot([point.x] * 2, [-side - 0.2, -side + 0.2], color=style.INK, lw=1.6, zorder=6, gid="critical point")
+            axes.plot(
+                [point.x] * 2,
+                [-side - 0.2, -side + 0.2],
+                color=style.INK,
+                lw=1.6,
+                zorder=6,
+                gid="critical point",
+            )
             name = f"$r_{side}$" + "'" * number
             axes.annotate(
                 f"{name} = {point.x:.2f}",
@@ -215,14 +227,21 @@ def _frame(axes: Axes, scene: Scene, sets: list[Extents], marked: list[float]) -
 
 def _legend(scene: Scene, sets: int) -> list[Any]:
     handles: list[Any] = [
-        Patch(facecolor=face, hatch=hatch, edgecolor=style.INK, label="limit set" if sets == 1 else f"limit set {k}")
+        Patch(
+            facecolor=face,
+            hatch=hatch,
+            edgecolor=style.INK,
+            label="limit set" if sets == 1 else f"limit set {k}",
+        )
         for k, (face, hatch) in enumerate(style.SETS[:sets])
     ]
     handles += [
         Line2D([], [], color=style.JOG, label="jog (stays on its side)"),
         Line2D([], [], color=style.FLIP, ls=style.FLIP_LINE, label="flip (to the next side)"),
         Patch(facecolor="#e9e9e9", edgecolor="#cfcfcf", label="where the flipping part lands"),
-        Line2D([], [], color=style.INK, marker="o", mfc="white", ms=5, ls="", label="start of the orbit shown"),
+        Line2D(
+            [], [], color=style.INK, marker="o", mfc="white", ms=5, ls="", label="start of the orbit shown"
+        ),
         Line2D([], [], color=style.INK, marker="|", ms=10, mew=1.6, ls="", label="critical point"),
     ]
     if isinstance(scene.goal, OrientedBeyond):

@@ -11,8 +11,7 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 
 from limitsets.analysis import other_vertex_first
-from limitsets.maps import FLIP, JOG, Orbit, images
-from limitsets.maps.critical import critical_points
+from limitsets.maps import FLIP, JOG, Orbit, critical_points, images
 from limitsets.plot import style
 from limitsets.plot.style import Extents
 
@@ -25,7 +24,7 @@ if TYPE_CHECKING:
 __all__ = ["map"]
 
 SAMPLES = 1500
-FLAG = {"facecolor": "none", "edgecolor": "#bdbdbd", "hatch": "////", "lw": 0.0}
+FLAG: dict[str, Any] = {"facecolor": "none", "edgecolor": "#bdbdbd", "hatch": "////", "lw": 0.0}
 
 
 def map(scene: Scene, found: Any = None) -> Figure:  # noqa: A001 - ls.plot.map is the word for it
@@ -36,8 +35,8 @@ def map(scene: Scene, found: Any = None) -> Figure:  # noqa: A001 - ls.plot.map 
     scene : Scene
         The scene.
     found : attractors, limit sets, one of them, or an Analysis, optional
-        Drawn along the lower border, with an orbit on the first of them as cobweb; the picture then shows the surroundings
-        of these sets and of the critical points, otherwise the whole arm.
+        Drawn along the lower border, with an orbit on the first of them as cobweb; the picture then shows the
+        surroundings of these sets and of the critical points, otherwise the whole arm.
 
     Returns
     -------
@@ -58,7 +57,9 @@ def map(scene: Scene, found: Any = None) -> Figure:  # noqa: A001 - ls.plot.map 
     count = len(scene.sides)
     columns = count if count < 4 else math.ceil(count / 2)
     rows = math.ceil(count / columns)
-    figure, panels = style.canvas(3.45 * columns + 0.4, 3.45 * rows + 1.35, rows, columns, sharex=True, sharey=True)
+    figure, panels = style.canvas(
+        3.45 * columns + 0.4, 3.45 * rows + 1.35, rows, columns, sharex=True, sharey=True
+    )
     critical, flags = critical_points(scene.map, scene.domain), other_vertex_first(scene)
     path = style.stretch(scene, sets[0], throws=10) if sets else None
     for side, axes in enumerate(panels[:count]):
@@ -81,9 +82,9 @@ def map(scene: Scene, found: Any = None) -> Figure:  # noqa: A001 - ls.plot.map 
             axes.set_xlabel(f"x before the throw [{scene.unit}]")
         if k % columns == 0:
             axes.set_ylabel(f"x after the throw [{scene.unit}]")
-    figure.suptitle(f"Map of {scene.name}: one throw, from each side", fontsize=style.TEXT + 1.5)
+    style.title(figure, f"Map of {scene.name}: one throw, from each side")
     handles = _legend(sets, path, _visible(panels[0], flags))
-    figure.legend(handles=handles, loc="outside lower center", ncols=min(4, len(handles)), fontsize=style.SMALL, frameon=False)
+    style.legend(figure, handles, 4)
     return figure
 
 
@@ -95,14 +96,35 @@ def _branches(axes: Axes, scene: Scene, side: int) -> None:
         (FLIP, style.FLIP, style.FLIP_LINE, "flip"),
     )
     for code, colour, line, name in looks:
-        axes.plot(x, np.where(there.code == code, there.x, np.nan), color=colour, ls=line, lw=1.8, zorder=3, gid=name)
-    axes.plot([0, scene.arm_length], [0, scene.arm_length], color=style.FAINT, lw=0.8, zorder=1, gid="diagonal")
+        axes.plot(
+            x,
+            np.where(there.code == code, there.x, np.nan),
+            color=colour,
+            ls=line,
+            lw=1.8,
+            zorder=3,
+            gid=name,
+        )
+    axes.plot(
+        [0, scene.arm_length], [0, scene.arm_length], color=style.FAINT, lw=0.8, zorder=1, gid="diagonal"
+    )
 
 
 def _bars(axes: Axes, extents: Extents, side: int, number: int) -> None:
     face, hatch = style.SETS[number % len(style.SETS)]
     for lo, hi in extents.get(side, ()):
-        axes.axvspan(lo, hi, ymin=0, ymax=0.03, facecolor=face, hatch=hatch, edgecolor=style.INK, lw=0.8, zorder=4, gid="limit set")
+        axes.axvspan(
+            lo,
+            hi,
+            ymin=0,
+            ymax=0.03,
+            facecolor=face,
+            hatch=hatch,
+            edgecolor=style.INK,
+            lw=0.8,
+            zorder=4,
+            gid="limit set",
+        )
 
 
 def _cobweb(axes: Axes, path: Orbit, side: int) -> None:

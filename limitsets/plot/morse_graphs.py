@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Any
 
 import networkx as nx
@@ -67,7 +68,9 @@ def morse(graph: nx.DiGraph[int] | TransitionGraph, name: str = "") -> Figure:
 
 def _condensed(whole: nx.DiGraph[int]) -> nx.DiGraph[Any]:
     """Keep at most `MOST` nodes and the order among them; ways out become nodes named after them."""
-    rank = sorted(whole.nodes, key=lambda node: (-whole.nodes[node]["attracting"], -whole.nodes[node]["cells"]))
+    rank = sorted(
+        whole.nodes, key=lambda node: (-whole.nodes[node]["attracting"], -whole.nodes[node]["cells"])
+    )
     kept = set(rank[:MOST])
     order: nx.DiGraph[Any] = nx.DiGraph()
     order.add_nodes_from((node, whole.nodes[node]) for node in sorted(kept))
@@ -100,35 +103,66 @@ def _places(drawn: nx.DiGraph[Any]) -> dict[Any, Place]:
 
 def _radius(cells: int, largest: int = 200_000) -> float:
     """Radius in points: the area grows with the root of the number of cells, so that small sets stay visible."""
-    return 7.0 + 17.0 * float(min(cells, largest) / largest) ** 0.25
+    share = min(cells, largest) / largest
+    return 7.0 + 17.0 * math.sqrt(math.sqrt(share))
 
 
 def _node(axes: Axes, node: Any, data: dict[str, Any], x: float, y: float, *, few: bool) -> None:
     if isinstance(node, str):
         axes.plot([x], [y], "s", ms=16, mfc="white", mec=style.FAINT, ls="none", gid="exit")
-        axes.annotate(f"leaves:\n{node}", (x, y), xytext=(0, -13), textcoords="offset points", ha="center", va="top", fontsize=style.SMALL)
+        axes.annotate(
+            f"leaves:\n{node}",
+            (x, y),
+            xytext=(0, -13),
+            textcoords="offset points",
+            ha="center",
+            va="top",
+            fontsize=style.SMALL,
+        )
         return
     size = 2 * _radius(data["cells"])
     face = style.SETS[0][0] if data["attracting"] else "white"
-    axes.plot([x], [y], "o", ms=size, mfc=face, mec=style.INK, mew=1.2, ls="none", gid="attracting" if data["attracting"] else "recurrent")
+    axes.plot(
+        [x],
+        [y],
+        "o",
+        ms=size,
+        mfc=face,
+        mec=style.INK,
+        mew=1.2,
+        ls="none",
+        gid="attracting" if data["attracting"] else "recurrent",
+    )
     if data["attracting"]:
         axes.plot([x], [y], "o", ms=size + 6, mfc="none", mec=style.INK, mew=1.2, ls="none", gid="border")
     axes.annotate(str(node), (x, y), ha="center", va="center", fontsize=style.SMALL)
     lines = [f"{data['cells']} cell{'' if data['cells'] == 1 else 's'}"]
     if few:
-        lines += [
-            f"side {side}: {', '.join(f'{lo:z.2f} to {hi:z.2f}' for lo, hi in parts[:2])}{' ...' if len(parts) > 2 else ''}"
-            for side, parts in data["extents"].items()
-        ]
+        for side, parts in data["extents"].items():
+            shown = ", ".join(f"{lo:z.2f} to {hi:z.2f}" for lo, hi in parts[:2])
+            lines.append(f"side {side}: {shown}{' ...' if len(parts) > 2 else ''}")
     axes.annotate(
-        "\n".join(lines), (x, y), xytext=(size / 2 + 7, 0), textcoords="offset points", va="center", fontsize=style.SMALL
+        "\n".join(lines),
+        (x, y),
+        xytext=(size / 2 + 7, 0),
+        textcoords="offset points",
+        va="center",
+        fontsize=style.SMALL,
     )
 
 
 def _arrow(axes: Axes, start: Place, end: Place, *, dotted: bool) -> None:
     axes.add_patch(
         FancyArrowPatch(
-            start, end, arrowstyle="-|>", mutation_scale=11, shrinkA=13, shrinkB=16, color="#555555", lw=1.0, ls=":" if dotted else "-"
+            start,
+            end,
+            arrowstyle="-|>",
+            mutation_scale=11,
+            shrinkA=13,
+            shrinkB=16,
+            color="#555555",
+            lw=1.0,
+            ls=":" if dotted else "-",
         )
     )
 
@@ -136,6 +170,7 @@ def _arrow(axes: Axes, start: Place, end: Place, *, dotted: bool) -> None:
 def _title(whole: nx.DiGraph[int], drawn: nx.DiGraph[Any], name: str) -> str:
     attracting = sum(data["attracting"] for _, data in whole.nodes(data=True))
     sets = whole.number_of_nodes()
-    text = f"Morse graph{f' of {name}' if name else ''}: {sets} recurrent set{'' if sets == 1 else 's'}, {attracting} attracting"
+    owner = f" of {name}" if name else ""
+    text = f"Morse graph{owner}: {sets} recurrent set{'' if sets == 1 else 's'}, {attracting} attracting"
     hidden = sets - sum(not isinstance(node, str) for node in drawn)
     return f"{text}\n({hidden} of the smallest are not drawn)" if hidden else text

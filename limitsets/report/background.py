@@ -1,0 +1,125 @@
+"""The second half of the page: how far to trust the answers, the scene they are about, how they were computed."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+from limitsets.analysis import overlap
+from limitsets.report.tables import intervals, number, percent, table
+
+if TYPE_CHECKING:
+    from limitsets.analysis import Analysis
+    from limitsets.scene import Scene
+
+__all__ = ["everything", "figure_line", "scene_of", "steps", "trust"]
+
+
+def figure_line(figures: Mapping[str, str], kind: str, caption: str) -> str:
+    """Show a figure if it is there."""
+    return f"\n\n![{caption}]({figures[kind]})" if kind in figures else ""
+
+
+def everything(analysis: Analysis) -> dict[int, list[tuple[float, float]]]:
+    """Put the intervals of all limit sets together, per side."""
+    union: dict[int, list[tuple[float, float]]] = {}
+    for extents in analysis.extents:
+        for side, parts in extents.items():
+            union.setdefault(side, []).extend(parts)
+    return union
+
+
+def trust(analysis: Analysis) -> str:
+    """Say what is sampled, what is flagged, what is assumed."""
+    unit, cells = analysis.scene.unit, [int(n) for n in analysis.grid.shape[:, 0]]
+    inside = min((attractor.in_cells for attractor in analysis.attractors), default=1.0)
+    lines = [
+        "## How far to trust this",
+        " ".join(
+            (
+                "**Sampled, not proved.**",
+                f"The arm was cut into {cells[0]} cells per side, and the image of each was found from its ends.",
+                f"{percent(inside)} of the states of a long orbit lay in the cells of its limit set.",
+                f"{percent(analysis.second_pass)} of the throws needed the slow, sure search for the impact.",
+            )
+        ),
+    ]
+    if analysis.spurious:
+        lines.append(
+            f"**Cells too coarse:** {len(analysis.spurious)} recurrent sets vanish when cells are cut finer. "
+            "Ask for more cells."
+        )
+    parts = [
+        f"side {side}: {intervals(found)} {unit}"
+        for side, found in analysis.other_vertex_first.items()
+        if found
+    ]
+    if parts:
+        broken = overlap(analysis.other_vertex_first, everything(analysis))
+        where = (
+            "This touches the limit set: "
+            + "; ".join(f"side {s}: {intervals(p)} {unit}" for s, p in broken.items())
+            if broken
+            else "No throw from the limit set is concerned"
+        )
+        lines.append(
+            f"**Another vertex lands first** on throws from {'; '.join(parts)}. "
+            f"There the model's formulas speak of a landing that does not take place. {where}."
+        )
+    lines.append(
+        "**Assumed:** the throw is impulsive and does not tip the part; the left bottom vertex lands first, sticks "
+        "without slipping or bouncing, and acts as a hinge until a side lies flat; the part then stays where it is "
+        "until the next throw."
+    )
+    return "\n\n".join(lines)
+
+
+def scene_of(scene: Scene) -> str:
+    """Give the scene in one paragraph and a table."""
+    unit, sides = scene.unit, scene.sides
+    throw = [f"kappa (gravity over the squared angular speed) {scene.kappa:.7g} {unit}"]
+    if scene.gravity is not None:
+        speed = math.degrees(math.sqrt(scene.gravity / scene.kappa))
+        throw.append(f"that is {speed:.2f} deg/s with gravity {scene.gravity:.6g} {unit}/s^2")
+    height = (
+        f"{abs(scene.surface_height):g} {unit} {'below' if scene.surface_height < 0 else 'above'} the joint"
+    )
+    rows = [
+        [side, number(float(sides.length[side])), number(float(sides.a[side])), number(float(sides.d[side]))]
+        for side in range(len(sides))
+    ]
+    return "\n\n".join(
+        [
+            "## The scene",
+            " ".join(
+                (
+                    f"Arm: surface {height}, parts can rest up to x = {scene.arm_length:g} {unit}.",
+                    f"Throw: {', '.join(throw)}.",
+                    f"Flight: {scene.flight}; flip criterion: {scene.flip}.",
+                    f"Radius of gyration {scene.radius_of_gyration:.6g} {unit}.",
+                )
+            ),
+            table(
+                [
+                    "side",
+                    f"length [{unit}]",
+                    f"centre of mass from the left end [{unit}]",
+                    f"centre of mass above it [{unit}]",
+                ],
+                rows,
+            ),
+        ]
+    )
+
+
+def steps(analysis: Analysis, figures: Mapping[str, str]) -> str:
+    """Give the Morse graph and how long each step took."""
+    sets = analysis.morse.number_of_nodes()
+    text = f"## How it was computed\n\n{sets} recurrent set{'' if sets == 1 else 's'} of cells in the Morse graph."
+    times = table(
+        ["step", "seconds"], [[step, f"{seconds:.3f}"] for step, seconds in analysis.timings.items()]
+    )
+    return (
+        text + figure_line(figures, "morse", "Morse graph: recurrent sets and their order") + "\n\n" + times
+    )
