@@ -35,7 +35,7 @@ contracts: .venv/dev.stamp  ## which room may import which
 	.venv/bin/lint-imports
 
 bench: .venv/bench.stamp  ## the benchmarks, with their rivals in the same run
-	$(PY) -m pytest tests/bench -s
+	$(PY) -m pytest tests/bench -s --benchmark-quiet
 
 docs: .venv/dev.stamp  ## the reference, from the docstrings, into docs/api
 	$(PY) docs/build.py

@@ -308,8 +308,31 @@ _folder = _open_cache()
 _CACHE = _source_cache(_folder) if _folder is not None else None
 
 
+# Loops over whole arrays run two vectors side by side: one throw is a chain of dependent operations several times
+# longer than the processor looks ahead, and LLVM on its own sees no reason to interleave so long a loop.
+INTERLEAVE = 2
+
+
+def _interleaved(dispatcher: Any) -> None:
+    """Set LLVM's interleaving for this dispatcher's compilations only: the option is the whole process's."""
+    from llvmlite import binding
+
+    plain = dispatcher._compiler.compile
+
+    def compile_interleaved(*args: Any) -> Any:
+        binding.set_option("limitsets", f"-force-vector-interleave={INTERLEAVE}")
+        try:
+            return plain(*args)
+        finally:
+            binding.set_option("limitsets", "-force-vector-interleave=0")
+
+    dispatcher._compiler.compile = compile_interleaved
+
+
 def _compile(function: F, options: dict[str, Any], entry: bool) -> F:
     dispatcher = numba.jit(**options, forceinline=not entry)(function)
+    if entry and hasattr(dispatcher, "_compiler"):
+        _interleaved(dispatcher)
     # The folder's name vouches for the package's own files only: a loop defined elsewhere is not kept.
     inside = PACKAGE in Path(function.__code__.co_filename).resolve().parents
     if entry and inside and _CACHE is not None and hasattr(dispatcher, "_cache"):

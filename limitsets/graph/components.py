@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from limitsets.graph.ranges import Ranges, box_rows, hits, row_start
+from limitsets.graph.ranges import Ranges, box_rows, row_start
 from limitsets.jit import kernel
 
 __all__ = ["Components", "descend", "reach", "strong_components"]
@@ -48,9 +48,9 @@ class Components:
 
 @kernel(entry=True)
 def _strong(
-    r: Ranges, rank: Any, label: Any, order: Any, path: Any, boxes: Any, rows: Any, waiting: Any
+    r: Ranges, rank: Any, label: Any, order: Any, path: Any, boxes: Any, rows: Any, waiting: Any, loops: Any
 ) -> Any:
-    """Fill `label` and `order`; the number of components.
+    """Fill `label`, `order` and `loops` (cells that meet their own image); the number of components.
 
     `rank` is 0 for a cell not yet met, the smallest visiting number known to be reachable while it is open, and
     ``n - component`` once its component is closed: always larger than any open number, so one minimum serves both.
@@ -76,6 +76,8 @@ def _strong(
                 count, run = box_rows(r, box), np.int64(r.run[box])
                 while row < count:
                     begin = row_start(r, box, row)
+                    if begin <= cell < begin + run:
+                        loops[cell] = True
                     for target in range(begin, begin + run):
                         known = rank[target]
                         if known == 0:
@@ -120,16 +122,6 @@ def _strong(
 
 
 @kernel(entry=True)
-def _recurrent(r: Ranges, label: Any, size: Any, order: Any, out: Any) -> None:
-    for cell in order:
-        c = label[cell]
-        if size[c] > 1:
-            out[c] = True
-        else:
-            out[c] = hits(r, cell, cell)
-
-
-@kernel(entry=True)
 def _reach(r: Ranges, label: Any, order: Any, marks: Any) -> None:
     i = 0
     while i < order.size:
@@ -170,10 +162,11 @@ def strong_components(r: Ranges) -> Components:
     label, order = np.empty(n, np.int32), np.empty(n, np.int32)
     path, waiting, rows = np.empty(n, np.int32), np.empty(n, np.int32), np.empty(n, np.int32)
     boxes = np.empty(n, np.int64 if r.start.size >= 2**31 else np.int32)
-    count = _strong(r, np.zeros(n, np.int32), label, order, path, boxes, rows, waiting)
+    loops = np.zeros(n, dtype=np.bool_)
+    count = _strong(r, np.zeros(n, np.int32), label, order, path, boxes, rows, waiting, loops)
     size = np.bincount(label, minlength=count)
-    recurrent = np.empty(count, dtype=np.bool_)
-    _recurrent(r, label, size, order, recurrent)
+    recurrent = size > 1
+    recurrent[label[loops]] = True
     return Components(label, order, size, recurrent)
 
 

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from limitsets.cells import Grid
 from limitsets.jit import kernel
 
-__all__ = ["Ranges", "box_rows", "build", "count_edges", "expand", "hits", "row_start"]
+__all__ = ["Ranges", "box_rows", "build", "count_edges", "expand", "row_start"]
 
 
 class Ranges(NamedTuple):
@@ -94,17 +94,6 @@ def row_start(r: Ranges, box: Any, row: Any) -> Any:
     return (
         r.start[box] + (row % rows) * r.row_stride[r.side[box]] + (row // rows) * r.plane_stride[r.side[box]]
     )
-
-
-@kernel
-def hits(r: Ranges, cell: int, target: int) -> bool:
-    """Whether a cell's image meets the target cell."""
-    for box in range(r.first[cell], r.first[cell + 1]):
-        for row in range(box_rows(r, box)):
-            begin = row_start(r, box, row)
-            if begin <= target < begin + r.run[box]:
-                return True
-    return False
 
 
 @kernel(entry=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import re
 from collections.abc import Mapping
@@ -86,6 +87,8 @@ def _value(value: Any) -> str:
 
 def _replace(path: Path, text: str) -> None:
     try:
+        if not path.parent.is_dir():  # rather a typing error than a wish
+            raise FileNotFoundError(errno.ENOENT, "there is no such folder", str(path.parent))
         with replaced(path.parent) as draft:
             (draft / path.name).write_text(text, encoding="utf-8", newline="\n")
     except (OSError, ValueError) as error:

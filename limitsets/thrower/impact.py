@@ -15,12 +15,12 @@ from typing import Any
 
 from limitsets.jit import generic, kernel
 from limitsets.thrower.params import Energy, Exact, Side, Signed, SmallAngle, SmallAngle2
-from limitsets.thrower.turn import turn
+from limitsets.thrower.turn import Turned
 
 __all__ = ["decide", "strike"]
 
 
-def strike(flight: Any, part: Side, x: float, phi: float) -> tuple[float, float, float]:
+def strike(flight: Any, part: Side, x: float, at: Turned) -> tuple[float, float, float]:
     """Rate after the impact, kinetic energy, barrier."""
 
 
@@ -35,11 +35,11 @@ decide = generic(decide)
 
 
 @kernel
-def _exact(flight: Any, part: Side, x: float, phi: float) -> tuple[float, float, float]:
-    s, v, _ = turn(phi)
+def _exact(flight: Any, part: Side, x: float, at: Turned) -> tuple[float, float, float]:
+    s, v = at.s, at.v
     right = part.a * (1.0 - v) - part.d * s  # X: the centre right of the vertex
     above = part.a * s + part.d * (1.0 - v)  # H: the centre above it
-    omega = (part.rho2 + right * (x - part.kappa * phi) + above * (part.h + part.d)) / part.inertia
+    omega = (part.rho2 + right * (x - part.kappa * at.phi) + above * (part.h + part.d)) * part.per_inertia
     kinetic = 0.5 * part.inertia * omega * omega
     # ell - H = X^2 / (ell + H) keeps its digits near the top; for H < 0 the difference itself does.
     near = right * abs(right) / (part.ell + abs(above))
@@ -48,9 +48,9 @@ def _exact(flight: Any, part: Side, x: float, phi: float) -> tuple[float, float,
 
 
 @kernel
-def _small(flight: Any, part: Side, x: float, phi: float) -> tuple[float, float, float]:
+def _small(flight: Any, part: Side, x: float, at: Turned) -> tuple[float, float, float]:
     a, d = part.a, part.d
-    omega = (part.rho2 - a * x + 2.0 * a * a + d * d + d * part.h) / part.inertia
+    omega = (part.rho2 - a * x + 2.0 * a * a + d * d + d * part.h) * part.per_inertia
     kinetic = 0.5 * part.inertia * omega * omega
     return omega, kinetic, part.kappa * (a * a / (part.ell + d)) - 2.0 * a * (x - a)
 

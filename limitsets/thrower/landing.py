@@ -10,12 +10,12 @@ from typing import Any
 
 from limitsets.jit import generic, kernel
 from limitsets.thrower.params import Exact, Side, SmallAngle, SmallAngle2
-from limitsets.thrower.turn import turn
+from limitsets.thrower.turn import Turned
 
 __all__ = ["jog_displacement"]
 
 
-def jog_displacement(flight: Any, part: Side, phi: float) -> tuple[float, float]:
+def jog_displacement(flight: Any, part: Side, at: Turned) -> tuple[float, float]:
     """Shift of the centre of mass by a jog, and its derivative with respect to phi."""
 
 
@@ -23,14 +23,13 @@ jog_displacement = generic(jog_displacement)
 
 
 @kernel
-def _exact(flight: Any, part: Side, phi: float) -> tuple[float, float]:
-    s, v, w = turn(phi)
-    return part.a * v - part.d * w - part.h * phi, part.a * s - part.d * v - part.h
+def _exact(flight: Any, part: Side, at: Turned) -> tuple[float, float]:
+    return part.a * at.v - part.d * at.w - part.h * at.phi, part.a * at.s - part.d * at.v - part.h
 
 
 @kernel
-def _small(flight: Any, part: Side, phi: float) -> tuple[float, float]:
-    return -part.h * phi, -part.h
+def _small(flight: Any, part: Side, at: Turned) -> tuple[float, float]:
+    return -part.h * at.phi, -part.h
 
 
 jog_displacement.on(Exact, _exact)  # type: ignore[attr-defined]  # generic functions carry `on`

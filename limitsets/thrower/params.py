@@ -94,6 +94,11 @@ class Side(NamedTuple):
     ell: float  # distance of the centre of mass from the left vertex
     rho2: float  # squared radius of gyration
     inertia: float  # rho^2 + ell^2, about the vertex
+    per_inertia: float  # its inverse
+    per_b: float  # of the first guess of the impact: 2 / (kappa - d), and the fraction's three coefficients
+    over: float
+    under: float
+    under2: float
     single_root: bool  # kappa > ell: the height of the vertex is strictly concave in the angle
     corner: float
     side: int
@@ -108,6 +113,8 @@ def gather(params: Throw, side: int) -> Side:
     after = side + 1 if side + 1 < params.a.size else 0
     ell2 = a * a + d * d
     ell = math.sqrt(ell2)
+    per_b = 2.0 / (params.kappa - d)
+    y = (2.0 / 3.0) * a * per_b
     rho2 = params.radius_of_gyration * params.radius_of_gyration
     return Side(
         params.flight,
@@ -120,6 +127,11 @@ def gather(params: Throw, side: int) -> Side:
         ell,
         rho2,
         rho2 + ell2,
+        1.0 / (rho2 + ell2),
+        per_b,
+        0.4 * y,
+        0.3 * y,
+        0.15 * d * per_b / 12.0,
         params.kappa > ell,
         params.corner[side],
         side,

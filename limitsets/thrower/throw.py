@@ -16,6 +16,7 @@ from limitsets.thrower.flight import impact_angle, sure_impact_angle
 from limitsets.thrower.impact import decide, strike
 from limitsets.thrower.landing import jog_displacement
 from limitsets.thrower.params import Side, Throw, gather
+from limitsets.thrower.turn import Turned
 
 __all__ = ["outcome"]
 
@@ -25,17 +26,17 @@ gather_side = kernel(gather)
 
 
 @kernel
-def flip_margin(part: Side, x: float, phi: float) -> float:
+def flip_margin(part: Side, x: float, at: Turned) -> float:
     """Positive where the part flips after an impact at phi."""
-    omega, kinetic, barrier = strike(part.flight, part, x, phi)
+    omega, kinetic, barrier = strike(part.flight, part, x, at)
     return decide(part.flip, omega, kinetic, barrier)
 
 
 @kernel
-def outcome(part: Side, x: float, phi: float) -> tuple[float, int, int, float]:
+def outcome(part: Side, x: float, at: Turned) -> tuple[float, int, int, float]:
     """Where a throw ends that meets the arm at phi: ``(x', side', code, displacement)``."""
-    flips = flip_margin(part, x, phi) > 0.0
-    shift, _ = jog_displacement(part.flight, part, phi)
+    flips = flip_margin(part, x, at) > 0.0
+    shift, _ = jog_displacement(part.flight, part, at)
     shift = shift - part.shift if flips else shift
     after = x + shift
     code = codes.FLIP if flips else codes.JOG
@@ -47,12 +48,12 @@ def outcome(part: Side, x: float, phi: float) -> tuple[float, int, int, float]:
 @kernel
 def side_image(part: Side, x: float, side: int) -> tuple[float, int, int]:
     """`image` of the throw on one side."""
-    phi, _, settled = impact_angle(part.flight, part, x)
-    after, side_after, code, _ = outcome(part, x, phi)
+    at, _, settled = impact_angle(part.flight, part, x)
+    after, side_after, code, _ = outcome(part, x, at)
     code = code if settled else codes.UNSETTLED
     # Only a start beyond the vertex flies, and the model ends at a full turn.  For the exact flight with one root
     # the second test is f(2 pi) > 0, that is x > pi kappa, and agrees with phi > 2 pi to rounding.
-    model = (x > part.a) & (phi > 0.0) & (phi <= part.flight.full_turn)
+    model = (x > part.a) & (at.phi > 0.0) & (at.phi <= part.flight.full_turn)
     code = code if model or (x > part.a and not settled) else codes.OUTSIDE_MODEL
     inside = code != codes.OUTSIDE_MODEL
     return after if inside else x, side_after if inside else side, code
@@ -61,27 +62,27 @@ def side_image(part: Side, x: float, side: int) -> tuple[float, int, int]:
 @kernel
 def side_fallback(part: Side, x: float, side: int) -> tuple[float, int, int]:
     """`fallback` of the throw on one side: the smallest root by a march."""
-    phi, _ = sure_impact_angle(part.flight, part, x)
-    if not (x > part.a and 0.0 < phi <= part.flight.full_turn):
+    at, _ = sure_impact_angle(part.flight, part, x)
+    if not (x > part.a and 0.0 < at.phi <= part.flight.full_turn):
         return x, side, codes.OUTSIDE_MODEL
-    after, side_after, code, _ = outcome(part, x, phi)
+    after, side_after, code, _ = outcome(part, x, at)
     return after, side_after, code
 
 
 @kernel
-def settle(part: Side, x: float) -> tuple[float, float]:
+def settle(part: Side, x: float) -> tuple[Turned, float]:
     """Angle of the impact and its derivative, by the fast way where that can be vouched for."""
-    phi, slope, settled = impact_angle(part.flight, part, x)
+    at, slope, settled = impact_angle(part.flight, part, x)
     if not settled:
-        phi, slope = sure_impact_angle(part.flight, part, x)
-    return phi, slope
+        at, slope = sure_impact_angle(part.flight, part, x)
+    return at, slope
 
 
 @kernel
 def side_image_on(part: Side, x: float, side: int, branch: int) -> tuple[float, int, float]:
     """`image_on` of the throw on one side: branch 0 jogs, branch 1 flips, whatever the energy says."""
-    phi, phi_slope = settle(part, x)
-    shift, shift_slope = jog_displacement(part.flight, part, phi)
+    at, phi_slope = settle(part, x)
+    shift, shift_slope = jog_displacement(part.flight, part, at)
     slope = 1.0 + shift_slope * phi_slope
     if branch == codes.FLIP:
         return x + (shift - part.shift), part.next, slope
@@ -91,17 +92,17 @@ def side_image_on(part: Side, x: float, side: int, branch: int) -> tuple[float, 
 @kernel
 def side_margin(part: Side, x: float, side: int) -> float:
     """`margin` of the throw on one side: nan where there is no impact within a full turn."""
-    phi, _ = settle(part, x)
-    if not (x > part.a and 0.0 < phi <= part.flight.full_turn):
+    at, _ = settle(part, x)
+    if not (x > part.a and 0.0 < at.phi <= part.flight.full_turn):
         return math.nan
-    return flip_margin(part, x, phi)
+    return flip_margin(part, x, at)
 
 
 @kernel
 def side_displacement(part: Side, x: float, side: int) -> float:
     """`displacement` of the throw on one side."""
-    phi, _ = settle(part, x)
-    _, _, _, shift = outcome(part, x, phi)
+    at, _ = settle(part, x)
+    _, _, _, shift = outcome(part, x, at)
     return shift
 
 

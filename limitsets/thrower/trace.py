@@ -26,19 +26,19 @@ _gather = kernel(gather)
 def _details(params: Throw, x: Any, side: Any, phi_out: Any, shift_out: Any, other: Any) -> None:
     for k in range(x.size):
         part = _gather(params, side[k])
-        phi, _ = settle(part, x[k])
-        _, _, _, shift = outcome(part, x[k], phi)
-        phi_out[k] = phi
+        at, _ = settle(part, x[k])
+        _, _, _, shift = outcome(part, x[k], at)
+        phi_out[k] = at.phi
         shift_out[k] = shift
-        other[k] = phi > part.corner
+        other[k] = at.phi > part.corner
 
 
 @kernel(entry=True)
 def _fly(params: Throw, x: float, side: int) -> tuple[float, float, float, float]:
     part = _gather(params, side)
-    phi, _ = settle(part, x)
-    omega, kinetic, barrier = strike(part.flight, part, x, phi)
-    return phi, omega, kinetic, barrier
+    at, _ = settle(part, x)
+    omega, kinetic, barrier = strike(part.flight, part, x, at)
+    return at.phi, omega, kinetic, barrier
 
 
 @dataclass(frozen=True)

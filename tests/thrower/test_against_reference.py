@@ -135,9 +135,7 @@ def test_displacement_keeps_its_digits(flight: str) -> None:
 
 
 def slope(params: Throw, side: int, branch: int, x: float) -> float:
-    out = np.empty(1)
-    drivers._slopes(params, np.array([side]), np.array([branch]), np.array([x]), out)
-    return float(out[0])
+    return float(maps.along(params, [x], side, [branch])[2][0])
 
 
 @pytest.mark.parametrize("flight", FLIGHTS)
