@@ -283,7 +283,14 @@ def test_ctrl_c_leaves_the_old_files_whole(tmp_path):
     folder.mkdir()
     (folder / "report.md").write_text("old")
     (folder / "map.png").write_text("old")
-    process = start("analyse", "paper-designed", "-o", str(folder))
+    # A run in the background of a shell hands on that SIGINT is ignored; a person's terminal does not.
+    process = start(
+        "analyse",
+        "paper-designed",
+        "-o",
+        str(folder),
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
+    )
     deadline = time.monotonic() + 120
     while not list(folder.glob(".draft-*")) and time.monotonic() < deadline and process.poll() is None:
         time.sleep(0.005)
