@@ -1,0 +1,108 @@
+"""IEEE 1788 test vectors, where a copy of them lies beside the checkout; our own vectors run everywhere.
+
+The vectors are third-party data (Interval Test Framework, github.com/oheim/ITF1788) and are not part of the project.
+Those with finite, bounded, bare operands apply to us; what is asked is containment, with an excess of a few units in
+the last place where the expected ends are finite.
+"""
+
+import json
+import math
+from fractions import Fraction
+from pathlib import Path
+
+import pytest
+
+from limitsets import interval
+
+FILE = Path(__file__).resolve().parents[3] / "shared" / "data" / "itf1788.json"
+OURS = {
+    "add": interval.add,
+    "sub": interval.sub,
+    "mul": interval.mul,
+    "div": interval.div,
+    "neg": interval.neg,
+    "abs": interval.absolute,
+    "sqr": interval.sqr,
+    "sqrt": interval.sqrt,
+    "sin": interval.sin,
+    "cos": interval.cos,
+    "atan2": interval.atan2,
+    "min": interval.minimum,
+    "max": interval.maximum,
+}
+# Vectors worked out on paper, in rationals: operation, operands, exact result.
+OWN = [
+    ("add", [(1.0, 2.0), (-3.0, 5.0)], (-2.0, 7.0)),
+    ("sub", [(1.0, 2.0), (-3.0, 5.0)], (-4.0, 5.0)),
+    ("mul", [(-2.0, 3.0), (-5.0, 7.0)], (-15.0, 21.0)),
+    ("mul", [(2.0**-600, 2.0**-600), (2.0**-474, 2.0**-474)], (2.0**-1074, 2.0**-1074)),
+    ("div", [(1.0, 2.0), (-4.0, -2.0)], (-1.0, -0.25)),
+    ("sqr", [(-2.0, 1.0)], (0.0, 4.0)),
+    ("sqrt", [(2.25, 6.25)], (1.5, 2.5)),
+    ("abs", [(-2.0, 1.0)], (0.0, 2.0)),
+    ("min", [(0.0, 3.0), (1.0, 2.0)], (0.0, 2.0)),
+    ("max", [(0.0, 3.0), (1.0, 2.0)], (1.0, 3.0)),
+    ("sin", [(0.0, 0.0)], (0.0, 0.0)),
+    ("cos", [(0.0, 0.0)], (1.0, 1.0)),
+    ("sin", [(1.0, 2.0)], (math.sin(1.0), 1.0)),
+    ("cos", [(-1.0, 1.0)], (math.cos(1.0), 1.0)),
+    ("atan2", [(1.0, 1.0), (-1.0, 1.0)], (math.pi / 4, 3 * math.pi / 4)),
+]
+
+
+def number(text):
+    return float.fromhex(text) if "x" in text.lower() else float(text)
+
+
+def applicable():
+    """Vectors with bare operands that are finite and bounded, and an operation of ours."""
+    if not FILE.is_file():
+        return []
+    found = []
+    for vector in json.loads(FILE.read_text())["vectors"]:
+        operands = vector["args"]
+        if vector["op"] not in OURS or vector["decorated"]:
+            continue
+        if any(a["kind"] != "bounded" for a in operands) or vector["expect"]["kind"] not in (
+            "bounded",
+            "empty",
+        ):
+            continue
+        ends = [(number(a["lo"]), number(a["hi"])) for a in operands]
+        if all(math.isfinite(x) and abs(x) < 1e150 for pair in ends for x in pair):
+            found.append((vector["op"], ends, vector["expect"], f"{vector['src']}:{vector['line']}"))
+    return found
+
+
+@pytest.mark.parametrize(("name", "operands", "expect"), OWN)
+def test_vectors_worked_out_on_paper(name, operands, expect):
+    got = OURS[name](*operands)
+    assert got[0] <= expect[0] <= expect[1] <= got[1]
+    for mine, exact in zip(got, expect, strict=True):
+        assert abs(mine - exact) <= 1e-12 * abs(exact) + 2.0**-1070
+
+
+if FILE.is_file():
+
+    @pytest.mark.parametrize(("name", "operands", "expect", "where"), applicable())
+    def test_ieee_1788(name, operands, expect, where):
+        got = OURS[name](*operands)
+        if expect["kind"] == "empty":  # the operation is defined nowhere on the operands
+            assert not interval.contains(got, 0.0) or got == (-math.inf, math.inf) or name == "atan2"
+            return
+        lo, hi = number(expect["lo"]), number(expect["hi"])
+        assert got[0] <= lo
+        assert hi <= got[1]
+        tight = name in ("add", "sub", "mul", "sqr", "sqrt", "neg", "abs", "min", "max")
+        if tight and math.isfinite(lo) and math.isfinite(hi):
+            for mine, exact in zip(got, (lo, hi), strict=True):
+                assert abs(Fraction(mine) - Fraction(exact)) <= 8 * Fraction(math.ulp(exact))
+
+    def test_many_vectors_apply():
+        counts = {}
+        for name, *_ in applicable():
+            counts[name] = counts.get(name, 0) + 1
+        assert counts["sin"] >= 40
+        assert counts["cos"] >= 40
+        assert counts["atan2"] >= 100
+        assert counts["div"] >= 60
