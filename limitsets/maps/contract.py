@@ -7,7 +7,11 @@ written once, here and in the rooms above, and know maps only through these func
 ``image(params, x, side)``              ``(x', side', code)``: one step (required)
 ``image_on(params, x, side, branch)``   ``(x', side', slope)``: one step on a forced branch, for one-sided limits,
                                         slopes and Newton's method
-``image_box(lo, hi, x_lo, x_hi, side)`` one or two boxes that contain the image of a box, for proofs
+``image_box(lo, hi, x_lo, x_hi, side)`` ``(count, slot, slot, witness)``: one or two boxes, each ``(lo', hi', side',
+                                        branch)``, that hold the image of a box of states for all parameters between
+                                        two; count -1 where nothing could be proved
+``fallback_box(...)``                   as `image_box`, slow and sure; asked where that can prove nothing
+``on_side_box(lo, hi, side)``           as `on_side`, for the two parameter corners of `image_box`
 ``on_side(params, side)``               gathers what one side needs, once for a whole batch; the class of what it
                                         returns then has the methods `image`, `image_on` and so on
 ``fallback(params, x, side)``           as `image`, slow and sure; asked where `image` answers ``UNSETTLED``
@@ -35,18 +39,28 @@ __all__ = [
     "coerce",
     "displacement",
     "fallback",
+    "fallback_box",
     "image",
     "image_box",
     "image_on",
     "kind_of",
     "margin",
     "on_side",
+    "on_side_box",
     "register",
 ]
 
 
 def _same(params: Any, side: int) -> Any:
     return params
+
+
+def _both(lo: Any, hi: Any, side: int) -> Any:
+    return lo, hi
+
+
+def _no_fallback_box(params_lo: Any, params_hi: Any, lo: Any, hi: Any, side: int) -> Any:
+    return image_box(params_lo, params_hi, lo, hi, side)
 
 
 def _no_fallback(params: Any, x: Any, side: int) -> Any:
@@ -63,6 +77,14 @@ def image_on(params: Any, x: Any, side: int, branch: int) -> Any:
 
 def image_box(params_lo: Any, params_hi: Any, lo: Any, hi: Any, side: int) -> Any:
     """Boxes that contain the image of a box, for every parameter between the two."""
+
+
+def fallback_box(params_lo: Any, params_hi: Any, lo: Any, hi: Any, side: int) -> Any:
+    """As `image_box`, slow and sure."""
+
+
+def on_side_box(params_lo: Any, params_hi: Any, side: int) -> Any:
+    """Return what `image_box` needs to know of one side, for both corners."""
 
 
 def on_side(params: Any, side: int) -> Any:
@@ -85,6 +107,8 @@ image = generic(image)
 image_on = generic(image_on)
 image_box = generic(image_box, proof=True)
 on_side = generic(on_side, default=_same)
+fallback_box = generic(fallback_box, proof=True, inlined=False, default=_no_fallback_box)
+on_side_box = generic(on_side_box, proof=True, default=_both)
 fallback = generic(fallback, inlined=False, default=_no_fallback)
 margin = generic(margin)
 displacement = generic(displacement)
@@ -106,7 +130,7 @@ class MapKind:
         Names of the branches; the code of a step is an index into it.
     exits : dict of str to int
         Names and codes of the ways out, in the order of the sinks of a graph.
-    has_image_on, has_margin, has_displacement : bool
+    has_image_on, has_image_box, has_margin, has_displacement : bool
         Which of the optional kernels exist.
     """
 
@@ -115,6 +139,7 @@ class MapKind:
     branches: tuple[str, ...]
     exits: dict[str, int]
     has_image_on: bool
+    has_image_box: bool
     has_margin: bool
     has_displacement: bool
 
@@ -129,6 +154,8 @@ def register(
     image_on: Callable[..., Any] | None = None,
     image_box: Callable[..., Any] | None = None,
     on_side: Callable[..., Any] | None = None,
+    on_side_box: Callable[..., Any] | None = None,
+    fallback_box: Callable[..., Any] | None = None,
     fallback: Callable[..., Any] | None = None,
     margin: Callable[..., Any] | None = None,
     displacement: Callable[..., Any] | None = None,
@@ -146,7 +173,7 @@ def register(
     image : callable
         ``image(params, x, side) -> (x', side', code)``; code is the index of the branch taken, or
         `limitsets.maps.OUTSIDE` (-2).  A module-level function, not decorated.
-    image_on, image_box, on_side, fallback, margin, displacement : callable, optional
+    image_on, image_box, on_side, on_side_box, fallback, fallback_box, margin, displacement : callable, optional
         See this module's table.
     dimension : int
         1, 2 or 3.
@@ -195,6 +222,8 @@ def register(
         "image_on": image_on,
         "image_box": image_box,
         "on_side": on_side,
+        "on_side_box": on_side_box,
+        "fallback_box": fallback_box,
         "fallback": fallback,
         "margin": margin,
         "displacement": displacement,
@@ -222,6 +251,7 @@ def register(
         tuple(branches),
         dict(EXITS_OF_A_MAP if exits is None else exits),
         image_on is not None,
+        image_box is not None,
         margin is not None,
         displacement is not None,
     )

@@ -11,11 +11,19 @@ from typing import Any
 
 from limitsets.jit import kernel
 from limitsets.maps import codes
-from limitsets.maps.contract import register
+from limitsets.maps.contract import fallback_box, image_box, register
 from limitsets.thrower.flight import impact_angle, sure_impact_angle
 from limitsets.thrower.impact import decide, strike
 from limitsets.thrower.landing import jog_displacement
 from limitsets.thrower.params import Side, Throw, gather
+from limitsets.thrower.throw_box import (
+    SideBox,
+    gather_pair,
+    side_fallback_box,
+    side_image_box,
+    throw_fallback_box,
+    throw_image_box,
+)
 from limitsets.thrower.turn import Turned
 
 __all__ = ["outcome"]
@@ -130,13 +138,18 @@ register(
     Throw,
     image=_image,
     image_on=_image_on,
+    image_box=throw_image_box,
+    fallback_box=throw_fallback_box,
     on_side=gather,
+    on_side_box=gather_pair,
     fallback=_fallback,
     margin=_margin,
     displacement=_displacement,
     branches=("jog", "flip"),
     exits=EXITS,
 )
+fallback_box.on(SideBox, side_fallback_box)  # type: ignore[attr-defined]
+image_box.on(SideBox, side_image_box)  # type: ignore[attr-defined]  # generic functions carry `on`
 register(
     Side,
     image=side_image,

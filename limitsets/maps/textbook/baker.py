@@ -5,13 +5,13 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+import limitsets.interval as iv
 from limitsets.maps import codes
 from limitsets.maps.contract import register
 from limitsets.maps.textbook.domains import DOMAINS
+from limitsets.maps.textbook.slots import Plane, Point, plane_of_two
 
 __all__ = ["Baker"]
-
-Point = tuple[float, float]
 
 
 class Baker(NamedTuple):
@@ -50,5 +50,23 @@ def _image_on(params: Baker, x: Point, side: int, branch: int) -> tuple[Point, i
     return (2.0 * x[0], c * x[1]), side, slope
 
 
-register(Baker, image=_image, image_on=_image_on, dimension=2, branches=("left", "right"))
+def _image_box(params_lo: Baker, params_hi: Baker, lo: Point, hi: Point, side: int) -> Plane:
+    """Both branches at x = 1/2; products with 2 are exact, and the unit square is not left by rounding."""
+    c = (params_lo.contraction, params_hi.contraction)
+    dough = (lo[0] >= 0.0) & (hi[0] <= 1.0)
+    y = (lo[1], hi[1])
+    thin = iv.mul(c, y)
+    # c y + 1 - c = 1 - c (1 - y), with each number once
+    lifted = iv.sub((1.0, 1.0), iv.mul(c, iv.sub((1.0, 1.0), y)))
+    bottom = 0.0 if (c[0] >= 0.0) & (y[0] >= 0.0) else -math.inf
+    top = 1.0 if (c[0] >= 0.0) & (y[1] <= 1.0) else math.inf
+    left = (2.0 * lo[0], min(2.0 * hi[0], 1.0)), (max(thin[0], bottom), thin[1])
+    right = iv.sub((2.0 * lo[0], 2.0 * hi[0]), (1.0, 1.0))
+    moved = (max(right[0], 0.0), min(right[1], 1.0)), (lifted[0], min(lifted[1], top))
+    return plane_of_two(dough & (lo[0] <= 0.5), left, dough & (hi[0] >= 0.5), moved, side)
+
+
+register(
+    Baker, image=_image, image_on=_image_on, image_box=_image_box, dimension=2, branches=("left", "right")
+)
 DOMAINS[Baker] = ((0.0, 1.0), (0.0, 1.0))

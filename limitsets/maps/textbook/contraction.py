@@ -5,9 +5,11 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+import limitsets.interval as iv
 from limitsets.maps import codes
 from limitsets.maps.contract import register
 from limitsets.maps.textbook.domains import DOMAINS
+from limitsets.maps.textbook.slots import Line, line
 
 __all__ = ["Contraction"]
 
@@ -39,5 +41,10 @@ def _image_on(params: Contraction, x: float, side: int, branch: int) -> tuple[fl
     return params.slope * x + params.offset, side, params.slope
 
 
-register(Contraction, image=_image, image_on=_image_on)
+def _image_box(params_lo: Contraction, params_hi: Contraction, lo: float, hi: float, side: int) -> Line:
+    slope, offset = (params_lo.slope, params_hi.slope), (params_lo.offset, params_hi.offset)
+    return line(iv.add(iv.mul(slope, (lo, hi)), offset), side, 0)
+
+
+register(Contraction, image=_image, image_on=_image_on, image_box=_image_box)
 DOMAINS[Contraction] = ((-1.0, 1.0),)

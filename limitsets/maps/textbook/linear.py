@@ -5,13 +5,13 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+import limitsets.interval as iv
 from limitsets.maps import codes
 from limitsets.maps.contract import register
 from limitsets.maps.textbook.domains import DOMAINS
+from limitsets.maps.textbook.slots import Plane, Point, plane, rectangle
 
 __all__ = ["Linear2"]
-
-Point = tuple[float, float]
 
 
 class Linear2(NamedTuple):
@@ -44,5 +44,13 @@ def _image_on(params: Linear2, x: Point, side: int, branch: int) -> tuple[Point,
     return (u, v), side, ((params.xx, params.xy), (params.yx, params.yy))
 
 
-register(Linear2, image=_image, image_on=_image_on, dimension=2)
+def _image_box(params_lo: Linear2, params_hi: Linear2, lo: Point, hi: Point, side: int) -> Plane:
+    """Exact range: each number occurs once per coordinate."""
+    x, y = rectangle(lo, hi)
+    u = iv.add(iv.mul((params_lo.xx, params_hi.xx), x), iv.mul((params_lo.xy, params_hi.xy), y))
+    v = iv.add(iv.mul((params_lo.yx, params_hi.yx), x), iv.mul((params_lo.yy, params_hi.yy), y))
+    return plane((u, v), side, 0)
+
+
+register(Linear2, image=_image, image_on=_image_on, image_box=_image_box, dimension=2)
 DOMAINS[Linear2] = ((-1.0, 1.0), (-1.0, 1.0))

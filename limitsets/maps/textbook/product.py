@@ -5,13 +5,15 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+import limitsets.interval as iv
+from limitsets.interval.arithmetic import Interval
+from limitsets.jit import proof_kernel
 from limitsets.maps import codes
 from limitsets.maps.contract import register
 from limitsets.maps.textbook.domains import DOMAINS
+from limitsets.maps.textbook.slots import Plane, Point, plane
 
 __all__ = ["Product"]
-
-Point = tuple[float, float]
 
 
 class Product(NamedTuple):
@@ -41,5 +43,22 @@ def _image_on(params: Product, x: Point, side: int, branch: int) -> tuple[Point,
     return (x[0] / left, x[1] / below), side, slope
 
 
-register(Product, image=_image, image_on=_image_on, dimension=2)
+@proof_kernel
+def _moebius(pole: Interval, lo: float, hi: float) -> Interval:
+    """Exact range of x / (pole - x) left of the pole: monotone in x; nan or infinite where it may be met."""
+    first = iv.div((lo, lo), iv.sub(pole, (lo, lo)))
+    last = iv.div((hi, hi), iv.sub(pole, (hi, hi)))
+    after = iv.hull(first, last)
+    left = iv.sub(pole, (hi, hi))[0] > 0.0
+    return (max(after[0], 0.0) if lo >= 0.0 else after[0]) if left else -math.inf, after[
+        1
+    ] if left else math.inf
+
+
+def _image_box(params_lo: Product, params_hi: Product, lo: Point, hi: Point, side: int) -> Plane:
+    pole = (params_lo.pole, params_hi.pole)
+    return plane((_moebius(pole, lo[0], hi[0]), _moebius(pole, lo[1], hi[1])), side, 0)
+
+
+register(Product, image=_image, image_on=_image_on, image_box=_image_box, dimension=2)
 DOMAINS[Product] = ((0.0, 1.2), (0.0, 1.2))

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
+import limitsets.interval as iv
 from limitsets.maps import codes
 from limitsets.maps.contract import register
 from limitsets.maps.textbook.domains import DOMAINS
+from limitsets.maps.textbook.slots import Line, line_of_two
 
 __all__ = ["Rotation"]
 
@@ -38,5 +41,18 @@ def _image_on(params: Rotation, x: float, side: int, branch: int) -> tuple[float
     return after - 1.0 if branch == 1 else after, side, 1.0
 
 
-register(Rotation, image=_image, image_on=_image_on, branches=("stay", "wrap"))
+def _image_box(params_lo: Rotation, params_hi: Rotation, lo: float, hi: float, side: int) -> Line:
+    """Both branches at equality; clipped to what x on the circle and an angle in [0, 1] allow."""
+    angle = (params_lo.angle, params_hi.angle)
+    turned = iv.add((lo, hi), angle)
+    less = iv.sub(turned, (1.0, 1.0))
+    circle = (lo >= 0.0) & (hi <= 1.0)
+    bottom = 0.0 if angle[0] >= 0.0 else -math.inf
+    top = 1.0 if angle[1] <= 1.0 else math.inf
+    stay = max(turned[0], bottom), min(turned[1], 1.0)
+    wrap = max(less[0], 0.0), min(less[1], top)
+    return line_of_two(circle & (turned[0] <= 1.0), stay, circle & (turned[1] >= 1.0), wrap, side)
+
+
+register(Rotation, image=_image, image_on=_image_on, image_box=_image_box, branches=("stay", "wrap"))
 DOMAINS[Rotation] = ((0.0, 1.0),)

@@ -5,13 +5,13 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+import limitsets.interval as iv
 from limitsets.maps import codes
 from limitsets.maps.contract import register
 from limitsets.maps.textbook.domains import DOMAINS
+from limitsets.maps.textbook.slots import Plane, Point, plane_of_two
 
 __all__ = ["TwoState"]
-
-Point = tuple[float, float]
 
 
 class TwoState(NamedTuple):
@@ -41,5 +41,16 @@ def _image_on(params: TwoState, x: Point, side: int, branch: int) -> tuple[Point
     return (after, after), side, ((0.0, 0.0), (0.0, 0.0))
 
 
-register(TwoState, image=_image, image_on=_image_on, dimension=2, branches=("down", "up"))
+def _image_box(params_lo: TwoState, params_hi: TwoState, lo: Point, hi: Point, side: int) -> Plane:
+    """Both states on x = 0."""
+    r = (params_lo.r, params_hi.r)
+    # below 1/2 both states are the origin
+    reach = (r[0] if r[0] >= 0.5 else 0.0, r[1] if r[1] >= 0.5 else 0.0)
+    down = iv.neg(reach)
+    return plane_of_two(lo[0] <= 0.0, (down, down), hi[0] >= 0.0, (reach, reach), side)
+
+
+register(
+    TwoState, image=_image, image_on=_image_on, image_box=_image_box, dimension=2, branches=("down", "up")
+)
 DOMAINS[TwoState] = ((-2.0, 2.0), (-2.0, 2.0))
