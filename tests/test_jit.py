@@ -202,7 +202,10 @@ class Place:
 
     def fill(self) -> None:
         source = Path(limitsets.jit.__file__).parent
-        shutil.copytree(source / "maps", self.maps, ignore=shutil.ignore_patterns("__pycache__"))
+        for room in ("interval", "maps"):  # the box kernels of the maps stand on the room below
+            shutil.copytree(
+                source / room, self.maps.parent / room, ignore=shutil.ignore_patterns("__pycache__")
+            )
         for file in ("errors.py", "jit.py"):
             shutil.copy(source / file, self.maps.parent / file)
         (self.maps.parent / "__init__.py").write_text("from limitsets.maps import register\n")

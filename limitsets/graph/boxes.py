@@ -28,17 +28,18 @@ class Boxes:
 
 @kernel(entry=True)
 def _place_hulls(
-    target: Target, side: Any, lo: Any, hi: Any, pad: int, k: Any, m: Any, exits: Any, met: Any
+    target: Target, side: Any, lo: Any, hi: Any, pad: int, first: Any, last: Any, exits: Any, met: Any
 ) -> None:
+    hint = np.int64(0)
     for box in range(side.size):
         out, meets = 0, True
         for axis in range(lo.shape[1]):
-            k[box, axis], m[box, axis], leaves = place(
-                target, np.int64(side[box]), axis, lo[box, axis], hi[box, axis], pad, np.int64(0)
-            )
+            k, m, leaves = place(target, np.int64(side[box]), axis, lo[box, axis], hi[box, axis], pad, hint)
             if leaves >= 0:
                 out |= 1 << leaves
-            meets &= m[box, axis] >= k[box, axis]
+            meets &= m >= k
+            first[box, axis], last[box, axis] = k, m
+            hint = k
         exits[box], met[box] = out, meets
 
 

@@ -13,10 +13,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from limitsets.graph import wide
 from limitsets.graph.ranges import Ranges, box_rows, row_start
 from limitsets.jit import kernel
 
-__all__ = ["Components", "descend", "reach", "strong_components"]
+__all__ = ["Components", "descend", "ranks", "reach", "strong_components"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -142,6 +143,22 @@ def _reach(r: Ranges, label: Any, order: Any, marks: Any) -> None:
 
 
 @kernel(entry=True)
+def _ranks(r: Ranges, label: Any, order: Any, size: Any, recurrent: Any, rank: Any) -> None:
+    for cell in order:
+        if recurrent[label[cell]]:
+            rank[cell] = 0
+    for cell in order:
+        highest = -1
+        for box in range(r.first[cell], r.first[cell + 1]):
+            for row in range(box_rows(r, box)):
+                begin = row_start(r, box, row)
+                for target in range(begin, begin + r.run[box]):
+                    highest = max(highest, rank[target])
+        if not recurrent[label[cell]]:
+            rank[cell] = highest + 1
+
+
+@kernel(entry=True)
 def _descend(r: Ranges, seen: Any, stack: Any, held: int) -> None:
     while held > 0:
         held -= 1
@@ -158,12 +175,21 @@ def _descend(r: Ranges, seen: Any, stack: Any, held: int) -> None:
 
 def strong_components(r: Ranges) -> Components:
     """Strongly connected components of the cells; recurrent are those of several cells or with a loop."""
+    if wide.is_wide(r):
+        label, order, loops, count = wide.strong(r)
+        return _components(label, order, loops, count)
     n = r.first.size - 1
     label, order = np.empty(n, np.int32), np.empty(n, np.int32)
     path, waiting, rows = np.empty(n, np.int32), np.empty(n, np.int32), np.empty(n, np.int32)
     boxes = np.empty(n, np.int64 if r.start.size >= 2**31 else np.int32)
     loops = np.zeros(n, dtype=np.bool_)
     count = _strong(r, np.zeros(n, np.int32), label, order, path, boxes, rows, waiting, loops)
+    return _components(label, order, loops, count)
+
+
+def _components(
+    label: NDArray[np.int32], order: NDArray[np.int32], loops: NDArray[np.bool_], count: int
+) -> Components:
     size = np.bincount(label, minlength=count)
     recurrent = size > 1
     recurrent[label[loops]] = True
@@ -187,13 +213,29 @@ def reach(r: Ranges, components: Components, marks: NDArray[Any]) -> NDArray[Any
     ndarray, shape (n_cells,)
         The bits it carries or can reach, in any number of steps.
     """
+    if wide.is_wide(r):
+        return wide.reach(r, components.label, components.order, marks)
     spread = marks.copy()
     _reach(r, components.label, components.order, spread)
     return spread
 
 
+def ranks(r: Ranges, components: Components) -> NDArray[np.int32]:
+    """Longest path from each cell to a recurrent one: 0 on recurrent cells, falling strictly along edges elsewhere.
+
+    Only where every recurrent component attracts is this a bound on the steps to an attractor.
+    """
+    if wide.is_wide(r):
+        return wide.ranks(r, components.order, components.recurrent[components.label])
+    rank = np.zeros(r.first.size - 1, dtype=np.int32)
+    _ranks(r, components.label, components.order, components.size, components.recurrent, rank)
+    return rank
+
+
 def descend(r: Ranges, cells: NDArray[np.int64]) -> NDArray[np.bool_]:
     """Cells that can be reached from the given ones in one step or more."""
+    if wide.is_wide(r):
+        return wide.descend(r, cells)
     n = r.first.size - 1
     seen, stack = np.zeros(n, dtype=np.bool_), np.empty(n + cells.size, np.int64)
     stack[: cells.size] = cells

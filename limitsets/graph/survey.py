@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from limitsets.graph import wide
 from limitsets.graph.components import Components, reach
 from limitsets.graph.ranges import Ranges, box_rows, row_start
 from limitsets.jit import kernel
@@ -106,7 +107,8 @@ def survey(
         Order, attracting components, destinations.
     """
     k = len(sets)
-    attracting = np.array([not _leaves(r, components.label, cells) for cells in sets], dtype=bool)
+    leads_out = wide.leaves if wide.is_wide(r) else _leaves
+    attracting = np.array([not leads_out(r, components.label, cells) for cells in sets], dtype=bool)
     number = np.cumsum(attracting) - 1
     order, out = np.zeros((k, k), dtype=bool), np.zeros((k, len(exits)), dtype=bool)
     destination: NDArray[np.int32] | None = None

@@ -51,52 +51,57 @@ class Target(NamedTuple):
 
 
 @kernel
-def first_meeting(target: Target, side: Any, axis: Any, x: Any, hint: Any) -> Any:
-    """Smallest position whose closed cell reaches x or beyond; the number of cells if none does."""
+def holding(target: Target, side: Any, axis: Any, x: Any, hint: Any) -> Any:
+    """Position of a cell that holds x, 0 or the last one where x lies outside.
+
+    Bisection between bounds that are found in steps of doubling size from the hint: images of neighbouring cells are
+    neighbours, so the hint is nearly always right.
+    """
     begin, n = target.begin[side, axis], target.cells[side, axis]
     rate = target.per_length[side, axis]
     k: Any = np.int64(hint)
     if rate > 0.0:
-        u = (x - target.edges[begin]) * rate
-        k = np.int64(min(max(u, 0.0), n - 1.0))
+        k = np.int64(min(max((x - target.edges[begin]) * rate, 0.0), n - 1.0))
     k = min(max(k, 0), n - 1)
-    while k > 0 and target.edges[begin + k] >= x:
-        k -= 1
-    while k < n and target.edges[begin + k + 1] < x:
-        k += 1
-    return k
-
-
-@kernel
-def last_meeting(target: Target, side: Any, axis: Any, x: Any, hint: Any) -> Any:
-    """Largest position whose closed cell begins at x or before; -1 if none does."""
-    begin, n = target.begin[side, axis], target.cells[side, axis]
-    rate = target.per_length[side, axis]
-    k: Any = np.int64(hint)
-    if rate > 0.0:
-        u = (x - target.edges[begin]) * rate
-        k = np.int64(min(max(u, 0.0), n - 1.0))
-    k = min(max(k, 0), n - 1)
-    while k < n - 1 and target.edges[begin + k + 1] <= x:
-        k += 1
-    while k >= 0 and target.edges[begin + k] > x:
-        k -= 1
-    return k
+    low, high, stride = k, k, 1
+    while low > 0 and target.edges[begin + low] > x:
+        low, stride = max(low - stride, 0), 2 * stride
+    stride = 1
+    while high < n - 1 and target.edges[begin + high + 1] < x:
+        high, stride = min(high + stride, n - 1), 2 * stride
+    while low < high:
+        middle = (low + high) // 2
+        if target.edges[begin + middle + 1] < x:
+            low = middle + 1
+        else:
+            high = middle
+    return low
 
 
 @kernel
 def place(
     target: Target, side: Any, axis: Any, lo: Any, hi: Any, pad: int, hint: Any
 ) -> tuple[Any, Any, Any]:
-    """Positions that [lo, hi] meets along one axis, and the exit it reaches past (-1: none)."""
+    """First and last position that [lo, hi] meets along one axis, and the exit it reaches past (-1: none).
+
+    Cells are closed, so an interval that ends on a border meets both cells there.  First larger than last: no cell.
+    """
     begin, n = target.begin[side, axis], target.cells[side, axis]
     leaves = -1
     if lo < target.edges[begin]:
         leaves = target.sink_below
     if hi > target.edges[begin + n]:
         leaves = target.sink_above
-    k = first_meeting(target, side, axis, lo, hint)
-    m = last_meeting(target, side, axis, hi, k)
-    if m >= k:
-        k, m = max(k - pad, 0), min(m + pad, n - 1)
-    return k, m, leaves
+    first = holding(target, side, axis, lo, hint)
+    while first > 0 and target.edges[begin + first] >= lo:
+        first -= 1
+    while first < n and target.edges[begin + first + 1] < lo:
+        first += 1
+    last = holding(target, side, axis, hi, min(first, n - 1))
+    while last < n - 1 and target.edges[begin + last + 1] <= hi:
+        last += 1
+    while last >= 0 and target.edges[begin + last] > hi:
+        last -= 1
+    if last >= first:
+        first, last = max(first - pad, 0), min(last + pad, n - 1)
+    return first, last, leaves

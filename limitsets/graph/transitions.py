@@ -8,7 +8,6 @@ import numpy as np
 
 from limitsets.cells import Grid
 from limitsets.errors import AnswerError
-from limitsets.graph.assemble import boxes_of_side
 from limitsets.graph.graph import TransitionGraph
 from limitsets.graph.images import METHODS
 from limitsets.graph.ranges import build
@@ -64,10 +63,7 @@ def transitions(map: Any, grid: Grid, method: str | None = None, **options: Any)
     if chosen not in METHODS:
         raise AnswerError("the image method", chosen, ", ".join(METHODS), "correct the word")
     target = Target.of(grid, kind.exits)
-    parts = [
-        boxes_of_side(map, grid, side, target, METHODS[chosen](grid, side, **options))
-        for side in range(grid.sides)
-    ]
+    parts = [METHODS[chosen](map, grid, side, target, **options) for side in range(grid.sides)]
     if len(parts) == 1:
         cell, side, lo, hi, exits = (
             getattr(parts[0], name) for name in ("cell", "side", "lo", "hi", "exits")

@@ -1,19 +1,25 @@
 """Image methods: from a cell to the cells its image meets.
 
-A method is a function ``(grid, side, **options) -> Samples``; to add one, write its file and name it here.
+A method is a function ``(map, grid, side, target, **options) -> Boxes``.  Most sample: they are a function
+``(grid, side, **options) -> Samples`` in `sampled`.  To add one, write its file and name it here.
 """
 
 from limitsets.graph.images.centres import centres
 from limitsets.graph.images.corners import corners, corners_padded, end_points
+from limitsets.graph.images.enclosed import enclosed
 from limitsets.graph.images.random import random
-from limitsets.graph.images.samples import Samples
+from limitsets.graph.images.sampled import sampled
 
-__all__ = ["METHODS", "Samples"]
+__all__ = ["METHODS", "RIGOROUS"]
 
 METHODS = {
-    "centres": centres,
-    "corners": corners,
-    "corners-padded": corners_padded,
-    "end-points": end_points,
-    "random": random,
+    "boxes": enclosed,
+    "centres": sampled(centres),
+    "corners": sampled(corners),
+    "corners-padded": sampled(corners_padded),
+    "end-points": sampled(end_points),
+    "random": sampled(random),
 }
+
+RIGOROUS = {"boxes"}
+"""Methods whose images are proved to hold every image of every point."""

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from limitsets.graph.boxes import Boxes, leaving, placed
-from limitsets.graph.images import Samples
+from limitsets.graph.images.samples import Samples
 from limitsets.graph.target import Target
 from limitsets.jit import kernel
 from limitsets.maps import codes, images_on, kind_of

@@ -1,4 +1,4 @@
-"""From images of sample points to boxes of target cells.
+"""Image methods that sample: from images of points to boxes of target cells.
 
 A cell all of whose points take one branch gets one box, in a compiled pass; the few others are done apart
 (`undecided.py`).
@@ -6,21 +6,22 @@ A cell all of whose points take one branch gets one box, in a compiled pass; the
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
 from limitsets.cells import Grid
 from limitsets.graph.boxes import Boxes, merged
-from limitsets.graph.images import Samples
+from limitsets.graph.images.samples import Samples
+from limitsets.graph.images.undecided import every_branch, split
 from limitsets.graph.target import Target, place
-from limitsets.graph.undecided import every_branch, split
 from limitsets.jit import kernel
 from limitsets.maps import codes, images
 from limitsets.maps.contract import fallback, image, on_side
 from limitsets.maps.drivers import pick, put
 
-__all__ = ["boxes_of_side"]
+__all__ = ["sampled"]
 
 DECIDED, EMPTY, MIXED = 1, 0, 2
 
@@ -111,7 +112,16 @@ def _hulls(
         exits[cell] = out
 
 
-def boxes_of_side(params: Any, grid: Grid, side: int, target: Target, samples: Samples) -> Boxes:
+def sampled(method: Callable[..., Samples]) -> Callable[..., Boxes]:
+    """Make an image method of a function that chooses the points of each cell."""
+
+    def images_of(params: Any, grid: Grid, side: int, target: Target, **options: Any) -> Boxes:
+        return _boxes_of_side(params, grid, side, target, method(grid, side, **options))
+
+    return images_of
+
+
+def _boxes_of_side(params: Any, grid: Grid, side: int, target: Target, samples: Samples) -> Boxes:
     """Boxes of all cells of one side."""
     dimension, shape = grid.dimension, grid.shape[side]
     n = int(shape.prod())

@@ -1,0 +1,304 @@
+"""Rigorous images in one, two and three dimensions: graphs that prove, maps of one's own, parameters in a box."""
+
+import importlib
+import math
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+
+import limitsets as ls
+from limitsets import interval as iv
+from limitsets.cells import CellSet, Domain
+from limitsets.errors import AnswerError
+from limitsets.graph.target import Target, place
+
+# The name of the module is hidden by that of its function.
+enclosed = importlib.import_module("limitsets.graph.images.enclosed")
+
+
+# ---------------------------------------------------------------- maps of one's own
+
+
+class Spiral(NamedTuple):
+    """A contraction of space that turns about an axis."""
+
+    turn: float
+    shrink: float
+
+
+def spiral(params, x, side):
+    c, s = math.cos(params.turn), math.sin(params.turn)
+    u = params.shrink * (c * x[0] - s * x[1]), params.shrink * (s * x[0] + c * x[1]), params.shrink * x[2]
+    return u, side, 0
+
+
+def spiral_box(low, high, lo, hi, side):
+    turn, shrink = (low.turn, high.turn), (low.shrink, high.shrink)
+    c, s = iv.cos(turn), iv.sin(turn)
+    x, y, z = (lo[0], hi[0]), (lo[1], hi[1]), (lo[2], hi[2])
+    u = iv.mul(shrink, iv.sub(iv.mul(c, x), iv.mul(s, y)))
+    v = iv.mul(shrink, iv.add(iv.mul(s, x), iv.mul(c, y)))
+    w = iv.mul(shrink, z)
+    slot = ((u[0], v[0], w[0]), (u[1], v[1], w[1]), side, 0)
+    return 1, slot, slot, (0.0, 0.0)
+
+
+class Tent(NamedTuple):
+    """Two sides: beyond the kink the state goes to the other side."""
+
+    slope: float
+    sides: float = 2.0
+
+
+def tent(params, x, side):
+    return (params.slope * x, side, 0) if x < 0.5 else (params.slope * (1.0 - x), 1 - side, 1)
+
+
+def tent_box(low, high, lo, hi, side):
+    slope = (low.slope, high.slope)
+    up = iv.mul(slope, (lo, min(hi, 0.5)))
+    down = iv.mul(slope, iv.sub((1.0, 1.0), (max(lo, 0.5), hi)))
+    first, second = lo <= 0.5, hi >= 0.5
+    one, two = (up[0], up[1], side, 0), (down[0], down[1], 1 - side, 1)
+    return 2 if first and second else 1, one if first else two, two, (0.0, 0.0)
+
+
+class Broken(NamedTuple):
+    """Answers that prove nothing, in each of the ways a kernel may go wrong."""
+
+    way: float
+
+
+def broken(params, x, side):
+    return 0.5 * x, side, 0
+
+
+def broken_box(low, high, lo, hi, side):
+    ends = iv.mul((0.5, 0.5), (lo, hi))
+    if low.way == 1.0:
+        ends = (math.nan, math.nan)
+    if low.way == 2.0:
+        ends = (-math.inf, math.inf)
+    if low.way == 3.0:
+        ends = (ends[1], ends[0])
+    slot = (ends[0], ends[1], 5 if low.way == 5.0 else side, 0)
+    return 0 if low.way == 4.0 else 1, slot, slot, (0.0, 0.0)
+
+
+ls.register(Spiral, image=spiral, image_box=spiral_box, dimension=3)
+ls.register(Tent, image=tent, image_box=tent_box, branches=("up", "down"))
+ls.register(Broken, image=broken, image_box=broken_box)
+
+
+def attracting(graph):
+    return [data["members"] for _, data in ls.morse_graph(graph).nodes(data=True) if data["attracting"]]
+
+
+def holds(graph, params, points, side=0):
+    """Whether the graph's images of the cells of points hold the cells of their images."""
+    got = ls.maps.images(params, points, side)
+    cells = graph.grid.index(points, side)
+    for k in range(len(cells)):
+        where = graph.grid.index(got.x[k : k + 1], int(got.side[k]))[0]
+        if where >= 0 and where not in graph.successors(int(cells[k])):
+            return False
+        if where < 0 and not graph.ranges.exits[cells[k]]:
+            return False
+    return True
+
+
+def is_forward_invariant(graph, members):
+    cells = set(members.numbers().tolist())
+    return all(set(graph.successors(k).tolist()) <= cells and not graph.ranges.exits[k] for k in cells)
+
+
+# ---------------------------------------------------------------- known answers, proved
+
+
+def test_the_orbit_of_period_two_of_the_logistic_map_attracts():
+    graph = ls.transitions(ls.maps.Logistic(3.2), ls.grid([(0.0, 1.0)], cells=4096), method="boxes")
+    (block,) = attracting(graph)
+    assert is_forward_invariant(graph, block)
+    r = 3.2
+    root = math.sqrt((r - 3) * (r + 1))
+    orbit = [(r + 1 - root) / (2 * r), (r + 1 + root) / (2 * r)]
+    extents = block.extents()[0]
+    assert len(extents) == 2
+    assert [lo <= x <= hi for x, (lo, hi) in zip(orbit, extents, strict=True)] == [True, True]
+    assert sum(hi - lo for lo, hi in extents) < 0.02
+    assert not graph.ranges.exits.any()
+
+
+def test_a_long_orbit_of_henon_stays_in_proved_cells():
+    params = ls.maps.Henon(1.4, 0.3)
+    graph = ls.transitions(params, ls.grid([(-1.5, 1.5), (-0.5, 0.5)], cells=(512, 256)), method="boxes")
+    start = ls.orbit(params, (0.1, 0.1), 0, 200).x[-1]
+    orbit = ls.orbit(params, start, 0, 20_000).x
+    visited = CellSet.of(graph.grid, graph.grid.index(orbit, 0))
+    (block,) = attracting(graph)
+    assert visited <= block
+    assert is_forward_invariant(graph, block)
+    assert len(block) < 0.1 * graph.n_cells
+    # A third of the rectangle is sent beyond it: a share known to the width of a column of cells.
+    leaving = np.count_nonzero(graph.ranges.exits) / graph.n_cells
+    rng = np.random.default_rng(1)
+    x = rng.uniform([-1.5, -0.5], [1.5, 0.5], (200_000, 2))
+    sampled = np.mean(graph.grid.index(ls.maps.images(params, x, 0).x, 0) < 0)
+    assert sampled - 0.005 <= leaving <= sampled + 0.02
+
+
+def test_leslie_images_hold_sampled_ones_and_are_no_looser_than_padded_corners():
+    params = ls.maps.Leslie()
+    cells = ls.grid([(-0.001, 90), (-0.001, 70)], depth=12)
+    graph = ls.transitions(params, cells, method="boxes")
+    padded = ls.transitions(params, cells, method="corners-padded")
+    rng = np.random.default_rng(2)
+    assert holds(graph, params, rng.uniform([-0.001, -0.001], [90, 70], (5000, 2)))
+    assert graph.number_of_cell_edges() < padded.number_of_cell_edges()
+    within = [set(graph.successors(k)) <= set(padded.successors(k)) for k in range(graph.n_cells)]
+    assert np.mean(within) > 0.95
+    (block,) = attracting(graph)
+    assert is_forward_invariant(graph, block)
+
+
+def test_two_states_and_the_baker_have_both_images_on_the_break():
+    graph = ls.transitions(ls.maps.TwoState(1.0), ls.grid([(-2, 2), (-2, 2)], cells=32), method="boxes")
+    assert len(attracting(graph)) == 2
+    beside = graph.grid.index([[0.01, 0.5], [-0.01, 0.5]], 0)
+    targets = graph.grid.index([[1.01, 1.01], [-1.01, -1.01]], 0)
+    for cell in beside.tolist():  # each meets x = 0
+        assert set(targets.tolist()) <= set(graph.successors(cell).tolist())
+    params = ls.maps.Baker(0.4)
+    graph = ls.transitions(params, ls.grid([(0, 1), (0, 1)], cells=33), method="boxes")
+    assert holds(graph, params, np.random.default_rng(3).uniform(0, 1, (2000, 2)))
+
+
+def test_a_map_of_space_proves_its_attractor():
+    params = Spiral(0.5, 0.6)
+    graph = ls.transitions(params, ls.grid([(-1, 1)] * 3, cells=17), method="boxes")
+    (block,) = attracting(graph)
+    assert is_forward_invariant(graph, block)
+    assert graph.grid.index([[0.0, 0.0, 0.0]], 0)[0] in block.numbers()
+    lo, hi = graph.grid.boxes(block.numbers(), 0)
+    assert np.abs([lo, hi]).max() < 0.6
+    assert holds(graph, params, np.random.default_rng(4).uniform(-1, 1, (1000, 3)))
+
+
+def test_a_map_on_two_sides_goes_to_both():
+    params = Tent(1.8)
+    domain = Domain([[0.0], [0.0]], [[1.0], [1.0]])
+    graph = ls.transitions(params, ls.grid(domain, cells=65), method="boxes")
+    for side in (0, 1):
+        assert holds(graph, params, np.random.default_rng(5).uniform(0, 1, 2000), side)
+        (middle,) = graph.grid.index([0.5], side)  # no border of a cell
+        assert set(graph.grid.side_of(graph.successors(int(middle))).tolist()) >= {0, 1}
+
+
+# ---------------------------------------------------------------- parameters in a box
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "domain", "cells"),
+    [
+        (ls.maps.Logistic(3.1), ls.maps.Logistic(3.3), [(0, 1)], 500),
+        (ls.maps.Doubling(1.6), ls.maps.Doubling(1.7), [(0, 1)], 300),
+        (ls.maps.Rotation(0.30), ls.maps.Rotation(0.31), [(0, 1)], 300),
+        (ls.maps.Henon(1.35, 0.29), ls.maps.Henon(1.4, 0.3), [(-2, 2), (-2, 2)], 64),
+        (
+            ls.maps.Leslie(19.0, 23.0, 0.095, 0.69),
+            ls.maps.Leslie(20.0, 24.0, 0.1, 0.7),
+            [(-0.001, 90), (-0.001, 70)],
+            32,
+        ),
+        (ls.maps.TwoState(0.4), ls.maps.TwoState(0.6), [(-2, 2), (-2, 2)], 30),
+        (Spiral(0.4, 0.5), Spiral(0.5, 0.6), [(-1, 1)] * 3, 9),
+    ],
+    ids=lambda value: type(value).__name__ if isinstance(value, tuple) else "",
+)
+def test_images_hold_for_every_parameter_of_a_box(low, high, domain, cells):
+    graph = ls.transitions(low, ls.grid(domain, cells=cells), method="boxes", upper=high)
+    rng = np.random.default_rng(6)
+    lo, hi = np.array(domain, dtype=float).T
+    for _ in range(20):
+        params = type(low)(*(rng.uniform(a, b) for a, b in zip(low, high, strict=True)))
+        points = rng.uniform(lo, hi, (300, len(domain)))
+        assert holds(graph, params, points if len(domain) > 1 else points[:, 0])
+
+
+def test_the_attractor_continues_over_a_box_of_parameters():
+    low, high = ls.maps.Logistic(3.19), ls.maps.Logistic(3.21)
+    graph = ls.transitions(low, ls.grid([(0, 1)], cells=4096), method="boxes", upper=high)
+    (block,) = attracting(graph)
+    assert is_forward_invariant(graph, block)
+    for r in (3.19, 3.2, 3.21):
+        assert np.isin(
+            graph.grid.index(ls.orbit(ls.maps.Logistic(r), 0.3, 0, 999).x[-2:], 0), block.numbers()
+        ).all()
+
+
+@pytest.mark.parametrize("upper", [ls.maps.Logistic(3.0), ls.maps.Cubic(4.0)])
+def test_an_upper_corner_that_is_none_is_refused(upper):
+    with pytest.raises(AnswerError, match="upper corner"):
+        ls.transitions(ls.maps.Logistic(3.2), ls.grid([(0, 1)]), method="boxes", upper=upper)
+
+
+# ---------------------------------------------------------------- nothing proved
+
+
+@pytest.mark.parametrize("way", [1.0, 2.0, 3.0, 4.0])
+def test_answers_that_prove_nothing_lead_everywhere(way):
+    graph = ls.transitions(Broken(way), ls.grid([(0.5, 1.5)], cells=8), method="boxes")
+    assert graph.ranges.exits.all()
+    assert all(set(range(8)) <= set(graph.successors(k).tolist()) for k in range(8))
+    assert attracting(graph) == []
+
+
+def test_a_side_that_does_not_exist_is_refused():
+    with pytest.raises(AnswerError, match="side"):
+        ls.transitions(Broken(5.0), ls.grid([(0.0, 1.0)], cells=8), method="boxes")
+
+
+def test_beyond_the_pole_nothing_is_proved_and_before_it_all():
+    graph = ls.transitions(ls.maps.Product(), ls.grid([(0, 4), (0, 4)], cells=16), method="boxes")
+    _, hi = graph.grid.boxes(np.arange(graph.n_cells), 0)
+    lost = (hi >= 2.0).any(axis=1)
+    counts = np.array([len(graph.successors(k)) for k in range(graph.n_cells)])
+    assert (counts[lost] > graph.n_cells).all()  # every cell, and the sink
+    assert (counts[~lost] < graph.n_cells).all()
+
+
+def test_an_image_that_reaches_past_both_ends_leaves_by_both():
+    scene = ls.load("paper-designed")
+    cells = ls.grid(scene.domain, cells=4)
+    exits = ls.maps.kind_of(scene.map).exits
+    target = Target.of(cells, exits)
+    lo, hi = np.full(4, -1e3), np.full(4, 1e3)
+    found = enclosed.Enclosures({(1, 0): (lo, hi)}, np.zeros((2, 4)), np.zeros(4, bool))
+    boxes = enclosed.boxes_of(found, target, len(exits))
+    numbers = list(exits)
+    assert (boxes.exits == (1 << numbers.index("inward") | 1 << numbers.index("outward"))).all()
+
+
+# ---------------------------------------------------------------- which closed cells an interval meets
+
+
+@pytest.mark.parametrize("graded", [False, True])
+def test_place_finds_every_closed_cell_that_an_interval_meets(graded):
+    domain = Domain([[0.1]], [[3.0]], [0.05]) if graded else Domain([[0.1]], [[3.0]])
+    cells = ls.grid(domain, cells=37)
+    edges = cells.edges[0][0]
+    target = Target.of(cells, {"outside": -2})
+    rng = np.random.default_rng(7)
+    borders = np.concatenate([edges, np.nextafter(edges, -9), np.nextafter(edges, 9), [-1e9, 1e9, 0.0, 3.5]])
+    for _ in range(20_000):
+        ends = [rng.choice(borders) if rng.random() < 0.7 else rng.uniform(-0.2, 3.3) for _ in range(2)]
+        lo, hi = sorted(map(float, ends))
+        k, m, leaves = place_one(target, lo, hi, int(rng.integers(0, 37)))
+        met = np.flatnonzero((edges[1:] >= lo) & (edges[:-1] <= hi))
+        assert (list(range(k, m + 1)) if k <= m else []) == met.tolist(), (lo, hi)
+        assert (leaves >= 0) == (lo < edges[0] or hi > edges[-1])
+
+
+def place_one(target, lo, hi, hint):
+    return place(target, np.int64(0), 0, lo, hi, 0, np.int64(hint))
