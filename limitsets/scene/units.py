@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 
 from limitsets.errors import SceneError
 
-__all__ = ["UNITS", "Quantity", "convert", "parse", "written"]
+__all__ = ["UNITS", "Quantity", "convert", "exact_factor", "parse", "written"]
 
 UNITS: dict[str, tuple[str, ...]] = {
     "length": ("m", "cm", "mm", "in", "ft"),
@@ -152,11 +152,20 @@ def convert(quantity: Quantity, unit: str) -> float:
         return float(quantity.number)
     if unit == "":
         return float(Fraction(quantity.number) / 100)
-    return float(Fraction(quantity.number) * _factor(quantity.unit, unit))
+    return float(Fraction(quantity.number) * exact_factor(quantity.unit, unit))
 
 
 @lru_cache(maxsize=128)
-def _factor(unit: str, target: str) -> Fraction:
+def exact_factor(unit: str, target: str) -> Fraction:
+    """Give what a number in one unit is multiplied by for another: exact, but for degrees (pi to 50 digits).
+
+    Examples
+    --------
+    >>> exact_factor("in", "cm")
+    Fraction(127, 50)
+    """
+    if unit == target:
+        return Fraction(1)
     return Fraction(_registry().Quantity(Fraction(1), unit).to(target).magnitude)
 
 

@@ -1,0 +1,121 @@
+"""Attraction: every start on the arm enters the attracting cells and stays there.
+
+An integer rank falls strictly along every image off the attracting cells, and attracting cells lead to attracting cells
+of the same component only; neither needs the map to be continuous.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from limitsets.cells import CellSet
+from limitsets.graph.components import ranks
+from limitsets.proofs.cover import Cover
+from limitsets.proofs.joint import NearJoint, near_joint
+
+__all__ = ["Attraction", "attraction"]
+
+
+@dataclass(frozen=True, eq=False)
+class Attraction:
+    """What is proved of where starts end.
+
+    Attributes
+    ----------
+    cover : Cover
+        Cells and images.
+    component : ndarray of int32, shape (n_cells,)
+        Number of the attracting component of each cell, -1 off them.
+    rank : ndarray of int32, shape (n_cells,)
+        Throws after which a start in the cell is in attracting cells, at most.
+    joint : tuple of NearJoint
+        The starts below the cells.
+    proved : bool
+        Whether every start on (a_i, arm.length] of every side enters the attracting cells.
+    reason : str
+        What is missing and where, empty if nothing.
+    unresolved : CellSet
+        Recurrent cells that do not attract.
+    """
+
+    cover: Cover
+    component: NDArray[np.int32]
+    rank: NDArray[np.int32]
+    joint: tuple[NearJoint, ...]
+    proved: bool
+    reason: str
+    unresolved: CellSet
+
+    @property
+    def cells(self) -> CellSet:
+        """The attracting cells."""
+        return CellSet(self.cover.grid, self.component >= 0)
+
+    @property
+    def max_rank(self) -> int:
+        """Throws after which every start in the cells is in attracting ones, at most."""
+        return int(self.rank.max())
+
+
+def attraction(found: Cover) -> Attraction:
+    """Find the attracting cells and prove that everything enters them.
+
+    Parameters
+    ----------
+    found : Cover
+        Cells and enclosed images.
+
+    Returns
+    -------
+    Attraction
+        With the reason where it is not proved.
+    """
+    graph = found.graph
+    survey, parts = graph.survey(), graph.components()
+    sets = graph.recurrent_components()
+    component = np.full(graph.n_cells, -1, dtype=np.int32)
+    for number, cells in enumerate(k for k, good in zip(sets, survey.attracting, strict=True) if good):
+        component[cells] = number
+    lost = [cells for cells, good in zip(sets, survey.attracting, strict=True) if not good]
+    unresolved = CellSet.of(found.grid, np.concatenate([np.zeros(0, np.int64), *lost]))
+    joint = near_joint(found)
+    return Attraction(
+        found,
+        component,
+        ranks(graph.ranges, parts),
+        joint,
+        *_verdict(found, component, unresolved, joint),
+        unresolved,
+    )
+
+
+def _verdict(
+    found: Cover, component: NDArray[np.int32], unresolved: CellSet, joint: tuple[NearJoint, ...]
+) -> tuple[bool, str]:
+    """Whether attraction is proved, and the first thing that is missing."""
+
+    def place(cell: int) -> str:
+        side = int(found.grid.side_of(cell))
+        lo, hi = found.grid.boxes([cell], side)
+        return f"side {side}, x in [{lo[0, 0]:.6g}, {hi[0, 0]:.6g}]"
+
+    lost = np.concatenate([images.lost for images in found.images])
+    if lost.any():
+        return False, f"nothing is proved of the image of {place(int(np.flatnonzero(lost)[0]))}"
+    leaving = np.flatnonzero(found.graph.ranges.exits)
+    if leaving.size:
+        return False, f"the image of {place(int(leaving[0]))} may leave the cells"
+    if len(unresolved):
+        return (
+            False,
+            f"{len(unresolved)} recurrent cells do not attract: first {place(unresolved.numbers()[0])}",
+        )
+    if not (component >= 0).any():
+        return False, "there are no attracting cells"
+    for side, near in enumerate(joint):
+        if not near.proved:
+            return False, f"near the joint on side {side}: {near.reason}"
+    return True, ""

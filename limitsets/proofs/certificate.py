@@ -1,0 +1,169 @@
+"""Writing a certificate: all that a recheck needs, and nothing it would have to trust.
+
+One zip, stored: `header.json` (claims, the map's formulas for people, the scene as written, hashes) and `arrays.npz`
+(per box of parameters: cell borders, target cells per branch, branch, rank, component, brackets of the impact angle).
+The format is described in docs/certificates.md.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import json
+import zipfile
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from limitsets.files import replaced
+from limitsets.proofs.attraction import Attraction
+from limitsets.proofs.cover import Cover
+from limitsets.thrower import Energy, Exact, Signed, SmallAngle, SmallAngle2
+
+__all__ = ["FORMAT", "VERSION", "arrays_of", "write"]
+
+FORMAT, VERSION = "limitsets-proof", 1
+
+# Brackets of the impact are widened by this share of the angle, so that another arithmetic can confirm them.
+SLACK = 2.0**-34
+
+FLIGHTS = {Exact: "exact", SmallAngle: "small-angle", SmallAngle2: "small-angle-2"}
+FLIPS = {Signed: "signed", Energy: "energy"}
+FORMULAS = [
+    "f(phi) = R phi - a sin phi + d (1 - cos phi) - kappa/2 phi^2, impact at its smallest positive root",
+    "X = a cos phi - d sin phi, H = a sin phi + d cos phi, M = rho^2 + a^2 + d^2",
+    "omega = (rho^2 + X (R - kappa phi) + H (h + d)) / M, K = M omega^2 / 2, V = kappa (sqrt(a^2 + d^2) - H)",
+    "signed: flip iff sgn(omega) K - sgn(X) V > 0; energy: flip iff K - sgn(X) V > 0",
+    "jog: R' = R - h phi + a (1 - cos phi) - d (phi - sin phi); flip: R' less a + L_next - a_next, next side",
+    "small-angle: phi = 2 (R - a)/kappa; small-angle-2: phi = 2 (R - a)/(kappa - d); both:",
+    "omega = (rho^2 - a R + 2 a^2 + d^2 + d h)/M, V = kappa (sqrt(a^2 + d^2) - d) - 2 a (R - a), sgn(X) = 1",
+    "jog: R' = R - h phi",
+]
+
+
+def _targets(found: Cover, branch: int) -> NDArray[np.int32]:
+    """First and last target cell of one branch, -1 -1 where it is impossible."""
+    grid = found.grid
+    out = np.full((grid.n_cells, 2), -1, dtype=np.int32)
+    for side, images in enumerate(found.images):
+        for (to, of_branch), (lo, hi) in images.hulls.items():
+            if of_branch != branch:
+                continue
+            edges = grid.edges[to][0]
+            some = lo <= hi
+            first = np.clip(np.searchsorted(edges, lo[some], side="right") - 1, 0, edges.size - 2)
+            last = np.clip(np.searchsorted(edges, hi[some], side="left") - 1, 0, edges.size - 2)
+            rows = grid.offset[side] + np.flatnonzero(some)
+            out[rows] = np.stack([first, last], axis=1) + grid.offset[to]
+    return out
+
+
+def arrays_of(proof: Attraction, prefix: str) -> dict[str, NDArray[Any]]:
+    """Arrays of one box of parameters."""
+    found = proof.cover
+    jog, flip = _targets(found, 0), _targets(found, 1)
+    jogs, flips = jog[:, 0] >= 0, flip[:, 0] >= 0
+    phi = np.concatenate([images.witness for images in found.images], axis=1).T
+    slack = SLACK * np.abs(phi)
+    arrays: dict[str, NDArray[Any]] = {
+        "jog": jog,
+        "flip": flip,
+        "branch": np.where(jogs & flips, 2, np.where(flips, 1, 0)).astype(np.int8),
+        "rank": proof.rank.astype(np.int32),
+        "component": proof.component,
+        "phi": np.stack([phi[:, 0] - slack[:, 0], phi[:, 1] + slack[:, 1]], axis=1),
+    }
+    for side, (edges,) in enumerate(found.grid.edges):
+        arrays[f"edges.{side}"] = edges
+    return {prefix + name: np.ascontiguousarray(value) for name, value in arrays.items()}
+
+
+def _parameters(found: Cover) -> dict[str, Any]:
+    lo, hi = found.box.lo, found.box.hi
+
+    def scalar(name: str) -> list[str]:
+        return [float(getattr(lo, name)).hex(), float(getattr(hi, name)).hex()]
+
+    def per_side(name: str) -> list[list[str]]:
+        return [
+            [float(a).hex(), float(b).hex()]
+            for a, b in zip(getattr(lo, name), getattr(hi, name), strict=True)
+        ]
+
+    return {
+        **{name: per_side(name) for name in ("a", "d", "length")},
+        **{name: scalar(name) for name in ("kappa", "surface_height", "arm_length", "radius_of_gyration")},
+    }
+
+
+def write(
+    path: str | Path,
+    proofs: Sequence[Attraction],
+    claims: Sequence[Mapping[str, Any]],
+    *,
+    noise: Mapping[str, str] | None,
+    tolerance: Mapping[str, str] | None,
+    unit: str,
+    producer: Mapping[str, str],
+) -> None:
+    """Write a certificate, replacing an older file whole.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file.
+    proofs : sequence of Attraction
+        One per box of parameters.
+    claims : sequence of mapping
+        ``{"claim": ..., "section": {...}}`` each.
+    noise, tolerance : mapping or None
+        What the parameters were allowed to do.
+    unit : str
+        Unit of length.
+    producer : mapping
+        Versions, for information.
+    """
+    arrays: dict[str, NDArray[Any]] = {}
+    boxes = []
+    for number, proof in enumerate(proofs):
+        arrays |= arrays_of(proof, f"{number}.")
+        found = proof.cover
+        boxes.append({"scene": found.box.scene, "parameters": _parameters(found), "prefix": f"{number}."})
+    first = proofs[0].cover.box.lo
+    header = {
+        "format": FORMAT,
+        "version": VERSION,
+        "map": {
+            "name": "throw",
+            "version": 1,
+            "flight": FLIGHTS[type(first.flight)],
+            "flip": FLIPS[type(first.flip)],
+            "formulas": FORMULAS,
+        },
+        "state": f"x [{unit}]: centre of mass along the arm; side: the one the part rests on, in flip order",
+        "noise": dict(noise) if noise else None,
+        "tolerance": dict(tolerance) if tolerance else None,
+        "boxes": boxes,
+        "claims": list(claims),
+        "arrays": {
+            name: {
+                "sha256": hashlib.sha256(value.tobytes()).hexdigest(),
+                "dtype": value.dtype.str,
+                "shape": list(value.shape),
+            }
+            for name, value in arrays.items()
+        },
+        "producer": dict(producer),
+    }
+    packed = io.BytesIO()
+    np.savez(packed, **arrays)  # type: ignore[arg-type]  # arrays by name
+    target = Path(path)
+    with (
+        replaced(target.parent) as draft,
+        zipfile.ZipFile(draft / target.name, "w", zipfile.ZIP_STORED) as file,
+    ):
+        file.writestr("header.json", json.dumps(header, indent=1))
+        file.writestr("arrays.npz", packed.getvalue())

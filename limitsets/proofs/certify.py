@@ -1,0 +1,422 @@
+"""Prove what is claimed of a scene, refining the cells until it is proved, refuted, or out of reach."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from fractions import Fraction
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+from limitsets.errors import AnswerError
+from limitsets.goals import OrientedBeyond
+from limitsets.proofs.attraction import Attraction, attraction
+from limitsets.proofs.certificate import write
+from limitsets.proofs.cover import cover
+from limitsets.proofs.end_points import proved_ends
+from limitsets.proofs.expansion import least_slope
+from limitsets.proofs.goal import State, counterexample, exceptions
+from limitsets.proofs.orbits import proved_cycles
+from limitsets.proofs.parameters import ParameterBox, parameter_box
+from limitsets.proofs.tolerance import Piece, whole
+from limitsets.proofs.trapping import trapping
+from limitsets.scene import Scene, load
+from limitsets.scene.quantities import deviation, find
+from limitsets.scene.units import parse
+
+__all__ = ["CLAIMS", "Claim", "Proof", "certify"]
+
+# Cells per side, tried in turn until everything asked for is proved or refuted.
+LADDER = (2048, 8192, 32768, 131072)
+
+# Pieces into which a tolerance may be cut, and cells that may be tried on them, before it is given up.
+MOST_PIECES, MOST_CELLS = 1024, 4_000_000
+
+Progress = Callable[[str, int, int], None]
+
+
+@dataclass(frozen=True)
+class Claim:
+    """One claim and what became of it.
+
+    Attributes
+    ----------
+    claim : str
+        A word of `CLAIMS`.
+    verdict : str
+        "proved", "refuted" or "undecided".
+    reason : str
+        Why it is not proved: what is missing and where; empty if it is.
+    section : dict
+        What a recheck needs, empty if it is not proved.
+    counterexample : tuple of State
+        An orbit that refutes it, empty if none was found.
+    fixed : dict of str to list of str
+        The counterexample's values of what is fixed but unknown, as pairs of texts.
+    final : bool
+        Whether finer cells cannot change the verdict.
+    """
+
+    claim: str
+    verdict: str
+    reason: str
+    section: dict[str, Any]
+    counterexample: tuple[State, ...] = ()
+    fixed: dict[str, list[str]] = field(default_factory=dict)
+    final: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class Proof:
+    """What was proved of a scene.
+
+    Attributes
+    ----------
+    scene : Scene
+        The scene.
+    noise, tolerance : dict of str to str
+        What may differ at every throw, and what is fixed but unknown, and by how much.
+    attractions : tuple of Attraction
+        Cells, images, ranks; one for each box into which a tolerance was cut.
+    claims : tuple of Claim
+        One per claim asked for.
+    seconds : float
+        Time it took.
+    """
+
+    scene: Scene
+    noise: dict[str, str]
+    tolerance: dict[str, str]
+    attractions: tuple[Attraction, ...]
+    claims: tuple[Claim, ...]
+    seconds: float
+
+    @property
+    def proved(self) -> bool:
+        """Whether every claim is proved."""
+        return all(claim.verdict == "proved" for claim in self.claims)
+
+    @property
+    def spans(self) -> dict[str, list[str]]:
+        """Both ends of each quantity that is fixed but unknown, as text."""
+        return whole(self.scene, self.tolerance).texts() if self.tolerance else {}
+
+    def to_json(self) -> list[dict[str, Any]]:
+        """Give it as plain tables for JSON, one per claim (`limitsets.proofs.answer`)."""
+        from limitsets.proofs.answer import to_json
+
+        return to_json(self)
+
+    def save(self, path: str | Path) -> Path:
+        """Write the certificate of the claims that are proved.
+
+        Parameters
+        ----------
+        path : str or Path
+            The file, replaced whole.
+
+        Raises
+        ------
+        AnswerError
+            Nothing is proved.
+        """
+        good = [
+            {"claim": claim.claim, "section": claim.section}
+            for claim in self.claims
+            if claim.verdict == "proved"
+        ]
+        if not good:
+            raise AnswerError(
+                "the certificate", "without a proved claim", "at least one", "see the reasons in .claims"
+            )
+        try:
+            producer = {"limitsets": version("limitsets")}
+        except PackageNotFoundError:  # sources that are not installed
+            producer = {}
+        write(
+            path,
+            self.attractions,
+            good,
+            noise=self.noise,
+            tolerance=self.tolerance,
+            unit=self.scene.unit,
+            producer=producer,
+        )
+        return Path(path)
+
+
+def _attracts_all(found: Attraction, _: Scene) -> Claim:
+    if not found.proved:
+        if not found.cover.box.hi.surface_height < 0.0:  # no matter how fine the cells are
+            reason = (
+                "the arm's surface is not below the joint: near the joint no throw is proved to go outward"
+            )
+            return Claim("attracts-all", "undecided", f"{reason}; {found.reason}", {}, final=True)
+        return Claim("attracts-all", "undecided", found.reason, {})
+    joint = {str(side): {"q": near.q.hex()} for side, near in enumerate(found.joint)}
+    return Claim("attracts-all", "proved", "", {"near_joint": joint, "max_rank": found.max_rank})
+
+
+def _invariant(found: Attraction, _: Scene) -> Claim:
+    # an attracting component is one that no image leaves; there has to be one
+    if not (found.component >= 0).any():
+        return Claim("invariant", "undecided", "there are no attracting cells", {})
+    return Claim("invariant", "proved", "", {})
+
+
+def _expanding(found: Attraction, _: Scene) -> Claim:
+    if not (found.component >= 0).any():
+        return Claim("expanding", "undecided", "there are no attracting cells", {})
+    slope, place = least_slope(found.cover, found.cells)
+    if not slope > 1.0:
+        return Claim("expanding", "undecided", f"slope {slope:.6g} at {place}", {})
+    # less by a little, so that other arithmetic can confirm it
+    stated = 1.0 + (slope - 1.0) * (1.0 - 2.0**-10)
+    return Claim("expanding", "proved", "", {"least_slope": stated.hex()})
+
+
+def _goal(found: Attraction, scene: Scene) -> Claim:
+    goal = scene.goal
+    if goal is None:
+        raise AnswerError(
+            "the goal", None, "a scene with [goal]", "give the scene one, or leave this claim out"
+        )
+    if not isinstance(goal, OrientedBeyond) or goal.from_anywhere:
+        asked = goal.kind + (" with from_anywhere" if goal.from_anywhere else "")
+        reason = (
+            f"a goal {asked} cannot be proved in this version, only oriented_beyond of the attracting cells"
+        )
+        return Claim("goal", "undecided", reason, {}, final=True)
+    if not (found.component >= 0).any():
+        return Claim("goal", "undecided", "there are no attracting cells", {})
+    bad = exceptions(found, goal)
+    if not bad.any():
+        section = {"kind": "oriented_beyond", "x": f"{goal.x!r} {scene.unit}", "side": goal.side}
+        return Claim("goal", "proved", "", section)
+    orbit = counterexample(found, goal)
+    reason = f"{int(bad.sum())} attracting cells reach beyond x = {goal.x:g} on other sides than {goal.side}"
+    return Claim("goal", "refuted" if orbit else "undecided", reason, {}, orbit)
+
+
+def _require_one_scene(claim: str, found: Attraction, scene: Scene) -> None:
+    """Refuse a tolerance: numbers that hold for every scene in it would be those of none."""
+    if found.cover.box.scene != dict(scene.text):
+        raise AnswerError("the claim", claim, "a claim about one scene", "ask for it without a tolerance")
+
+
+def _end_points(found: Attraction, scene: Scene) -> Claim:
+    _require_one_scene("end-points", found, scene)
+    ends = proved_ends(found)
+    if ends.reason:
+        return Claim("end-points", "undecided", ends.reason, {})
+    return Claim("end-points", "proved", "", ends.section())
+
+
+def _cycles(found: Attraction, scene: Scene) -> Claim:
+    _require_one_scene("cycles", found, scene)
+    orbits = proved_cycles(found)
+    if not orbits.cycles:
+        reason = orbits.missing[0] if orbits.missing else f"none is found of period up to {orbits.up_to}"
+        return Claim("cycles", "undecided", reason, {})
+    return Claim("cycles", "proved", "", orbits.section())
+
+
+def _trapping(found: Attraction, _: Scene) -> Claim:
+    reason = trapping(found)
+    return Claim("trapping", "undecided" if reason else "proved", reason, {})
+
+
+PROVERS: dict[str, Callable[[Attraction, Scene], Claim]] = {
+    "attracts-all": _attracts_all,
+    "cycles": _cycles,
+    "end-points": _end_points,
+    "expanding": _expanding,
+    "goal": _goal,
+    "invariant": _invariant,
+    "trapping": _trapping,
+}
+CLAIMS = tuple(PROVERS)
+"""What can be claimed in this version."""
+
+
+def _chosen(scene: Scene, claims: Sequence[str] | None) -> tuple[str, ...]:
+    if claims is None:
+        return ("attracts-all",) if scene.goal is None else ("attracts-all", "goal")
+    for claim in claims:
+        if claim not in CLAIMS:
+            raise AnswerError("the claim", claim, ", ".join(CLAIMS), "correct the word")
+    return tuple(dict.fromkeys(claims))
+
+
+def _deviations(scene: Scene, given: Mapping[str, str] | None) -> dict[str, str]:
+    """Check deviations, and write them as a certificate has them: a decimal number, a space, a unit."""
+    found = {}
+    for name, text in (given or {}).items():
+        deviation(text, name, scene.unit, zero=True, key=name)
+        number, unit = parse(text, "share" if text.rstrip().endswith("%") else find(name).dimension)
+        number = number.lstrip("+")
+        found[name] = f"{'0' if number.startswith('.') else ''}{number} {unit}"
+    return found
+
+
+def certify(
+    scene: Scene | str | Path,
+    claims: Sequence[str] | None = None,
+    *,
+    noise: Mapping[str, str] | None = None,
+    tolerance: Mapping[str, str] | None = None,
+    progress: Progress | None = None,
+) -> Proof:
+    """Prove claims about the limit set of a scene.
+
+    Parameters
+    ----------
+    scene : Scene, str or Path
+        A scene, or what `limitsets.load` takes.
+    claims : sequence of str, optional
+        Of "attracts-all" (every start on the arm enters the attracting cells and stays), "invariant", "expanding"
+        (every slope on the attracting cells exceeds 1), "trapping" (the attracting cells are mapped into their
+        interior), "end-points" (those of the limit set, in brackets), "cycles" (periodic orbits exist, and attract or
+        repel) and "goal".  Default: attracts-all, and the goal if there is one.
+    noise : mapping of str to str, optional
+        ``{"throw.speed": "0.3 %"}``: what may differ at every throw; the claims are then proved for every sequence of
+        throws.
+    tolerance : mapping of str to str, optional
+        ``{"throw.speed": "0.7 %"}``: what is fixed but unknown; the claims are then proved for every such value.
+    progress : callable, optional
+        Called with what is tried, how much of it is done, and of how much, before each attempt.
+
+    Returns
+    -------
+    Proof
+        With the verdict, and the reason where something is not proved.
+
+    Raises
+    ------
+    AnswerError
+        For a word that is no claim, noise that cannot be enclosed, or a thread that does not round to nearest.
+
+    Examples
+    --------
+    >>> import limitsets as ls
+    >>> proof = ls.certify("paper-designed")
+    >>> [(claim.claim, claim.verdict) for claim in proof.claims]
+    [('attracts-all', 'proved'), ('goal', 'proved')]
+    """
+    asked = scene if isinstance(scene, Scene) else load(scene)
+    wanted = _chosen(asked, claims)
+    noise, tolerance = _deviations(asked, noise), _deviations(asked, tolerance)
+    begin = time.perf_counter()
+    if tolerance:
+        found, answers = _pieces(asked, wanted, whole(asked, tolerance), noise, progress)
+    else:
+        one, answers = _attempt(asked, wanted, parameter_box(asked, noise=noise), LADDER, progress)
+        found = (one,)
+    seconds = time.perf_counter() - begin
+    return Proof(asked, noise, tolerance, found, answers, seconds)
+
+
+def _attempt(
+    scene: Scene,
+    wanted: tuple[str, ...],
+    box: ParameterBox,
+    ladder: Sequence[int],
+    progress: Progress | None,
+) -> tuple[Attraction, tuple[Claim, ...]]:
+    """Refine the cells until every claim is proved or refuted for one box of parameters, or the ladder ends."""
+    goal = scene.goal
+    cuts = {side: [goal.x] for side in range(box.lo.a.size)} if isinstance(goal, OrientedBeyond) else {}
+    for step, cells in enumerate(ladder):
+        if progress is not None:
+            progress(f"{cells} cells a side", step, len(ladder))
+        found = attraction(cover(box, cells, cuts))
+        answers = tuple(PROVERS[word](found, scene) for word in wanted)
+        if all(answer.verdict != "undecided" or answer.final for answer in answers):
+            break
+    return found, answers
+
+
+def _pieces(
+    scene: Scene,
+    wanted: tuple[str, ...],
+    piece: Piece,
+    noise: Mapping[str, str] | None,
+    progress: Progress | None,
+) -> tuple[tuple[Attraction, ...], tuple[Claim, ...]]:
+    """Prove the claims on a box of quantities; or refute the goal at one of its corners."""
+    settled: dict[str, Claim] = {}
+    found: tuple[Attraction, ...] = ()
+    for corner in piece.corners() if "goal" in wanted else ():
+        box = parameter_box(scene, tree=corner.tree(), noise=noise)
+        one, (answer,) = _attempt(scene, ("goal",), box, LADDER, progress)
+        found = (one,)
+        if answer.verdict == "refuted":
+            settled["goal"] = replace(answer, fixed=corner.texts())
+            break
+    left = tuple(word for word in wanted if word not in settled)
+    while left:
+        found, answers = _halved(scene, left, piece, noise, progress)
+        settled |= {answer.claim: answer for answer in answers}
+        left = tuple(word for word in wanted if word not in settled)
+    return found, tuple(settled[word] for word in wanted)
+
+
+def _halved(
+    scene: Scene,
+    wanted: tuple[str, ...],
+    piece: Piece,
+    noise: Mapping[str, str] | None,
+    progress: Progress | None,
+) -> tuple[tuple[Attraction, ...], tuple[Claim, ...]]:
+    """Prove all of the claims, halving the box of quantities as needed; or give up some of them, with the reason."""
+    scales = {name: max(span.hi - span.lo, Fraction(1, 10**30)) for name, span in piece.spans.items()}
+    waiting, tried = [(piece, LADDER[0])], 0
+    proved: list[tuple[Attraction, tuple[Claim, ...]]] = []
+    while waiting:
+        if progress is not None:
+            progress("pieces of the tolerance", len(proved), len(proved) + len(waiting))
+        part, cells = waiting.pop()
+        box = parameter_box(scene, tree=part.tree(), noise=noise)
+        one, answers = _attempt(scene, wanted, box, (cells,), None)
+        tried += one.cover.grid.n_cells
+        missing = tuple(answer for answer in answers if answer.verdict != "proved")
+        refuted = tuple(replace(each, fixed=part.texts()) for each in missing if each.verdict == "refuted")
+        if (
+            noise
+        ):  # the search chose kappa from the noise about every value in the piece: more than is allowed
+            refuted = ()
+        if refuted:
+            return (one,), refuted
+        if not missing:
+            proved.append((one, answers))
+        elif (
+            any(each.final for each in missing)
+            or len(proved) + len(waiting) >= MOST_PIECES
+            or tried > MOST_CELLS
+        ):
+            where = ", ".join(f"{name} from {lo} to {hi}" for name, (lo, hi) in part.texts().items())
+            return (one,), tuple(
+                Claim(each.claim, "undecided", f"for {where}: {each.reason}", {}) for each in missing
+            )
+        else:
+            # a narrower box of parameters is worth finer cells
+            waiting += [(half, min(cells * 6 // 5, LADDER[-1])) for half in part.halves(scales)]
+    joined = tuple(_joined([answers[k] for _, answers in proved]) for k in range(len(wanted)))
+    return tuple(one for one, _ in proved), joined
+
+
+def _joined(claims: Sequence[Claim]) -> Claim:
+    """One claim proved on every piece: with the weakest of the numbers."""
+    sections = [claim.section for claim in claims]
+    section = dict(sections[0])
+    if "max_rank" in section:
+        section["max_rank"] = max(other["max_rank"] for other in sections)
+        section["near_joint"] = {
+            side: {"q": min((other["near_joint"][side]["q"] for other in sections), key=float.fromhex)}
+            for side in section["near_joint"]
+        }
+    if "least_slope" in section:
+        section["least_slope"] = min((other["least_slope"] for other in sections), key=float.fromhex)
+    return Claim(claims[0].claim, "proved", "", section)

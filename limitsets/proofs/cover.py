@@ -1,0 +1,115 @@
+"""Cells for a proof, and the enclosures of their images.
+
+The cells of side i run from just beyond a_i to the arm's end, graded towards a_i; what lies nearer to a_i is the
+business of `joint.py`.  Wanted borders (the x of a goal) are cut in.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from limitsets.cells import Domain, Grid, grid
+from limitsets.errors import AnswerError
+from limitsets.graph import TransitionGraph
+from limitsets.graph.images.enclosed import Enclosures, boxes_of, enclosures
+from limitsets.graph.ranges import build
+from limitsets.graph.target import Target
+from limitsets.maps import kind_of
+from limitsets.proofs.parameters import ParameterBox
+
+__all__ = ["Cover", "cover"]
+
+# Share of a side's extent that is left to the argument near the joint.
+NEAREST = 1e-6
+
+# Images are widened by this share of the cell they come from, so that other arithmetic can confirm them.
+SLACK = 1e-3
+
+
+@dataclass(frozen=True, eq=False)
+class Cover:
+    """Cells of every side and what is proved of their images.
+
+    Attributes
+    ----------
+    box : ParameterBox
+        The parameters for which it holds.
+    grid : Grid
+        The cells.
+    images : tuple of Enclosures
+        Per side, widened by `SLACK`.
+    graph : TransitionGraph
+        The same as a graph; the sinks are reached by images that may leave.
+    """
+
+    box: ParameterBox
+    grid: Grid
+    images: tuple[Enclosures, ...]
+    graph: TransitionGraph
+
+
+def _widened(found: Enclosures, edges: NDArray[np.float64]) -> Enclosures:
+    slack = SLACK * np.diff(edges)
+    hulls = {key: (lo - slack, hi + slack) for key, (lo, hi) in found.hulls.items()}
+    return Enclosures(hulls, found.witness, found.lost)
+
+
+def cover(box: ParameterBox, cells: int, cuts: Mapping[int, Sequence[float]] | None = None) -> Cover:
+    """Cut the sides into cells and enclose their images.
+
+    Parameters
+    ----------
+    box : ParameterBox
+        Parameters.
+    cells : int
+        Cells per side.
+    cuts : mapping of int to sequence of float, optional
+        Borders wanted on each side.
+
+    Returns
+    -------
+    Cover
+
+    Raises
+    ------
+    AnswerError
+        For a part that may stand beyond the arm's end.
+    """
+    foot, end = box.hi.a, np.full(box.hi.a.size, box.hi.arm_length)
+    if not (foot < box.lo.arm_length).all():
+        raise AnswerError("the arm", box.lo.arm_length, f"longer than a = {foot.max()}", "lengthen it")
+    lo = foot + NEAREST * (end - foot)
+    plain = grid(Domain(lo[:, None], end[:, None], box.lo.a), cells=cells)
+    sides = []
+    for side, (edges,) in enumerate(plain.edges):
+        wanted = [x for x in (cuts or {}).get(side, ()) if edges[0] < x < edges[-1]]
+        sides.append((np.union1d(edges, wanted),))
+    cells_of = Grid(plain.domain, tuple(sides))
+    found = tuple(
+        _widened(enclosures(box.lo, box.hi, edges, side), edges) for side, (edges,) in enumerate(sides)
+    )
+    return Cover(box, cells_of, found, _graph(box, cells_of, found))
+
+
+def _graph(box: ParameterBox, cells: Grid, found: Sequence[Enclosures]) -> TransitionGraph:
+    exits = kind_of(box.lo).exits
+    target = Target.of(cells, exits)
+    # the arm's end as it is known, not the last border: what may land beyond it leaves
+    parts = [boxes_of(images, target, len(exits)) for images in found]
+    cell = np.concatenate([part.cell + cells.offset[k] for k, part in enumerate(parts)])
+    joined = [
+        np.concatenate([getattr(part, name) for part in parts]) for name in ("side", "lo", "hi", "exits")
+    ]
+    first = np.concatenate([[0], np.cumsum(np.bincount(cell, minlength=cells.n_cells))])
+    leaving = joined[3]
+    outward = np.uint8(1 << list(exits).index("outward"))
+    for side, images in enumerate(found):
+        for lo, hi in images.hulls.values():
+            beyond = (lo <= hi) & (hi > box.lo.arm_length)
+            leaving[cells.of_side(side)] |= np.where(beyond, outward, 0).astype(np.uint8)
+    ranges = build(cells, first, joined[0], joined[1], joined[2], leaving)
+    return TransitionGraph(box.lo, cells, ranges, "boxes")

@@ -1,0 +1,56 @@
+"""Expansion: |dx'/dx| > 1 on every attracting cell.
+
+Then no periodic orbit in the limit set attracts, so the limit set is no repeating trajectory; and every interval in it
+grows until it meets a critical point, so the topological entropy is at least the logarithm of the least slope.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from limitsets.cells import CellSet
+from limitsets.jit import proof_kernel
+from limitsets.proofs.cover import Cover
+from limitsets.thrower.throw_box import NOTHING, gather_box, throw_box
+
+__all__ = ["least_slope"]
+
+# Cells are cut into this many pieces, so that the slope is not lost in the width of a cell.
+PIECES = 8
+
+
+@proof_kernel(entry=True)
+def _slopes(lo_map: Any, hi_map: Any, side: int, lo: Any, hi: Any, out: Any) -> None:
+    b = gather_box(lo_map, hi_map, side)
+    for k in range(lo.size):
+        state, _, _, slope, _ = throw_box(b, lo[k], hi[k])
+        out[k] = slope[0] if state != NOTHING else -1.0
+
+
+def least_slope(found: Cover, cells: CellSet) -> tuple[float, str]:
+    """Lower bound of the slope on the given cells (the same for a jog and a flip), and where it is met.
+
+    Returns
+    -------
+    float
+        The bound; at most 1 if expansion is not proved.
+    str
+        The side and cell of the least slope.
+    """
+    least, place = np.inf, ""
+    for side, (edges,) in enumerate(found.grid.edges):
+        k = np.flatnonzero(cells.mask[found.grid.of_side(side)])
+        if not k.size:
+            continue
+        weights = np.arange(PIECES + 1) / PIECES
+        cuts = edges[k][:, None] + weights * (edges[k + 1] - edges[k])[:, None]
+        cuts[:, -1] = edges[k + 1]
+        out = np.empty(k.size * PIECES)
+        lo, hi = np.ascontiguousarray(cuts[:, :-1].ravel()), np.ascontiguousarray(cuts[:, 1:].ravel())
+        _slopes(found.box.lo, found.box.hi, side, lo, hi, out)
+        worst = int(out.argmin())
+        if out[worst] < least:
+            least, place = float(out[worst]), f"side {side}, x in [{lo[worst]:.6g}, {hi[worst]:.6g}]"
+    return least, place

@@ -1,0 +1,104 @@
+"""Near the joint: every start on (a_i, a_i + delta_i] is thrown outward, by a factor that is proved.
+
+For h < 0 and R - a = r small the throw is a decided jog with R' - a = r - h phi + a v - d w, v = 1 - cos phi,
+w = phi - sin phi, and
+
+    phi >= 2 r / kappa                      (f(phi) = r phi + a w + d v - (kappa/2) phi^2 is positive before that),
+    a v - d w >= phi^2 (a/2 - a phi^2/24 - d phi/6) >= 0      where the bracket is proved positive,
+
+so R' - a >= q r with q = 1 + 2 |h| / kappa > 1: the orbit leaves the interval after ln(delta/r) / ln q throws at most.
+The small-angle flights have phi >= 2 r / kappa and no v and w in the displacement, so the same q serves.
+Source: docs/model.md, "Near the joint".
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+import limitsets.interval as iv
+from limitsets.jit import proof_kernel
+from limitsets.proofs.cover import Cover
+from limitsets.thrower.throw_box import bracket, decide_box, displacement_box, gather_box, strike_box
+
+__all__ = ["NearJoint", "near_joint"]
+
+
+@dataclass(frozen=True)
+class NearJoint:
+    """What is proved of starts between a_i and the first cell of side i.
+
+    Attributes
+    ----------
+    x : float
+        Where the cells begin.
+    q : float
+        R' - a >= q (R - a) on (a_i, x].
+    proved : bool
+        Whether q > 1 and all that it rests on is proved.
+    reason : str
+        What is missing, empty if nothing.
+    """
+
+    x: float
+    q: float
+    proved: bool
+    reason: str
+
+
+@proof_kernel(entry=True)
+def _near(lo: Any, hi: Any, side: int, x: float, out: Any) -> None:
+    """Numbers that have to be positive, and q: root found, jog decided, bracket, -h, room on the arm, q."""
+    b = gather_box(lo, hi, side)
+    last, good = bracket(b.flight, b, x)
+    phi = (0.0, last[1])
+    starts = (b.a[0], x)
+    omega, barrier = strike_box(b.flight, b, starts, phi)
+    margin = decide_box(b.flip, b, omega, barrier)
+    square = iv.mul(b.a, iv.sqr(phi))
+    left = iv.sub(iv.mul(b.a, (0.5, 0.5)), iv.div(square, (24.0, 24.0)))
+    left = iv.sub(left, iv.div(iv.mul(b.d, phi), (6.0, 6.0)))
+    shift, _ = displacement_box(b.flight, b, phi)
+    reached = iv.add((x, x), shift)[1]
+    out[0] = 1.0 if good else -1.0
+    out[1] = -margin[1]
+    out[2] = left[0]
+    out[3] = -b.h[1]
+    out[4] = iv.sub((lo.arm_length, lo.arm_length), (reached, reached))[0]
+    gain = iv.div(iv.mul((2.0, 2.0), iv.neg(b.h)), b.kappa)
+    out[5] = iv.add((1.0, 1.0), gain)[0]
+
+
+REASONS = (
+    "the impact is not enclosed",
+    "the jog is not decided",
+    "the displacement is not proved to grow",
+    "the arm's surface is not below the joint (h < 0)",
+    "the throw may reach beyond the arm",
+    "no expansion is proved",
+)
+
+
+def near_joint(found: Cover) -> tuple[NearJoint, ...]:
+    """Prove the expansion near a_i on every side.
+
+    Parameters
+    ----------
+    found : Cover
+        The cells, which say where "near" ends.
+
+    Returns
+    -------
+    tuple of NearJoint
+        One per side.
+    """
+    answers = []
+    for side, (edges,) in enumerate(found.grid.edges):
+        out = np.full(6, np.nan)
+        _near(found.box.lo, found.box.hi, side, float(edges[0]), out)
+        good = [*(out[:5] > 0.0), out[5] > 1.0]
+        reason = "" if all(good) else REASONS[good.index(False)]
+        answers.append(NearJoint(float(edges[0]), float(out[5]), all(good), reason))
+    return tuple(answers)

@@ -1,0 +1,209 @@
+"""The box of map parameters that a scene's decimals, tolerances and noise stand for.
+
+From the text of the scene, in exact rational spans (`rational.py`), through the same formulas of `geometry` that floats
+go through; only the last step rounds to doubles, outward.
+"""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+
+from limitsets.errors import AnswerError
+from limitsets.geometry import OnSide, mass_of, rest_of, triangle_of
+from limitsets.proofs.rational import Span, pi, sine, square_root
+from limitsets.scene import Scene
+from limitsets.scene.quantities import find
+from limitsets.scene.units import exact_factor, parse
+from limitsets.thrower import Throw
+
+__all__ = ["ParameterBox", "parameter_box"]
+
+NARROWER = "lower the tolerance or noise"
+
+
+@dataclass(frozen=True, eq=False)
+class ParameterBox:
+    """A box of parameters of the throw map, and what it stands for.
+
+    Attributes
+    ----------
+    lo, hi : Throw
+        Its corners, as kernels take them.
+    scene : dict
+        The scene as written; a quantity with a tolerance is a pair of texts.
+    noise : dict of str to str
+        Quantities that differ at every throw, and by how much.
+    """
+
+    lo: Throw
+    hi: Throw
+    scene: dict[str, Any]
+    noise: dict[str, str]
+
+
+def _at(tree: Mapping[str, Any], name: str) -> Any:
+    node: Any = tree
+    for word in find(name).path:
+        node = node[word]
+    return node
+
+
+class _Reader:
+    """Spans of the quantities of one scene, in its unit of length."""
+
+    def __init__(self, scene: Scene, tree: Mapping[str, Any]) -> None:
+        self.scene, self.tree, self.unit = scene, tree, scene.unit
+
+    def has(self, table: str, key: str) -> bool:
+        return key in self.tree.get(table, {})
+
+    def span(self, name: str) -> Span:
+        """Return a quantity, or the span between the two texts of a tolerance."""
+        found = _at(self.tree, name)
+        texts = found if isinstance(found, list) else [found, found]
+        lo, hi = (self.one(text, find(name).dimension) for text in texts)
+        return Span(lo.lo, hi.hi)
+
+    def one(self, text: str, dimension: str) -> Span:
+        quantity = parse(text, dimension)
+        number = Fraction(quantity.number)
+        if dimension in ("angle", "angular speed"):
+            turn = pi() / 180 if quantity.unit.startswith("deg") else Span.of(Fraction(1))
+            return turn * Span.of(number)
+        target = {"acceleration": f"{self.unit}/s^2", "mass": "kg", "mass per area": f"kg/{self.unit}^2"}
+        return Span.of(number * exact_factor(quantity.unit, target.get(dimension, self.unit)))
+
+    def kappa(self, noise: Mapping[str, str]) -> Span:
+        """Return kappa = g / w^2, with the noise of the speed w: in percent, or of its own dimension."""
+        share = more = Span.of(0)
+        for name, text in noise.items():
+            if name != "throw.speed":
+                raise AnswerError(
+                    "the noise", name, "throw.speed", "other noise cannot be enclosed in this version"
+                )
+            if text.rstrip().endswith("%"):
+                share = Span.of(Fraction(parse(text, "share").number) / 100)
+            else:
+                more = self.one(text, "angular speed")
+        slow, fast = 1 - share, 1 + share
+        if self.has("throw", "kappa"):
+            if more.hi > 0:
+                raise AnswerError(
+                    "the noise", noise, "percent, for a scene given by kappa", "give it in percent"
+                )
+            kappa = self.span("throw.kappa")
+            return Span((kappa / (fast * fast)).lo, (kappa / (slow * slow)).hi)
+        if self.has("gravity", "acceleration"):
+            gravity = self.span("gravity.acceleration")
+        else:
+            tilt = self.span("gravity.tilt")
+            if not (tilt.lo > 0 and tilt.hi <= (pi() / 2).hi):
+                raise AnswerError(
+                    "gravity.tilt", self.tree["gravity"]["tilt"], "from 0 to 90 degrees", NARROWER
+                )
+            gravity = self.one("9.80665 m/s^2", "acceleration") * sine(tilt)
+        speed = self.span("throw.speed")
+        slow, fast = speed * slow - more, speed * fast + more
+        if not (gravity.lo > 0 and slow.lo > 0):
+            raise AnswerError("the speed or gravity", self.tree["throw"], "above 0 throughout", NARROWER)
+        return Span((gravity / (fast * fast)).lo, (gravity / (slow * slow)).hi)
+
+    def body(self) -> tuple[list[tuple[Any, ...]], Span]:
+        """Return (a, d, length) of every side, and the radius of gyration."""
+        part = self.tree["part"]
+        lengths = None
+        vertices: list[Any]
+        if "sides" in part:
+            lengths = [self.span(f"part.sides[{k}]") for k in range(3)]
+            vertices = list(triangle_of(lengths, square_root))
+        else:
+            vertices = [
+                tuple(self.span(f"part.vertices[{k}].{axis}") for axis in "xy")
+                for k in range(len(part["vertices"]))
+            ]
+        mass = part["mass"]
+        if "center" in mass:
+            along, above = (self.span(f"part.mass.center.{word}") for word in ("along", "above"))
+            centre: Any = OnSide(mass["center"]["side"], along, above)
+            radius = self.span("part.mass.radius_of_gyration")
+        else:
+            points: list[Any] = [
+                tuple(self.span(f"part.mass.points[{k}].{word}") for word in ("x", "y", "mass"))
+                for k in range(len(mass.get("points", ())))
+            ]
+            density = self.one(mass["plate_density"], "mass per area")
+            found: Any = mass_of(vertices, density, points, square_root)
+            centre, radius = found.centre, found.radius_of_gyration
+        corner = Span.of(0, 4)  # of no use to a proof about the minimal map
+        sides = rest_of(vertices, centre, lengths, square_root, lambda _y, _x: corner)
+        return [side[:3] for side in sides], radius
+
+
+def _require_rest(sides: Sequence[tuple[Any, ...]], kappa: Span, radius: Span) -> None:
+    """Refuse parameters some of which are those of no part, or of one that falls over at rest."""
+    for side, (a, d, length) in enumerate(sides):
+        if not (a.lo > 0 and d.lo > 0 and a.hi < length.lo):
+            raise AnswerError(
+                f"side {side}", float(a), "a side on which the part rests, throughout", NARROWER
+            )
+    if not (kappa.lo > 0 and radius.lo > 0):
+        raise AnswerError("kappa or the radius of gyration", float(kappa), "above 0 throughout", NARROWER)
+
+
+def parameter_box(
+    scene: Scene, *, tree: Mapping[str, Any] | None = None, noise: Mapping[str, str] | None = None
+) -> ParameterBox:
+    """Enclose the parameters of a scene's map.
+
+    Parameters
+    ----------
+    scene : Scene
+        The scene.
+    tree : mapping, optional
+        Its text with some quantities replaced by pairs of texts; default as written.
+    noise : mapping of str to str, optional
+        ``{"throw.speed": "0.3 %"}``: differs at every throw.
+
+    Returns
+    -------
+    ParameterBox
+        Doubles around the exact numbers.
+
+    Examples
+    --------
+    >>> import limitsets as ls
+    >>> box = parameter_box(ls.load("paper-designed"))
+    >>> box.lo.kappa < box.hi.kappa  # 25.3778518 is no double
+    True
+    """
+    text: Any = copy.deepcopy(dict(scene.text if tree is None else tree))
+    reader = _Reader(scene, text)
+    kappa = reader.kappa(noise or {})
+    try:
+        sides, radius = reader.body()
+    except ZeroDivisionError:  # so wide that a length may be nothing
+        raise AnswerError("the part", tree, "one that can be, throughout the tolerance", NARROWER) from None
+    _require_rest(sides, kappa, radius)
+    scalars = [kappa, reader.span("arm.surface_height"), reader.span("arm.length"), radius]
+    ends = [span.outward() for span in scalars]
+    columns = [np.array([side[k].outward() for side in sides]) for k in range(3)]
+    corner = np.full(len(sides), np.nan)
+    model: Any = Throw
+    flight, flip = scene.map.flight, scene.map.flip
+    lo, hi = (
+        model(
+            flight,
+            flip,
+            *(pair[end] for pair in ends),
+            *(np.ascontiguousarray(c[:, end]) for c in columns),
+            corner,
+        )
+        for end in (0, 1)
+    )
+    return ParameterBox(lo, hi, text, dict(noise or {}))

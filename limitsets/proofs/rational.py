@@ -1,0 +1,128 @@
+"""Spans of rational numbers: exact arithmetic for the few numbers a scene's decimals turn into.
+
+A scene says "5.75 in"; the exact scene is that decimal, not the double next to it.  Everything a map needs is computed
+once per scene in spans with rational ends, exactly but for square roots and sines, whose ends are rounded outward at
+200 bits; only the last step goes to doubles, outward again.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from fractions import Fraction
+from math import isqrt
+
+__all__ = ["Span", "pi", "sine", "square_root"]
+
+BITS = 200
+
+
+@dataclass(frozen=True)
+class Span:
+    """All numbers from `lo` to `hi`.
+
+    Examples
+    --------
+    >>> from fractions import Fraction
+    >>> (Span.of("0.1") * 3).contains(Fraction(3, 10))
+    True
+    """
+
+    lo: Fraction
+    hi: Fraction
+
+    @classmethod
+    def of(cls, lo: str | float | Fraction, hi: str | float | Fraction | None = None) -> Span:
+        """Read a decimal, or two."""
+        return cls(Fraction(lo), Fraction(lo if hi is None else hi))
+
+    def contains(self, value: Fraction) -> bool:
+        """Whether a number lies in the span."""
+        return self.lo <= value <= self.hi
+
+    def outward(self) -> tuple[float, float]:
+        """Doubles strictly around the span: ball arithmetic cannot confirm an end that is met exactly."""
+        return math.nextafter(float(self.lo), -math.inf), math.nextafter(float(self.hi), math.inf)
+
+    def __float__(self) -> float:
+        return float((self.lo + self.hi) / 2)
+
+    def __neg__(self) -> Span:
+        return Span(-self.hi, -self.lo)
+
+    def __add__(self, other: Span | int) -> Span:
+        b = _span(other)
+        return _short(self.lo + b.lo, self.hi + b.hi)
+
+    __radd__ = __add__
+
+    def __sub__(self, other: Span | int) -> Span:
+        b = _span(other)
+        return _short(self.lo - b.hi, self.hi - b.lo)
+
+    def __rsub__(self, other: int) -> Span:
+        return _span(other) - self
+
+    def __mul__(self, other: Span | int) -> Span:
+        b = _span(other)
+        ends = [self.lo * b.lo, self.lo * b.hi, self.hi * b.lo, self.hi * b.hi]
+        if other is self:  # a square
+            ends = [self.lo**2, self.hi**2, *([Fraction(0)] if self.lo < 0 < self.hi else [])]
+        return _short(min(ends), max(ends))
+
+    __rmul__ = __mul__
+
+    def __truediv__(self, other: Span | int) -> Span:
+        b = _span(other)
+        if b.lo <= 0 <= b.hi:
+            raise ZeroDivisionError
+        return self * Span(1 / b.hi, 1 / b.lo)
+
+    def __rtruediv__(self, other: int) -> Span:
+        return _span(other) / self
+
+
+def _span(value: Span | int) -> Span:
+    return value if isinstance(value, Span) else Span(Fraction(value), Fraction(value))
+
+
+def _short(lo: Fraction, hi: Fraction) -> Span:
+    """Round ends with long denominators outward, so that numbers do not grow without bound."""
+    if lo.denominator.bit_length() + hi.denominator.bit_length() > 4 * BITS:
+        scale = 1 << BITS
+        lo = Fraction(math.floor(lo * scale), scale)
+        hi = Fraction(math.ceil(hi * scale), scale)
+    return Span(lo, hi)
+
+
+def square_root(x: Span) -> Span:
+    """Square root of a span of numbers >= 0."""
+    scale = 1 << BITS
+    below = isqrt(math.floor(max(x.lo, Fraction(0)) * scale * scale))
+    above = isqrt(math.ceil(x.hi * scale * scale)) + 1
+    return Span(Fraction(below, scale), Fraction(above, scale))
+
+
+def pi() -> Span:
+    """pi, by Machin's formula."""
+
+    def arctan_inverse(n: int, terms: int) -> Span:
+        parts = [Fraction((-1) ** k, (2 * k + 1) * n ** (2 * k + 1)) for k in range(terms)]
+        total, last = sum(parts, Fraction(0)), abs(parts[-1])
+        return Span(total - last, total + last)
+
+    value = 16 * arctan_inverse(5, 50) - 4 * arctan_inverse(239, 16)
+    scale = 1 << BITS
+    return Span(Fraction(math.floor(value.lo * scale), scale), Fraction(math.ceil(value.hi * scale), scale))
+
+
+def sine(x: Span) -> Span:
+    """Sine of a span within [0, pi/2]."""
+
+    def bounds(t: Fraction) -> tuple[Fraction, Fraction]:
+        t = Fraction(round(t * (1 << BITS)), 1 << BITS)
+        parts = [(-1) ** k * t ** (2 * k + 1) / math.factorial(2 * k + 1) for k in range(24)]
+        total, last = sum(parts, Fraction(0)), abs(parts[-1]) + Fraction(1, 1 << (BITS - 2))
+        return total - last, total + last
+
+    return _short(bounds(x.lo)[0], min(bounds(x.hi)[1], Fraction(1)))

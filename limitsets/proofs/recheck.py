@@ -1,0 +1,1412 @@
+#!/usr/bin/env python3
+"""Check a proof certificate of a throw-and-catch feeder: a lone file, written from the physics, not from the prover.
+
+    python recheck.py FILE [--json] [--workers N]
+
+It needs Python, numpy and python-flint, and nothing else of the package that wrote the certificate.  Everything that
+is believed here is either an integer comparison, an exact rational, or a sign of a ball that Arb computed.  A
+certificate is taken to come from a stranger: it is data, nothing in it is evaluated, unpickled or used as a path.
+
+A proof for one throw map: a part rests on side i at x = R, the arm throws it, it lands on its left vertex at the
+angle phi and either falls back ("jog") or over that vertex on side i+1 ("flip").  The certificate cuts every side
+into cells.  For every cell it says how the throw decides, where the images lie and what bracket holds phi; this file
+proves each of these anew, for all x in the cell and all parameters allowed, and follows the integers to the claims.
+
+Exit status: 0 every claim proved, 1 not proved, 2 not a readable certificate, 130 interrupted.
+"""
+
+import argparse
+import hashlib
+import itertools
+import json
+import math
+import mmap
+import multiprocessing
+import os
+import re
+import signal
+import struct
+import sys
+import threading
+import time
+import zlib
+from collections.abc import Callable, Iterator
+from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass, field
+from fractions import Fraction
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import flint
+import numpy as np
+from flint import arb, fmpq
+
+PRECISION = 100  # bits of every ball
+DEPTH = 12  # a cell is halved at most so often in x, and so often in kappa
+MOST_BOXES = 20_000  # pieces of one cell: a certificate that needs more is refused
+CHUNK = 2_000  # cells handed to a worker at once
+SMALL = 20_000  # so many cells are done before other processes have started
+FULL_TURN = 6.283185307179586  # a float below 2 pi
+
+Arb = Any  # flint.arb has no stubs
+Array = np.ndarray[Any, np.dtype[Any]]
+HALF, ZERO, ONE = arb(0.5), arb(0), arb(1)
+
+FORMULAS = {
+    "always": [
+        "a, d, L: foot from the left vertex, height of the centre of mass, length of the side; rho: radius of gyration",
+        "ell^2 = a^2 + d^2;  M = rho^2 + ell^2;  kappa = g/w^2;  h: height of the arm's surface above the joint",
+    ],
+    "exact": [
+        "phi: smallest positive root of R phi - a sin(phi) + d (1 - cos(phi)) - (kappa/2) phi^2",
+        "X = a cos(phi) - d sin(phi);  H = a sin(phi) + d cos(phi);  V = kappa (ell - H)",
+        "om = (rho^2 + X (R - kappa phi) + H (h + d))/M;  K = (1/2) M om^2",
+        "jog: R' = R - h phi + a (1 - cos phi) - d (phi - sin phi);  flip: R' = R'(jog) - a - (L' - a'), next side",
+    ],
+    "small": [
+        "om = (rho^2 - a R + 2 a^2 + d^2 + d h)/M;  K = (1/2) M om^2;  V = kappa (ell - d) - 2 a (R - a)",
+        "jog: R' = R - h phi;  flip: R' = R - h phi - a - (L' - a'), next side",
+    ],
+    "small-angle": ["phi = 2 (R - a)/kappa"],
+    "small-angle-2": ["phi = 2 (R - a)/(kappa - d)"],
+    "exact energy": ["flip if and only if K > V or X < 0"],
+    "exact signed": ["flip if and only if sgn(om) K - sgn(X) V > 0"],
+    "small energy": ["flip if and only if K > V"],
+    "small signed": ["flip if and only if sgn(om) K - V > 0"],
+}
+
+
+# ---------------------------------------------------------------------------------------------------------- the file
+
+
+class BadFileError(Exception):
+    """The file is not a certificate that can be read."""
+
+
+def require(condition: bool, message: str) -> None:
+    """Raise BadFileError unless the condition holds."""
+    if not condition:
+        raise BadFileError(message)
+
+
+def plain(text: object, most: int = 80) -> str:
+    """Clean the text of a stranger: cut and without control characters, fit to be printed."""
+    return "".join(c if c.isprintable() and c.isascii() else "?" for c in str(text)[:most])
+
+
+def stored_entries(data: memoryview, most: int, what: str) -> dict[str, memoryview]:
+    """Find the entries of an uncompressed zip, as views of its bytes; refuse anything out of the ordinary."""
+
+    def ordinary(condition: bool, message: str) -> None:
+        require(condition, f"{what}: {message}")
+
+    end = len(data) - 22
+    ordinary(end >= 0 and bytes(data[end : end + 4]) == b"PK\5\6", "not a complete zip file")
+    disk, first, here, count, size, start, comment = struct.unpack("<4H2LH", data[end + 4 :])
+    ordinary(disk == first == comment == 0 and here == count, "an unusual zip end record")
+    ordinary(count <= most, f"{count} entries, at most {most} expected")
+    ordinary(start + size == end, "its directory is not where it should be")
+    entries: dict[str, memoryview] = {}
+    spans = []
+    at = start
+    for _ in range(count):
+        ordinary(at + 46 <= end and bytes(data[at : at + 4]) == b"PK\1\2", "damaged directory")
+        fields = struct.unpack("<6H3L5H2L", data[at + 4 : at + 46])
+        _, _, flags, method, _, _, crc, packed, full, n, extra, note, _, _, _, offset = fields
+        name = bytes(data[at + 46 : at + 46 + n])
+        at += 46 + n + extra + note
+        shown = plain(name.decode("latin-1"))
+        ordinary(method == 0 and packed == full, f"entry {shown} is compressed; only stored ones are read")
+        ordinary(flags & ~0x0800 == 0 and name.isascii(), f"entry {shown} has unusual flags or an odd name")
+        ordinary(shown not in entries, f"entry {shown} occurs twice")
+        local = bytes(data[offset : offset + 30])  # what stands before the entry itself
+        ordinary(offset + 30 <= start and local[:4] == b"PK\3\4", f"entry {shown} is damaged")
+        n_local, extra_local = struct.unpack("<2H", local[26:])
+        begin = offset + 30 + n_local + extra_local
+        same = local[8:10] == b"\0\0" and bytes(data[offset + 30 : offset + 30 + n_local]) == name
+        ordinary(same and begin + full <= start, f"entry {shown} is damaged")
+        entries[shown] = data[begin : begin + full]
+        spans.append((offset, begin + full))
+        if full <= 4 << 20:  # larger ones are covered by the hashes of the arrays
+            ordinary(zlib.crc32(entries[shown]) == crc, f"entry {shown} is damaged (checksum)")
+    ordinary(at == end, "damaged directory")
+    ordinary(all(a[1] <= b[0] for a, b in itertools.pairwise(sorted(spans))), "entries overlap")
+    return entries
+
+
+def parse_json(raw: bytes) -> dict[str, Any]:
+    """Parse the header; depth, numbers and repeated keys are limited before and while it is read."""
+    bare = np.frombuffer(re.sub(rb'"[^"\\]*(?:\\.[^"\\]*)*"?', b"", raw, flags=re.DOTALL), dtype=np.uint8)
+    opened = np.isin(bare, (0x5B, 0x7B)).astype(np.int32) - np.isin(bare, (0x5D, 0x7D))
+    require(int(np.cumsum(opened).max(initial=0)) <= 24, "header.json is nested too deeply")
+
+    def unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+        require(len({key for key, _ in pairs}) == len(pairs), "header.json repeats a key")
+        return dict(pairs)
+
+    def number(text: str) -> int | float:
+        form = r"-?[0-9]{1,17}(\.[0-9]{1,20})?([eE][+-]?[0-9]{1,2})?"
+        require(re.fullmatch(form, text) is not None, f"header.json holds the odd number {plain(text)}")
+        return int(text) if re.fullmatch(r"-?[0-9]+", text) else float(text)
+
+    def constant(text: str) -> Any:
+        raise BadFileError(f"header.json holds {text}")
+
+    hooks: dict[str, Any] = {"object_pairs_hook": unique, "parse_int": number, "parse_float": number}
+    try:
+        header = json.loads(raw.decode("utf-8"), parse_constant=constant, **hooks)
+    except (ValueError, RecursionError) as error:
+        raise BadFileError(f"header.json cannot be read: {plain(error)}") from None
+    require(isinstance(header, dict), "header.json is not an object")
+    return dict(header)
+
+
+NPY = re.compile(
+    rb"\{'descr': '([<|][fi][148])', 'fortran_order': False, 'shape': \(([0-9]{1,10}),(?: ([0-9]{1,2}))?\), \} *\n"
+)
+
+
+def read_array(entry: memoryview, name: str, dtype: str, columns: int, said: object) -> Array:
+    """Read one array from the bytes of a .npy file: of the type its name asks for, with the hash that is said."""
+    require(
+        len(entry) >= 10 and bytes(entry[:8]) == b"\x93NUMPY\1\0", f"array {name} is not a .npy, version 1"
+    )
+    (length,) = struct.unpack("<H", entry[8:10])
+    body = entry[10 + length :]
+    form = NPY.fullmatch(bytes(entry[10 : 10 + length]))
+    require(form is not None, f"array {name} has an odd .npy header")
+    assert form is not None
+    shape = [int(n) for n in form.groups()[1:] if n is not None]
+    fits = form[1].decode() == dtype and shape[1:] == [columns][: columns - 1]
+    require(fits, f"array {name} is not of type {dtype} or has the wrong shape")
+    require(len(body) == math.prod(shape) * int(dtype[2]), f"array {name} is not as long as its shape says")
+    described = said == {"sha256": hashlib.sha256(body).hexdigest(), "dtype": dtype, "shape": shape}
+    require(described, f"array {name} is not the one the header describes (hash, type or shape)")
+    array = np.frombuffer(body, dtype=dtype).reshape(shape).copy()
+    require(
+        dtype != "<f8" or bool(np.isfinite(array).all()), f"array {name} holds a value that is not finite"
+    )
+    return array
+
+
+def open_certificate(path: str | os.PathLike[str]) -> tuple[dict[str, Any], dict[str, memoryview]]:
+    """Return the header and the entries of the arrays."""
+    try:
+        with Path(path).open("rb") as file:
+            size = os.fstat(file.fileno()).st_size
+            require(100 <= size <= (2 << 30) + (8 << 20), f"a certificate does not have {size} bytes")
+            data = memoryview(mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ))
+    except (OSError, ValueError) as error:
+        raise BadFileError(f"cannot be read: {plain(error)}") from None
+    entries = stored_entries(data, 2, "the certificate")
+    require(set(entries) == {"header.json", "arrays.npz"}, "it has to hold header.json and arrays.npz")
+    require(len(entries["header.json"]) <= 4 << 20, "header.json is larger than 4 MB")
+    require(len(entries["arrays.npz"]) <= 2 << 30, "arrays.npz is larger than 2 GB")
+    header = parse_json(bytes(entries["header.json"]))
+    return header, stored_entries(entries["arrays.npz"], 60_000, "arrays.npz")
+
+
+# --------------------------------------------------------------------------------------------------------- the scene
+
+NUMBER = re.compile(r"([+-]?[0-9]{1,100}(?:\.[0-9]{0,100})?(?:[eE][+-]?[0-9]{1,2})?) +([a-z%/^0-9]{1,8})")
+INCH = Fraction(254, 10_000)
+LENGTHS = {"m": Fraction(1), "cm": Fraction(1, 100), "mm": Fraction(1, 1000), "in": INCH, "ft": 12 * INCH}
+UNITS: dict[str, dict[str, Fraction]] = {
+    "length": LENGTHS,
+    "angle": {"rad": Fraction(1), "deg": Fraction(1, 180)},  # degrees as multiples of pi
+    "speed": {"rad/s": Fraction(1), "deg/s": Fraction(1, 180)},
+    "acceleration": {f"{unit}/s^2": factor for unit, factor in LENGTHS.items()},
+    "mass": {"kg": Fraction(1), "g": Fraction(1, 1000), "lb": Fraction(45359237, 100_000_000)},
+    "density": {"kg/m^2": Fraction(1)},
+    "share": {"%": Fraction(1, 100)},
+}
+G0 = Fraction(980665, 100_000)
+
+
+class Quantity(NamedTuple):
+    """An interval in basic units (metre, radian, second, kilogram), exact; in multiples of pi where `pi` says so."""
+
+    lo: Fraction
+    hi: Fraction
+    pi: bool
+    unit: str
+
+    def ball(self) -> Arb:
+        """Enclose it in a ball."""
+        return span(self.lo, self.hi) * (arb.pi() if self.pi else 1)
+
+    def ends(self) -> list[Arb]:
+        """Enclose its two ends."""
+        return [exact(end) * (arb.pi() if self.pi else 1) for end in (self.lo, self.hi)]
+
+
+def exact(value: Fraction) -> Arb:
+    """Enclose a rational number."""
+    return arb(fmpq(value.numerator, value.denominator))
+
+
+def span(lo: Fraction, hi: Fraction) -> Arb:
+    """Enclose an interval."""
+    return exact(lo) if lo == hi else exact(lo).union(exact(hi))
+
+
+def quantity(value: object, kinds: str, where: str) -> Quantity:
+    """Read a quantity, `"5.75 in"` or a pair of such, of one of the kinds named."""
+    pair = value if isinstance(value, list) else [value, value]
+    require(len(pair) == 2, f"{where}: an interval has two ends")
+    read = []
+    for text in pair:
+        found = NUMBER.fullmatch(text) if isinstance(text, str) else None
+        require(found is not None, f"{where}: {plain(text)} is not a decimal number and a unit")
+        assert found is not None
+        factors = [UNITS[kind][found[2]] for kind in kinds.split() if found[2] in UNITS[kind]]
+        require(len(factors) == 1, f"{where}: {plain(found[2])} is not a unit of {kinds}")
+        read.append((Fraction(found[1]) * factors[0], found[2]))
+    (lo, unit), (hi, other) = read
+    require(unit.startswith("deg") == other.startswith("deg"), f"{where}: mixes degrees and radians")
+    require(lo <= hi, f"{where}: the interval is empty")
+    return Quantity(lo, hi, unit.startswith("deg"), unit)
+
+
+def table(value: object, where: str, needed: str, optional: str = "") -> dict[str, Any]:
+    """Return a JSON object that has the keys needed and no others but the optional ones."""
+    require(isinstance(value, dict), f"{where} is not an object")
+    assert isinstance(value, dict)
+    missing = [key for key in needed.split() if key not in value]
+    require(not missing, f"{where}: {', '.join(missing)} missing")
+    odd = [key for key in value if key not in needed.split() + optional.split()]
+    require(not odd, f"{where}: unknown key {plain(' '.join(odd))}")
+    return value
+
+
+def rows(value: object, where: str, least: int, most: int) -> list[Any]:
+    """Return a JSON array of a fitting length."""
+    fits = isinstance(value, list) and least <= len(value) <= most
+    require(fits, f"{where} is not a list of a fitting length")
+    assert isinstance(value, list)
+    return value
+
+
+@dataclass(slots=True)
+class Side:
+    """What the throw from one side depends on, as balls (`small_d` is d in small-angle-2 and 0 otherwise)."""
+
+    a: Arb
+    d: Arb
+    length: Arb
+    h: Arb
+    rho2: Arb
+    arm: Arb
+    exact: bool
+    signed: bool
+    concave: bool = False
+    small_d: Arb = ZERO
+    shift: Arb = ZERO  # R'(jog) - R'(flip) = a + L' - a'
+    ell: Arb = ZERO
+    hd: Arb = ZERO  # h + d
+    over_2m: Arb = ZERO
+    floats: tuple[float, float, float] = (0.0, 0.0, 0.0)  # a, d, small_d: for guesses only
+
+
+@dataclass(slots=True)
+class Scene:
+    """Enclosures of all that a scene says, lengths in the unit of arm.length."""
+
+    sides: list[Side]
+    k_lo: Arb  # kappa at its smallest, noise included; both ends are exact points
+    k_hi: Arb
+    rho: Arb
+    arm: tuple[Fraction, Fraction]
+    unit: str
+
+
+def read_scene(raw: object, noise: object) -> Scene:
+    """Enclose a_i, d_i, L_i, rho, kappa, h and the arm's length from the decimals of a scene."""
+    scene = table(raw, "scene", "part arm throw model", "name gravity goal world tolerance effects")
+    effects = scene.get("effects", {})
+    plain_map = isinstance(effects, dict) and not any(effects.values())
+    require(plain_map, "scene: effects are switched on, which the throw map, version 1, has not")
+    arm = table(scene["arm"], "arm", "surface_height length")
+    reach = quantity(arm["length"], "length", "arm.length")
+    unit = LENGTHS[reach.unit]
+
+    def length(value: object, where: str) -> Arb:
+        q = quantity(value, "length", where)
+        return span(q.lo / unit, q.hi / unit)
+
+    vertices = read_polygon(scene["part"], length)
+    n = len(vertices)
+    mass = scene["part"]["mass"]
+    if "plate_density" in mass:
+        table(mass, "part.mass", "plate_density", "points")
+        require("vertices" in scene["part"] or not mass.get("points"), "points of mass need vertices")
+        start, rho2 = read_plate(mass, vertices, unit, length)
+        (ex, ey), along, above = (ONE, ZERO), ZERO, ZERO
+    else:
+        table(mass, "part.mass", "center radius_of_gyration")
+        center = table(mass["center"], "part.mass.center", "side along above")
+        fits = type(center["side"]) is int and 0 <= center["side"] < n
+        require(fits, "part.mass.center.side is not a side")
+        along = length(center["along"], "part.mass.center.along")
+        above = length(center["above"], "part.mass.center.above")
+        start, (ex, ey), _ = side_frame(vertices, center["side"])
+        rho = length(mass["radius_of_gyration"], "part.mass.radius_of_gyration")
+        require(bool(rho > 0), "the radius of gyration is not positive")
+        rho2 = rho * rho
+
+    k_lo, k_hi = read_kappa(scene, noise, unit)
+    model = table(scene["model"], "model", "flight flip")
+    known = model["flight"] in ("exact", "small-angle", "small-angle-2") and model["flip"] in (
+        "signed",
+        "energy",
+    )
+    require(known, "the model is not one that is known")
+    is_exact, is_signed = model["flight"] == "exact", model["flip"] == "signed"
+    require(reach.lo > 0, "arm.length is not positive")
+    h = length(arm["surface_height"], "arm.surface_height")
+    reach_ball = span(reach.lo / unit, reach.hi / unit)
+    sides = []
+    for i in range(n):
+        (px, py), (ux, uy), long = side_frame(vertices, i)
+        x, y = start[0] - px, start[1] - py
+        with_e, across_e = ex * ux + ey * uy, ux * ey - uy * ex
+        a = x * ux + y * uy + along * with_e - above * across_e  # the centre is start + along e + above n
+        d = ux * y - uy * x + along * across_e + above * with_e
+        require(bool(a > 0) and bool(a < long) and bool(d > 0), f"the part does not rest on side {i}")
+        sides.append(Side(a, d, long, h, rho2, reach_ball, is_exact, is_signed))
+    for side, after in zip(sides, sides[1:] + sides[:1], strict=True):
+        side.shift = side.a + after.length - after.a
+        side.ell = (side.a**2 + side.d**2).sqrt()
+        side.hd = side.h + side.d
+        side.over_2m = HALF / (side.rho2 + side.ell**2)
+        side.small_d = side.d if model["flight"] == "small-angle-2" else ZERO
+        side.concave = bool(k_lo > side.ell) or not side.exact
+        side.floats = (float(side.a.mid()), float(side.d.mid()), float(side.small_d.mid()))
+        require(bool(k_lo > side.small_d), "small-angle-2 needs kappa > d")
+    return Scene(sides, k_lo, k_hi, rho2.sqrt(), (reach.lo / unit, reach.hi / unit), reach.unit)
+
+
+def read_polygon(part: object, length: Callable[[object, str], Arb]) -> list[tuple[Arb, Arb]]:
+    """Read the vertices, counterclockwise; side i goes from vertex -i to vertex 1 - i (mod their number).
+
+    So side 0 is the edge from vertex 0 to vertex 1, and the left vertex of side i is the right vertex of side i+1.
+    """
+    keys = table(part, "part", "mass", "sides vertices")
+    require(("sides" in keys) != ("vertices" in keys), "part: either sides or vertices")
+    require(isinstance(keys["mass"], dict), "part.mass is not an object")
+    if "sides" in keys:
+        three = rows(keys["sides"], "part.sides", 3, 3)
+        base, left, right = (length(q, f"part.sides[{i}]") for i, q in enumerate(three))
+        x = (base**2 + left**2 - right**2) / (2 * base)
+        y2 = left**2 - x**2
+        positive = all(bool(q > 0) for q in (base, left, right, y2))
+        require(positive, "the sides form no triangle")
+        vertices = [(ZERO, ZERO), (base, ZERO), (x, y2.sqrt())]
+    else:
+        pairs = [rows(v, "a vertex", 2, 2) for v in rows(keys["vertices"], "part.vertices", 3, 64)]
+        vertices = [(length(x, "part.vertices"), length(y, "part.vertices")) for x, y in pairs]
+    n = len(vertices)
+    for k in range(n):
+        (px, py), (ex, ey), _ = side_frame(vertices, -k)
+        for j in set(range(n)) - {k, (k + 1) % n}:
+            beyond = (vertices[j][1] - py) * ex - (vertices[j][0] - px) * ey
+            require(bool(beyond > 0), "the vertices are not those of a convex polygon, counterclockwise")
+    return vertices
+
+
+def side_frame(vertices: list[tuple[Arb, Arb]], i: int) -> tuple[tuple[Arb, Arb], tuple[Arb, Arb], Arb]:
+    """Left end, unit vector to the right end, and length of side i."""
+    n = len(vertices)
+    left, right = vertices[-i % n], vertices[(1 - i) % n]
+    dx, dy = right[0] - left[0], right[1] - left[1]
+    long = (dx**2 + dy**2).sqrt()
+    return left, (dx / long, dy / long), long
+
+
+def read_plate(
+    mass: dict[str, Any],
+    vertices: list[tuple[Arb, Arb]],
+    unit: Fraction,
+    length: Callable[[object, str], Arb],
+) -> tuple[tuple[Arb, Arb], Arb]:
+    """Compute centre of mass and squared radius of gyration of a uniform plate with points of mass on it."""
+    area = sx = sy = second = ZERO
+    for (x0, y0), (x1, y1) in zip(vertices, vertices[1:] + vertices[:1], strict=True):
+        cross = x0 * y1 - x1 * y0
+        area += cross / 2
+        sx += (x0 + x1) * cross / 6
+        sy += (y0 + y1) * cross / 6
+        second += (x0 * x0 + x0 * x1 + x1 * x1 + y0 * y0 + y0 * y1 + y1 * y1) * cross / 12
+    density = quantity(mass["plate_density"], "density", "part.mass.plate_density")
+    weight = density.ball() * exact(unit) ** 2
+    total, sx, sy, second = weight * area, weight * sx, weight * sy, weight * second
+    for point in rows(mass.get("points", []), "part.mass.points", 0, 1000):
+        table(point, "part.mass.points", "x y mass")
+        x, y = (length(point[key], f"part.mass.points.{key}") for key in "xy")
+        m = quantity(point["mass"], "mass", "part.mass.points.mass")
+        require(m.lo > 0, "a mass is not positive")
+        w = m.ball()
+        total, sx, sy, second = total + w, sx + w * x, sy + w * y, second + w * (x**2 + y**2)
+    require(density.lo > 0 and bool(total > 0), "a mass is not positive")
+    return (sx / total, sy / total), second / total - (sx / total) ** 2 - (sy / total) ** 2
+
+
+def read_kappa(scene: dict[str, Any], noise: object, unit: Fraction) -> tuple[Arb, Arb]:
+    """Enclose the smallest and largest kappa = g/w^2, with the noise of w, from below and from above by points."""
+    throw = table(scene["throw"], "throw", "", "kappa speed")
+    require(len(throw) == 1, "throw: either kappa or speed")
+    gravity = table(scene.get("gravity", {}), "gravity", "", "acceleration tilt")
+    share = more = ZERO  # relative and absolute noise of the speed
+    if noise is not None:
+        dev = quantity(table(noise, "noise", "throw.speed")["throw.speed"], "share speed", "noise")
+        require(dev.lo == dev.hi >= 0, "noise is not a number that is not negative")
+        share, more = (dev.ball(), ZERO) if dev.unit == "%" else (ZERO, dev.ball())
+    require(bool(share < 1), "noise reaches 100 %")
+    if "kappa" in throw:
+        q = quantity(throw["kappa"], "length", "throw.kappa")
+        require(q.lo > 0, "throw.kappa is not positive")
+        require(bool(more == 0), "noise with a unit needs throw.speed")
+        lo, hi = exact(q.lo / unit) / (1 + share) ** 2, exact(q.hi / unit) / (1 - share) ** 2
+        return lo.lower(), hi.upper()
+    require(len(gravity) == 1, "gravity: either acceleration or tilt")
+    if "tilt" in gravity:
+        tilts = quantity(gravity["tilt"], "angle", "gravity.tilt").ends()
+        require(bool(tilts[0] > 0) and bool(tilts[1] < 1.57), "gravity.tilt is not between 0 and 90 degrees")
+        g = [exact(G0 / unit) * tilt.sin() for tilt in tilts]
+    else:
+        g = [end / exact(unit) for end in quantity(gravity["acceleration"], "acceleration", "gravity").ends()]
+    speeds = quantity(throw["speed"], "speed", "throw.speed").ends()
+    slow, fast = speeds[0] * (1 - share) - more, speeds[1] * (1 + share) + more
+    require(bool(g[0] > 0) and bool(slow > 0), "gravity and throw.speed must be positive")
+    return (g[0] / fast**2).lower(), (g[1] / slow**2).upper()
+
+
+def check_parameters(scene: Scene, said: object, where: str) -> str:
+    """Check that each enclosure lies inside the interval the producer says it computed with; else what does not."""
+    names = "a d length kappa surface_height arm_length radius_of_gyration"
+    said = table(said, f"{where} parameters", names)
+    first = scene.sides[0]
+    mine: dict[str, list[Arb]] = {key: [getattr(s, key) for s in scene.sides] for key in ("a", "d", "length")}
+    mine |= {"kappa": [scene.k_lo.union(scene.k_hi)], "surface_height": [first.h], "arm_length": [first.arm]}
+    mine["radius_of_gyration"] = [scene.rho]
+    for key, balls in mine.items():
+        pairs = rows(said[key], key, len(balls), len(balls)) if key in ("a", "d", "length") else [said[key]]
+        for i, (ball, pair) in enumerate(zip(balls, pairs, strict=True)):
+            lo, hi = (arb(hex_float(text, key)) for text in rows(pair, key, 2, 2))
+            slack = (hi - lo) * 2.0**-26  # the radius of a ball has 30 bits: a wide one is a little too wide
+            if not (ball >= lo - slack and ball <= hi + slack):
+                return f"parameter {key} {i}: the scene gives {ball.str(17)}, not in [{lo.str(17)}, {hi.str(17)}]"
+    return ""
+
+
+def hex_float(text: object, where: str) -> float:
+    """Read a float in Python's hexadecimal form."""
+    form = r"-?0x[01]\.[0-9a-f]{1,13}p[+-][0-9]{1,4}"
+    fits = isinstance(text, str) and re.fullmatch(form, text) is not None
+    require(fits, f"{where} is not a hexadecimal number")
+    try:
+        return float.fromhex(str(text))
+    except OverflowError:
+        raise BadFileError(f"{where} is too large") from None
+
+
+# ---------------------------------------------------------------------------------------------- the model's formulas
+
+
+class Angle(NamedTuple):
+    """An angle p with two functions of it alone: g, where f = (R - kappa p/2) p + g, and D = R'(jog) - R."""
+
+    p: Arb
+    g: Arb
+    D: Arb
+
+
+def at_angle(s: Side, p: Arb) -> Angle:
+    """Evaluate what depends on the angle alone."""
+    if s.exact:
+        sin, cos = p.sin_cos()
+        return Angle(p, s.d - s.a * sin - s.d * cos, s.a - s.a * cos + s.d * sin - s.hd * p)
+    return Angle(p, (HALF * s.small_d * p - s.a) * p, -s.h * p)
+
+
+def flight(x: Arb, kappa: Arb, at: Angle) -> Arb:
+    """Evaluate f at one angle: positive before the impact."""
+    return (x - HALF * kappa * at.p) * at.p + at.g
+
+
+def over_angles(s: Side, phi: Arb, R: Arb, kappa: Arb) -> tuple[int, Arb, Arb]:
+    """Over a box: the decision (0 jog, 1 flip, 2 not settled), D'(phi), and df/dphi."""
+    if s.exact:
+        sin, cos = phi.sin_cos()
+        H = s.a * sin + s.d * cos
+        X = s.a * cos - s.d * sin
+        fall = R - kappa * phi
+        spin = s.rho2 + X * fall + H * s.hd  # M om
+        return decide_exact(s, spin, X, H, kappa), H - s.hd, fall - X
+    spin = s.rho2 - s.a * R + 2 * s.a * s.a + s.d * s.d + s.d * s.h
+    V = kappa * (s.ell - s.d) - 2 * s.a * (R - s.a)
+    F = spin * (abs(spin) if s.signed else spin) * s.over_2m - V
+    return (1 if F > 0 else 0 if F < 0 else 2), -s.h, R - s.a - (kappa - s.small_d) * phi
+
+
+def decide_exact(s: Side, spin: Arb, X: Arb, H: Arb, kappa: Arb) -> int:
+    """Decide by the flip criterion of the exact model over a box; X^2 + H^2 = ell^2 gives ell - H = X^2/(ell + H)."""
+    top = s.ell + H
+    if s.signed:
+        if top > 0:
+            V = kappa * X * abs(X) / top
+        elif X > 0:
+            V = kappa * (s.ell - H)
+        elif X < 0:
+            V = kappa * (H - s.ell)
+        else:
+            return 2
+        F = spin * abs(spin) * s.over_2m - V
+        return 1 if F > 0 else 0 if F < 0 else 2
+    V = kappa * X * X / top if top > 0 else kappa * (s.ell - H)
+    F = spin * spin * s.over_2m - V
+    if X < 0 or F > 0:
+        return 1
+    return 0 if F < 0 and X > 0 else 2
+
+
+def positive_until(s: Side, x: Arb, kappa: Arb, end: Angle) -> bool:
+    """Prove f > 0 on (0, end].
+
+    f(0) = 0 and f'(0) = x - a > 0.  Where f is strictly concave, f(end) > 0 is enough.  Otherwise a march: with
+    m >= |f''|, f(t + u) >= f(t) + f'(t) u - m u^2/2, which is concave in u, so that two positive ends suffice.
+    """
+    if not (flight(x, kappa, end) > 0 and x > s.a):
+        return False
+    if s.concave:
+        return True
+    m = s.ell + kappa
+    t = arb(
+        float(((x - s.a) / m).lower())
+    )  # f(u) >= u (x - a - m u/2) > 0 for u <= (x - a)/m, and t rounds near
+    if not x - s.a - HALF * m * t > 0:
+        return False
+    for _ in range(1000):
+        if t >= end.p:
+            return True
+        sin, cos = t.sin_cos()
+        f = flight(x, kappa, at_angle(s, t))
+        slope = x - s.a * cos + s.d * sin - kappa * t
+        f0, s0, m0 = float(f.mid()), float(slope.mid()), float(m.mid())
+        if not f0 > 0:
+            return False
+        u = arb((s0 + math.sqrt(s0 * s0 + 2 * m0 * f0)) / m0 * (1 - 2.0**-20))
+        if not (u > 0 and f > 0 and f + (slope - HALF * m * u) * u > 0):
+            return False
+        t = arb(math.nextafter(float(t + u), 0.0))  # not above t + u
+    return False
+
+
+def guess_root(s: Side, x: float, kappa: float, p: float) -> float:
+    """Newton in floats from p; believed by nobody."""
+    a, d, small = s.floats
+    if not s.exact:
+        return 2.0 * (x - a) / (kappa - small)
+    for _ in range(12):
+        sin, cos = math.sin(p), math.cos(p)
+        slope = x - a * cos + d * sin - kappa * p
+        if slope >= 0.0:
+            return math.nan
+        step = ((x - 0.5 * kappa * p) * p + d - a * sin - d * cos) / slope
+        p -= step
+        if abs(step) < 1e-14 * p:
+            break
+    return p
+
+
+def root_above(s: Side, x: Arb, kappa: Arb, at: Angle) -> Angle:
+    """Find an angle that the impact at x comes before, for this kappa and larger ones: `at` or a proved better one."""
+    p = guess_root(s, float(x.mid()), float(kappa.mid()), float(at.p.mid())) * (1 + 2.0**-40)
+    if 0 < p < at.p:
+        better = at_angle(s, arb(p))
+        if flight(x, kappa, better) < 0:
+            return better
+    return at
+
+
+def root_below(s: Side, x: Arb, kappa: Arb, at: Angle, start: Arb) -> Angle:
+    """Find an angle that the impact at x comes after, for this kappa and smaller ones: `at` or a proved better one."""
+    p = guess_root(s, float(x.mid()), float(kappa.mid()), float(start.mid())) * (1 - 2.0**-40)
+    if at.p < p < FULL_TURN:
+        better = at_angle(s, arb(p))
+        if positive_until(s, x, kappa, better):
+            return better
+    return at
+
+
+# ------------------------------------------------------------------------------------------------------ the integers
+
+
+class Failure(NamedTuple):
+    """What was not proved: `kind` is "image" or "slope" for a cell, and text for people."""
+
+    kind: str
+    text: str
+
+
+@dataclass
+class Cells:
+    """The arrays of one box, cells of all sides one after another."""
+
+    edges: list[Array]
+    jog: Array
+    flip: Array
+    branch: Array
+    rank: Array
+    component: Array
+    phi: Array
+    side: Array = field(init=False)
+    start: Array = field(init=False)  # the first cell of each side, and the number of cells
+
+    def __post_init__(self) -> None:
+        counts = [len(edges) - 1 for edges in self.edges]
+        self.start = np.concatenate([[0], np.cumsum(counts)])
+        self.side = np.repeat(np.arange(len(counts)), counts)
+
+    def lower(self) -> Array:
+        """Lower ends of all cells."""
+        return np.concatenate([edges[:-1] for edges in self.edges])
+
+    def upper(self) -> Array:
+        """Upper ends of all cells."""
+        return np.concatenate([edges[1:] for edges in self.edges])
+
+    def name(self, cell: int) -> str:
+        """Name a cell, for people."""
+        side = int(self.side[cell])
+        k = cell - int(self.start[side])
+        return f"side {side}, cell {cell}, x in [{float(self.edges[side][k])!r}, {float(self.edges[side][k + 1])!r}]"
+
+
+def read_cells(entries: dict[str, memoryview], said: dict[str, Any], prefix: str, sides: int) -> Cells:
+    """Read the arrays of one box and see that their shapes fit each other."""
+
+    def read(name: str, dtype: str, columns: int = 1) -> Array:
+        require(f"{prefix}{name}.npy" in entries, f"array {prefix}{name} is missing")
+        key = prefix + name
+        return read_array(entries[f"{key}.npy"], key, dtype, columns, said.get(key))
+
+    edges = [read(f"edges.{i}", "<f8") for i in range(sides)]
+    require(all(len(e) >= 2 for e in edges), "a side has no cells")
+    cells = Cells(
+        edges, read("jog", "<i4", 2), read("flip", "<i4", 2), read("branch", "|i1"),
+        read("rank", "<i4"), read("component", "<i4"), read("phi", "<f8", 2),
+    )  # fmt: skip
+    n = len(cells.side)
+    arrays = (cells.jog, cells.flip, cells.branch, cells.rank, cells.component, cells.phi)
+    require(all(len(array) == n for array in arrays), "the arrays do not have one row for each cell")
+    return cells
+
+
+def range_max(values: Array, first: Array, last: Array) -> Array:
+    """Maxima of values[first..last], by the table of maxima over windows of length 2^k, one k at a time."""
+    level = np.frexp((last - first + 1).astype(np.float64))[1] - 1  # floor(log2), exact for integers
+    out = np.zeros(len(first), dtype=np.int64)
+    window = values.astype(np.int64)
+    for k in range(int(level.max(initial=0)) + 1):
+        q = np.flatnonzero(level == k)
+        out[q] = np.maximum(window[first[q]], window[last[q] - (1 << k) + 1])
+        window = np.maximum(window[: -(1 << k)], window[1 << k :])
+    return out
+
+
+def check_structure(c: Cells, scene: Scene) -> str:
+    """Check what every claim needs: order of the edges, brackets, branches, targets; "" or what fails."""
+    n_sides = len(c.edges)
+    for i, edges in enumerate(c.edges):
+        if not (np.diff(edges) > 0).all():
+            return f"side {i}: the edges of the cells do not ascend"
+        if not arb(float(edges[0])) > scene.sides[i].a:
+            return f"side {i}: the cells begin left of a_{i}"
+    lo, hi = c.phi[:, 0], c.phi[:, 1]
+    checks = [
+        ((lo > 0) & (lo < hi) & (hi <= FULL_TURN), "the bracket of phi is not one"),
+        ((c.branch >= 0) & (c.branch <= 2), "the branch is not 0, 1 or 2"),
+        (c.component >= -1, "the component is below -1"),
+        (c.rank >= 0, "the rank is negative"),
+    ]
+    for array, mine, target in ((c.jog, 0, c.side), (c.flip, 1, (c.side + 1) % n_sides)):
+        first, last = array[:, 0], array[:, 1]
+        inside = (first >= c.start[target]) & (first <= last) & (last < c.start[target + 1])
+        fits = np.where((c.branch == mine) | (c.branch == 2), inside, (first == -1) & (last == -1))
+        checks.append((fits, f"its branch and the target cells of a {('jog', 'flip')[mine]} do not fit"))
+    return first_bad(c, checks)
+
+
+def first_bad(c: Cells, checks: list[tuple[Array, str]]) -> str:
+    """Name the first cell at which one of the checks does not hold."""
+    for good, what in checks:
+        if not good.all():
+            return f"{c.name(int(np.argmin(good)))}: {what}"
+    return ""
+
+
+def check_components(c: Cells) -> str:
+    """Check that component cells map into cells of their own component; "" or what fails."""
+    if not (c.component >= 0).any():
+        return "there are no attracting cells"
+    for array, what in ((c.jog, "jog"), (c.flip, "flip")):
+        q = np.flatnonzero((array[:, 0] >= 0) & (c.component >= 0))
+        first, last = array[q, 0], array[q, 1]
+        own = c.component[q]
+        good = np.ones(len(c.component), dtype=bool)
+        highest, lowest = range_max(c.component, first, last), -range_max(-c.component, first, last)
+        good[q] = (highest == own) & (lowest == own)
+        bad = first_bad(c, [(good, f"a {what} may leave its component")])
+        if bad:
+            return bad
+    return ""
+
+
+def check_ranks(c: Cells, scene: Scene, max_rank: int) -> str:
+    """Check that the cells reach to the arm's end and the rank falls off the components; "" or what fails."""
+    for i, edges in enumerate(c.edges):
+        if Fraction(float(edges[-1])) < scene.arm[1]:
+            return f"side {i}: the cells end before arm.length"
+    inside = c.component >= 0
+    checks = [(~inside | (c.rank == 0), "a cell of a component has a rank above 0")]
+    for array, what in ((c.jog, "jog"), (c.flip, "flip")):
+        q = np.flatnonzero((array[:, 0] >= 0) & ~inside)
+        good = np.ones(len(inside), dtype=bool)
+        good[q] = range_max(c.rank, array[q, 0], array[q, 1]) < c.rank[q]
+        checks.append((good, f"the rank does not fall along a {what}"))
+    checks.append((c.rank <= max_rank, f"its rank is above max_rank = {max_rank}"))
+    return first_bad(c, checks)
+
+
+def check_goal(c: Cells, beyond: Fraction, side: int) -> str:
+    """Check that every cell of a component that reaches beyond x is on the side; "" or what fails."""
+    x = float(beyond)
+    if Fraction(x) > beyond:
+        x = math.nextafter(x, -math.inf)  # the largest float that is not above
+    good = (c.component < 0) | (c.side == side) | (c.upper() <= x)
+    return first_bad(c, [(good, f"an attracting cell of another side reaches beyond x = {float(beyond)!r}")])
+
+
+# --------------------------------------------------------------------------------------------------------- the cells
+
+
+def check_cell(
+    s: Side, k_lo: Arb, k_hi: Arb, x: tuple[float, float], phi: tuple[float, float],
+    targets: tuple[tuple[float, float], tuple[float, float]], least: Arb | None,
+) -> tuple[Failure | None, int]:  # fmt: skip
+    """Prove what the certificate says about one cell; the failure or None, and the number of boxes looked at.
+
+    `targets` are the ends of the target cells of a jog and of a flip: (nan, nan) where the branch is excluded, so
+    that nothing lies inside; an upper end inf stands for the arm's length.  f rises with x and falls with kappa, so
+    the bracket of phi holds over the cell if it does at two corners.
+    """
+    low, high = at_angle(s, arb(phi[0])), at_angle(s, arb(phi[1]))
+    first = Box(arb(x[0]), arb(x[1]), k_lo, k_hi, low, high, 0, 0)
+    if not positive_until(s, first.x0, k_hi, low):
+        return Failure("image", f"f > 0 up to phi = {phi[0]!r} is not proved at x = {x[0]!r}"), 1
+    if not flight(first.x1, k_lo, high) < 0:
+        return Failure("image", f"f < 0 at phi = {phi[1]!r} is not proved at x = {x[1]!r}"), 1
+    stack, boxes = [first], 0
+    while stack:
+        box = stack.pop()
+        boxes += 1
+        failure = check_box(s, box, targets, least)
+        if failure is not None:
+            halves = box.halves()
+            if not halves or boxes + len(stack) > MOST_BOXES:
+                return failure, boxes
+            for half in halves:
+                high = root_above(s, half.x1, half.k0, half.high)
+                low = root_below(s, half.x0, half.k1, half.low, high.p)
+                stack.append(half._replace(low=low, high=high))
+    return None, boxes
+
+
+class Box(NamedTuple):
+    """A piece of a cell, a piece of kappa, a bracket of the impact angle over both, and how often each was halved."""
+
+    x0: Arb
+    x1: Arb
+    k0: Arb
+    k1: Arb
+    low: Angle
+    high: Angle
+    in_x: int
+    in_k: int
+
+    def halves(self) -> list["Box"]:
+        """Halve it in what matters more to the angle, x or kappa; [] if it has been halved enough."""
+        xm = arb(float((HALF * (self.x0 + self.x1)).mid()))
+        km = arb(float((HALF * (self.k0 + self.k1)).mid()))
+        by_x = self.in_x < DEPTH and self.x0 < xm and xm < self.x1
+        by_k = self.in_k < DEPTH and self.k0 < km and km < self.k1
+        if by_k and not (by_x and HALF * self.high.p * (self.k1 - self.k0) < self.x1 - self.x0):
+            return [self._replace(k0=km, in_k=self.in_k + 1), self._replace(k1=km, in_k=self.in_k + 1)]
+        if by_x:
+            return [self._replace(x0=xm, in_x=self.in_x + 1), self._replace(x1=xm, in_x=self.in_x + 1)]
+        return []
+
+
+def check_box(
+    s: Side, box: Box, targets: tuple[tuple[float, float], tuple[float, float]], least: Arb | None
+) -> Failure | None:
+    """Check decision, images and slope over a box.
+
+    R'(jog) = R + D(phi).  Where D' > 0 both terms are largest at the upper ends.  Otherwise, where R' is proved to
+    rise with R at each kappa (phi'(R) = phi/(-df/dphi)), its extremes lie at the ends of the cell, and D there is
+    enclosed from a bracket of phi at that end by the mean value theorem; else the mean value theorem over the box.
+    """
+    x0, x1, k0, k1, low, high, _, _ = box
+    phi, R = low.p.union(high.p), x0.union(x1)
+    decision, rise, f_slope = over_angles(s, phi, R, k0.union(k1))
+    lo, hi = x0 + low.D, x1 + high.D
+    slope = None
+    rises = rise > 0
+    if (least is not None or not rises) and f_slope < 0:
+        slope = ONE - rise * phi / f_slope
+    if not rises:
+        if slope is not None and slope > 0:
+            lo = lo + rise * ZERO.union(root_above(s, x0, k0, high).p - low.p)
+            hi = hi - rise * ZERO.union(high.p - root_below(s, x1, k1, low, high.p).p)
+        else:
+            lo = hi = R + low.D + rise * (phi - low.p)
+    for branch in (0, 1) if decision == 2 else (decision,):
+        left, right = targets[branch]
+        if branch == 1:
+            lo, hi = lo - s.shift, hi - s.shift
+        if not (lo > left and (hi <= s.arm if right == math.inf else hi < right)):
+            what = ("jog", "flip")[branch]
+            if math.isnan(left):
+                return Failure("image", f"a {what} is not excluded")
+            image = f"[{float(lo.lower())!r}, {float(hi.upper())!r}]"
+            end = "arm.length" if right == math.inf else repr(right)
+            text = f"the image of a {what}, {image}, is not proved to lie in ({left!r}, {end})"
+            return Failure("image", text)
+    if least is not None and not (slope is not None and (slope >= least or -slope >= least)):
+        return Failure("slope", "its slope is not proved to be as large as claimed")
+    return None
+
+
+class Task(NamedTuple):
+    """Some cells of one side: ends, brackets and ends of the targets, as arrays of rows."""
+
+    box: int
+    side: int
+    cells: Array
+    rows: Array  # x0, x1, phi_lo, phi_hi, jog lo, jog hi, flip lo, flip hi
+    least: float | None
+
+
+SETUP: list[Any] = []  # of this process: the scenes as written, and the noise
+SCENES: dict[int, Scene] = {}  # balls do not travel between processes, so each reads the scenes it needs anew
+
+
+def prepare(raw: list[object], noise: object) -> None:
+    """Set up a worker."""
+    flint.ctx.prec = PRECISION
+    SETUP[:] = raw, noise
+    SCENES.clear()
+
+
+def check_task(task: Task) -> tuple[int, Failure | None, int]:
+    """Find the first cell of a task that is not proved, and what fails; and count the boxes looked at."""
+    if task.box not in SCENES:
+        SCENES[task.box] = read_scene(SETUP[0][task.box], SETUP[1])
+    scene = SCENES[task.box]
+    s = scene.sides[task.side]
+    least = None if task.least is None else arb(task.least)
+    total = 0
+    for cell, (x0, x1, p0, p1, j0, j1, f0, f1) in zip(task.cells.tolist(), task.rows.tolist(), strict=True):
+        targets = ((j0, j1), (f0, f1))
+        failure, boxes = check_cell(s, scene.k_lo, scene.k_hi, (x0, x1), (p0, p1), targets, least)
+        total += boxes
+        if failure is not None:
+            return cell, failure, total
+    return -1, None, total
+
+
+def tasks_of(c: Cells, scene: Scene, box: int, chosen: Array, least: float | None) -> Iterator[Task]:
+    """Cut the chosen cells (ascending) into tasks of one side each."""
+    lower, upper = c.lower(), c.upper()
+    reach = float(scene.arm[1])
+    reach = reach if Fraction(reach) >= scene.arm[1] else math.nextafter(reach, math.inf)
+    for side in range(len(c.edges)):
+        own = chosen[c.side[chosen] == side]
+        for part in np.array_split(own, max(1, -(-len(own) // CHUNK))):
+            rows = np.full((len(part), 8), math.nan)
+            rows[:, 0], rows[:, 1], rows[:, 2:4] = lower[part], upper[part], c.phi[part]
+            for column, array in ((4, c.jog[part]), (6, c.flip[part])):
+                q = np.flatnonzero(array[:, 0] >= 0)
+                rows[q, column] = lower[array[q, 0]]
+                ends = upper[array[q, 1]]
+                rows[q, column + 1] = np.where(ends >= reach, math.inf, ends)  # the arm ends before the cells
+            if len(part):
+                yield Task(box, side, part, rows, least)
+
+
+@contextmanager
+def deaf_children() -> Iterator[None]:
+    """Let processes that are started in here leave Ctrl-C to this one."""
+    if threading.current_thread() is not threading.main_thread():  # only that one may say what a signal does
+        yield
+        return
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, signal.SIG_DFL if before is None else before)
+
+
+class Crew:
+    """The processes that check cells, or this one alone; they are started for large certificates only."""
+
+    def __init__(
+        self, raw: list[object], noise: object, workers: int, progress: Callable[[int], None] | None
+    ):
+        self.setup, self.workers, self.progress = (raw, noise), workers, progress
+        self.done = self.boxes = 0
+        self.pool: ProcessPoolExecutor | None = None
+        prepare(raw, noise)
+
+    def run(self, tasks: list[Task]) -> tuple[int, Failure] | None:
+        """Return the first cell, in the order of the tasks, that is not proved, and what fails there; or None."""
+        if self.workers > 1 and self.pool is None and sum(len(t.cells) for t in tasks) > SMALL:
+            context = multiprocessing.get_context("spawn")
+            self.pool = ProcessPoolExecutor(self.workers, context, prepare, self.setup)
+        try:
+            with deaf_children():
+                results = map(check_task, tasks) if self.pool is None else self.pool.map(check_task, tasks)
+            for task, (cell, failure, boxes) in zip(tasks, results, strict=True):
+                self.done += len(task.cells)
+                self.boxes += boxes
+                if failure is not None:
+                    return cell, failure
+                if self.progress is not None:
+                    self.progress(self.done)
+        except BrokenProcessPool:  # processes cannot be started here, as from a script without a main guard
+            self.close()
+            self.workers = 1
+            return self.run(tasks)
+        return None
+
+    def close(self) -> None:
+        """End the processes."""
+        if self.pool is not None:
+            self.pool.shutdown(cancel_futures=True)
+            self.pool = None
+
+
+# --------------------------------------------------------------------------------------------------- near the joint
+
+
+def check_near_joint(s: Side, k_lo: Arb, k_hi: Arb, edge: float, q: float) -> str:
+    """Prove on (a, edge] that a throw is a decided jog and R' - a >= q (R - a), R' <= arm; "" or what fails.
+
+    f = (R - a) phi + a (phi - sin phi) + d (1 - cos phi) - (kappa/2) phi^2 and both brackets are >= 0, so f > 0 for
+    phi < 2 (R - a)/kappa: the impact comes later than that.  f rises with R, so f(bound) < 0 at the edge bounds it
+    from above.  R' - R = -h phi + a (1 - cos phi) - d (phi - sin phi) >= -h phi + phi^2 (a/2 - a phi^2/24 - d phi/6)
+    and <= -h phi + a phi^2/2.  Small angles: phi = 2 (R - a)/(kappa - small_d) and R' - R = -h phi.
+    """
+    x, height = arb(edge), -s.h
+    if not height > 0:
+        return "the arm's surface is not below the joint"
+    if not x > s.a:
+        return "the cells begin left of a"
+    bound = arb(float((2 * (x - s.a) / (k_hi - s.small_d)).upper()))
+    for _ in range(20):
+        if flight(x, k_lo, at_angle(s, bound)) < 0:
+            break
+        bound = bound * 1.25
+    if not (flight(x, k_lo, at_angle(s, bound)) < 0 and bound < 1):
+        return "the impact angle is not bounded"
+    if s.exact and not HALF * s.a - s.a * bound**2 / 24 - s.d * bound / 6 > 0:
+        return "a (1 - cos phi) >= d (phi - sin phi) is not proved"
+    if not (q > 1 and q <= 1 + 2 * height / (k_hi - s.small_d)):
+        return f"R' - a >= q (R - a) is not proved for q = {q!r}"
+    if not x + height * bound + HALF * (s.a if s.exact else ZERO) * bound**2 <= s.arm:
+        return "R' <= arm.length is not proved"
+    R, kappa, pieces = s.a.union(x), k_lo.union(k_hi), 64
+    for k in range(pieces):
+        phi = (bound * k / pieces).union(bound * (k + 1) / pieces)
+        if over_angles(s, phi, R, kappa)[0] != 0:
+            return "a jog is not proved"
+    return ""
+
+
+# --------------------------------------------------------------------------------------------------------- the claims
+
+SECTIONS = {  # the claims that are known, and the keys of their sections
+    "attracts-all": "near_joint max_rank",
+    "invariant": "",
+    "trapping": "",
+    "goal": "kind x side",
+    "expanding": "least_slope",
+}
+
+
+@dataclass
+class Report:
+    """What became of a certificate: `claims` has (claim, "proved" | "not rechecked" | "failed", reason)."""
+
+    verdict: str = "failed"
+    claims: list[tuple[str, str, str]] = field(default_factory=list)
+    statement: list[str] = field(default_factory=list)
+    parameters: dict[str, str] = field(default_factory=dict)
+    relied_on: list[str] = field(default_factory=list)
+    reason: str = ""
+    seconds: float = 0.0
+    cells: int = 0
+    boxes: int = 0
+
+
+def quantities(value: object, where: str = "") -> Iterator[tuple[str, object]]:
+    """Name every quantity of a scene."""
+    if isinstance(value, dict):
+        for key, inner in value.items():
+            if where or key in ("part", "arm", "throw", "gravity"):
+                yield from quantities(inner, f"{where}.{key}" if where else key)
+    elif isinstance(value, list) and where in ("part.sides", "part.vertices", "part.mass.points"):
+        for i, inner in enumerate(value):
+            yield from quantities(inner, f"{where}[{i}]")
+    elif isinstance(value, list) and re.fullmatch(r"part\.vertices\[[0-9]+\]", where):
+        yield from ((f"{where}.{key}", inner) for key, inner in zip("xy", value, strict=True))
+    else:
+        yield where, value
+
+
+def check_tolerance(raw: list[Any], tolerance: object) -> tuple[dict[str, str], str]:
+    """Check that the boxes cover the tolerance: the range of each quantity for people, and what fails.
+
+    All boxes agree but in the quantities named.  Between neighbouring ends of intervals each little box must lie in
+    a box of the certificate, and the whole must be as wide as the tolerance around some middle.
+    """
+    if tolerance is None:
+        require(len(raw) == 1, "several boxes need a tolerance")
+        return {}, ""
+    require(isinstance(tolerance, dict) and 0 < len(tolerance) <= 6, "tolerance is not an object")
+    assert isinstance(tolerance, dict)
+    flat = [dict(quantities(scene)) for scene in raw]
+    kinds = "length angle speed acceleration mass density share"
+    ranges: list[list[Quantity]] = []
+    shown, names = {}, []
+    for name, text in tolerance.items():
+        dev = quantity(text, kinds, "tolerance")
+        square = name == "throw.speed" and "throw.kappa" in flat[0]
+        key = "throw.kappa" if square else name
+        require(
+            all(key in f for f in flat) and dev.lo == dev.hi >= 0,
+            f"tolerance: {plain(name)} is not understood",
+        )
+        own = [quantity(f[key], kinds, key) for f in flat]
+        require(len({q.pi for q in own}) == 1, f"{plain(key)}: mixes degrees and radians")
+        ranges.append(own)
+        names.append(key)
+        lo, hi = min(q.lo for q in own), max(q.hi for q in own)
+        unit = next(u[own[0].unit] for u in UNITS.values() if own[0].unit in u)
+        shown[key] = f"every value in [{float(lo / unit)!r}, {float(hi / unit)!r}] {own[0].unit}"
+        if dev.unit == "%":
+            lo, hi = (lo, hi) if lo > 0 else (-hi, -lo)
+            power = 2 if square else 1
+            wide = dev.lo < 1 and lo > 0 and lo * (1 + dev.lo) ** power <= hi * (1 - dev.lo) ** power
+        else:
+            require(not square and dev.pi == own[0].pi, f"tolerance of {plain(name)} is in another unit")
+            wide = hi - lo >= 2 * dev.lo
+        if not wide:
+            return shown, f"the boxes do not cover the tolerance of {plain(name)}"
+    rest = [{key: value for key, value in f.items() if key not in names} for f in flat]
+    same = all(r == rest[0] and scene["model"] == raw[0]["model"] for r, scene in zip(rest, raw, strict=True))
+    if not same:
+        return shown, "the boxes differ in something else than the tolerance"
+    cuts = [sorted({end for q in own for end in (q.lo, q.hi)}) for own in ranges]
+    require(math.prod(len(c) for c in cuts) * len(raw) <= 10_000_000, "too many boxes")
+    for point in itertools.product(*([(a + b) / 2 for a, b in itertools.pairwise(c)] or c for c in cuts)):
+        inside = (
+            all(q[b].lo <= x <= q[b].hi for q, x in zip(ranges, point, strict=True)) for b in range(len(raw))
+        )
+        if not any(inside):
+            return shown, "the boxes leave a gap in the tolerance"
+    return shown, ""
+
+
+def read_claims(
+    header: dict[str, Any], n_sides: int
+) -> tuple[dict[str, dict[str, Any]], list[tuple[str, str, str]]]:
+    """Read the claims that can be checked, name -> section, and those that cannot."""
+    known: dict[str, dict[str, Any]] = {}
+    unknown = []
+    for claim in rows(header["claims"], "claims", 1, 100):
+        table(claim, "a claim", "claim", "section")
+        name, section = claim["claim"], claim.get("section")
+        if not isinstance(name, str) or name not in SECTIONS:
+            unknown.append((plain(name), "not rechecked", "this checker does not know the claim"))
+        elif section is None:
+            unknown.append((name, "not rechecked", "the claim has no section"))
+        elif name == "goal" and isinstance(section, dict) and section.get("kind") != "oriented_beyond":
+            unknown.append((name, "not rechecked", "this checker does not know the kind of goal"))
+        else:
+            require(name not in known, f"claim {name} is made twice")
+            known[name] = read_section(name, table(section, f"section of {name}", SECTIONS[name]), n_sides)
+    return known, unknown
+
+
+def read_section(name: str, section: dict[str, Any], n_sides: int) -> dict[str, Any]:
+    """Read the numbers of a section."""
+    if name == "attracts-all":
+        near = table(section["near_joint"], "near_joint", " ".join(str(i) for i in range(n_sides)))
+        q = [hex_float(table(near[str(i)], "near_joint", "q")["q"], "q") for i in range(n_sides)]
+        require(type(section["max_rank"]) is int, "max_rank is not an integer")
+        return {"q": q, "max_rank": section["max_rank"]}
+    if name == "goal":
+        x = quantity(section["x"], "length", "goal.x")
+        require(x.lo == x.hi, "goal.x is not one number")
+        require(type(section["side"]) is int and 0 <= section["side"] < n_sides, "goal.side is not a side")
+        return {"x": x, "side": section["side"], "text": section["x"]}
+    if name == "expanding":
+        least = hex_float(section["least_slope"], "least_slope")
+        require(least > 1, "least_slope is not above 1")
+        return {"least": least}
+    return {}
+
+
+def extents(c: Cells) -> str:
+    """List the attracting cells as intervals, for people."""
+    parts = []
+    for i, edges in enumerate(c.edges):
+        own = np.concatenate([[False], c.component[c.start[i] : c.start[i + 1]] >= 0, [False]])
+        ends = np.flatnonzero(np.diff(own.astype(np.int8)))
+        spans = [f"[{edges[a]:.9g}, {edges[b]:.9g}]" for a, b in ends.reshape(-1, 2)[:6]]
+        more = " ..." if len(ends) > 12 else ""
+        parts.append(f"side {i}: {' u '.join(spans) or 'none'}{more}")
+    return "; ".join(parts)
+
+
+def statement_of(name: str, section: dict[str, Any], noisy: bool) -> str:
+    """Put a claim in words."""
+    if name == "attracts-all":
+        return (
+            f"attracts-all: every start a_i < x <= arm.length on every side i enters the attracting cells and stays in"
+            f" them, within {section['max_rank']} throws where x is in the cells; nearer to the joint x - a_i grows by"
+            f" a factor of at least {min(section['q']):.9g} with every throw"
+        )
+    if name == "goal":
+        return f"goal: in the attracting cells, x > {plain(section['text'])} implies side {section['side']}"
+    if name == "expanding":
+        least = section["least"]
+        entropy = "" if noisy else f"; topological entropy >= ln({least!r}) = {math.log(least):.6g}"
+        return f"expanding: |dR'/dR| >= {least!r} on the attracting cells{entropy}"
+    if name == "trapping":
+        return "trapping: the attracting cells are mapped into their interior (relative to x <= arm.length)"
+    return "invariant: no throw leaves the attracting cells, nor the component it starts in"
+
+
+def check_box_claims(
+    scene: Scene, c: Cells, box: int, claims: dict[str, dict[str, Any]], crew: Crew
+) -> Iterator[tuple[list[str], str]]:
+    """Check all claims for one box; yields the claims that fail, with the reason.
+
+    Images are proved to lie strictly inside the union of their target cells (or at most at the arm's length), so
+    that "invariant" already gives "trapping".
+    """
+    everything = list(claims)
+    bad = check_structure(c, scene) or check_components(c)
+    if bad:
+        yield everything, bad
+        return
+    if "goal" in claims:
+        goal = claims["goal"]
+        bad = check_goal(c, goal["x"].lo / LENGTHS[scene.unit], goal["side"])
+        if bad:
+            yield ["goal"], bad
+    attracts = "attracts-all" in claims
+    if attracts:
+        bad = check_ranks(c, scene, claims["attracts-all"]["max_rank"])
+        for i, s in enumerate(scene.sides):
+            edge = float(c.edges[i][0])
+            near = check_near_joint(s, scene.k_lo, scene.k_hi, edge, claims["attracts-all"]["q"][i])
+            bad = bad or (f"side {i}, near the joint, x in (a, {edge!r}]: {near}" if near else "")
+        if bad:
+            attracts = False
+            yield ["attracts-all"], bad
+    least = claims["expanding"]["least"] if "expanding" in claims else None
+    inside = np.flatnonzero(c.component >= 0)
+    found = crew.run(list(tasks_of(c, scene, box, inside, least)))
+    if found is not None and found[1].kind == "slope":
+        yield ["expanding"], f"{c.name(found[0])}: {found[1].text}"
+        found = crew.run(list(tasks_of(c, scene, box, inside, None)))
+    if found is not None:
+        yield everything, f"{c.name(found[0])}: {found[1].text}"
+    elif attracts:
+        found = crew.run(list(tasks_of(c, scene, box, np.flatnonzero(c.component < 0), None)))
+        if found is not None:
+            yield ["attracts-all"], f"{c.name(found[0])}: {found[1].text}"
+
+
+# --------------------------------------------------------------------------------------------------------- the report
+
+
+def check_certificate(
+    path: str | os.PathLike[str], workers: int, progress: Callable[[int, int], None] | None, report: Report
+) -> None:
+    """Fill in the report; raises BadFileError."""
+    header, entries = open_certificate(path)
+    needed = "format version map noise boxes claims arrays tolerance"
+    table(header, "header.json", needed, "state producer")
+    right = (header["format"], header["version"]) == ("limitsets-proof", 1)
+    require(right, "the format is not limitsets-proof, version 1")
+    the_map = table(header["map"], "map", "name version flight flip", "formulas")
+    require((the_map["name"], the_map["version"]) == ("throw", 1), "the map is not throw, version 1")
+    boxes = rows(header["boxes"], "boxes", 1, 5_000)
+    prefixes = [table(b, "a box", "scene parameters prefix")["prefix"] for b in boxes]
+    named = all(isinstance(p, str) and re.fullmatch(r"[0-9]{1,6}\.", p) for p in prefixes)
+    require(named and len(set(prefixes)) == len(boxes), "the prefixes of the boxes are not as they should be")
+    raw = [b["scene"] for b in boxes]
+    scenes = [read_scene(scene, header["noise"]) for scene in raw]
+    for scene in raw:
+        model = (the_map["flight"], the_map["flip"])
+        same = model == (scene["model"]["flight"], scene["model"]["flip"])
+        require(same, "map and scene name different models")
+    require(isinstance(header["arrays"], dict), "arrays is not an object")
+    n_sides = len(scenes[0].sides)
+    require(all(len(s.sides) == n_sides for s in scenes), "the boxes do not have the same number of sides")
+    cells = [read_cells(entries, header["arrays"], prefix, n_sides) for prefix in prefixes]
+    expected = {p + name for p in prefixes for name in ["jog", "flip", "branch", "rank", "component", "phi"]}
+    expected |= {f"{p}edges.{i}" for p in prefixes for i in range(n_sides)}
+    require(set(header["arrays"]) == expected, "the header describes arrays that do not belong there")
+    named = set(entries) == {f"{name}.npy" for name in expected}
+    require(named, "arrays.npz holds entries that do not belong there")
+    claims, unknown = read_claims(header, n_sides)
+
+    flight_of = the_map["flight"]
+    kind = "exact" if flight_of == "exact" else "small"
+    for key in ("always", flight_of, kind, f"{kind} {the_map['flip']}"):
+        report.relied_on += [line for line in FORMULAS[key] if line not in report.relied_on]
+    the_model = f"throw, version 1, flight {flight_of}, flip {the_map['flip']}"
+    report.relied_on.insert(0, f"the formulas of the map {the_model}")
+    report.relied_on.append(
+        f"the ball arithmetic of python-flint {flint.__version__} (Arb), numpy and Python"
+    )
+    for name, value in quantities(raw[0]):
+        text = f"every value in [{', '.join(map(str, value))}]" if isinstance(value, list) else str(value)
+        report.parameters[plain(name)] = plain(text, 200)
+    noise = header["noise"]
+    covered, gap = check_tolerance(raw, header["tolerance"])
+    report.parameters |= covered
+    if header["tolerance"] is not None:
+        report.parameters["tolerance (fixed but unknown)"] = plain(header["tolerance"], 200)
+    report.parameters["noise (at every throw)"] = "none" if noise is None else plain(noise)
+    report.cells = sum(len(c.side) for c in cells)
+    report.statement = [statement_of(name, section, noise is not None) for name, section in claims.items()]
+    first = " (first box)" if len(cells) > 1 else ""
+    report.statement.append(f"attracting cells: {extents(cells[0])}{first}")
+
+    failed: dict[str, str] = {}
+    if gap:
+        failed = dict.fromkeys(claims, gap)
+    work = sum(len(c.side) if "attracts-all" in claims else int((c.component >= 0).sum()) for c in cells)
+    told = None if progress is None else (lambda done: progress(min(done, work), work))
+    crew = Crew(raw, noise, workers, told)
+    try:
+        for k, (scene, c, b) in enumerate(zip(scenes, cells, boxes, strict=True)):
+            bad = check_parameters(scene, b["parameters"], f"box {k}")
+            where = f"box {k}, " if len(boxes) > 1 else ""
+            found = [(list(claims), bad)] if bad else check_box_claims(scene, c, k, claims, crew)
+            for names, reason in found:
+                for name in names:
+                    failed.setdefault(name, where + reason)
+            if len(failed) == len(claims):
+                break
+    finally:
+        crew.close()
+    report.boxes = crew.boxes
+    for name in claims:
+        report.claims.append((name, "failed" if name in failed else "proved", failed.get(name, "")))
+    report.claims += unknown
+    report.verdict = "proved" if all(state == "proved" for _, state, _ in report.claims) else "failed"
+    report.reason = next((f"{name}: {why}" for name, state, why in report.claims if state != "proved"), "")
+
+
+def recheck(
+    path: str | os.PathLike[str],
+    workers: int | None = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> Report:
+    """Check the certificate in a file.
+
+    Parameters
+    ----------
+    path
+        The file.
+    workers
+        Number of processes; all processors of this process if None.  Small certificates are checked in this one.
+    progress
+        Called now and then with the number of cells done and the number of all.
+    """
+    begun = time.perf_counter()
+    report = Report()
+    if workers is None:
+        workers = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    before = flint.ctx.prec
+    flint.ctx.prec = PRECISION
+    try:
+        check_certificate(path, workers, progress, report)
+    except BadFileError as error:
+        report = Report(verdict="bad file", reason=str(error))
+    finally:
+        flint.ctx.prec = before
+    report.seconds = time.perf_counter() - begun
+    return report
+
+
+def show(report: Report, file: str) -> None:
+    """Print a report for people."""
+    print(f"certificate: {plain(file, 200)}")
+    for title, lines in (
+        ("claimed", report.statement),
+        ("for", [f"{name} = {value}" for name, value in report.parameters.items()]),
+        ("relying on", report.relied_on),
+    ):
+        if lines:
+            print("\n  ".join([f"{title}:", *lines]))
+    for name, state, why in report.claims:
+        print(f"{name}: {state.upper()}" + (f" - {why}" if why else ""))
+    print(f"{report.cells} cells, {report.seconds:.1f} s")
+    print("PROVED" if report.verdict == "proved" else f"{report.verdict.upper()}: {report.reason}")
+
+
+def main() -> int:
+    """Run from the command line."""
+    parser = argparse.ArgumentParser(description="Check a proof certificate of a throw-and-catch feeder.")
+    parser.add_argument("file", help="the certificate, NAME.proof.zip")
+    parser.add_argument("--json", action="store_true", help="print one JSON object")
+    parser.add_argument("--workers", type=int, metavar="N", help="processes (default: all processors)")
+    options = parser.parse_args()
+    begun = last = time.monotonic()
+
+    def bar(done: int, total: int) -> None:
+        nonlocal last
+        now = time.monotonic()
+        if now - begun > 2 and (now - last > 0.2 or done == total):
+            last = now
+            full = 40 * done // max(total, 1)
+            text = f"\r[{'#' * full}{'.' * (40 - full)}] {done}/{total} cells"
+            print(text, end="", file=sys.stderr, flush=True)
+            if done == total:
+                print(file=sys.stderr)
+
+    try:
+        report = recheck(options.file, options.workers, bar)
+    except KeyboardInterrupt:
+        print("\ninterrupted", file=sys.stderr)
+        return 130
+    if options.json:
+        print(json.dumps(asdict(report), allow_nan=False))
+    else:
+        show(report, options.file)
+    return {"proved": 0, "failed": 1, "bad file": 2}[report.verdict]
+
+
+if __name__ == "__main__":
+    sys.exit(main())

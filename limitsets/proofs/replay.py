@@ -1,0 +1,62 @@
+"""Orbits replayed in interval arithmetic: every decision proved, every state enclosed."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+import limitsets.interval as iv
+from limitsets.jit import proof_kernel
+from limitsets.maps import codes
+from limitsets.proofs.parameters import ParameterBox
+from limitsets.thrower.throw_box import gather_box, throw_box, with_kappa
+
+__all__ = ["replay"]
+
+
+@proof_kernel(entry=True)
+def _replay(lo_map: Any, hi_map: Any, kappa: Any, lo: Any, hi: Any, side: Any) -> int:
+    """Fill the enclosures after the first; the number of throws whose decision is proved."""
+    for k in range(lo.size - 1):
+        b = with_kappa(gather_box(lo_map, hi_map, side[k]), kappa[0, k], kappa[1, k])
+        state, jog, _, _, _ = throw_box(b, lo[k], hi[k])
+        if state == codes.JOG:
+            lo[k + 1], hi[k + 1], side[k + 1] = jog[0], jog[1], b.side
+        elif state == codes.FLIP:
+            lo[k + 1], hi[k + 1] = iv.sub(jog, b.shift)
+            side[k + 1] = b.next
+        else:
+            return k
+    return int(lo.size - 1)
+
+
+def replay(
+    box: ParameterBox, x: float, side: int, kappa: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]]:
+    """Enclose an orbit.
+
+    Parameters
+    ----------
+    box : ParameterBox
+        The scene's parameters.
+    x : float
+        Start.
+    side : int
+        Its side.
+    kappa : ndarray, shape (2, throws)
+        Bounds of kappa at each throw; fewer throws are returned where a decision cannot be proved.
+
+    Returns
+    -------
+    lo, hi : ndarray, shape (m + 1,)
+        Enclosures of the states, the start first.
+    side : ndarray of int, shape (m + 1,)
+        Their sides.
+    """
+    throws = kappa.shape[1]
+    lo, hi, sides = np.empty(throws + 1), np.empty(throws + 1), np.empty(throws + 1, np.int64)
+    lo[0], hi[0], sides[0] = x, x, side
+    made = _replay(box.lo, box.hi, np.ascontiguousarray(kappa), lo, hi, sides)
+    return lo[: made + 1], hi[: made + 1], sides[: made + 1]

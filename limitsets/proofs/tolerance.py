@@ -1,0 +1,141 @@
+"""Tolerances: quantities that are fixed but unknown.
+
+A box of quantities is proved piece by piece: where a piece cannot be proved as a whole it is halved along the quantity
+that is widest against its tolerance.  That is allowed because the quantity is the same at every throw; for noise, which
+is not, it would be wrong.
+"""
+
+from __future__ import annotations
+
+import copy
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from fractions import Fraction
+from itertools import product
+from typing import Any
+
+from limitsets.errors import AnswerError
+from limitsets.proofs.rational import Span
+from limitsets.scene import Scene
+from limitsets.scene.quantities import find
+from limitsets.scene.units import exact_factor, parse
+
+__all__ = ["Piece", "whole"]
+
+# Digits to which a bound that is no short decimal is written, outward.
+DIGITS = 25
+
+
+def _decimal(value: Fraction, up: bool) -> str:
+    """Write a rational as a decimal, outward if it has no short one."""
+    scale = 10**DIGITS
+    scaled = value * scale
+    whole_part = math.ceil(scaled) if up else math.floor(scaled)
+    sign, digits = ("-" if whole_part < 0 else ""), str(abs(whole_part)).rjust(DIGITS + 1, "0")
+    return f"{sign}{digits[:-DIGITS]}.{digits[-DIGITS:]}".rstrip("0").rstrip(".")
+
+
+def _at(tree: Any, name: str) -> Any:
+    """Return what stands in a scene under a name, None if nothing does."""
+    for word in find(name).path:
+        known = word in tree if isinstance(tree, Mapping) else isinstance(word, int) and word < len(tree)
+        if not known:
+            return None
+        tree = tree[word]
+    return tree
+
+
+@dataclass(frozen=True)
+class Piece:
+    """A box of quantities of a scene.
+
+    Attributes
+    ----------
+    scene : Scene
+        The scene they belong to.
+    spans : dict of str to Span
+        Per quantity, in the unit in which the scene gives it.
+    """
+
+    scene: Scene
+    spans: dict[str, Span]
+
+    def texts(self) -> dict[str, list[str]]:
+        """Both ends of each quantity, as text with the unit in which the scene gives it."""
+        found = {}
+        for name, span in self.spans.items():
+            unit = parse(_at(self.scene.text, name), find(name).dimension).unit
+            found[name] = [f"{_decimal(span.lo, up=False)} {unit}", f"{_decimal(span.hi, up=True)} {unit}"]
+        return found
+
+    def tree(self) -> dict[str, Any]:
+        """Write the scene as text, each of the quantities a pair of texts."""
+        tree: dict[str, Any] = copy.deepcopy(dict(self.scene.text))
+        for name, pair in self.texts().items():
+            *path, last = find(name).path
+            node: Any = tree
+            for word in path:
+                node = node[word]
+            node[last] = pair
+        return tree
+
+    def halves(self, scales: Mapping[str, Fraction]) -> tuple[Piece, Piece]:
+        """Cut along the quantity that is widest against its scale."""
+        name = max(self.spans, key=lambda key: (self.spans[key].hi - self.spans[key].lo) / scales[key])
+        span = self.spans[name]
+        middle = (span.lo + span.hi) / 2
+        lower, upper = Span(span.lo, middle), Span(middle, span.hi)
+        return Piece(self.scene, {**self.spans, name: lower}), Piece(self.scene, {**self.spans, name: upper})
+
+    def corners(self) -> Iterator[Piece]:
+        """Yield the scenes at the corners, the first 16 of them."""
+        ends = [(Span(s.lo, s.lo), Span(s.hi, s.hi)) for s in self.spans.values()]
+        for _, chosen in zip(range(16), product(*ends), strict=False):
+            yield Piece(self.scene, dict(zip(self.spans, chosen, strict=True)))
+
+
+def whole(scene: Scene, tolerance: Mapping[str, str]) -> Piece:
+    """Build the box that a tolerance stands for.
+
+    Parameters
+    ----------
+    scene : Scene
+        The scene.
+    tolerance : mapping of str to str
+        Symmetric deviations by quantity, ``{"throw.speed": "0.7 %"}`` or ``{"arm.surface_height": "0.01 in"}``.
+
+    Raises
+    ------
+    AnswerError
+        A quantity that the scene does not give.
+    """
+    spans = {}
+    for name, text in tolerance.items():
+        relative = text.rstrip().endswith("%")
+        quantity = parse(text, "share" if relative else find(name).dimension)
+        share = Fraction(quantity.number) / 100
+        if name == "throw.speed" and "kappa" in scene.text["throw"]:
+            # the scene gives kappa = g / w^2: a slower throw is a larger kappa
+            if not relative:
+                raise AnswerError(
+                    "the tolerance", text, "percent, for a scene given by kappa", "give it in percent"
+                )
+            if "throw.kappa" in tolerance:
+                raise AnswerError(
+                    "the tolerance", name, "of throw.speed or of throw.kappa", "leave one of them out"
+                )
+            kappa = Fraction(parse(scene.text["throw"]["kappa"], "length").number)
+            spans["throw.kappa"] = Span(kappa / (1 + share) ** 2, kappa / (1 - share) ** 2)
+            continue
+        node = _at(scene.text, name)
+        if node is None:
+            raise AnswerError("the tolerance", name, "a quantity that the scene gives", "name another")
+        given = parse(node, find(name).dimension)
+        nominal = Fraction(given.number)
+        if not relative and quantity.unit.startswith("deg") != given.unit.startswith("deg"):
+            raise AnswerError("the tolerance", text, f"percent, or the scene's {given.unit}", "convert it")
+        factor = Fraction(1) if relative else exact_factor(quantity.unit, given.unit)
+        half = abs(nominal) * share if relative else Fraction(quantity.number) * factor
+        spans[name] = Span(nominal - half, nominal + half)
+    return Piece(scene, spans)

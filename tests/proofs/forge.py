@@ -1,0 +1,288 @@
+"""A small producer of certificates for tests, in plain floats and apart from the package and from the checker.
+
+It proves nothing: the checker has to find every bracket, decision and image right.  Cells are graded, the images are
+those of the corners of a cell with a margin, the attracting cells are the last component of the graph.
+"""
+
+import copy
+import hashlib
+import io
+import json
+import zipfile
+from pathlib import Path
+
+import networkx as nx
+import numpy as np
+
+SLACK = 2.0**-34
+MODELS = {  # flight, flip, along, above, kappa, height, arm
+    "designed": ("exact", "signed", "4.2255778 in", "0.7082490 in", "25.3778518 in", "-0.2 in", "28 in"),
+    "energy": ("exact", "energy", "4.2255778 in", "0.7082490 in", "25.3778518 in", "-0.2 in", "28 in"),
+    "initial": ("exact", "signed", "3.9867006 in", "1.8835981 in", "33.3605945 in", "-0.2 in", "28 in"),
+    "initial-small": (
+        "small-angle",
+        "energy",
+        "3.2444722 in",
+        "1.7898493 in",
+        "85.2549144 in",
+        "-1.0 in",
+        "40 in",
+    ),
+    "small": ("small-angle", "energy", "4.4179581 in", "0.5040259 in", "48.6228609 in", "-1.0 in", "40 in"),
+}
+LENGTHS = (5.75, 3.6, 6.75)
+
+
+def scene(model: str) -> dict:
+    flight, flip, along, above, kappa, height, arm = MODELS[model]
+    return {
+        "name": f"forged-{model}",
+        "part": {
+            "sides": ["5.75 in", "3.6 in", "6.75 in"],
+            "mass": {
+                "center": {"side": 2, "along": along, "above": above},
+                "radius_of_gyration": "1.25 in",
+            },
+        },
+        "arm": {"surface_height": height, "length": arm},
+        "throw": {"kappa": kappa},
+        "model": {"flight": flight, "flip": flip},
+    }
+
+
+class Plain:
+    """The throw in numpy floats."""
+
+    def __init__(self, data: dict, noise: float = 0.0):
+        number = lambda text: float(text.split()[0])  # noqa: E731
+        center = data["part"]["mass"]["center"]
+        self.h, self.arm = number(data["arm"]["surface_height"]), number(data["arm"]["length"])
+        self.kappa = number(data["throw"]["kappa"])
+        self.k_lo, self.k_hi = self.kappa / (1 + noise) ** 2, self.kappa / (1 - noise) ** 2
+        self.rho = number(data["part"]["mass"]["radius_of_gyration"])
+        self.exact = data["model"]["flight"] == "exact"
+        self.signed = data["model"]["flip"] == "signed"
+        # The triangle on side 2: (0, 0), (L2, 0) and the apex, which is the left vertex of side 0.
+        low, left, right = LENGTHS[2], LENGTHS[0], LENGTHS[1]
+        x = (low**2 + left**2 - right**2) / (2 * low)
+        apex = np.array([x, np.sqrt(left**2 - x**2)])
+        zero, far = np.zeros(2), np.array([low, 0.0])
+        com = np.array([number(center["along"]), number(center["above"])])
+        self.a, self.d = np.empty(3), np.empty(3)
+        for side, (start, end) in {2: (zero, far), 0: (apex, zero), 1: (far, apex)}.items():
+            e = (end - start) / np.linalg.norm(end - start)
+            self.a[side] = (com - start) @ e
+            self.d[side] = e[0] * (com - start)[1] - e[1] * (com - start)[0]
+        self.L = np.array(LENGTHS)
+        self.ell = np.hypot(self.a, self.d)
+
+    def phi(self, i: int, R: np.ndarray, kappa: float) -> np.ndarray:
+        a, d = self.a[i], self.d[i]
+        if not self.exact:
+            return 2 * (R - a) / kappa
+        p = (R + np.sqrt(R**2 + 2 * kappa * (d + self.ell[i]))) / kappa
+        for _ in range(25):
+            f = R * p - a * np.sin(p) + d * (1 - np.cos(p)) - kappa / 2 * p**2
+            p = p - f / (R - a * np.cos(p) + d * np.sin(p) - kappa * p)
+        return p
+
+    def decision(self, i: int, R: np.ndarray, kappa: float) -> np.ndarray:
+        """F*, positive where the part flips."""
+        a, d, h = self.a[i], self.d[i], self.h
+        M = self.rho**2 + self.ell[i] ** 2
+        if not self.exact:
+            om = (self.rho**2 - a * R + 2 * a**2 + d**2 + d * h) / M
+            return (
+                0.5 * M * om * (np.abs(om) if self.signed else om)
+                - kappa * (self.ell[i] - d)
+                + 2 * a * (R - a)
+            )
+        p = self.phi(i, R, kappa)
+        X, H = a * np.cos(p) - d * np.sin(p), a * np.sin(p) + d * np.cos(p)
+        om = (self.rho**2 + X * (R - kappa * p) + H * (h + d)) / M
+        K, V = 0.5 * M * om**2, kappa * (self.ell[i] - H)
+        if self.signed:
+            return np.sign(om) * K - np.sign(X) * V
+        return np.where(X < 0, K + V, K - V)
+
+    def jog(self, i: int, R: np.ndarray, kappa: float) -> np.ndarray:
+        p = self.phi(i, R, kappa)
+        turn = self.a[i] * (1 - np.cos(p)) - self.d[i] * (p - np.sin(p)) if self.exact else 0.0
+        return R - self.h * p + turn
+
+    def flip(self, i: int, R: np.ndarray, kappa: float) -> np.ndarray:
+        j = (i + 1) % 3
+        return self.jog(i, R, kappa) - self.a[i] - (self.L[j] - self.a[j])
+
+    def slope(self, i: int, R: np.ndarray, kappa: float) -> np.ndarray:
+        return (self.jog(i, R * (1 + 1e-6), kappa) - self.jog(i, R * (1 - 1e-6), kappa)) / (2e-6 * R)
+
+
+class Forged:
+    """A header and arrays that can be spoiled before they are written."""
+
+    def __init__(self, header: dict, arrays: dict[str, np.ndarray]):
+        self.header, self.arrays = header, arrays
+
+    def copy(self) -> "Forged":
+        return Forged(copy.deepcopy(self.header), {name: array.copy() for name, array in self.arrays.items()})
+
+    def seal(self) -> "Forged":
+        """Describe the arrays anew, as a forger would."""
+        self.header["arrays"] = {
+            name: {
+                "sha256": hashlib.sha256(np.ascontiguousarray(array).tobytes()).hexdigest(),
+                "dtype": array.dtype.str,
+                "shape": list(array.shape),
+            }
+            for name, array in self.arrays.items()
+        }
+        return self
+
+    def bytes(self, method: int = zipfile.ZIP_STORED) -> bytes:
+        inner, outer = io.BytesIO(), io.BytesIO()
+        np.savez(inner, **self.arrays)
+        with zipfile.ZipFile(outer, "w", method) as file:
+            file.writestr("header.json", json.dumps(self.header))
+            file.writestr("arrays.npz", inner.getvalue())
+        return outer.getvalue()
+
+    def write(self, path: Path) -> Path:
+        path.write_bytes(self.bytes())
+        return path
+
+
+def graded(start: float, end: float, first: float, ratio: float, widest: float) -> np.ndarray:
+    edges = [start + first]
+    while edges[-1] < end:
+        edges.append(edges[-1] + min(ratio * (edges[-1] - start), widest))
+    edges[-1] = end
+    if edges[-1] - edges[-2] < 0.3 * (edges[-2] - edges[-3]):
+        del edges[-2]
+    return np.array(edges)
+
+
+def sampled(m: Plain, i: int, x0: float, x1: float) -> tuple[int, dict[int, tuple[float, float]]]:
+    """The decision in a cell with noise, and the images of the parts where the part jogs and flips, by samples."""
+    x = np.linspace(x0, x1, 31)
+    kappas = np.linspace(m.k_lo, m.k_hi, 31)
+    F = np.array([m.decision(i, x, k) for k in kappas])
+    spare = 0.02 * (F.max() - F.min())
+    images = {}
+    for branch, image, mask in ((0, m.jog, spare >= F), (1, m.flip, -spare <= F)):
+        values = np.array([image(i, x, k) for k in kappas])
+        if mask.any():
+            steps = np.abs(np.diff(values, axis=0)).max() + np.abs(np.diff(values, axis=1)).max()
+            images[branch] = float(values[mask].min() - steps), float(values[mask].max() + steps)
+    return (2 if len(images) == 2 else next(iter(images))), images
+
+
+def forge(
+    model: str, *, noise: float = 0.0, first: float = 0.02, ratio: float = 0.012, widest: float = 0.04
+) -> Forged:
+    """A certificate with all claims that are known; noise is a share of the speed."""
+    data = scene(model)
+    m = Plain(data, noise)
+    edges = [graded(m.a[i], m.arm, first, ratio, widest) for i in range(3)]
+    starts = np.concatenate([[0], np.cumsum([len(e) - 1 for e in edges])])
+    n = int(starts[-1])
+    jog, flip = np.full((n, 2), -1, np.int32), np.full((n, 2), -1, np.int32)
+    branch, phi = np.empty(n, np.int8), np.empty((n, 2))
+    for i in range(3):
+        x0, x1 = edges[i][:-1], edges[i][1:]
+        own = slice(starts[i], starts[i + 1])
+        phi[own, 0] = m.phi(i, x0, m.k_hi) * (1 - SLACK)
+        phi[own, 1] = m.phi(i, x1, m.k_lo) * (1 + SLACK)
+        corners = [(x, k) for x in (x0, x1) for k in (m.k_lo, m.k_hi)]
+        F = np.array([m.decision(i, x, k) for x, k in corners])
+        clear = np.abs(F).min(axis=0) > 0.5 * (F.max(axis=0) - F.min(axis=0))
+        branch[own] = np.where(clear & (F > 0).all(axis=0), 1, np.where(clear & (F < 0).all(axis=0), 0, 2))
+        reached = {}
+        for cell in np.flatnonzero(branch[own] == 2) if noise else ():
+            branch[own][cell], reached[cell] = sampled(m, i, x0[cell], x1[cell])
+        for array, image, j, mine in ((jog, m.jog, i, 0), (flip, m.flip, (i + 1) % 3, 1)):
+            values = np.array([image(i, x, k) for x, k in corners])
+            margin = 1e-3 * (x1 - x0)
+            lo, hi = values.min(axis=0) - margin, values.max(axis=0) + margin
+            for cell, images in reached.items():
+                if mine in images:
+                    lo[cell], hi[cell] = max(lo[cell], images[mine][0]), min(hi[cell], images[mine][1])
+            ranges = np.stack(
+                [np.searchsorted(edges[j], lo, "right") - 1, np.searchsorted(edges[j], hi, "left") - 1],
+                axis=1,
+            )
+            used = (branch[own] == mine) | (branch[own] == 2)
+            assert ((ranges[used] >= 0) & (ranges[used] < len(edges[j]) - 1)).all()
+            array[own][used] = ranges[used] + starts[j]
+
+    graph = nx.DiGraph()
+    for cell in range(n):
+        for first_cell, last_cell in (jog[cell], flip[cell]):
+            graph.add_edges_from((cell, t) for t in range(first_cell, last_cell + 1) if t >= 0)
+    component, rank = np.full(n, -1, np.int32), np.zeros(n, np.int32)
+    last = [c for c in nx.strongly_connected_components(graph) if all(t in c for v in c for t in graph[v])]
+    for number, cells in enumerate(last):
+        component[list(cells)] = number
+    outside = graph.subgraph(np.flatnonzero(component < 0).tolist())
+    for cell in reversed(list(nx.topological_sort(outside))):
+        rank[cell] = 1 + max(rank[t] for t in graph[cell])
+
+    inside = component >= 0
+    slopes = []
+    for i in range(3):
+        cells = inside[starts[i] : starts[i + 1]]
+        x = np.concatenate([edges[i][:-1][cells], edges[i][1:][cells]])
+        slopes += [m.slope(i, x, k).min() for k in (m.k_lo, m.k_hi) if len(x)]
+    box = lambda lo, hi=None: [float(v).hex() for v in (  # noqa: E731
+        lo - 1e-12 * (1 + abs(lo)), (lo if hi is None else hi) + 1e-12 * (1 + abs(lo)))]  # fmt: skip
+    claims = [
+        {
+            "claim": "attracts-all",
+            "section": {
+                "near_joint": {
+                    str(i): {"q": float(1 + 2 * abs(m.h) / m.k_hi * (1 - 1e-9)).hex()} for i in range(3)
+                },
+                "max_rank": int(rank.max()),
+            },
+        },
+        {"claim": "invariant", "section": {}},
+        {"claim": "trapping", "section": {}},
+        {"claim": "expanding", "section": {"least_slope": float(1 + (min(slopes) - 1) * 0.7).hex()}},
+        {"claim": "goal", "section": {"kind": "oriented_beyond", "x": "20 in", "side": 2}},
+    ]
+    header = {
+        "format": "limitsets-proof",
+        "version": 1,
+        "map": {
+            "name": "throw",
+            "version": 1,
+            "flight": MODELS[model][0],
+            "flip": MODELS[model][1],
+            "formulas": [],
+        },
+        "state": "x of the centre of mass at rest, and the side it rests on",
+        "noise": {"throw.speed": f"{noise * 100!r} %"} if noise else None,
+        "tolerance": None,
+        "boxes": [
+            {
+                "scene": data,
+                "prefix": "0.",
+                "parameters": {
+                    "a": [box(a) for a in m.a],
+                    "d": [box(d) for d in m.d],
+                    "length": [box(length) for length in LENGTHS],
+                    "kappa": box(m.k_lo, m.k_hi),
+                    "surface_height": box(m.h),
+                    "arm_length": box(m.arm),
+                    "radius_of_gyration": box(m.rho),
+                },
+            }
+        ],
+        "claims": claims,
+        "arrays": {},
+        "producer": {"name": "forge"},
+    }
+    arrays = {f"0.edges.{i}": edges[i] for i in range(3)}
+    arrays |= {"0.jog": jog, "0.flip": flip, "0.branch": branch, "0.rank": rank}
+    arrays |= {"0.component": component, "0.phi": phi}
+    return Forged(header, arrays).seal()

@@ -1,0 +1,381 @@
+"""What is proved of the paper's feeders, and what is refuted: global attraction, expansion, the goal, noise, tolerance.
+
+The truths are those of the model: closed forms where there are some (docs/model.md), the tables of `test_paper.py`,
+which come from 40-digit orbits, and margins found by reachability and bisection apart from this package.  Refuting
+orbits are thrown again by `tests/thrower/reference.py`, 50 digits of the plain formulas.
+"""
+
+import json
+import math
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+import limitsets as ls
+from limitsets.errors import AnswerError, LimitsetsError
+from limitsets.maps import images
+from limitsets.proofs.attraction import attraction
+from limitsets.proofs.certificate import arrays_of
+from limitsets.proofs.cover import cover
+from limitsets.proofs.parameters import parameter_box
+from limitsets.scene.units import parse
+from tests.test_paper import LIMIT_SETS, THRESHOLDS
+from tests.thrower import reference
+
+# Least slope of the map on the limit set: constant in the small-angle scenes, a minimum in the exact ones.
+SMALL, EXACT = (
+    ("paper-initial-small-angle", "paper-designed-small-angle"),
+    ("paper-initial", "paper-designed"),
+)
+LEAST_LOG_SLOPE = {"paper-initial": (0.058, 0.0597), "paper-designed": (0.030, 0.0324)}
+
+ASKED = ["attracts-all", "invariant", "expanding", "goal"]
+
+
+def verdicts(proof):
+    return {claim.claim: claim.verdict for claim in proof.claims}
+
+
+def claim_of(proof, word):
+    return next(claim for claim in proof.claims if claim.claim == word)
+
+
+def table_of(proof, word):
+    return next(record for record in proof.to_json() if record["claim"] == word)
+
+
+def numbers(scene):
+    """Facts of a built-in scene from its decimals, by plane geometry at 50 digits."""
+    return reference.paper(scene.name.removeprefix("paper-").removesuffix("-angle"))
+
+
+def require_rechecked(proof, tmp_path):
+    report = ls.recheck(proof.save(tmp_path / "x.proof.zip"))
+    assert report.reason == ""
+    assert report.verdict == "proved"
+    proved = {claim.claim for claim in proof.claims if claim.verdict == "proved"}
+    assert {claim for claim, state, _ in report.claims if state == "proved"} == proved
+
+
+@pytest.fixture(scope="module", params=LIMIT_SETS)
+def paper(request):
+    return ls.certify(request.param, ASKED)
+
+
+# ---------------------------------------------------------------- the paper's four scenes
+
+
+def test_every_start_on_the_arm_is_attracted(paper):
+    """Global attraction, for the exact decimals of each of the paper's scenes."""
+    assert verdicts(paper)["attracts-all"] == "proved"
+    bound = table_of(paper, "attracts-all")["max_throws"]
+    scene = paper.scene
+    facts, extents = numbers(scene), table_of_extents(paper)
+    rng = np.random.default_rng(11)
+    for side in range(3):
+        begin = bound["beyond"][str(side)]
+        assert 0.0 < begin - float(facts.a[side]) < 1e-4  # "every start" leaves out nothing but what follows
+        for x in [begin, scene.arm_length, *rng.uniform(begin, scene.arm_length, 6)]:
+            path = ls.orbit(scene.map, x, side, bound["throws"] + 500)
+            assert path.stopped is None
+            for number, cells in extents.items():
+                late = path.x[bound["throws"] :][path.side[bound["throws"] :] == int(number)]
+                assert np.any([(lo <= late) & (late <= hi) for lo, hi in cells], axis=0).all()
+
+
+def table_of_extents(proof):
+    return {
+        side: [(part[0][0], part[1][1]) for part in parts]
+        for side, parts in table_of(proof, "attracts-all")["extents"].items()
+    }
+
+
+def test_nearer_to_the_joint_every_throw_goes_outward(paper):
+    """R' - a >= (1 + 2 |h| / kappa) (R - a) near the joint: closed form."""
+    facts = numbers(paper.scene)
+    factor = 1 + 2 * abs(facts.surface_height) / facts.kappa
+    found = table_of(paper, "attracts-all")["max_throws"]["near_joint"]
+    assert factor * (1 - 1e-9) < found <= factor
+
+
+def test_the_limit_sets_of_the_table_lie_in_the_attracting_cells(paper):
+    cells = table_of_extents(paper)
+    for side, parts in LIMIT_SETS[paper.scene.name].items():
+        for lo, hi in parts:
+            assert any(left <= lo and hi <= right for left, right in cells[str(side)])
+            near = min(
+                max(lo - left, right - hi) for left, right in cells[str(side)] if left <= lo and hi <= right
+            )
+            assert near < 0.5  # inches: cells around it, not the whole arm
+
+
+def test_nothing_in_the_limit_set_attracts_and_the_entropy_is_bounded(paper):
+    assert verdicts(paper)["expanding"] == "proved"
+    found = table_of(paper, "expanding")["entropy"]
+    name = paper.scene.name
+    if name in SMALL:
+        facts = numbers(paper.scene)
+        exact = float(reference.mp.log(1 + 2 * abs(facts.surface_height) / facts.kappa))
+        assert exact - 1e-3 <= found <= exact
+    else:
+        least, most = LEAST_LOG_SLOPE[name]
+        assert least <= found <= most
+    assert table_of(paper, "expanding")["least_slope"] == pytest.approx(math.exp(found), rel=1e-12)
+
+
+def test_the_goal_is_proved_where_it_holds_and_refuted_where_not(paper):
+    _, holds = THRESHOLDS[paper.scene.name]
+    assert verdicts(paper)["goal"] == ("proved" if holds else "refuted")
+    if not holds:
+        require_refuting_orbit(paper)
+
+
+def require_refuting_orbit(proof, share=0.0):
+    """Throw the orbit again with the plain formulas, and see that it does what is said."""
+    goal, facts = proof.scene.goal, numbers(proof.scene)
+    states = table_of(proof, "goal")["counterexample"]
+    first, last = states[0], states[-1]
+    cells = table_of_extents(proof) if verdicts(proof).get("attracts-all") == "proved" else {}
+    assert not cells or any(lo <= first["x"] <= hi for lo, hi in cells[str(first["side"])])
+    for before, after in pairwise(states):
+        kappa = float(parse(before["parameters"]["throw.kappa"], "length").number)
+        assert (
+            facts.kappa / (1 + share) ** 2 * (1 - 1e-12)
+            <= kappa
+            <= facts.kappa / (1 - share) ** 2 * (1 + 1e-12)
+        )
+        thrown = reference.throw(
+            reference.Facts({**facts.numbers, "kappa": kappa}), before["side"], before["x"]
+        )
+        assert thrown.code in (0, 1)
+        assert thrown.side == after["side"]
+        # each throw is begun at the middle of an interval of width w: it ends within a few w of the next one's
+        width = 1e-12 + 4 * (before["between"][1] - before["between"][0])
+        assert after["between"][0] - width <= thrown.x <= after["between"][1] + width
+    assert last["parameters"] is None
+    assert last["between"][0] > goal.x
+    assert last["side"] != goal.side
+
+
+def test_what_is_proved_is_proved_by_other_arithmetic_too(paper, tmp_path):
+    require_rechecked(paper, tmp_path)
+
+
+# ---------------------------------------------------------------- noise and tolerance
+
+
+def test_noise_at_every_throw(tmp_path):
+    """The goal of the designed scene, sharp at 0.397 %: a slow throw jogs, a fast one then flips."""
+    proof = ls.certify("paper-designed", noise={"throw.speed": "0.38 %"})
+    assert verdicts(proof) == {"attracts-all": "proved", "goal": "proved"}
+    require_rechecked(proof, tmp_path)
+    proof = ls.certify("paper-designed", noise={"throw.speed": "0.41%"})
+    assert verdicts(proof)["goal"] == "refuted"
+    assert (
+        len({state["parameters"]["throw.kappa"] for state in table_of(proof, "goal")["counterexample"][:-1]})
+        > 1
+    )
+    require_refuting_orbit(proof, 0.0041)
+
+
+def test_a_speed_that_is_fixed_but_unknown(tmp_path):
+    """Sharp at 0.733 %, slower."""
+    proof = ls.certify("paper-designed", tolerance={"throw.speed": "0.7 %"})
+    assert verdicts(proof) == {"attracts-all": "proved", "goal": "proved"}
+    assert len(proof.attractions) > 1
+    require_rechecked(proof, tmp_path)
+
+
+def test_a_tolerance_is_refuted_at_one_of_its_values_and_the_rest_is_still_proved_of_all(tmp_path):
+    proof = ls.certify("paper-designed", tolerance={"throw.speed": "0.8%"})
+    assert verdicts(proof) == {"attracts-all": "proved", "goal": "refuted"}
+    kappas = {state["parameters"]["throw.kappa"] for state in table_of(proof, "goal")["counterexample"][:-1]}
+    assert len(kappas) == 1
+    require_refuting_orbit(proof, 0.008)
+    require_rechecked(proof, tmp_path)  # the checker refuses boxes that do not cover the tolerance
+
+
+def test_what_is_refuted_at_a_corner_is_never_called_proved_of_the_rest():
+    """A surface 0.12 in lower or higher: the designed goal fails at h = -0.3 (20.18), so it is refuted there."""
+    proof = ls.certify("paper-designed", ["goal", "invariant"], tolerance={"arm.surface_height": "0.12 in"})
+    assert verdicts(proof)["goal"] == "refuted"
+    record = table_of(proof, "goal")
+    assert record["extents"] is None
+    lo, hi = record["counterexample"][0]["parameters"]["arm.surface_height"]
+    assert float(parse(lo, "length").number) == pytest.approx(-0.32)
+    assert lo == hi
+
+
+# ---------------------------------------------------------------- what cannot be proved
+
+
+def test_a_surface_above_the_joint_is_not_proved_to_attract_everything():
+    """With h = 0.1 in every start below 3.16 in on side 0 creeps to the joint: attraction of all is false."""
+    scene = ls.load("paper-designed").with_values({"arm.surface_height": 0.1})
+    path = ls.orbit(scene.map, 2.5, 0, 3000)
+    assert path.x[-1] < path.x[0]
+    proof = ls.certify(scene)
+    claim = claim_of(proof, "attracts-all")
+    assert claim.verdict == "undecided"
+    assert "not below the joint" in claim.reason
+    assert "side 0, x in [" in claim.reason
+    record = table_of(proof, "attracts-all")
+    assert record["max_throws"] is record["extents"] is None
+    assert record["reason"] == claim.reason
+    assert verdicts(proof)["goal"] == "proved"  # sharp at 18.52 there
+
+
+@pytest.mark.parametrize("kappa", [2.0, 3.0])
+def test_throws_so_fast_that_parts_never_land_are_undecided(kappa):
+    """kappa < ell: f may have several roots, or none within a turn, as from x = 27 on here."""
+    scene = ls.load("paper-designed").with_values({"throw.kappa": kappa})
+    assert ls.orbit(scene.map, 27.0, 0, 1).stopped == "outside-model"
+    proof = ls.certify(scene, ["attracts-all", "goal", "invariant", "expanding"])
+    for claim in proof.claims:
+        assert claim.verdict == "undecided"
+        assert claim.reason
+        assert claim.section == {}
+    assert "side " in claim_of(proof, "attracts-all").reason
+    with pytest.raises(AnswerError, match="without a proved claim"):
+        proof.save("nowhere.proof.zip")
+
+
+def test_a_goal_that_cannot_be_proved_in_this_version_is_undecided():
+    tree = ls.load("paper-designed").as_dict()
+    for goal in (
+        {"oriented_beyond": {"x": "20 in", "side": 2}, "from_anywhere": True},
+        {"reaches": {"x": "20 in", "side": 2}},
+    ):
+        proof = ls.certify(ls.load({**tree, "goal": goal}))
+        assert verdicts(proof) == {"attracts-all": "proved", "goal": "undecided"}
+        assert "cannot be proved in this version" in claim_of(proof, "goal").reason
+
+
+@pytest.mark.parametrize(
+    "asked",
+    [
+        {"claims": ["attracts"]},
+        {"noise": {"throw.speeed": "1 %"}},
+        {"noise": {"throw.speed": "-1 %"}},
+        {"noise": {"throw.speed": "100 %"}},
+        {"noise": {"throw.speed": "1 deg/s"}},  # the scene is given by kappa
+        {"noise": {"landing.x": "0.1 in"}},
+        {"tolerance": {"throw.speed": "-1 %"}},
+        {"tolerance": {"throw.speed": "1 in"}},
+        {"tolerance": {"throw.speed": "1 %", "throw.kappa": "1 %"}},
+        {"tolerance": {"gravity.tilt": "1 %"}},
+        {"tolerance": {"part.sides[7]": "1 %"}},
+        {"tolerance": {"part.mass.center.above": "0.8 in"}},
+    ],
+    ids=str,
+)
+def test_questions_that_are_none(asked):
+    with pytest.raises(LimitsetsError):
+        ls.certify("paper-designed", **asked)
+
+
+def test_a_goal_that_is_not_there():
+    tree = ls.load("paper-designed").as_dict()
+    del tree["goal"]
+    assert verdicts(ls.certify(ls.load(tree))) == {"attracts-all": "proved"}
+    with pytest.raises(AnswerError, match="the goal"):
+        ls.certify(ls.load(tree), ["goal"])
+
+
+def test_noise_of_a_speed_with_a_unit():
+    """w = sqrt(g / kappa): 0.5 % of it and the same in degrees per second enclose the same kappas."""
+    tree = ls.load("paper-designed").as_dict()
+    tree["throw"] = {"speed": "158 deg/s"}
+    scene = ls.load(tree)
+    one, two = (parameter_box(scene, noise={"throw.speed": text}) for text in ("0.5 %", "0.79 deg/s"))
+    assert one.lo.kappa == pytest.approx(two.lo.kappa, rel=1e-14)
+    assert one.hi.kappa == pytest.approx(two.hi.kappa, rel=1e-14)
+    speed = math.radians(158)
+    assert one.lo.kappa < 193.045 / (speed * 1.005) ** 2 * (1 + 1e-15)
+    assert one.hi.kappa > 193.045 / (speed * 0.995) ** 2 * (1 - 1e-15)
+
+
+# ---------------------------------------------------------------- JSON
+
+
+def test_json_has_the_fixed_words_and_no_nan(paper):
+    words = {
+        "claim", "verdict", "counterexample", "parameters", "noise", "max_throws", "extents", "cells", "undecided",
+        "unresolved", "timings",
+    }  # fmt: skip
+    records = json.loads(json.dumps(paper.to_json(), allow_nan=False))
+    assert [record["claim"] for record in records] == ASKED
+    for record in records:
+        assert words <= set(record)
+        assert record["verdict"] in ("proved", "refuted", "undecided")
+        assert record["parameters"]["part.sides[1]"] == "3.6 in"
+        assert record["parameters"]["throw.kappa"] == paper.scene.text["throw"]["kappa"]
+        assert record["noise"] is None
+        assert record["cells"] == sum(len(edges) - 1 for (edges,) in paper.attractions[0].cover.grid.edges)
+        assert 0 < record["undecided"] < record["cells"]
+        assert record["unresolved"] == {}
+
+
+# ---------------------------------------------------------------- enclosures
+
+MODELS = [("exact", "signed"), ("exact", "energy"), ("small-angle", "energy")]
+SCENES_OF_A_MODEL, POINTS, CELLS = 7, 5000, 200
+
+
+def random_scene(rng, flight, flip):
+    """A part, an arm and a throw that can be: drawn until one is."""
+    tree = ls.load("paper-designed").as_dict()
+    while True:
+        tree["part"]["mass"]["center"] = {
+            "side": 2, "along": f"{rng.uniform(1, 6):.6f} in", "above": f"{rng.uniform(0.1, 3):.6f} in",
+        }  # fmt: skip
+        tree["part"]["mass"]["radius_of_gyration"] = f"{rng.uniform(0.3, 3):.6f} in"
+        tree["arm"] = {
+            "surface_height": f"{rng.uniform(-2, 0.5):.6f} in",
+            "length": f"{rng.uniform(15, 50):.6f} in",
+        }
+        tree["throw"] = {"kappa": f"{math.exp(rng.uniform(math.log(2), math.log(90))):.6f} in"}
+        tree["model"] = {"flight": flight, "flip": flip}
+        try:
+            return ls.load(tree)
+        except LimitsetsError:
+            continue
+
+
+@pytest.mark.parametrize(("flight", "flip"), MODELS)
+def test_random_points_land_where_the_cells_say(flight, flip):
+    """Of random points of random cells of random scenes, thrown with kappa anywhere in the noise: branch and target."""
+    rng = np.random.default_rng(20)
+    total = met = 0
+    for number in range(SCENES_OF_A_MODEL):
+        scene = random_scene(rng, flight, flip)
+        noise = {"throw.speed": "0.3 %"} if number % 2 else {}
+        box = parameter_box(scene, noise=noise)
+        found = attraction(cover(box, CELLS))
+        arrays = arrays_of(found, "")
+        leaves = found.cover.graph.ranges.exits != 0
+        offset = found.cover.grid.offset
+        share = rng.uniform(-0.003, 0.003) if noise else 0.0
+        thrown = scene.map._replace(kappa=scene.kappa / (1 + share) ** 2)
+        for side in range(3):
+            edges = arrays[f"edges.{side}"]
+            k = rng.integers(0, edges.size - 1, POINTS)
+            x = edges[k] + rng.random(POINTS) * (edges[k + 1] - edges[k])
+            got = images(thrown, x, side)
+            cell = offset[side] + k
+            stays = got.code >= 0
+            assert leaves[cell[~stays]].all()
+            for branch, name in enumerate(("jog", "flip")):
+                mine = stays & (got.code == branch) & ~leaves[cell]
+                here = cell[mine]
+                assert np.isin(arrays["branch"][here], (branch, 2)).all()
+                first, last = arrays[name][here].T
+                to = arrays[f"edges.{(side + branch) % 3}"]
+                local = offset[(side + branch) % 3]
+                assert (to[first - local] <= got.x[mine]).all()
+                assert (got.x[mine] <= to[last - local + 1]).all()
+                met += here.size
+            total += POINTS
+    assert total * len(MODELS) >= 100_000
+    assert met > 0.3 * total  # most scenes keep most of their parts

@@ -1,0 +1,751 @@
+"""The checker of certificates: accepts what is right, and nothing that has been made false or that is damaged.
+
+It is loaded from its file, as a stranger would have it; the certificates come from `forge.py`, not from the package.
+"""
+
+import importlib.util
+import io
+import json
+import math
+import os
+import random
+import shutil
+import struct
+import subprocess
+import sys
+import time
+import zipfile
+from fractions import Fraction
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+pytest.importorskip("flint", reason="the checker needs python-flint")
+
+import flint
+from flint import arb
+
+from tests.proofs import forge
+
+ROOT = Path(__file__).resolve().parents[2]
+SOURCE = ROOT / "limitsets" / "proofs" / "recheck.py"
+
+
+def load(name: str, path: Path):
+    spec = importlib.util.spec_from_file_location(name, path)
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[name] = module
+    spec.loader.exec_module(module)
+    return module
+
+
+checker = load("lone_recheck", SOURCE)
+
+CLAIMS = ["attracts-all", "invariant", "trapping", "expanding", "goal"]
+COARSE = {"first": 0.1, "ratio": 0.012, "widest": 0.06}
+
+
+@pytest.fixture(autouse=True)
+def precision():
+    """The checker sets the precision in `recheck` and in its workers; tests of its parts need it as well."""
+    before = flint.ctx.prec
+    flint.ctx.prec = checker.PRECISION
+    yield
+    flint.ctx.prec = before
+
+
+@pytest.fixture(scope="module")
+def good():
+    """Certificates of both models that are right, forged once."""
+    return {model: forge.forge(model, **COARSE) for model in ("designed", "small")}
+
+
+def verdict(forged, tmp_path):
+    data = forged if isinstance(forged, bytes) else forged.bytes()
+    path = tmp_path / "x.proof.zip"
+    path.write_bytes(data)
+    return checker.recheck(path, workers=1)
+
+
+# ------------------------------------------------------------------------------------------------- what is accepted
+
+
+@pytest.mark.parametrize("model", ["designed", "small"])
+def test_a_right_certificate_is_proved(good, tmp_path, model):
+    report = verdict(good[model], tmp_path)
+    assert report.reason == ""
+    assert report.verdict == "proved"
+    assert report.claims == [(claim, "proved", "") for claim in CLAIMS]
+    assert report.cells == len(good[model].arrays["0.branch"])
+    assert report.parameters["arm.length"] in ("28 in", "40 in")
+    assert any("goal: in the attracting cells, x > 20 in implies side 2" in line for line in report.statement)
+
+
+def test_what_was_accepted_is_true_at_sampled_points(good):
+    rng = np.random.default_rng(5)
+    for model, f in good.items():
+        m = forge.Plain(forge.scene(model))
+        starts = np.cumsum([0] + [len(f.arrays[f"0.edges.{i}"]) - 1 for i in range(3)])
+        for i in range(3):
+            edges = f.arrays[f"0.edges.{i}"]
+            x = rng.uniform(edges[0], edges[-1], 3000)
+            cell = np.searchsorted(edges, x, "right") - 1 + starts[i]
+            F = m.decision(i, x, m.kappa)
+            branch = f.arrays["0.branch"][cell]
+            assert (F[branch == 0] <= 0).all()
+            assert (F[branch == 1] >= 0).all()
+            image = np.where(F > 0, m.flip(i, x, m.kappa), m.jog(i, x, m.kappa))
+            target = np.where((F > 0)[:, None], f.arrays["0.flip"][cell], f.arrays["0.jog"][cell])
+            lower = np.concatenate([f.arrays[f"0.edges.{k}"][:-1] for k in range(3)])
+            upper = np.concatenate([f.arrays[f"0.edges.{k}"][1:] for k in range(3)])
+            assert (lower[target[:, 0]] < image).all()
+            assert (image < upper[target[:, 1]]).all()
+
+
+def test_a_noisy_certificate_is_proved_and_says_so(tmp_path):
+    f = forge.forge("designed", noise=0.001)
+    del f.header["claims"][4]
+    report = verdict(f, tmp_path)
+    assert (report.verdict, report.reason) == ("proved", "")
+    assert "0.1 %" in report.parameters["noise (at every throw)"]
+    assert "entropy" not in " ".join(report.statement)
+
+
+def test_boxes_of_a_tolerance_have_to_cover_it(good, tmp_path):
+    f = good["small"].copy()
+    f.header["tolerance"] = {"throw.kappa": "0 %"}
+    assert verdict(f, tmp_path).verdict == "proved"
+    f.header["tolerance"] = {"throw.kappa": "0.1 %"}
+    report = verdict(f, tmp_path)
+    assert report.verdict == "failed"
+    assert "do not cover the tolerance" in report.reason
+    kappas = [["10 in", "10.5 in"], ["10.5 in", "11 in"], ["11.0000001 in", "12 in"]]
+    scenes = [forge.scene("small") for _ in kappas]
+    for scene, kappa in zip(scenes, kappas, strict=True):
+        scene["throw"]["kappa"] = kappa
+    asked = {"throw.speed": "1 %"}
+    assert checker.check_tolerance(scenes, asked)[1] == "the boxes leave a gap in the tolerance"
+    assert checker.check_tolerance(scenes[:2], asked)[1] == ""
+    assert checker.check_tolerance(scenes[:2], {"throw.speed": "3 %"})[1] != ""
+    scenes[1]["arm"]["surface_height"] = "-1.1 in"
+    assert "differ in something else" in checker.check_tolerance(scenes[:2], asked)[1]
+
+
+def test_a_tight_image_near_a_decision_is_reached_by_halving(tmp_path):
+    """Speeds differ at every throw, and an undecided cell stores images only of where it jogs and where it flips."""
+    f = forge.forge("designed", noise=0.002, first=0.1, ratio=0.012, widest=0.02)
+    report = verdict(f, tmp_path)
+    assert (report.verdict, report.reason) == ("proved", "")
+    assert report.boxes > report.cells + 100
+
+
+@pytest.mark.parametrize("model", ["energy", "initial", "initial-small"])
+def test_the_other_models_are_proved(tmp_path, model):
+    f = forge.forge(model, first=0.1, ratio=0.008, widest=0.03)
+    if model != "energy":  # on the limit sets of the initial scenes the goal does not hold
+        assert verdict(f, tmp_path).claims[4][1] == "failed"
+        del f.header["claims"][4]
+    report = verdict(f, tmp_path)
+    assert (report.verdict, report.reason) == ("proved", "")
+
+
+# ------------------------------------------------------------------------------------------- what is made false
+
+
+def pick(rng, mask):
+    cells = np.flatnonzero(mask)
+    return int(cells[rng.randrange(len(cells))])
+
+
+class Spoiler:
+    """Ways to make the statement or its proof false; each takes a copy of a right certificate, and a generator."""
+
+    def __init__(self, f, model, rng):
+        self.f, self.rng, self.A = f, rng, {name[2:]: array for name, array in f.arrays.items()}
+        self.m = forge.Plain(forge.scene(model))
+        self.sections = {claim["claim"]: claim["section"] for claim in f.header["claims"]}
+        self.starts = np.cumsum([0] + [len(self.A[f"edges.{i}"]) - 1 for i in range(3)])
+        self.inside = self.A["component"] >= 0
+        self.scene = f.header["boxes"][0]["scene"]
+        self.parameters = f.header["boxes"][0]["parameters"]
+
+    def where(self, cell):
+        side = int(np.searchsorted(self.starts, cell, "right") - 1)
+        edges, k = self.A[f"edges.{side}"], cell - self.starts[side]
+        return side, edges[k], edges[k + 1]
+
+    def targets(self, cell):
+        ranges = (self.A["jog"][cell], self.A["flip"][cell])
+        return np.concatenate([np.arange(a, b + 1) for a, b in ranges if a >= 0])
+
+    def rank_too_low(self):
+        cell = pick(self.rng, ~self.inside)
+        self.A["rank"][cell] = self.A["rank"][self.targets(cell)].max()
+
+    def rank_in_component(self):
+        self.A["rank"][pick(self.rng, self.inside)] = 1
+
+    def other_branch(self):
+        cell = pick(self.rng, self.A["branch"] != 2)
+        old, new = ("jog", "flip") if self.A["branch"][cell] == 0 else ("flip", "jog")
+        side, x0, x1 = self.where(cell)
+        to = (side + (new == "flip")) % 3
+        image = getattr(self.m, new)
+        edges = self.A[f"edges.{to}"]
+        ends = np.clip(
+            np.searchsorted(edges, image(side, np.array([x0, x1]), self.m.kappa)) - 1, 0, len(edges) - 2
+        )
+        self.A[new][cell] = self.starts[to] + np.sort(ends)
+        self.A[old][cell] = -1
+        self.A["branch"][cell] = 1 - self.A["branch"][cell]
+
+    def branch_forgotten(self):
+        own = self.A["branch"] == 2
+        for cell in np.flatnonzero(own):
+            side, x0, x1 = self.where(cell)
+            F = self.m.decision(side, np.array([x0, x1]), self.m.kappa)
+            own[cell] = F.min() < -1e-9 and F.max() > 1e-9
+        cell, keep = pick(self.rng, own), self.rng.randrange(2)
+        self.A["branch"][cell] = keep
+        self.A[("flip", "jog")[keep]][cell] = -1
+
+    def branch_without_targets(self):
+        self.A["branch"][pick(self.rng, self.A["branch"] != 2)] = 2
+
+    def branch_unknown(self):
+        self.A["branch"][self.rng.randrange(len(self.inside))] = self.rng.choice([-1, 3, 127])
+
+    def bracket_low(self):
+        cell = self.rng.randrange(len(self.inside))
+        side, x0, _ = self.where(cell)
+        self.A["phi"][cell, 0] = self.m.phi(side, np.array([x0]), self.m.kappa)[0] * (
+            1 + 10 ** self.rng.uniform(-9, -4)
+        )
+
+    def bracket_high(self):
+        cell = self.rng.randrange(len(self.inside))
+        side, _, x1 = self.where(cell)
+        self.A["phi"][cell, 1] = self.m.phi(side, np.array([x1]), self.m.kappa)[0] * (
+            1 - 10 ** self.rng.uniform(-9, -4)
+        )
+
+    def bracket_negative(self):
+        self.A["phi"][self.rng.randrange(len(self.inside)), 0] *= -1
+
+    def bracket_beyond_a_turn(self):
+        self.A["phi"][self.rng.randrange(len(self.inside)), 1] = 7.0
+
+    def edge_moved(self):
+        edges = self.A[f"edges.{self.rng.randrange(3)}"]
+        k = self.rng.randrange(1, len(edges) - 1)
+        edges[k] += self.rng.choice([-0.3, 0.3]) * (edges[k + 1] - edges[k])
+
+    def edge_left_of_a(self):
+        side = self.rng.randrange(3)
+        self.A[f"edges.{side}"][0] = self.m.a[side] * (1 - 1e-6)
+
+    def edge_short_of_arm(self):
+        self.A[f"edges.{self.rng.randrange(3)}"][-1] *= 1 - 1e-9
+
+    def edges_swapped(self):
+        edges = self.A[f"edges.{self.rng.randrange(3)}"]
+        k = self.rng.randrange(len(edges) - 1)
+        edges[[k, k + 1]] = edges[[k + 1, k]]
+
+    def target_narrowed(self):
+        while True:
+            cell = self.rng.randrange(len(self.inside))
+            what = self.rng.choice(["jog", "flip"])
+            first, last = self.A[what][cell]
+            if last <= first or self.A["branch"][cell] == 2:
+                continue
+            side, x0, x1 = self.where(cell)
+            image = getattr(self.m, what)(side, np.array([x0, x1]), self.m.kappa)
+            end = self.rng.randrange(2)
+            if end == 0 and image.min() < self.where(first)[2] - 1e-7:
+                self.A[what][cell, 0] += 1
+                return
+            if end == 1 and image.max() > self.where(last)[1] + 1e-7:
+                self.A[what][cell, 1] -= 1
+                return
+
+    def target_on_another_side(self):
+        self.A["jog"][pick(self.rng, self.A["jog"][:, 0] >= self.starts[1])] -= self.starts[1]
+
+    def target_out_of_range(self):
+        cell = pick(self.rng, self.A["flip"][:, 0] >= 0)
+        self.A["flip"][cell, self.rng.randrange(2)] = self.rng.choice(
+            [2**31 - 1, -(2**31), len(self.inside), -2]
+        )
+
+    def component_cell_dropped(self):
+        hit = np.zeros(len(self.inside), dtype=bool)
+        for cell in np.flatnonzero(self.inside):
+            targets = self.targets(cell)
+            hit[targets[targets != cell]] = True
+        cell = pick(self.rng, hit & self.inside)
+        self.A["component"][cell], self.A["rank"][cell] = -1, 1
+
+    def component_cell_added(self):
+        while True:
+            cell = pick(self.rng, ~self.inside)
+            if not self.inside[self.targets(cell)].all():
+                self.A["component"][cell], self.A["rank"][cell] = 0, 0
+                return
+
+    def component_renamed(self):
+        self.A["component"][pick(self.rng, self.inside)] = 1
+
+    def no_component(self):
+        self.A["component"][:] = -1
+
+    def parameter_shifted(self):
+        name = self.rng.choice(sorted(self.parameters))
+        pair = self.parameters[name]
+        pair = pair[self.rng.randrange(3)] if isinstance(pair[0], list) else pair
+        shift = self.rng.choice([-1, 1]) * 10 ** self.rng.uniform(-8, 0)
+        pair[:] = [(float.fromhex(text) + shift).hex() for text in pair]
+
+    def wide_parameters(self):
+        for name, pair in self.parameters.items():
+            wide = [(-1e3).hex(), (1e3).hex()]
+            self.parameters[name] = [wide] * 3 if isinstance(pair[0], list) else wide
+
+    def other_speed(self):
+        self.wide_parameters()
+        self.scene["throw"]["kappa"] = (
+            f"{self.m.kappa * (1 + self.rng.choice([-1, 1]) * 10 ** self.rng.uniform(-7, -2))!r} in"
+        )
+
+    def other_centre(self):
+        self.wide_parameters()
+        center = self.scene["part"]["mass"]["center"]
+        center["along"] = (
+            f"{float(center['along'][:-3]) + self.rng.choice([-1, 1]) * 10 ** self.rng.uniform(-6, -2)!r} in"
+        )
+
+    def other_height(self):
+        self.scene["arm"]["surface_height"] = self.rng.choice(["0 in", "0.2 in", "-0.1 in", "-3 in"])
+        self.wide_parameters()
+        del self.f.header["claims"][1:]
+
+    def longer_arm(self):
+        self.wide_parameters()
+        self.scene["arm"]["length"] = f"{self.m.arm + 10 ** self.rng.uniform(-9, 1)!r} in"
+
+    def other_unit(self):
+        self.wide_parameters()
+        self.scene["throw"]["kappa"] = self.scene["throw"]["kappa"].replace(
+            "in", self.rng.choice(["cm", "ft", "m"])
+        )
+
+    def other_flight(self):
+        flight = "small-angle" if self.m.exact else "exact"
+        self.scene["model"]["flight"] = self.f.header["map"]["flight"] = flight
+
+    def model_of_the_map_only(self):
+        self.f.header["map"]["flip"] = "energy" if self.m.signed else "signed"
+
+    def noise_added(self):
+        self.wide_parameters()
+        self.f.header["noise"] = {"throw.speed": f"{10 ** self.rng.uniform(-5, 0):.9f} %"}
+
+    def tolerance_added(self):
+        self.f.header["tolerance"] = {self.rng.choice(["throw.speed", "arm.length"]): "0.5 %"}
+
+    def fewer_throws(self):
+        self.sections["attracts-all"]["max_rank"] = self.rng.randrange(int(self.A["rank"].max()))
+
+    def steeper_near_joint(self):
+        limit = 1 + 2 * abs(self.m.h) / self.m.kappa
+        q = self.rng.choice([limit * (1 + 10 ** self.rng.uniform(-9, 0)), 1.0, 0.5, 1e300])
+        self.sections["attracts-all"]["near_joint"][str(self.rng.randrange(3))]["q"] = q.hex()
+
+    def steeper(self):
+        least = float.fromhex(self.sections["expanding"]["least_slope"])
+        self.sections["expanding"]["least_slope"] = float(1 + (least - 1) * self.rng.uniform(1.45, 3)).hex()
+
+    def goal_nearer(self):
+        limit = 19.7 if self.m.exact else 12.8
+        self.sections["goal"]["x"] = f"{self.rng.uniform(1, limit):.6f} in"
+
+    def goal_on_another_side(self):
+        self.sections["goal"]["side"] = self.rng.randrange(2)
+
+    def no_section(self):
+        claim = self.rng.choice(self.f.header["claims"])
+        if self.rng.randrange(2):
+            claim["section"] = None
+        else:
+            del claim["section"]
+
+    def unknown_claim(self):
+        name = self.rng.choice(["end-points", "cycles", "everything", "Invariant", ""])
+        self.f.header["claims"].insert(self.rng.randrange(6), {"claim": name, "section": {}})
+
+    def another_goal(self):
+        self.sections["goal"]["kind"] = "reaches"
+
+    def no_claims(self):
+        del self.f.header["claims"][:]
+
+    def sides_swapped(self):
+        i = self.rng.randrange(3)
+        names = [f"0.edges.{i}", f"0.edges.{(i + 1) % 3}"]
+        arrays = self.f.arrays
+        arrays[names[0]], arrays[names[1]] = arrays[names[1]], arrays[names[0]]
+
+    def arrays_swapped(self):
+        self.f.arrays["0.jog"], self.f.arrays["0.flip"] = self.f.arrays["0.flip"], self.f.arrays["0.jog"]
+
+    def value_not_finite(self):
+        name = self.rng.choice(["0.phi", "0.edges.1"])
+        self.f.arrays[name].flat[self.rng.randrange(50)] = self.rng.choice([math.nan, math.inf, -math.inf])
+
+    def of_another_type(self):
+        name = self.rng.choice(["0.phi", "0.jog", "0.branch", "0.rank"])
+        self.f.arrays[name] = self.f.arrays[name].astype(self.rng.choice(["<f4", "<i8", ">i4", "<i2"]))
+
+    def of_another_shape(self):
+        name = self.rng.choice(["0.phi", "0.jog", "0.branch", "0.rank", "0.edges.1"])
+        self.f.arrays[name] = self.f.arrays[name][:-1]
+
+
+WAYS = sorted(
+    name
+    for name in vars(Spoiler)
+    if not name.startswith("_") and name not in ("where", "targets", "wide_parameters")
+)
+EACH = -(-500 // len(WAYS))
+
+
+@pytest.mark.parametrize("way", WAYS)
+def test_no_spoiled_certificate_is_proved(good, tmp_path, way):
+    for seed in range(EACH):
+        rng = random.Random(f"{way} {seed}")
+        model = rng.choice(["designed", "small"])
+        f = good[model].copy()
+        spoiler = Spoiler(f, model, rng)
+        getattr(spoiler, way)()
+        report = verdict(f.seal(), tmp_path)
+        assert report.verdict in ("failed", "bad file"), (way, seed, model)
+        assert report.reason
+        assert "\n" not in report.reason
+
+
+def test_the_failure_names_claim_side_cell_and_interval(good, tmp_path):
+    f = good["designed"].copy()
+    f.arrays["0.phi"][7, 0] *= 1.01
+    report = verdict(f.seal(), tmp_path)
+    assert report.reason.startswith("attracts-all: side 0, cell 7, x in [")
+    states = {claim: state for claim, state, _ in report.claims}
+    assert states == {"attracts-all": "failed"} | dict.fromkeys(CLAIMS[1:], "proved")
+
+
+def test_claims_it_does_not_know_are_not_rechecked(good, tmp_path):
+    f = good["small"].copy()
+    f.header["claims"].append({"claim": "cycles", "section": {"itinerary": "0"}})
+    report = verdict(f, tmp_path)
+    assert report.verdict == "failed"
+    assert report.claims[-1] == ("cycles", "not rechecked", "this checker does not know the claim")
+
+
+# --------------------------------------------------------------------------------------------------- damaged files
+
+
+def zipped(entries: dict[str, bytes], method: int = zipfile.ZIP_STORED) -> bytes:
+    outer = io.BytesIO()
+    with zipfile.ZipFile(outer, "w", method) as file:
+        for name, data in entries.items():
+            file.writestr(name, data)
+    return outer.getvalue()
+
+
+def parts(forged) -> tuple[bytes, dict[str, bytes]]:
+    with zipfile.ZipFile(io.BytesIO(forged.bytes())) as file:
+        inner = file.read("arrays.npz")
+        header = file.read("header.json")
+    with zipfile.ZipFile(io.BytesIO(inner)) as file:
+        return header, {name: file.read(name) for name in file.namelist()}
+
+
+def whole(header: bytes, arrays: dict[str, bytes]) -> bytes:
+    return zipped({"header.json": header, "arrays.npz": zipped(arrays)})
+
+
+def damaged_files(f):
+    """Name and bytes of files that are not certificates."""
+    header, arrays = parts(f)
+    data = f.bytes()
+    yield "empty", b""
+    yield "noise", random.Random(1).randbytes(5000)
+    yield "compressed", f.bytes(zipfile.ZIP_DEFLATED)
+    yield "bomb", zipped({"header.json": b"0" * (50 << 20), "arrays.npz": b""}, zipfile.ZIP_DEFLATED)
+    yield (
+        "compressed inside",
+        zipped({"header.json": header, "arrays.npz": zipped(arrays, zipfile.ZIP_DEFLATED)}),
+    )
+    yield "a comment", data[:-2] + struct.pack("<H", 3) + b"abc"
+    yield (
+        "another entry",
+        zipped({"header.json": header, "arrays.npz": zipped(arrays), "../../etc/passwd": b"x"}),
+    )
+    yield "another name", zipped({"/header.json": header, "arrays.npz": zipped(arrays)})
+    yield "another array", whole(header, arrays | {"0.more.npy": arrays["0.rank.npy"]})
+    yield "a path", whole(header, arrays | {"../0.more.npy": arrays["0.rank.npy"]})
+    yield "a missing array", whole(header, {k: v for k, v in arrays.items() if k != "0.rank.npy"})
+    yield "zip in zip", zipped({"header.json": header, "arrays.npz": data})
+    pickled = io.BytesIO()
+    np.save(pickled, np.array([{"a": 1}], dtype=object))
+    yield "a pickle", whole(header, arrays | {"0.rank.npy": pickled.getvalue()})
+    huge = arrays["0.rank.npy"].replace(b"'shape': (2", b"'shape': (9999992")
+    yield "a huge shape", whole(header, arrays | {"0.rank.npy": huge})
+    yield (
+        "a formula in an array",
+        whole(header, arrays | {"0.rank.npy": arrays["0.rank.npy"].replace(b"False", b"1+1+1")}),
+    )
+    yield "large header", whole(b" " * (5 << 20) + header, arrays)
+    yield "deep", whole(b"[" * 100_000 + b"]" * 100_000, arrays)
+    yield "deep in an object", whole(b'{"a":' * 90_000 + b"1" + b"}" * 90_000, arrays)
+    yield "quotes", whole(b'\\"' * (2 << 20), arrays)
+    yield "an open string", whole(b'"' + b'\\"' * (1 << 20), arrays)
+    yield "twice a key", whole(header[:-1] + b', "format": "limitsets-proof"}', arrays)
+    yield "NaN", whole(header.replace(b'"version": 1', b'"version": NaN', 1), arrays)
+    yield (
+        "a long integer",
+        whole(header.replace(b'"version": 1', b'"version": ' + b"1" * 3_000_000, 1), arrays),
+    )
+    yield "a large exponent", whole(header.replace(b'"version": 1', b'"version": 1e999999999', 1), arrays)
+    yield "not utf-8", whole(header.replace(b"forge", b"\xff\xfe\xfd__"), arrays)
+    yield "a list", whole(b"[1, 2]", arrays)
+    for old, new in [
+        ("28 in", "1e99999 in"),
+        ("28 in", "1" * 5000 + " in"),
+        ("28 in", "28,0 in"),
+        ("28 in", "28"),
+        ("28 in", "nan in"),
+        ("28 in", "28 parsec"),
+        ("28 in", "28 deg"),
+        ("28 in", "-28 in"),
+        ("28 in", "2**9 in"),
+        ("28 in", "\u0662\u0668 in"),
+        ("5.75 in", "57.5 in"),
+        ("5.75 in", "0 in"),
+        ("1.25 in", "0 in"),
+        ("0.7082490 in", "-0.7 in"),
+        ("0.7082490 in", "7 in"),
+        ("25.3778518 in", "0 in"),
+        ('"side": 2, "along"', '"side": 3, "along"'),
+        ('"side": 2, "along"', '"side": true, "along"'),
+        ('"side": 2, "along"', '"side": "2", "along"'),
+        ('"flip": "signed"', '"flip": "__import__"'),
+        ('"flight": "exact"', '"flight": ["exact"]'),
+        ('"prefix": "0."', '"prefix": "../"'),
+        ('"prefix": "0."', '"prefix": {}'),
+        ('"name": "throw"', '"name": "logistic"'),
+        ('"format": "limitsets-proof"', '"format": []'),
+        ('"noise": null', '"noise": {"throw.speed": "100 %"}'),
+        ('"noise": null', '"noise": {"throw.speed": "-1 %"}'),
+        ('"noise": null', '"noise": {"arm.length": "1 %"}'),
+        ('"noise": null', '"noise": 3'),
+        ('"tolerance": null', '"tolerance": {"throw.speed": 1}'),
+        ('"tolerance": null', '"tolerance": {"a.b": "1 %"}'),
+        ('"boxes": [', '"boxes": [], "other": ['),
+        ('"max_rank": ', '"max_rank": 0.'),
+        ('"q": "0x1', '"q": "0x9'),
+        ("p+0", "p+9999"),
+        ('"claim": "invariant", "section": {}', '"claim": "trapping", "section": {}'),
+        ('"claim": "invariant", "section": {}', '"claim": "invariant", "section": {"x": 1}'),
+        ('"claim": "invariant", "section": {}', '"claim": "invariant", "section": 1'),
+        ('"state"', '"effects": {}, "state"'),
+        ('"throw": {', '"effects": {"landing": true}, "throw": {'),
+        ('"throw": {', '"effects": [1], "throw": {'),
+        ('"throw": {', '"throw": {"speed": "1 rad/s", '),
+    ]:
+        text = header.decode()
+        assert old in text, old
+        yield f"{old} -> {new[:40]}", whole(text.replace(old, new).encode(), arrays)
+
+
+def test_damaged_files_give_one_clear_line_within_a_second(good, tmp_path):
+    slow = []
+    for name, data in damaged_files(good["designed"]):
+        begun = time.process_time()
+        report = verdict(data, tmp_path)
+        slow.append((time.process_time() - begun, name))
+        assert report.verdict == "bad file", name
+        assert 5 < len(report.reason) < 250, name
+        assert report.reason.isprintable(), name
+    assert max(slow)[0] < 1.0, max(slow)
+
+
+def test_truncated_and_randomly_damaged_files_are_refused(good, tmp_path):
+    data = good["small"].bytes()
+    rng = random.Random(3)
+    for k in range(200):
+        spoiled = bytearray(data)
+        if k % 4 == 0:
+            del spoiled[rng.randrange(len(data)) :]
+        elif k % 4 == 1:  # in the arrays, where the hashes are
+            spoiled[rng.randrange(len(data) // 4, len(data) // 2)] ^= 1 << rng.randrange(8)
+        elif k % 4 == 2:  # in the directories
+            at = len(data) - 1 - rng.randrange(900)
+            spoiled[at] ^= 1 << rng.randrange(8)
+        else:
+            at = rng.randrange(len(data))
+            del spoiled[at : at + rng.randrange(1, 100)]
+        begun = time.process_time()
+        report = verdict(bytes(spoiled), tmp_path)
+        assert time.process_time() - begun < 1.0
+        # Times, versions and attributes of a directory, and paddings, mean nothing: the statement is then the same.
+        same = k % 4 == 2 and report.verdict == "proved"
+        assert same or report.verdict == "bad file"
+        assert same or report.reason
+
+
+def test_a_file_that_is_not_there(tmp_path):
+    assert checker.recheck(tmp_path / "none.zip").verdict == "bad file"
+    assert checker.recheck(tmp_path).verdict == "bad file"
+
+
+def test_text_of_a_stranger_is_cleaned():
+    assert checker.plain("a\x1b[31mb\u202ec\nd") == "a?[31mb?c?d"
+
+
+# ------------------------------------------------------------------------------------------------ scenes and numbers
+
+REFERENCE = {
+    ("3.2444722", "1.7898493"): ((2.05089, 3.36103, 3.24447), (0.21620, 2.04836, 1.78985)),
+    ("4.4179581", "0.5040259"): ((1.74394, 1.65101, 4.41796), (1.92973, 1.72239, 0.50403)),
+    ("3.9867006", "1.8835981"): ((1.37302, 3.05205, 3.98670), (0.53272, 1.36702, 1.88360)),
+    ("4.2255778", "0.7082490"): ((1.79776, 1.92575, 4.22558), (1.65438, 1.77927, 0.70825)),
+}
+
+
+@pytest.mark.parametrize("center", REFERENCE)
+def test_feet_and_heights_of_the_paper_scenes(center):
+    raw = forge.scene("designed")
+    raw["part"]["mass"]["center"] |= {"along": f"{center[0]} in", "above": f"{center[1]} in"}
+    sides = checker.read_scene(raw, None).sides
+    for s, a, d in zip(sides, *REFERENCE[center], strict=True):
+        assert float(s.a.mid()) == pytest.approx(a, abs=6e-6)
+        assert float(s.d.mid()) == pytest.approx(d, abs=6e-6)
+        assert float(s.a.rad()) < 1e-25
+
+
+def test_vertices_and_plate():
+    """A square plate with a lead weight, in feet and inches; side 1 is the edge that ends in vertex 0."""
+    raw = forge.scene("designed")
+    raw["part"] = {
+        "vertices": [["0 in", "0 in"], ["12 in", "0 in"], ["1 ft", "1 ft"], ["0 in", "30.48 cm"]],
+        "mass": {
+            "plate_density": "1 kg/m^2",
+            "points": [{"x": "8 in", "y": "3 in", "mass": "92.90304 g"}],
+        },
+    }
+    scene = checker.read_scene(raw, None)
+    # Equal masses at (6, 6) and (8, 3): the centre is (7, 4.5).
+    for s, a, d in zip(scene.sides, (7, 7.5, 5, 4.5), (4.5, 7, 7.5, 5), strict=True):
+        assert s.a.contains(a)
+        assert s.d.contains(d)
+        assert s.length.contains(12)
+    assert scene.sides[0].rho2.contains(arb(24) / 2 + arb(13) / 4)
+
+
+def test_kappa_from_speed_gravity_and_noise():
+    raw = forge.scene("designed")
+    raw["throw"], raw["gravity"] = {"speed": "90 deg/s"}, {"tilt": "30 deg"}
+    want = arb("4.903325") / arb("0.0254") / (arb.pi() / 2) ** 2
+    scene = checker.read_scene(raw, None)
+    assert scene.k_lo <= want.upper()
+    assert scene.k_hi >= want.lower()
+    assert scene.k_hi - scene.k_lo < 1e-20
+    for noise in ("1 %", "0.9 deg/s"):
+        scene = checker.read_scene(raw, {"throw.speed": noise})
+        assert abs(scene.k_lo - want / arb("1.01") ** 2) < 1e-20
+        assert abs(scene.k_hi - want / arb("0.99") ** 2) < 1e-20
+        assert scene.k_lo <= (want / arb("1.01") ** 2).upper()
+        assert scene.k_hi >= (want / arb("0.99") ** 2).lower()
+
+
+def test_a_quantity_is_exact():
+    q = checker.quantity(["1 ft", "1.5e0 ft"], "length", "x")
+    assert (q.lo, q.hi) == (Fraction(3048, 10000), Fraction(4572, 10000))
+
+
+def test_the_march_finds_the_smallest_root_where_f_is_not_concave():
+    """kappa below ell: f > 0 is proved up to just below the first root, and never beyond it."""
+    raw = forge.scene("designed")
+    rng = np.random.default_rng(11)
+    refused = 0
+    for _ in range(150):
+        raw["throw"]["kappa"] = f"{rng.uniform(1.0, 4.0):.6f} in"
+        scene = checker.read_scene(raw, None)
+        s = scene.sides[rng.integers(3)]
+        a, d, kappa = float(s.a), float(s.d), float(scene.k_hi)
+        x = a + rng.exponential(1.5) + 0.05
+        p = np.linspace(1e-3, 6.2, 200_001)
+        f = x * p - a * np.sin(p) + d * (1 - np.cos(p)) - kappa / 2 * p**2
+        if (f > 0).all():
+            continue
+        root = p[np.argmax(f <= 0)]
+        below = checker.positive_until(s, arb(x), scene.k_hi, checker.at_angle(s, arb(root * (1 - 1e-3))))
+        near_graze = f[p < root].min() < 1e-6 and not s.concave
+        assert below or near_graze
+        for q in (root * 1.001, p[f > 0][-1]):
+            if q > root:
+                refused += 1
+                assert not checker.positive_until(s, arb(x), scene.k_hi, checker.at_angle(s, arb(q)))
+    assert refused > 50
+
+
+def test_range_max_is_the_maximum():
+    rng = np.random.default_rng(2)
+    values = rng.integers(-5, 1000, 700).astype(np.int32)
+    first = rng.integers(0, 700, 3000)
+    last = np.minimum(699, first + (rng.exponential(60, 3000)).astype(int))
+    want = [values[a : b + 1].max() for a, b in zip(first, last, strict=True)]
+    assert (checker.range_max(values, first, last) == want).all()
+
+
+# ------------------------------------------------------------------------------------------------------- a lone file
+
+
+def run(script, *arguments):
+    environment = {key: value for key, value in os.environ.items() if key != "PYTHONPATH"}
+    return subprocess.run(
+        [sys.executable, str(script), *map(str, arguments)],
+        capture_output=True,
+        text=True,
+        check=False,
+        cwd=script.parent,
+        env=environment,
+    )
+
+
+def test_it_imports_nothing_of_the_package():
+    text = SOURCE.read_text(encoding="utf-8")
+    assert "import limitsets" not in text
+    assert "from limitsets" not in text
+    assert "eval(" not in text.replace("literal_eval(", "eval(")
+    assert "allow_pickle" not in text
+
+
+def test_it_runs_as_a_lone_file_in_several_processes(good, tmp_path):
+    script = tmp_path / "recheck.py"
+    shutil.copy(SOURCE, script)
+    script.write_text(script.read_text().replace("SMALL = 20_000", "SMALL = 100"))
+    done = run(script, good["designed"].write(tmp_path / "good.proof.zip"), "--workers", 2)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.rstrip().endswith("PROVED")
+    f = good["designed"].copy()
+    f.arrays["0.phi"][-3, 1] *= 0.999
+    done = run(script, f.seal().write(tmp_path / "wrong.proof.zip"), "--json", "--workers", 2)
+    assert done.returncode == 1
+    assert json.loads(done.stdout)["verdict"] == "failed"
+    (tmp_path / "no.zip").write_bytes(b"no")
+    done = run(script, tmp_path / "no.zip")
+    assert done.returncode == 2
+    assert done.stdout.count("\n") < 6
+    assert not done.stderr
