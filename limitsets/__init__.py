@@ -17,32 +17,42 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-if TYPE_CHECKING:
-    from limitsets import maps, plot
+if TYPE_CHECKING:  # each from the file that holds it: most rooms have a file of the same name
+    from limitsets import interval, maps, plot
     from limitsets.analysis import analyse
     from limitsets.cells import grid
-    from limitsets.graph import morse_graph, transitions
+    from limitsets.graph.morse import morse_graph
+    from limitsets.graph.transitions import transitions
     from limitsets.maps import critical_points, orbit, register
+    from limitsets.proofs.certify import certify
+    from limitsets.proofs.confirm import recheck
     from limitsets.scene import dump, load, scenes
-    from limitsets.sets import attractors, basins, cycles, limit_set
+    from limitsets.sets.attractors import attractors
+    from limitsets.sets.basins import basins
+    from limitsets.sets.cycles import cycles
+    from limitsets.sets.limit_set import limit_set
 
 __version__ = "0.1.0"
 
-# Public name -> the room it comes from; a namespace is its own room.
+# Public name -> the room it comes from; a namespace is its own room.  A file of `proofs` bears the name `recheck` and
+# would take the function's place there.
 _ROOMS = {
     "analyse": "analysis",
     "attractors": "sets",
     "basins": "sets",
+    "certify": "proofs",
     "critical_points": "maps",
     "cycles": "sets",
     "dump": "scene",
     "grid": "cells",
+    "interval": "interval",
     "limit_set": "sets",
     "load": "scene",
     "maps": "maps",
     "morse_graph": "graph",
     "orbit": "maps",
     "plot": "plot",
+    "recheck": "proofs.confirm",
     "register": "maps",
     "scenes": "scene",
     "transitions": "graph",
@@ -52,16 +62,19 @@ __all__ = [
     "analyse",
     "attractors",
     "basins",
+    "certify",
     "critical_points",
     "cycles",
     "dump",
     "grid",
+    "interval",
     "limit_set",
     "load",
     "maps",
     "morse_graph",
     "orbit",
     "plot",
+    "recheck",
     "register",
     "scenes",
     "transitions",

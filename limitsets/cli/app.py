@@ -7,7 +7,9 @@ from typing import Annotated
 import typer
 
 from limitsets.cli.analyse import analyse
+from limitsets.cli.certify import certify
 from limitsets.cli.plot import plot
+from limitsets.cli.recheck import recheck
 from limitsets.cli.scenes import scenes
 from limitsets.cli.throw import throw
 
@@ -41,5 +43,5 @@ def limitsets(
     """
 
 
-for command in (scenes, analyse, throw, plot):
+for command in (scenes, analyse, throw, plot, certify, recheck):
     app.command()(command)

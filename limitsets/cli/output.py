@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
+import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -74,19 +75,36 @@ def answer(record: Any, as_json: bool, out: Path | None, text: Callable[[], None
         text()
 
 
+class _Lines:
+    """A line for a step that lasts: at once where the last line is two seconds old, else as soon as it is."""
+
+    def __init__(self) -> None:
+        self.last, self.timer = time.monotonic(), threading.Timer(0.0, print)
+
+    def tell(self, step: str, done: int, of: int) -> None:
+        self.stop()
+        text = f"limitsets: {step} ({done + 1} of {of})"
+        self.timer = threading.Timer(max(self.last + PATIENCE - time.monotonic(), 0.0), self._say, (text,))
+        self.timer.daemon = True
+        self.timer.start()
+
+    def stop(self) -> None:
+        self.timer.cancel()
+
+    def _say(self, text: str) -> None:
+        self.last = time.monotonic()
+        print(text, file=sys.stderr, flush=True)
+
+
 @contextmanager
 def progress() -> Iterator[Callable[[str, int, int], None]]:
-    """Show steps on stderr: a bar on a terminal, elsewhere a line now and then once two seconds have passed."""
+    """Show steps on stderr: a bar on a terminal, elsewhere a line for what takes over two seconds."""
     if not sys.stderr.isatty():
-        last = time.monotonic()
-
-        def tell(step: str, done: int, of: int) -> None:
-            nonlocal last
-            if time.monotonic() - last > PATIENCE:
-                last = time.monotonic()
-                print(f"limitsets: {step} ({done + 1} of {of})", file=sys.stderr, flush=True)
-
-        yield tell
+        lines = _Lines()
+        try:
+            yield lines.tell
+        finally:
+            lines.stop()
         return
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn

@@ -1,0 +1,191 @@
+"""`limitsets certify`: what is proved of a scene, in words and as a certificate."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from limitsets.cli.output import Json, Scene, progress, saved, table
+from limitsets.errors import LimitsetsError
+
+if TYPE_CHECKING:
+    from limitsets.proofs import Claim, Proof
+
+__all__ = ["certify"]
+
+# States of a counterexample that are printed: the start, and the last of them.
+LAST = 8
+
+HELP_CLAIM = (
+    "What to prove: attracts-all, invariant, trapping, end-points, cycles, expanding or goal; repeatable."
+)
+HELP_TOLERANCE = "A quantity that is fixed but unknown, like throw.speed='0.7 %'; repeatable."
+HELP_NOISE = "A quantity that differs at every throw, like throw.speed='0.3 %'; repeatable."
+
+
+def certify(
+    scene: Scene,
+    claim: Annotated[list[str] | None, typer.Option("--claim", metavar="C", help=HELP_CLAIM)] = None,
+    tolerance: Annotated[
+        list[str] | None, typer.Option("--tolerance", metavar="Q=DEV", help=HELP_TOLERANCE)
+    ] = None,
+    noise: Annotated[list[str] | None, typer.Option("--noise", metavar="Q=DEV", help=HELP_NOISE)] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option("--out", "-o", metavar="FILE", help="The certificate, ./NAME.proof.zip by default."),
+    ] = None,
+    json: Json = False,
+) -> None:
+    """Prove where the throws lead, and write a certificate that `limitsets recheck` verifies."""
+    import json as json_words
+
+    fixed, varying = _deviations("--tolerance", tolerance), _deviations("--noise", noise)
+    with progress() as tell:
+        from limitsets.scene import load
+
+        chosen = load(scene)
+        file = out if out is not None else Path(f"{chosen.name}.proof.zip")
+        from limitsets.proofs import certify as run
+
+        with saved(file) as draft:
+            proof = run(chosen, claim or None, noise=varying, tolerance=fixed, progress=tell)
+            written = any(each.verdict == "proved" for each in proof.claims)
+            if written:
+                proof.save(draft)
+    if json:
+        print(json_words.dumps(proof.to_json(), indent=2, allow_nan=False))
+    else:
+        _text(proof, file if written else None)
+    raise typer.Exit(0 if proof.proved else 1)
+
+
+def _deviations(option: str, words: list[str] | None) -> dict[str, str]:
+    found: dict[str, str] = {}
+    for word in words or []:
+        name, sign, text = word.partition("=")
+        name = name.strip()
+        if not sign or name in found:
+            remedy = "name each quantity once" if sign else "put a sign of equality between them"
+            raise LimitsetsError(option.lstrip("-"), word, "QUANTITY=DEVIATION", remedy, key=option)
+        found[name] = text.strip()
+    return found
+
+
+def _text(proof: Proof, file: Path | None) -> None:
+    cells = sum(found.cover.grid.n_cells for found in proof.attractions)
+    typer.echo(f"{proof.scene.name}: {cells} cells, {proof.seconds:.2g} s")
+    for name, (lo, hi) in proof.spans.items():
+        typer.echo(f"for every {name} from {_short(lo)} to {_short(hi)}, the same at every throw")
+    for name, text in proof.noise.items():
+        typer.echo(f"for every sequence of throws, {name} within {text} of its value, anew at every throw")
+    for claim in proof.claims:
+        typer.echo(f"\n{claim.claim}: {claim.verdict.upper()}")
+        for line in _words(proof, claim):
+            typer.echo(f"  {line}")
+        if claim.counterexample:
+            _orbit(proof, claim)
+    typer.echo("")
+    if file is None:
+        typer.echo("nothing is proved: no certificate is written")
+    else:
+        left = "" if proof.proved else ", of what is proved only"
+        typer.echo(f"certificate: {file}{left} (check it: limitsets recheck {file})")
+
+
+def _short(text: str) -> str:
+    """Write a quantity with few digits."""
+    number, _, unit = text.partition(" ")
+    return f"{float(number):.7g} {unit}"
+
+
+def _words(proof: Proof, claim: Claim) -> list[str]:
+    """Say a claim in words for people."""
+    if claim.verdict != "proved":
+        return [claim.reason[:1].upper() + claim.reason[1:] + "."]
+    scene = proof.scene
+    if claim.claim == "attracts-all":
+        return _attraction(proof)
+    if claim.claim == "goal":
+        goal = claim.section
+        return [
+            f"In the attracting cells, every part at rest beyond x = {goal['x']} lies on side {goal['side']}."
+        ]
+    if claim.claim == "expanding":
+        slope = float.fromhex(claim.section["least_slope"])
+        entropy = "" if proof.noise else f"; topological entropy {_down(math.log(slope), 5)} at least"
+        return [
+            f"In the attracting cells each throw stretches distances by {_down(slope, 6)} at least{entropy}.",
+            "So no repeating sequence of places attracts; each that exists is unstable.",
+        ]
+    if claim.claim == "end-points":
+        ends = [(end["side"], end["which"], end["outer"], end["inner"]) for end in claim.section["ends"]]
+        return [
+            f"side {side}, {which} end: x = {float.fromhex(outer):.12f} {scene.unit},"
+            f" within {abs(float.fromhex(outer) - float.fromhex(inner)):.1e}"
+            for side, which, outer, inner in ends
+        ]
+    if claim.claim == "cycles":
+        cycles = claim.section["cycles"]
+        return [
+            f"period {len(each['itinerary'])}, {'attracts' if each['attracts'] else 'repels'}: from"
+            f" x = {float.fromhex(each['interval'][0]):.9f} {scene.unit} on side {each['side']}"
+            for each in cycles
+        ]
+    if claim.claim == "trapping":
+        return ["The attracting cells are thrown into their interior: small errors do not carry a part out."]
+    return ["No throw leads out of the attracting cells."]
+
+
+def _attraction(proof: Proof) -> list[str]:
+    from limitsets.proofs.answer import max_throws, outer_extents
+
+    unit, bound = proof.scene.unit, max_throws(proof)
+    extents = {
+        side: ", ".join(f"{_down(lo, 3)} to {_up(hi, 3)}" for lo, hi in parts)
+        for side, parts in outer_extents(proof).items()
+    }
+    growth = _down(bound["near_joint"], 6)
+    starts = ", ".join(f"{_up(x, 6)} {unit} on side {side}" for side, x in bound["beyond"].items())
+    return [
+        "From every position on the arm and every side, a part comes into the attracting cells and stays there:",
+        *(f"side {side}: x = {parts} {unit}" for side, parts in extents.items()),
+        f"It takes {bound['throws']} throws at most from x = {starts}, or beyond.",
+        f"Nearer to the joint more come before; each moves the part out, x - a by a factor of {growth} at least.",
+    ]
+
+
+def _down(value: float, digits: int) -> str:
+    """Write a number that is not above a proved one."""
+    return f"{math.floor(value * 10**digits) / 10**digits:.{digits}f}"
+
+
+def _up(value: float, digits: int) -> str:
+    """Write a number that is not below a proved one."""
+    return f"{math.ceil(value * 10**digits) / 10**digits:.{digits}f}"
+
+
+def _orbit(proof: Proof, claim: Claim) -> None:
+    """Print the orbit that refutes a claim."""
+    states, scene = claim.counterexample, proof.scene
+    typer.echo("  This orbit shows it:")
+    for name, (lo, hi) in claim.fixed.items():
+        value = _short(lo) if _short(lo) == _short(hi) else f"any value from {_short(lo)} to {_short(hi)}"
+        typer.echo(f"  {name} = {value}")
+    heads = ["throws", f"x [{scene.unit}]", "side"]
+    rows: list[list[str]] = []
+    if proof.noise:
+        heads.append("speed of the next throw")
+    for k, state in enumerate(states):
+        if 0 < k < len(states) - LAST:
+            if k == 1:
+                rows.append(["..."] + [""] * (len(heads) - 1))
+            continue
+        row = [str(k), f"{0.5 * (state.lo + state.hi):.6f}", str(state.side)]
+        if proof.noise:
+            share = None if state.kappa is None else 100.0 * (math.sqrt(scene.kappa / state.kappa) - 1.0)
+            row.append("" if share is None else f"{share:+.4f} %")
+        rows.append(row)
+    table(heads, rows)

@@ -1,0 +1,39 @@
+"""`limitsets recheck`: a certificate, checked anew."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from limitsets.cli.output import Json, Out, answer, progress
+
+__all__ = ["recheck"]
+
+CODES = {"proved": 0, "failed": 1, "bad file": 2}
+
+
+def recheck(
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="A certificate, NAME.proof.zip.")],
+    json: Json = False,
+    out: Out = None,
+) -> None:
+    """Check a certificate by other code and in other arithmetic than those that made it."""
+    with progress() as tell:
+        from limitsets.proofs.confirm import recheck as check
+
+        report = check(file, workers=None, progress=lambda done, of: tell("cells checked", done - 1, of))
+    if report.verdict == "bad file":
+        from limitsets.errors import AnswerError
+
+        raise AnswerError("the certificate", str(file), "one that limitsets certify wrote", report.reason)
+
+    def text() -> None:
+        from limitsets.proofs.recheck import show
+
+        show(report, str(file))
+
+    answer(asdict(report), json, out, text)
+    raise typer.Exit(CODES[report.verdict])
