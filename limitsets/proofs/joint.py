@@ -8,7 +8,7 @@ w = phi - sin phi, and
 
 so R' - a >= q r with q = 1 + 2 |h| / kappa > 1: the orbit leaves the interval after ln(delta/r) / ln q throws at most.
 The small-angle flights have phi >= 2 r / kappa and no v and w in the displacement, so the same q serves.
-Source: docs/model.md, "Near the joint".
+Source: docs/model.md, "Conventions": near a_i.
 """
 
 from __future__ import annotations
