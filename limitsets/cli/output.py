@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import signal
 import sys
 import threading
 import time
@@ -96,9 +97,50 @@ class _Lines:
         print(text, file=sys.stderr, flush=True)
 
 
+class _Interrupts:
+    """Ctrl-C, remembered: raised inside a callback of somebody else's C code an exception may be lost on the way.
+
+    The next step raises it again, so that no file is replaced after it.
+    """
+
+    def __init__(self) -> None:
+        self.pressed = False
+
+    def __call__(self, *_: object) -> None:
+        self.pressed = True
+        raise KeyboardInterrupt
+
+    def check(self) -> None:
+        if self.pressed:
+            raise KeyboardInterrupt
+
+
 @contextmanager
 def progress() -> Iterator[Callable[[str, int, int], None]]:
     """Show steps on stderr: a bar on a terminal, elsewhere a line for what takes over two seconds."""
+    interrupts = _Interrupts()
+    ours = (
+        threading.current_thread() is threading.main_thread()
+        and signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    )
+    if ours:
+        signal.signal(signal.SIGINT, interrupts)
+    try:
+        with _shown() as show:
+
+            def tell(step: str, done: int, of: int) -> None:
+                interrupts.check()
+                show(step, done, of)
+
+            yield tell
+    finally:
+        if ours:
+            signal.signal(signal.SIGINT, signal.default_int_handler)
+    interrupts.check()
+
+
+@contextmanager
+def _shown() -> Iterator[Callable[[str, int, int], None]]:
     if not sys.stderr.isatty():
         lines = _Lines()
         try:

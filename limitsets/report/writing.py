@@ -133,6 +133,8 @@ def write(analysis: Analysis, folder: str | Path, *, progress: Progress | None =
                 if progress is not None:
                     progress(name, number, len(names))
                 figure(analysis, kind).savefig(draft / name, dpi=DPI)
+            if progress is not None:
+                progress("report.md", len(figures), len(names))
             record = json.dumps(analysis.to_json(), indent=2, allow_nan=False)
             (draft / "analysis.json").write_text(record + "\n", encoding="utf-8", newline="\n")
             (draft / "report.md").write_text(page(analysis, figures), encoding="utf-8", newline="\n")
