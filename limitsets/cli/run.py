@@ -69,7 +69,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _ready_streams() -> None:
     """Let no closed stream, and no sign that a terminal lacks, stop a command."""
     sys.stdout = sys.stdout or Path(os.devnull).open("w")  # noqa: SIM115 - it lives as long as the process
-    sys.stderr = sys.stderr or Path(os.devnull).open("w")  # noqa: SIM115
+    sys.stderr = sys.stderr or Path(os.devnull).open("w")  # noqa: SIM115 - likewise
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="replace")

@@ -42,7 +42,7 @@ class TransitionGraph:
     ranges : Ranges
         Images of the cells.
     method : str
-        How the images were found; all methods so far sample them.
+        How the images were found; proved for "boxes", sampled otherwise.
     second_pass : float
         Share of the sampled states that the map's fast kernel could not vouch for.
     """

@@ -26,11 +26,11 @@ def transitions(map: Any, grid: Grid, method: str | None = None, **options: Any)
         A map (`scene.map`, `limitsets.maps`, or your own after `limitsets.register`).
     grid : Grid
         Cells to go between.
-    method : {"end-points", "corners", "corners-padded", "centres", "random"}, optional
-        How the image of a cell is found.  Default: the end points in one dimension, padded corners in more.  All of
-        them sample; none proves that nothing is missed.
+    method : {"end-points", "corners", "corners-padded", "centres", "random", "boxes"}, optional
+        How the image of a cell is found.  Default: the end points in one dimension, padded corners in more.  "boxes"
+        proves that no image of any point is missed, for a map with `image_box`; the others sample.
     **options
-        For "random": samples=16, seed=0.
+        For "random": samples=16, seed=0.  For "boxes": upper, the upper corner of a box of parameters.
 
     Returns
     -------

@@ -10,7 +10,7 @@ from limitsets.graph.images.enclosed import enclosed
 from limitsets.graph.images.random import random
 from limitsets.graph.images.sampled import sampled
 
-__all__ = ["METHODS", "RIGOROUS"]
+__all__ = ["METHODS"]
 
 METHODS = {
     "boxes": enclosed,
@@ -20,6 +20,3 @@ METHODS = {
     "end-points": sampled(end_points),
     "random": sampled(random),
 }
-
-RIGOROUS = {"boxes"}
-"""Methods whose images are proved to hold every image of every point."""

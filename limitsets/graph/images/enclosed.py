@@ -160,7 +160,7 @@ class Enclosures:
     lost: NDArray[np.bool_]
 
 
-def _check(map: Any, upper: Any) -> None:  # noqa: A002
+def _check(map: Any, upper: Any) -> None:  # noqa: A002  # the field's word
     if not kind_of(map).has_image_box:
         raise AnswerError(
             "the map", kind_of(map).name, "one with image_box", "register image_box, or sample instead"
@@ -176,7 +176,7 @@ def _check(map: Any, upper: Any) -> None:  # noqa: A002
     guard()
 
 
-def enclosures(map: Any, upper: Any, edges: Floats | Columns, side: int) -> Enclosures:  # noqa: A002
+def enclosures(map: Any, upper: Any, edges: Floats | Columns, side: int) -> Enclosures:  # noqa: A002  # the field's word
     """Enclose the images of the cells between consecutive edges of one side.
 
     Parameters
@@ -217,7 +217,7 @@ def enclosures(map: Any, upper: Any, edges: Floats | Columns, side: int) -> Encl
     return Enclosures(hulls, whole.witness, lost)
 
 
-def enclosed(map: Any, grid: Grid, side: int, target: Target, *, upper: Any = None) -> Boxes:  # noqa: A002
+def enclosed(map: Any, grid: Grid, side: int, target: Target, *, upper: Any = None) -> Boxes:  # noqa: A002  # the field's word
     """Image method: enclose the images of all cells of one side.
 
     Parameters
