@@ -34,19 +34,19 @@ if TYPE_CHECKING:  # each from the file that holds it: most rooms have a file of
 
 __version__ = "0.1.0"
 
-# Public name -> the room it comes from; a namespace is its own room.  A file of `proofs` bears the name `recheck` and
-# would take the function's place there.
+# Public name -> the room it comes from, or the file where a module bears the same name: that module could stand in for
+# the function.  A namespace is its own room.
 _ROOMS = {
     "analyse": "analysis",
-    "attractors": "sets",
-    "basins": "sets",
-    "certify": "proofs",
+    "attractors": "sets.attractors",
+    "basins": "sets.basins",
+    "certify": "proofs.certify",
     "critical_points": "maps",
-    "cycles": "sets",
+    "cycles": "sets.cycles",
     "dump": "scene",
     "grid": "cells",
     "interval": "interval",
-    "limit_set": "sets",
+    "limit_set": "sets.limit_set",
     "load": "scene",
     "maps": "maps",
     "morse_graph": "graph",
@@ -55,7 +55,7 @@ _ROOMS = {
     "recheck": "proofs.confirm",
     "register": "maps",
     "scenes": "scene",
-    "transitions": "graph",
+    "transitions": "graph.transitions",
 }
 
 __all__ = [
