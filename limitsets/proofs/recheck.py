@@ -1102,7 +1102,7 @@ def read_orbits(section: dict[str, Any], n_sides: int) -> dict[str, Any]:
         least, most = (hex_float(end, "multiplier") for end in rows(each["multiplier"], "a multiplier", 2, 2))
         require(lo < hi and least <= most, "an interval or a multiplier is empty")
         attracts = each["attracts"]
-        right = (-1 < least and most < 1) if attracts else (least > 1 or most < -1)
+        right = (least > -1 and most < 1) if attracts else (least > 1 or most < -1)
         require(isinstance(attracts, bool) and right, "a multiplier and what it is said to do do not fit")
         orbits.append(Orbit(read_side(each["side"], n_sides), lo, hi, word, (least, most), attracts))
     return {"orbits": orbits}
@@ -1110,10 +1110,11 @@ def read_orbits(section: dict[str, Any], n_sides: int) -> dict[str, Any]:
 
 def ends_statement(section: dict[str, Any], noisy: bool) -> str:
     """Put the claim of end points in words: the numbers are those that are checked."""
+    noise = ", with whatever speeds of the noise" if noisy else ""
+    after = f"after {section['images']} throws or more they lie within the outer ends"
+    always = "and always they hold all between the inner ends"
     lines = [
-        "end-points: let the attracting cells be thrown, all of them, ever again"
-        f"{', with whatever speeds of the noise' if noisy else ''}; after {section['images']} throws or more they lie"
-        " within the outer ends, and at all times they hold every x between the inner ends"
+        f"end-points: let the attracting cells be thrown, all of them, ever again{noise}; {after}, {always}"
     ]
     for side, (outer, inner) in enumerate(zip(section["outer"], section["inner"], strict=True)):
         for (a, d), (b, c) in zip(outer, inner, strict=True):
@@ -1405,7 +1406,8 @@ def follow(throws: Throws, orbit: Orbit, x0: Arb, x1: Arb) -> Followed:
         side, lo, hi = states[-1]
         t = throws.interval(side, lo, hi)
         prove(t.decision == branch, f"throw {k + 1}: that it is a {('jog', 'flip')[branch]} is not proved")
-        prove(t.slope is not None, f"throw {k + 1}: its slope is not bounded")
+        if t.slope is None:
+            raise UnprovedError(f"throw {k + 1}: its slope is not bounded")
         shift = throws.scene.sides[side].shift if branch else ZERO
         after = (side + branch) % len(throws.scene.sides)
         states.append((after, (t.lo - shift).lower(), (t.hi - shift).upper()))

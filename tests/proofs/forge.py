@@ -302,7 +302,9 @@ def attracting(f: Forged) -> list[list[tuple[float, float]]]:
         edges = f.arrays[f"0.edges.{i}"]
         own = np.concatenate([[0], f.arrays["0.component"][at : at + len(edges) - 1] >= 0, [0]]).astype(int)
         at += len(edges) - 1
-        spans.append([(float(edges[a]), float(edges[b])) for a, b in np.flatnonzero(np.diff(own)).reshape(-1, 2)])
+        spans.append(
+            [(float(edges[a]), float(edges[b])) for a, b in np.flatnonzero(np.diff(own)).reshape(-1, 2)]
+        )
     return spans
 
 
@@ -349,7 +351,9 @@ def at_rest(m: Plain, union: list, pieces: list[tuple], grow: float) -> tuple[li
                     if x0 - grow <= x1 + grow:
                         images[(i + throw) % 3].append((x0 - grow, x1 + grow))
         smaller = [
-            joined([(max(a, c), min(b, d)) for a, b in one for c, d in joined(other) if max(a, c) <= min(b, d)])
+            joined(
+                [(max(a, c), min(b, d)) for a, b in one for c, d in joined(other) if max(a, c) <= min(b, d)]
+            )
             for one, other in zip(union, images, strict=True)
         ]
         if smaller == union:
@@ -377,8 +381,8 @@ def cycles_of(m: Plain, spans: list, wanted: int) -> list[dict]:
         words.append(flips)
         word = np.array(words)
         back = (side[1:] == 0) & (side[:-1] == 0) & (word[:, 1:] == word[:, :-1]).all(axis=0)
-        for k in np.flatnonzero(back & ((x - x0)[1:] * (x - x0)[:-1] < 0))[:1]:
-            found.append(refined(m, word[:, k], x0[k], x0[k + 1]))
+        crossed = np.flatnonzero(back & ((x - x0)[1:] * (x - x0)[:-1] < 0))[:1]
+        found += [refined(m, word[:, k], x0[k], x0[k + 1]) for k in crossed]
         if len(found) == wanted:
             return found
     raise AssertionError

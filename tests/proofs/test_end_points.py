@@ -225,10 +225,3 @@ def test_claims_and_their_sections():
 def test_a_tolerance_is_refused():
     with pytest.raises(AnswerError, match="without a tolerance"):
         certify("paper-designed", ["end-points"], tolerance={"throw.kappa": "0.1 %"})
-
-
-def test_the_checker_says_what_it_rechecks(tmp_path):
-    recheck = pytest.importorskip("limitsets.proofs.recheck", reason="the checker needs python-flint")
-    path = certify("paper-designed", ["end-points", "cycles", "trapping"]).save(tmp_path / "x.proof.zip")
-    claims = {claim: verdict for claim, verdict, _ in recheck.recheck(path, workers=1).claims}
-    assert claims == {"end-points": "not rechecked", "cycles": "not rechecked", "trapping": "proved"}
