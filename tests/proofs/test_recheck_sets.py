@@ -176,6 +176,8 @@ def test_images_of_unions_hold_samples_and_are_held(good):
         assert held.all()
         for lo, hi in inner[k]:
             assert np.diff(x[(x > lo) & (x < hi)], prepend=lo, append=hi).max() < 3 * step
+    undecided = [[piece._replace(branch=2) for piece in own] for own in pieces]
+    assert checker.image_inward(throws, union, undecided) == [[], [], []]
     assert sum(hi - lo for part in outer for lo, hi in part) < 1e-6 + sum(
         hi - lo for part in inner for lo, hi in part
     )
@@ -425,6 +427,34 @@ def test_what_fails_is_named_and_the_rest_is_proved(good, tmp_path):
     assert state == "failed"
     assert why.startswith(f"period 8, side 0, x in [{float.fromhex(cycles['cycles'][1]['interval'][0])!r}, ")
     assert "multiplier" in why
+
+
+def test_an_orbit_outside_of_the_attracting_cells_is_none_in_them(good):
+    throws = checker.Throws(checker.read_scene(forge.scene("designed"), None))
+    (orbit, *_) = checker.read_orbits(sections(good["designed"])[1], 3)["orbits"]
+    checker.prove_orbit(throws, [[(orbit.lo, orbit.hi)], [], []], orbit)
+    for cells in ([[], [], []], [[(orbit.lo + 1e-12, orbit.hi)], [(0.0, 30.0)], [(0.0, 30.0)]]):
+        with pytest.raises(checker.UnprovedError, match="not in the attracting cells"):
+            checker.prove_orbit(throws, cells, orbit)
+
+
+def test_an_itinerary_that_the_map_does_not_take_is_none():
+    """Two flips, eleven jogs and a flip have a fixed point; but from the last of its points the part jogs."""
+    throws = checker.Throws(checker.read_scene(forge.scene("designed"), None))
+    m = forge.Plain(forge.scene("designed"))
+    cycle = forge.refined(m, np.array([1, 1, *[0] * 11, 1]), 6.0, 26.0)
+    (orbit,) = checker.read_orbits({"cycles": [cycle], "complete": False}, 3)["orbits"]
+    with pytest.raises(checker.UnprovedError, match="throw 14: that it is a flip is not proved"):
+        checker.prove_orbit(throws, [[(0.0, 30.0)]] * 3, orbit)
+
+
+def test_orbits_are_of_one_speed(tmp_path):
+    """Noise so small that everything else is proved with it."""
+    f = forge.with_sets(forge.forge("small", noise=1e-14, **COARSE), "small")
+    claims = {claim: (state, why) for claim, state, why in verdict(f, tmp_path).claims}
+    assert claims["end-points"] == ("proved", "")
+    assert claims["cycles"][0] == "failed"
+    assert "not with noise" in claims["cycles"][1]
 
 
 def test_a_gap_of_the_limit_set_cannot_be_filled(tmp_path):
