@@ -21,227 +21,24 @@ critical point itself does not matter.  Not claimed is that one orbit is dense i
 Where the map contracts, rounding inward eats B up: the inner ends are then None, and what L is there is a matter of
 `orbits.py`.  With noise, both sets hold for every sequence of throws.
 
-Checked by machine: branches and signs of slopes on tiles of N (throws of boxes), images of tile ends (throws of
-points), and the exact comparison of B with its image.  Where the map is monotone on a tile, the images of two points
-span that of all between them.  Undecided or bent tiles are halved until only rounding keeps them so, which brackets the
-critical points.  Source: docs/model.md, limit sets.
+Checked by machine: branches and signs of slopes on tiles of N, images of tile ends (`tiles.py`), and the exact
+comparison of B with its image.  Source: docs/model.md, limit sets.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-import limitsets.interval as iv
-from limitsets.jit import proof_kernel
 from limitsets.maps import codes
 from limitsets.proofs.attraction import Attraction
 from limitsets.proofs.orbits import follow
-from limitsets.proofs.parameters import ParameterBox
-from limitsets.thrower.throw_box import BOTH, NOTHING, gather_box, throw_box
+from limitsets.proofs.tiles import Intervals, Pair, Part, Tile, UnionImages, at_rest, joined, tiles_of
+from limitsets.thrower.throw_box import BOTH
 
 __all__ = ["CriticalBracket", "ProvedEnd", "ProvedEnds", "proved_ends"]
-
-Pair = tuple[float, float]
-Intervals = dict[int, list[Pair]]
-Array = NDArray[np.float64]
-
-# Tiles are halved down to this width relative to x, and no further than to so many of one side at a time.
-FLOOR, MOST_TILES = 2.0**-47, 1024
-
-MOST_IMAGES = 20_000
-
-
-# ---------------------------------------------------------------- tiles
-
-
-class Tile(NamedTuple):
-    """A part of N with one answer: the branch (`BOTH` if not proved), the sign of the slope (0 if not proved)."""
-
-    lo: float
-    hi: float
-    branch: int
-    sign: int
-
-
-@proof_kernel(entry=True)
-def _judge(lo_map: Any, hi_map: Any, side: int, lo: Any, hi: Any, branch: Any, sign: Any) -> None:
-    b = gather_box(lo_map, hi_map, side)
-    for k in range(lo.size):
-        state, _, _, slope, _ = throw_box(b, lo[k], hi[k])
-        branch[k] = state
-        sign[k] = 1 if slope[0] > 0.0 else (-1 if slope[1] < 0.0 else 0)
-        sign[k] = 0 if state == NOTHING else sign[k]
-
-
-def _tiles(box: ParameterBox, side: int, lo: Array, hi: Array) -> list[Tile]:
-    """Tile the given cells of one side, finely only where the branch changes or the slope has no sign."""
-    done: list[Tile] = []
-    while lo.size:
-        branch, sign = np.empty(lo.size, np.int64), np.empty(lo.size, np.int64)
-        _judge(box.lo, box.hi, side, lo, hi, branch, sign)
-        middle = lo + 0.5 * (hi - lo)
-        wide = (hi - lo > FLOOR * np.abs(hi)) & (lo < middle) & (middle < hi)
-        open_ = ((branch == BOTH) | (branch == NOTHING) | (sign == 0)) & wide
-        if int(open_.sum()) > MOST_TILES:
-            open_[:] = False
-        done += map(Tile, *(part[~open_].tolist() for part in (lo, hi, branch, sign)))
-        lo, hi = np.append(lo[open_], middle[open_]), np.append(middle[open_], hi[open_])
-    return _merged_tiles(sorted(done))
-
-
-def _merged_tiles(tiles: Iterable[Tile]) -> list[Tile]:
-    """Join neighbours of one branch and one proved sign."""
-    merged: list[Tile] = []
-    for tile in tiles:
-        last = merged[-1] if merged else None
-        if last and last.hi == tile.lo and last.sign == tile.sign != 0 and last.branch == tile.branch:
-            merged[-1] = last._replace(hi=tile.hi)
-        else:
-            merged.append(tile)
-    return merged
-
-
-# ---------------------------------------------------------------- images of unions of intervals
-
-
-@proof_kernel(entry=True)
-def _images(lo_map: Any, hi_map: Any, side: Any, lo: Any, hi: Any, out: Any) -> None:
-    """Images of lo, of hi, and of all between; rows 0 to 5 by a jog, 6 to 11 by a flip."""
-    for k in range(lo.size):
-        b = gather_box(lo_map, hi_map, side[k])
-        for j in range(3):
-            first = hi[k] if j == 1 else lo[k]
-            last = lo[k] if j == 0 else hi[k]
-            state, jog, _, _, _ = throw_box(b, first, last)
-            flip = iv.sub(jog, b.shift)
-            good = state != NOTHING
-            out[2 * j, k], out[2 * j + 1, k] = jog[0] if good else -np.inf, jog[1] if good else np.inf
-            out[6 + 2 * j, k], out[7 + 2 * j, k] = flip[0] if good else -np.inf, flip[1] if good else np.inf
-
-
-class _Part(NamedTuple):
-    """What of interval number `owner` of a side lies on one tile, and the image by one of the tile's branches."""
-
-    side: int
-    owner: int
-    tile: Tile
-    lo: float
-    hi: float
-    branch: int
-    to: int
-    at_lo: Pair
-    at_hi: Pair
-    whole: Pair
-
-
-def _joined(intervals: Iterable[Pair]) -> list[Pair]:
-    """Union of closed intervals, ascending."""
-    union: list[Pair] = []
-    for lo, hi in sorted(intervals):
-        if union and lo <= union[-1][1]:
-            union[-1] = (union[-1][0], max(union[-1][1], hi))
-        else:
-            union.append((lo, hi))
-    return union
-
-
-def _both_of(one: Intervals, other: Intervals) -> Intervals:
-    """Intersection of two unions."""
-    common: Intervals = {}
-    for side, intervals in one.items():
-        parts = [(max(a, c), min(b, d)) for a, b in intervals for c, d in other.get(side, [])]
-        kept = _joined(part for part in parts if part[0] <= part[1])
-        if kept:
-            common[side] = kept
-    return common
-
-
-@dataclass(frozen=True, eq=False)
-class _Images:
-    """Images of unions of intervals inside the tiled set."""
-
-    box: ParameterBox
-    tiles: dict[int, list[Tile]]
-
-    def parts(self, union: Intervals) -> list[_Part]:
-        """Cut a union at the borders of the tiles, and throw every part."""
-        cuts = [
-            (side, owner, tile, max(lo, tile.lo), min(hi, tile.hi))
-            for side, intervals in union.items()
-            for owner, (lo, hi) in enumerate(intervals)
-            for tile in self.tiles[side]
-            if tile.lo <= hi and tile.hi >= lo
-        ]
-        side = np.array([cut[0] for cut in cuts], dtype=np.int64)
-        lo, hi = np.array([cut[3] for cut in cuts]), np.array([cut[4] for cut in cuts])
-        out = np.empty((12, lo.size))
-        _images(self.box.lo, self.box.hi, side, lo, hi, out)
-        parts = []
-        for cut, row in zip(cuts, out.T.tolist(), strict=True):
-            tile = cut[2]
-            for branch in (codes.JOG, codes.FLIP) if tile.branch in (BOTH, NOTHING) else (tile.branch,):
-                to = (cut[0] + branch) % self.box.lo.a.size
-                pairs = [(row[k], row[k + 1]) for k in range(6 * branch, 6 * branch + 6, 2)]
-                parts.append(_Part(*cut, branch, to, *pairs))
-        return parts
-
-    def outward(self, union: Intervals) -> Intervals:
-        """Return a superset of F(union)."""
-        images: Intervals = {}
-        for part in self.parts(union):
-            ends = (part.at_lo, part.at_hi) if part.tile.sign else (part.whole,)
-            images.setdefault(part.to, []).append((min(end[0] for end in ends), max(end[1] for end in ends)))
-        return {side: _joined(intervals) for side, intervals in images.items()}
-
-    def inward(self, union: Intervals) -> Intervals:
-        """Return a subset of F(union), from decided starts only."""
-        images: Intervals = {}
-        for run in _runs(self.parts(union)):
-            ends = [end for part in run for end in (part.at_lo, part.at_hi)]
-            lo, hi = min(end[1] for end in ends), max(end[0] for end in ends)
-            if lo <= hi:
-                images.setdefault(run[0].to, []).append((lo, hi))
-        return {side: _joined(intervals) for side, intervals in images.items()}
-
-
-def _runs(parts: list[_Part]) -> Iterator[list[_Part]]:
-    """Decided parts of one interval that follow one another on one branch: the map is continuous on their union."""
-    run: list[_Part] = []
-    for part in parts:
-        if part.tile.branch not in (codes.JOG, codes.FLIP):
-            continue
-        last = run[-1] if run else None
-        if last and (last.side, last.owner, last.branch, last.hi) == (
-            part.side,
-            part.owner,
-            part.branch,
-            part.lo,
-        ):
-            run.append(part)
-        else:
-            if run:
-                yield run
-            run = [part]
-    if run:
-        yield run
-
-
-def _at_rest(image: Callable[[Intervals], Intervals], union: Intervals) -> tuple[Intervals, int]:
-    """Intersect with the image until nothing moves; the number of images, or -1 if it still does."""
-    for count in range(1, MOST_IMAGES):
-        smaller = _both_of(image(union), union)
-        if smaller == union:
-            return union, count
-        union = smaller
-    return union, -1
-
-
-# ---------------------------------------------------------------- answers
 
 
 class CriticalBracket(NamedTuple):
@@ -292,6 +89,8 @@ class ProvedEnds:
         The critical points in the outer set.
     images : (int, int)
         Images taken for the outer and the inner set.
+    tiles : dict of int to list of Tile
+        By side, what was proved of the throws from the attracting cells.
     reason : str
         Why inner ends are missing; empty if none is.
     """
@@ -299,6 +98,7 @@ class ProvedEnds:
     ends: tuple[ProvedEnd, ...]
     critical: tuple[CriticalBracket, ...]
     images: tuple[int, int]
+    tiles: dict[int, list[Tile]]
     reason: str
 
     @property
@@ -318,30 +118,25 @@ class ProvedEnds:
     def section(self) -> dict[str, Any]:
         """Return what a recheck needs."""
         return {
-            "ends": [_written(end) for end in self.ends],
-            "images": list(self.images),
-            "reason": self.reason,
-        }
-
-
-def _written(end: ProvedEnd) -> dict[str, Any]:
-    at = end.critical
-    return {
-        "side": end.side,
-        "which": end.which,
-        "outer": end.outer.hex(),
-        "inner": None if end.inner is None else end.inner.hex(),
-        "critical": None if at is None else {"side": at.side, "bracket": [at.lo.hex(), at.hi.hex()]},
-        "branches": list(end.branches),
-        "orbit": [[lo.hex(), hi.hex()] for lo, hi in end.orbit],
-    }
+            "images": self.images[0],
+            "ends": [
+                {"side": end.side, "which": end.which, "outer": end.outer.hex(),
+                 "inner": None if end.inner is None else end.inner.hex()}
+                for end in self.ends
+            ],
+            "pieces": [
+                [side, tile.lo.hex(), tile.hi.hex(), tile.branch if tile.branch >= 0 else BOTH, tile.sign]
+                for side, row in sorted(self.tiles.items())
+                for tile in row
+            ],
+        }  # fmt: skip
 
 
 def _critical(tiles: dict[int, list[Tile]]) -> tuple[CriticalBracket, ...]:
     """Undecided tiles between decided ones of different branches."""
     found = []
     for side, row in tiles.items():
-        groups = _joined((tile.lo, tile.hi) for tile in row if tile.branch == BOTH)
+        groups = joined((tile.lo, tile.hi) for tile in row if tile.branch == BOTH)
         before = {tile.hi: tile.branch for tile in row if tile.branch in (codes.JOG, codes.FLIP)}
         after = {tile.lo: tile.branch for tile in row if tile.branch in (codes.JOG, codes.FLIP)}
         found += [
@@ -362,7 +157,7 @@ class _Step(NamedTuple):
     which: str
 
 
-def _source(parts: list[_Part], outer: Intervals, side: int, x: float) -> _Step:
+def _source(parts: list[Part], outer: Intervals, side: int, x: float) -> _Step:
     """Of the ends of all images on a side, find where the one nearest to x comes from."""
     distance = np.inf
     best = _Step(side, x, -1, -1, "")
@@ -382,7 +177,7 @@ def _source(parts: list[_Part], outer: Intervals, side: int, x: float) -> _Step:
 
 
 def _traced(
-    images: _Images, outer: Intervals, critical: tuple[CriticalBracket, ...], side: int, x: float
+    images: UnionImages, outer: Intervals, critical: tuple[CriticalBracket, ...], side: int, x: float
 ) -> tuple[CriticalBracket | None, tuple[int, ...], tuple[Pair, ...]]:
     """Follow an end back to a critical point, and enclose the orbit from there."""
     parts = images.parts(outer)
@@ -452,13 +247,13 @@ def proved_ends(found: Attraction) -> ProvedEnds:
     tiles: dict[int, list[Tile]] = {}
     for side, (edges,) in enumerate(grid.edges):
         mine = np.flatnonzero(found.component[grid.of_side(side)] >= 0)
-        tiles[side] = _tiles(box, side, edges[mine], edges[mine + 1])
-    images = _Images(box, tiles)
-    cells = {side: _joined((tile.lo, tile.hi) for tile in row) for side, row in tiles.items() if row}
+        tiles[side] = tiles_of(box, side, edges[mine], edges[mine + 1])
+    images = UnionImages(box, tiles)
+    cells = {side: joined((tile.lo, tile.hi) for tile in row) for side, row in tiles.items() if row}
     if not cells:
-        return ProvedEnds((), (), (0, 0), "there are no attracting cells")
-    outer, taken = _at_rest(images.outward, cells)
-    inner, then = _at_rest(images.inward, outer)
+        return ProvedEnds((), (), (0, 0), {}, "there are no attracting cells")
+    outer, taken = at_rest(images.outward, cells)
+    inner, then = at_rest(images.inward, outer)
     held, reason = _inner_ends(outer, inner) if then > 0 else ({}, "the inner ends still move")
     critical = tuple(
         one
@@ -471,4 +266,4 @@ def proved_ends(found: Attraction) -> ProvedEnds:
             within = held.get((side, owner), (None, None))
             for which, x, inside in zip(("lo", "hi"), pair, within, strict=True):
                 ends.append(ProvedEnd(side, which, x, inside, *_traced(images, outer, critical, side, x)))
-    return ProvedEnds(tuple(ends), critical, (taken, then), reason)
+    return ProvedEnds(tuple(ends), critical, (taken, then), tiles, reason)

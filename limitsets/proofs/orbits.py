@@ -38,6 +38,9 @@ PERIODS = (16, 32, 64)
 # Half widths of I that are tried, relative to x: from some rounding errors up to what still resolves the orbits.
 FIRST, GROWTH, TRIES = 2.0**-44, 4.0, 14
 
+# The multiplier of a section is wider by this share of it.
+SLACK = 2.0**-34
+
 
 # ---------------------------------------------------------------- an itinerary
 
@@ -153,9 +156,16 @@ class ProvedCycle:
             "side": int(self.side[0]),
             "itinerary": self.branches.tolist(),
             "interval": [float(self.lo[0]).hex(), float(self.hi[0]).hex()],
-            "multiplier": [end.hex() for end in self.multiplier],
+            "multiplier": [end.hex() for end in self._stated()],
             "attracts": self.attracts,
         }
+
+    def _stated(self) -> Pair:
+        """Return the multiplier a little wider, so that other arithmetic can confirm it; never as far as to 1 or -1."""
+        lo, hi = self.multiplier
+        spare = min(abs(end - one) for end in (lo, hi) for one in (-1.0, 1.0))
+        slack = min(SLACK * max(abs(lo), abs(hi), 1.0), 0.5 * spare)
+        return lo - slack, hi + slack
 
 
 def _crosses(box: ParameterBox, lo: float, hi: float, side: int, word: NDArray[np.int64]) -> bool:
@@ -195,9 +205,11 @@ def proved_cycle(box: ParameterBox, cycle: Cycle) -> ProvedCycle | str:
     word, x, side = np.ascontiguousarray(cycle.branches), float(cycle.x[0]), int(cycle.side[0])
     radius = FIRST * max(abs(x), 1.0)
     for _ in range(TRIES):
-        lo, hi = x - radius, x + radius
+        found = _crosses(box, x - radius, x + radius, side, word)
+        # half of it would do: other arithmetic about as good has to see the signs too
+        lo, hi = x - 2.0 * radius, x + 2.0 * radius
         radius *= GROWTH
-        if not _crosses(box, lo, hi, side, word):
+        if not (found and _crosses(box, lo, hi, side, word)):
             continue
         orbit = follow(box, lo, hi, side, word)
         p = word.size

@@ -210,7 +210,8 @@ def open_certificate(path: str | os.PathLike[str]) -> tuple[dict[str, Any], dict
 
 # --------------------------------------------------------------------------------------------------------- the scene
 
-NUMBER = re.compile(r"([+-]?[0-9]{1,100}(?:\.[0-9]{0,100})?(?:[eE][+-]?[0-9]{1,2})?) +([a-z%/^0-9]{1,8})")
+DECIMAL = r"[+-]?(?:[0-9]{1,100}(?:\.[0-9]{0,100})?|\.[0-9]{1,100})(?:[eE][+-]?[0-9]{1,3})?"
+NUMBER = re.compile(rf" *({DECIMAL})(?: +|(?=%))([a-z%/^0-9]{{1,8}}) *")  # as a scene may be written
 INCH = Fraction(254, 10_000)
 LENGTHS = {"m": Fraction(1), "cm": Fraction(1, 100), "mm": Fraction(1, 1000), "in": INCH, "ft": 12 * INCH}
 UNITS: dict[str, dict[str, Fraction]] = {
@@ -261,6 +262,9 @@ def quantity(value: object, kinds: str, where: str) -> Quantity:
         found = NUMBER.fullmatch(text) if isinstance(text, str) else None
         require(found is not None, f"{where}: {plain(text)} is not a decimal number and a unit")
         assert found is not None
+        size = abs(Fraction(found[1]))
+        ordinary = size == 0 or Fraction(1, 10**300) <= size <= 10**12
+        require(ordinary, f"{where}: {plain(text)} is not 0 or of a size from 1e-300 to 1e12")
         factors = [UNITS[kind][found[2]] for kind in kinds.split() if found[2] in UNITS[kind]]
         require(len(factors) == 1, f"{where}: {plain(found[2])} is not a unit of {kinds}")
         read.append((Fraction(found[1]) * factors[0], found[2]))
@@ -999,6 +1003,477 @@ class Crew:
             self.pool = None
 
 
+# ------------------------------------------------------------------------- end points, and periodic orbits
+
+MOST_ENDS, MOST_PIECES, MOST_IMAGES = 400, 4_000, 20_000
+MOST_ORBITS, LONGEST = 200, 1_000
+MOST_THROWS = 100_000  # of boxes, for one claim: a section that needs more is refused
+
+Pair = tuple[float, float]
+Union = list[list[Pair]]  # closed intervals by side, ascending and disjoint
+
+
+class UnprovedError(Exception):
+    """What a section says was not proved."""
+
+
+def prove(condition: bool, message: str) -> None:
+    """Raise UnprovedError unless the condition holds."""
+    if not condition:
+        raise UnprovedError(message)
+
+
+class Piece(NamedTuple):
+    """A part of the attracting cells: the branch there (2: either) and the sign of dR'/dR (0: none is claimed)."""
+
+    side: int
+    lo: float
+    hi: float
+    branch: int
+    sign: int
+
+    def name(self) -> str:
+        """Name it, for people."""
+        return f"side {self.side}, x in [{self.lo!r}, {self.hi!r}]"
+
+
+def read_ends(section: dict[str, Any], n_sides: int) -> dict[str, Any]:
+    """Read the section of end-points: two unions of intervals, one inside the other, and the pieces."""
+    images = section["images"]
+    require(type(images) is int and 0 < images <= MOST_IMAGES, "images is not a number of images")
+    outer: Union = [[] for _ in range(n_sides)]
+    inner: Union = [[] for _ in range(n_sides)]
+    ends = [table(e, "an end", "side which outer inner") for e in rows(section["ends"], "ends", 2, MOST_ENDS)]
+    sides = [read_side(end["side"], n_sides) for end in ends]
+    paired = [end["which"] for end in ends] == ["lo", "hi"] * (len(ends) // 2)
+    paired = paired and sides[::2] == sides[1::2] and sides == sorted(sides)
+    require(paired, "the ends are not a lower and an upper one of each interval, by sides")
+    for side, low, high in zip(sides[::2], ends[::2], ends[1::2], strict=True):
+        a, b, c, d = (
+            hex_float(end[key], key) for end, key in zip((low, low, high, high), END_KEYS, strict=True)
+        )
+        apart = a < b < c < d and (not outer[side] or outer[side][-1][1] < a)
+        require(apart, f"side {side}: the ends do not ascend, outer before inner, interval after interval")
+        outer[side].append((a, d))
+        inner[side].append((b, c))
+    pieces: list[list[Piece]] = [[] for _ in range(n_sides)]
+    for row in rows(section["pieces"], "pieces", 1, MOST_PIECES):
+        side, lo, hi, branch, sign = rows(row, "a piece", 5, 5)
+        fits = all(type(n) is int for n in (branch, sign)) and 0 <= branch <= 2 and -1 <= sign <= 1
+        require(fits, "branch or slope of a piece is not one")
+        piece = Piece(read_side(side, n_sides), hex_float(lo, "lo"), hex_float(hi, "hi"), branch, sign)
+        own = pieces[piece.side]
+        ordered = piece.lo < piece.hi and (not own or own[-1].hi <= piece.lo)
+        require(ordered, f"{piece.name()}: the pieces do not ascend")
+        own.append(piece)
+    return {"images": images, "outer": outer, "inner": inner, "pieces": pieces}
+
+
+END_KEYS = ("outer", "inner", "inner", "outer")
+
+
+def read_side(value: object, n_sides: int) -> int:
+    """Read the number of a side."""
+    require(type(value) is int and 0 <= value < n_sides, "a side is not a number of one")
+    assert isinstance(value, int)
+    return value
+
+
+class Orbit(NamedTuple):
+    """A periodic orbit as it is claimed: where it begins, the branches, and its multiplier."""
+
+    side: int
+    lo: float
+    hi: float
+    word: list[int]
+    multiplier: Pair
+    attracts: bool
+
+
+def read_orbits(section: dict[str, Any], n_sides: int) -> dict[str, Any]:
+    """Read the section of cycles."""
+    require(section["complete"] is False, "that no cycle is missing is nothing that can be proved here")
+    orbits = []
+    for each in rows(section["cycles"], "cycles", 1, MOST_ORBITS):
+        table(each, "a cycle", "side itinerary interval multiplier attracts")
+        word = rows(each["itinerary"], "an itinerary", 1, LONGEST)
+        require(all(type(b) is int and b in (0, 1) for b in word), "an itinerary is not one of 0 and 1")
+        lo, hi = (hex_float(end, "interval") for end in rows(each["interval"], "an interval", 2, 2))
+        least, most = (hex_float(end, "multiplier") for end in rows(each["multiplier"], "a multiplier", 2, 2))
+        require(lo < hi and least <= most, "an interval or a multiplier is empty")
+        attracts = each["attracts"]
+        right = (least > -1 and most < 1) if attracts else (least > 1 or most < -1)
+        require(isinstance(attracts, bool) and right, "a multiplier and what it is said to do do not fit")
+        orbits.append(Orbit(read_side(each["side"], n_sides), lo, hi, word, (least, most), attracts))
+    return {"orbits": orbits}
+
+
+def ends_statement(section: dict[str, Any], noisy: bool) -> str:
+    """Put the claim of end points in words: the numbers are those that are checked."""
+    noise = ", with whatever speeds of the noise" if noisy else ""
+    after = f"after {section['images']} throws or more they lie within the outer ends"
+    always = "and always they hold all between the inner ends"
+    lines = [
+        f"end-points: let the attracting cells be thrown, all of them, ever again{noise}; {after}, {always}"
+    ]
+    for side, (outer, inner) in enumerate(zip(section["outer"], section["inner"], strict=True)):
+        for (a, d), (b, c) in zip(outer, inner, strict=True):
+            lines.append(f"    side {side}: lower end in [{a!r}, {b!r}], upper end in [{c!r}, {d!r}]")
+    return "\n".join(lines)
+
+
+def orbits_statement(section: dict[str, Any]) -> str:
+    """Put the claim of periodic orbits in words."""
+    lines = ["cycles: periodic orbits in the attracting cells, no two the same (there may be more)"]
+    for o in section["orbits"]:
+        does = "attracts" if o.attracts else "repels"
+        where = f"the only one of it with x in [{o.lo!r}, {o.hi!r}] on side {o.side}"
+        lines.append(
+            f"    period {len(o.word)}, {where}: {does}, multiplier in [{o.multiplier[0]!r}, {o.multiplier[1]!r}]"
+        )
+    return "\n".join(lines)
+
+
+class Thrown(NamedTuple):
+    """Throws from a box: the decision (0, 1, or 2: not settled), bounds of R'(jog), and dR'/dR or None."""
+
+    decision: int
+    lo: Arb
+    hi: Arb
+    slope: Arb | None
+
+
+def beside_root(s: Side, x: Arb, kappa: Arb, before: bool) -> Angle:
+    """Find an angle that is proved to lie just before, or just after, the impact at x."""
+    if not s.exact:
+        p = 2 * (x - s.a) / (kappa - s.small_d)
+        p = p.lower() if before else p.upper()
+        prove(bool(p > 0 and p < FULL_TURN), "the impact is not within a turn")
+        return at_angle(s, p)
+    a, d, _ = s.floats
+    x0, k = float(x), float(kappa)
+    right = (x0 + math.sqrt(x0 * x0 + 2 * k * (d + math.hypot(a, d)))) / k  # f < 0 there
+    p = arb(guess_root(s, x0, k, right) if 0 < right < 1e3 else math.nan)
+    for _ in range(2):
+        f = flight(x, kappa, at_angle(s, p))
+        sin, cos = p.sin_cos()
+        p = (p - f / (x - s.a * cos + s.d * sin - kappa * p)).mid()
+    at = at_angle(s, (p * (ONE - ROOT if before else ONE + ROOT)).mid())
+    f = flight(x, kappa, at)
+    # x > a and f concave: positive up to its one positive root and negative from there on
+    right_side = bool(f > 0 if before else f < 0) and bool(at.p > 0 and at.p < FULL_TURN)
+    prove(right_side and s.concave and bool(x > s.a), f"the impact is not bracketed at x = {x0!r}")
+    return at
+
+
+ROOT = arb(2) ** -70  # brackets of the impact are so narrow, relative to the angle
+
+
+class Throws:
+    """Throws of points and boxes from one scene, counted."""
+
+    def __init__(self, scene: Scene):
+        self.scene, self.left = scene, MOST_THROWS
+        self.points: dict[tuple[int, float], Thrown] = {}
+
+    def spend(self) -> None:
+        """Count a box."""
+        self.left -= 1
+        prove(self.left >= 0, f"more than {MOST_THROWS} boxes would be needed")
+
+    def box(self, side: int, x0: Arb, x1: Arb, k0: Arb, k1: Arb) -> Thrown:
+        """Throw all x in [x0, x1] with all kappa in [k0, k1]; the four are exact.
+
+        The angle rises with x and falls with kappa.  phi'(R) = -f_R/f_phi = -phi/f_phi, R' = R + D(phi).
+        """
+        self.spend()
+        s = self.scene.sides[side]
+        low, high = beside_root(s, x0, k1, True), beside_root(s, x1, k0, False)
+        phi, R, kappa = low.p.union(high.p), x0.union(x1), k0.union(k1)
+        decision, rise, f_slope = over_angles(s, phi, R, kappa)
+        if not s.exact:
+            slope = ONE - 2 * s.h / (kappa - s.small_d)
+        else:
+            slope = ONE - rise * phi / f_slope if f_slope < 0 else None
+        if rise > 0:
+            return Thrown(decision, x0 + low.D, x1 + high.D, slope)
+        whole = R + low.D + rise * (phi - low.p)
+        return Thrown(decision, whole, whole, slope)
+
+    def interval(self, side: int, x0: Arb, x1: Arb) -> Thrown:
+        """Throw an interval; where dR'/dR has a sign the images of its ends bound all of them."""
+        k0, k1 = self.scene.k_lo, self.scene.k_hi
+        t = self.box(side, x0, x1, k0, k1)
+        if x0 < x1 and t.slope is not None and (t.slope > 0 or t.slope < 0):
+            first, last = (x0, x1) if t.slope > 0 else (x1, x0)
+            lo, hi = self.box(side, first, first, k0, k1).lo, self.box(side, last, last, k0, k1).hi
+            return t._replace(lo=lo, hi=hi)
+        return t
+
+    def point(self, side: int, x: float) -> Thrown:
+        """Throw one point, once."""
+        if (side, x) not in self.points:
+            self.points[side, x] = self.interval(side, arb(x), arb(x))
+        return self.points[side, x]
+
+    def piece(self, piece: Piece) -> None:
+        """Prove branch and sign of the slope on a piece, halving it in x and in kappa."""
+        stack = [(arb(piece.lo), arb(piece.hi), self.scene.k_lo, self.scene.k_hi)]
+        while stack:
+            x0, x1, k0, k1 = stack.pop()
+            t = self.box(piece.side, x0, x1, k0, k1)
+            wrong = piece.branch != 2 and t.decision == 1 - piece.branch
+            steep = bool(piece.sign == 0 or (t.slope is not None and piece.sign * t.slope > 0))
+            if piece.branch in (2, t.decision) and steep:
+                continue
+            xm, km = (arb(float((HALF * (lo + hi)).mid())) for lo, hi in ((x0, x1), (k0, k1)))
+            by_x, by_k = bool(x0 < xm and xm < x1), bool(k0 < km and km < k1)
+            what = "branch" if piece.branch not in (2, t.decision) else "sign of the slope"
+            prove(not wrong and (by_x or by_k), f"{piece.name()}: the {what} is not proved")
+            if by_k and not (by_x and k1 - k0 < x1 - x0):
+                stack += [(x0, x1, km, k1), (x0, x1, k0, km)]
+            else:
+                stack += [(xm, x1, k0, k1), (x0, xm, k0, k1)]
+
+
+def below(value: Arb) -> float:
+    """Round down."""
+    prove(value.is_finite(), "an image is not bounded")
+    x = float(value.lower())
+    while not arb(x) <= value:
+        x = math.nextafter(x, -math.inf)
+    return x
+
+
+def above(value: Arb) -> float:
+    """Round up."""
+    return -below(-value)
+
+
+def joined(intervals: list[Pair]) -> list[Pair]:
+    """Union of closed intervals, ascending."""
+    union: list[Pair] = []
+    for lo, hi in sorted(intervals):
+        if union and lo <= union[-1][1]:
+            union[-1] = (union[-1][0], max(union[-1][1], hi))
+        else:
+            union.append((lo, hi))
+    return union
+
+
+def meeting(one: list[Pair], other: list[Pair]) -> list[Pair]:
+    """Intersection of two unions, ascending."""
+    common = []
+    i = k = 0
+    while i < len(one) and k < len(other):
+        lo, hi = max(one[i][0], other[k][0]), min(one[i][1], other[k][1])
+        if lo <= hi:
+            common.append((lo, hi))
+        if one[i][1] < other[k][1]:
+            i += 1
+        else:
+            k += 1
+    return common
+
+
+def first_outside(union: Union, within: Union) -> str:
+    """Name the first interval that does not lie in one of another union; "" if all do."""
+    for side, (parts, wider) in enumerate(zip(union, within, strict=True)):
+        for lo, hi in parts:
+            if meeting([(lo, hi)], wider) != [(lo, hi)]:
+                return f"side {side}, x in [{lo!r}, {hi!r}]"
+    return ""
+
+
+def attracting(c: Cells) -> Union:
+    """Return the attracting cells as intervals."""
+    union: Union = []
+    for i, edges in enumerate(c.edges):
+        own = np.flatnonzero(c.component[c.start[i] : c.start[i + 1]] >= 0)
+        union.append(joined(list(zip(edges[own].tolist(), edges[own + 1].tolist(), strict=True))))
+    return union
+
+
+def parts_of(throws: Throws, union: Union, pieces: list[list[Piece]]) -> Iterator[tuple[int, Piece]]:
+    """Cut a union at the borders of the pieces; each part with the number of the interval it is of."""
+    for intervals, own in zip(union, pieces, strict=True):
+        at = 0
+        for owner, (lo, hi) in enumerate(intervals):
+            while at < len(own) and own[at].hi < lo:
+                at += 1
+            for piece in itertools.islice(own, at, None):
+                if piece.lo > hi:
+                    break
+                throws.spend()
+                yield owner, piece._replace(lo=max(lo, piece.lo), hi=min(hi, piece.hi))
+
+
+def image_outward(throws: Throws, union: Union, pieces: list[list[Piece]]) -> Union:
+    """Return a union that holds the image of another, by both branches where either is possible."""
+    n = len(union)
+    images: Union = [[] for _ in range(n)]
+    for _, part in parts_of(throws, union, pieces):
+        if part.sign != 0:
+            ends = [throws.point(part.side, x) for x in (part.lo, part.hi)]
+        else:
+            ends = [throws.interval(part.side, arb(part.lo), arb(part.hi))]
+        for branch in (0, 1) if part.branch == 2 else (part.branch,):
+            shift = throws.scene.sides[part.side].shift if branch else ZERO
+            lo, hi = min(below(t.lo - shift) for t in ends), max(above(t.hi - shift) for t in ends)
+            images[(part.side + branch) % n].append((lo, hi))
+    return [joined(intervals) for intervals in images]
+
+
+def image_inward(throws: Throws, union: Union, pieces: list[list[Piece]]) -> Union:
+    """Return a union that lies in the image of another.
+
+    On neighbouring pieces of one branch the map is continuous, f being concave.  So all between the images of two of
+    their points is covered (intermediate values).  Pieces without a branch give nothing.
+    """
+    n = len(union)
+    images: Union = [[] for _ in range(n)]
+
+    def close(run: list[Piece]) -> None:
+        shift = throws.scene.sides[run[0].side].shift if run[0].branch else ZERO
+        ends = [throws.point(part.side, x) for part in run for x in (part.lo, part.hi)]
+        lo, hi = min(above(t.hi - shift) for t in ends), max(below(t.lo - shift) for t in ends)
+        if lo <= hi:
+            images[(run[0].side + run[0].branch) % n].append((lo, hi))
+
+    run: list[Piece] = []
+    of = -1
+    for owner, part in parts_of(throws, union, pieces):
+        last = run[-1] if run else part
+        follows = (of, last.side, last.branch, last.hi) == (owner, part.side, part.branch, part.lo)
+        if run and not follows:
+            close(run)
+            run = []
+        if part.branch != 2:
+            run.append(part)
+            of = owner
+    if run:
+        close(run)
+    return [joined(intervals) for intervals in images]
+
+
+def check_ends(scene: Scene, c: Cells, section: dict[str, Any]) -> str:
+    """Prove the end points from the attracting cells N, which are invariant; "" or what fails.
+
+    Outer: A(0) = N, A(n+1) = F(A(n)) & A(n), rounded outward, holds the image of N under n + 1 throws, whatever kappas
+    of the noise they have.  Inner: B lies in N and in its own image F(B), for each kappa: so in every image of N.
+    """
+    cells, outer, inner, pieces = attracting(c), section["outer"], section["inner"], section["pieces"]
+    for side, s in enumerate(scene.sides):
+        if not s.concave:
+            return f"side {side}: kappa > ell is not proved, so that there may be several impacts"
+        if joined([(piece.lo, piece.hi) for piece in pieces[side]]) != cells[side]:
+            return f"side {side}: the pieces do not make up the attracting cells"
+    bad = first_outside(inner, cells)
+    if bad:
+        return f"{bad}: not in the attracting cells"
+    throws = Throws(scene)
+    try:
+        for piece in itertools.chain(*pieces):
+            throws.piece(piece)
+        bad = first_outside(inner, image_inward(throws, inner, pieces))
+        if bad:
+            return f"{bad}: it is not proved that all of it is reached again"
+        union, taken = cells, 0
+        while first_outside(union, outer):
+            images = image_outward(throws, union, pieces)
+            smaller = [meeting(one, other) for one, other in zip(images, union, strict=True)]
+            taken += 1
+            if smaller == union or taken > section["images"]:
+                after = f"after {taken - 1} images of the attracting cells"
+                return f"{first_outside(union, outer)}: not proved to lie within the outer ends {after}"
+            union = smaller
+    except UnprovedError as error:
+        return str(error)
+    return ""
+
+
+class Followed(NamedTuple):
+    """Starts along an itinerary: side and bounds of every state, the last one after all throws, and dR/dR(start)."""
+
+    states: list[tuple[int, Arb, Arb]]
+    slope: Arb
+
+
+def follow(throws: Throws, orbit: Orbit, x0: Arb, x1: Arb) -> Followed:
+    """Follow the starts in [x0, x1], proving that each throw decides as the itinerary says."""
+    states, slope = [(orbit.side, x0, x1)], ONE
+    for k, branch in enumerate(orbit.word):
+        side, lo, hi = states[-1]
+        t = throws.interval(side, lo, hi)
+        prove(t.decision == branch, f"throw {k + 1}: that it is a {('jog', 'flip')[branch]} is not proved")
+        if t.slope is None:
+            raise UnprovedError(f"throw {k + 1}: its slope is not bounded")
+        shift = throws.scene.sides[side].shift if branch else ZERO
+        after = (side + branch) % len(throws.scene.sides)
+        states.append((after, (t.lo - shift).lower(), (t.hi - shift).upper()))
+        slope = slope * t.slope
+    return Followed(states, slope)
+
+
+def prove_orbit(throws: Throws, cells: Union, orbit: Orbit) -> Followed:
+    """Prove one periodic orbit: with G the throws along the itinerary, G(R) - R changes sign in the interval.
+
+    Along the interval all decisions are those of the itinerary and f is concave, so that G is the map and continuous.
+    |G'| > 1 or < 1 on it: G(R) - R is monotone and the orbit alone.  The attracting cells are invariant: one point of
+    the orbit in them is enough.
+    """
+    here: Union = [[] for _ in cells]
+    here[orbit.side] = [(orbit.lo, orbit.hi)]
+    prove(not first_outside(here, cells), "not in the attracting cells")
+    lo, hi = arb(orbit.lo), arb(orbit.hi)
+    first, last = (follow(throws, orbit, x, x).states[-1] for x in (lo, hi))
+    prove(first[0] == orbit.side, "it ends on another side")
+    grows = bool(first[2] < lo and last[1] > hi)
+    prove(grows or bool(first[1] > lo and last[2] < hi), "that it comes back is not proved")
+    found = follow(throws, orbit, lo, hi)
+    period = len(orbit.word)
+    for k in range(1, period):
+        apart = period % k or not meets(found.states[k], found.states[0])
+        prove(bool(apart), f"its period may be {k}")
+    least, most = orbit.multiplier
+    within = bool(found.slope >= least and found.slope <= most)
+    prove(within, f"its multiplier, {found.slope.str(10)}, is not proved to be as claimed")
+    return found
+
+
+def meets(one: tuple[int, Arb, Arb], other: tuple[int, Arb, Arb]) -> bool:
+    """Whether two intervals may have a point in common."""
+    return one[0] == other[0] and not (one[2] < other[1] or other[2] < one[1])
+
+
+def check_orbits(scene: Scene, c: Cells, section: dict[str, Any]) -> str:
+    """Prove that all of the periodic orbits exist, and are different; "" or what fails."""
+    cells, throws = attracting(c), Throws(scene)
+    proved: list[Followed] = []
+    for orbit in section["orbits"]:
+        name = f"period {len(orbit.word)}, side {orbit.side}, x in [{orbit.lo!r}, {orbit.hi!r}]"
+        try:
+            prove(all(s.concave for s in scene.sides), "kappa > ell is not proved")
+            found = prove_orbit(throws, cells, orbit)
+        except UnprovedError as error:
+            return f"{name}: {error}"
+        for other in proved:
+            if len(other.states) == len(found.states) and any(
+                meets(state, found.states[0]) for state in other.states
+            ):
+                return f"{name}: it may be the same orbit as another one"
+        proved.append(found)
+    return ""
+
+
+def check_sets(scene: Scene, c: Cells, claims: dict[str, dict[str, Any]]) -> Iterator[tuple[list[str], str]]:
+    """Check end points and periodic orbits of attracting cells that are proved; yields what fails."""
+    for name, check in (("end-points", check_ends), ("cycles", check_orbits)):
+        bad = check(scene, c, claims[name]) if name in claims else ""
+        if bad:
+            yield [name], bad
+
+
 # --------------------------------------------------------------------------------------------------- near the joint
 
 
@@ -1044,6 +1519,8 @@ SECTIONS = {  # the claims that are known, and the keys of their sections
     "trapping": "",
     "goal": "kind x side",
     "expanding": "least_slope",
+    "end-points": "images ends pieces",
+    "cycles": "cycles complete",
 }
 
 
@@ -1168,6 +1645,10 @@ def read_section(name: str, section: dict[str, Any], n_sides: int) -> dict[str, 
         least = hex_float(section["least_slope"], "least_slope")
         require(least > 1, "least_slope is not above 1")
         return {"least": least}
+    if name == "end-points":
+        return read_ends(section, n_sides)
+    if name == "cycles":
+        return read_orbits(section, n_sides)
     return {}
 
 
@@ -1197,6 +1678,10 @@ def statement_of(name: str, section: dict[str, Any], noisy: bool) -> str:
         least = section["least"]
         entropy = "" if noisy else f"; topological entropy >= ln({least!r}) = {math.log(least):.6g}"
         return f"expanding: |dR'/dR| >= {least!r} on the attracting cells{entropy}"
+    if name == "end-points":
+        return ends_statement(section, noisy)
+    if name == "cycles":
+        return orbits_statement(section)
     if name == "trapping":
         return "trapping: the attracting cells are mapped into their interior (relative to x <= arm.length)"
     return "invariant: no throw leaves the attracting cells, nor the component it starts in"
@@ -1238,7 +1723,9 @@ def check_box_claims(
         found = crew.run(list(tasks_of(c, scene, box, inside, None)))
     if found is not None:
         yield everything, f"{c.name(found[0])}: {found[1].text}"
-    elif attracts:
+        return
+    yield from check_sets(scene, c, claims)
+    if attracts:
         found = crew.run(list(tasks_of(c, scene, box, np.flatnonzero(c.component < 0), None)))
         if found is not None:
             yield ["attracts-all"], f"{c.name(found[0])}: {found[1].text}"
@@ -1305,6 +1792,8 @@ def check_certificate(
     failed: dict[str, str] = {}
     if gap:
         failed = dict.fromkeys(claims, gap)
+    if header["noise"] is not None and "cycles" in claims:
+        failed["cycles"] = "the orbit of the one throw is not that of the other: not with noise"
     work = sum(len(c.side) if "attracts-all" in claims else int((c.component >= 0).sum()) for c in cells)
     told = None if progress is None else (lambda done: progress(min(done, work), work))
     crew = Crew(raw, noise, workers, told)

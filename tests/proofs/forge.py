@@ -286,3 +286,157 @@ def forge(
     arrays |= {"0.jog": jog, "0.flip": flip, "0.branch": branch, "0.rank": rank}
     arrays |= {"0.component": component, "0.phi": phi}
     return Forged(header, arrays).seal()
+
+
+# ------------------------------------------------------------------------------ end points, and periodic orbits
+
+# Critical points are cut out by this much, and images moved outward or inward by it; cycles get as much room [in].
+GAP = 1e-10
+
+
+def attracting(f: Forged) -> list[list[tuple[float, float]]]:
+    """The attracting cells of each side as intervals."""
+    spans: list[list[tuple[float, float]]] = []
+    at = 0
+    for i in range(3):
+        edges = f.arrays[f"0.edges.{i}"]
+        own = np.concatenate([[0], f.arrays["0.component"][at : at + len(edges) - 1] >= 0, [0]]).astype(int)
+        at += len(edges) - 1
+        spans.append(
+            [(float(edges[a]), float(edges[b])) for a, b in np.flatnonzero(np.diff(own)).reshape(-1, 2)]
+        )
+    return spans
+
+
+def pieces_of(m: Plain, spans: list) -> list[tuple]:
+    """Cut the spans where the decision changes: side, ends, branch (2: either), sign of the slope."""
+    pieces = []
+    for i, parts in enumerate(spans):
+        for lo, hi in parts:
+            x = np.linspace(lo, hi, 4001)
+            assert (m.slope(i, x, m.kappa) > 0).all()
+            flips = m.decision(i, x, m.kappa) > 0
+            borders, branches = [lo], [int(flips[0])]
+            for k in np.flatnonzero(flips[1:] != flips[:-1]):
+                a, b = x[k], x[k + 1]
+                for _ in range(60):
+                    middle = 0.5 * (a + b)
+                    same = (m.decision(i, np.array([middle]), m.kappa)[0] > 0) == flips[k]
+                    a, b = (middle, b) if same else (a, middle)
+                borders += [float(a) - GAP, float(a) + GAP]
+                branches += [2, int(flips[k + 1])]
+            borders.append(hi)
+            pieces += [(i, borders[k], borders[k + 1], branch, 1) for k, branch in enumerate(branches)]
+    return pieces
+
+
+def joined(intervals: list[tuple[float, float]]) -> list[tuple[float, float]]:
+    union: list[tuple[float, float]] = []
+    for lo, hi in sorted(intervals):
+        if union and lo <= union[-1][1]:
+            union[-1] = (union[-1][0], max(hi, union[-1][1]))
+        else:
+            union.append((lo, hi))
+    return union
+
+
+def at_rest(m: Plain, union: list, pieces: list[tuple], grow: float) -> tuple[list, int]:
+    """Intersect with the image, moved outward (grow > 0, by all branches) or inward, until nothing moves."""
+    for count in range(1, 100):
+        images: list = [[], [], []]
+        for i, a, b, branch, _ in pieces:
+            for lo, hi in [(max(a, lo), min(b, hi)) for lo, hi in union[i] if lo <= b and hi >= a]:
+                for throw in {0: (0,), 1: (1,), 2: (0, 1) if grow > 0 else ()}[branch]:
+                    x0, x1 = (m.jog, m.flip)[throw](i, np.array([lo, hi]), m.kappa).tolist()
+                    if x0 - grow <= x1 + grow:
+                        images[(i + throw) % 3].append((x0 - grow, x1 + grow))
+        smaller = [
+            joined(
+                [(max(a, c), min(b, d)) for a, b in one for c, d in joined(other) if max(a, c) <= min(b, d)]
+            )
+            for one, other in zip(union, images, strict=True)
+        ]
+        if smaller == union:
+            return union, count
+        union = smaller
+    raise AssertionError
+
+
+def throw(m: Plain, side: np.ndarray, x: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Where points of all sides go, on which side, and by which branch."""
+    to, flips = np.empty_like(x), np.zeros(len(x), dtype=int)
+    for i in range(3):
+        own = side == i
+        flips[own] = m.decision(i, x[own], m.kappa) > 0
+        to[own] = np.where(flips[own] == 1, m.flip(i, x[own], m.kappa), m.jog(i, x[own], m.kappa))
+    return (side + flips) % 3, to, flips
+
+
+def cycles_of(m: Plain, spans: list, wanted: int) -> list[dict]:
+    """Some periodic orbits that begin on side 0: sign changes of G(x) - x between neighbours of one itinerary."""
+    x0 = np.linspace(*spans[0][0], 20_001)
+    side, x, words, found = np.zeros(len(x0), dtype=int), x0, [], []
+    for _ in range(70):
+        side, x, flips = throw(m, side, x)
+        words.append(flips)
+        word = np.array(words)
+        back = (side[1:] == 0) & (side[:-1] == 0) & (word[:, 1:] == word[:, :-1]).all(axis=0)
+        crossed = np.flatnonzero(back & ((x - x0)[1:] * (x - x0)[:-1] < 0))[:1]
+        found += [refined(m, word[:, k], x0[k], x0[k + 1]) for k in crossed]
+        if len(found) == wanted:
+            return found
+    raise AssertionError
+
+
+def refined(m: Plain, word: np.ndarray, lo: float, hi: float) -> dict:
+    """Bisect for the orbit of one itinerary."""
+
+    def around(x: float) -> tuple[float, float]:
+        i, start, slope = 0, x, 1.0
+        for branch in word:
+            slope *= float(m.slope(i, np.array([x]), m.kappa)[0])
+            x = float((m.jog, m.flip)[branch](i, np.array([x]), m.kappa)[0])
+            i = (i + int(branch)) % 3
+        return x - start, slope
+
+    down = around(lo)[0]
+    for _ in range(60):
+        middle = 0.5 * (lo + hi)
+        lo, hi = (middle, hi) if around(middle)[0] * down > 0 else (lo, middle)
+    slope = around(lo)[1]
+    assert slope > 1.01
+    return {
+        "side": 0,
+        "itinerary": word.tolist(),
+        "interval": [float(lo - GAP).hex(), float(lo + GAP).hex()],
+        "multiplier": [(slope * (1 - 1e-5)).hex(), (slope * (1 + 1e-5)).hex()],
+        "attracts": False,
+    }
+
+
+def with_sets(f: Forged, model: str) -> Forged:
+    """The claims of end points and of some periodic orbits besides "invariant", and no others."""
+    m, spans = Plain(scene(model)), attracting(f)
+    pieces = pieces_of(m, spans)
+    outer, images = at_rest(m, spans, pieces, GAP)
+    inner, _ = at_rest(m, outer, pieces, -GAP)
+    ends = [
+        {"side": i, "which": which, "outer": out.hex(), "inner": within.hex()}
+        for i in range(3)
+        for one, other in zip(outer[i], inner[i], strict=True)
+        for which, out, within in zip(("lo", "hi"), one, other, strict=True)
+    ]
+    f = f.copy()
+    f.header["claims"] = [
+        {"claim": "invariant", "section": {}},
+        {
+            "claim": "end-points",
+            "section": {
+                "images": images,
+                "ends": ends,
+                "pieces": [[i, lo.hex(), hi.hex(), branch, sign] for i, lo, hi, branch, sign in pieces],
+            },
+        },
+        {"claim": "cycles", "section": {"cycles": cycles_of(m, spans, 2), "complete": False}},
+    ]
+    return f

@@ -8,12 +8,12 @@ import pytest
 
 import limitsets as ls
 from limitsets.errors import AnswerError
-from limitsets.proofs import end_points
 from limitsets.proofs.attraction import attraction
 from limitsets.proofs.certify import certify
 from limitsets.proofs.cover import cover
 from limitsets.proofs.end_points import proved_ends
 from limitsets.proofs.parameters import parameter_box
+from limitsets.proofs.tiles import UnionImages, tiles_of
 from limitsets.proofs.trapping import trapping
 from tests.sets.part import Part
 from tests.test_paper import LIMIT_SETS
@@ -114,8 +114,8 @@ def images_of(name):
     tiles = {}
     for side, (edges,) in enumerate(found.cover.grid.edges):
         mine = np.flatnonzero(found.component[found.cover.grid.of_side(side)] >= 0)
-        tiles[side] = end_points._tiles(found.cover.box, side, edges[mine], edges[mine + 1])
-    return end_points._Images(found.cover.box, tiles)
+        tiles[side] = tiles_of(found.cover.box, side, edges[mine], edges[mine + 1])
+    return UnionImages(found.cover.box, tiles)
 
 
 @pytest.mark.parametrize("name", ["paper-initial", "paper-designed-small-angle"])
@@ -218,18 +218,10 @@ def test_claims_and_their_sections():
     assert len(section["ends"]) == 8
     first = section["ends"][0]
     assert float.fromhex(first["outer"]) < 13.522673689975 < float.fromhex(first["inner"])
-    assert first["critical"]["side"] == 2
-    assert first["branches"] == [1]
+    assert (first["side"], first["which"]) == (0, "lo")
     assert proof.claims[1].section == {}
 
 
 def test_a_tolerance_is_refused():
     with pytest.raises(AnswerError, match="without a tolerance"):
         certify("paper-designed", ["end-points"], tolerance={"throw.kappa": "0.1 %"})
-
-
-def test_the_checker_says_what_it_rechecks(tmp_path):
-    recheck = pytest.importorskip("limitsets.proofs.recheck", reason="the checker needs python-flint")
-    path = certify("paper-designed", ["end-points", "cycles", "trapping"]).save(tmp_path / "x.proof.zip")
-    claims = {claim: verdict for claim, verdict, _ in recheck.recheck(path, workers=1).claims}
-    assert claims == {"end-points": "not rechecked", "cycles": "not rechecked", "trapping": "proved"}

@@ -381,7 +381,7 @@ class Spoiler:
             del claim["section"]
 
     def unknown_claim(self):
-        name = self.rng.choice(["end-points", "cycles", "everything", "Invariant", ""])
+        name = self.rng.choice(["entropy", "everything", "Invariant", ""])
         self.f.header["claims"].insert(self.rng.randrange(6), {"claim": name, "section": {}})
 
     def another_goal(self):
@@ -445,10 +445,10 @@ def test_the_failure_names_claim_side_cell_and_interval(good, tmp_path):
 
 def test_claims_it_does_not_know_are_not_rechecked(good, tmp_path):
     f = good["small"].copy()
-    f.header["claims"].append({"claim": "cycles", "section": {"itinerary": "0"}})
+    f.header["claims"].append({"claim": "ergodic", "section": {"itinerary": "0"}})
     report = verdict(f, tmp_path)
     assert report.verdict == "failed"
-    assert report.claims[-1] == ("cycles", "not rechecked", "this checker does not know the claim")
+    assert report.claims[-1] == ("ergodic", "not rechecked", "this checker does not know the claim")
 
 
 # --------------------------------------------------------------------------------------------------- damaged files
