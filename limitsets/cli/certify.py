@@ -167,11 +167,12 @@ def _two_basins(proof: Proof, points: dict[str, list[float]]) -> list[str]:
     """Say what becomes of parts near the joint where the arm's surface is above it."""
     unit = proof.scene.unit
     lines = [
-        f"side {side}: R* between x = {_down(lo, 10)} and {_up(hi, 10)} {unit}" for side, (lo, hi) in points.items()
+        f"side {side}: R* between x = {_down(lo, 10)} and {_up(hi, 10)} {unit}"
+        for side, (lo, hi) in points.items()
     ]
     between = ["Between the two ends nothing is claimed: it depends on the throws."] if proof.noise else []
     return [
-        "The arm's surface is above the joint: a jog moves a part in that lies nearer than R*, an unstable place of rest,",
+        "The arm's surface is above the joint: jogs move a part out beyond R*, and in nearer than R*.",
         *lines,
         "From every position nearer than R*, jogs bring the part ever closer to x = a: it never leaves its side.",
         *between,

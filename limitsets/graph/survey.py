@@ -85,9 +85,7 @@ def _destinations(
     return merged
 
 
-def attracting_of(
-    r: Ranges, components: Components, sets: Sequence[NDArray[np.int32]]
-) -> NDArray[np.bool_]:
+def attracting_of(r: Ranges, components: Components, sets: Sequence[NDArray[np.int32]]) -> NDArray[np.bool_]:
     """Whether each recurrent component is attracting: no edge and no way out leads from it; of any number of them."""
     leads_out = wide.leaves if wide.is_wide(r) else _leaves
     return np.array([not leads_out(r, components.label, cells) for cells in sets], dtype=bool)

@@ -175,7 +175,8 @@ def _not_attracted(found: Attraction, scene: Scene) -> Claim:
             reason = f"side {side}, up to x = {near.x:.6g}: {near.reason}"
             return Claim("attracts-all", "undecided", f"{reason}; {found.reason}", {})
     least = min((near.q for near in found.joint if found.cover.points), default=math.inf)
-    slow = f"; beyond the jog's fixed point a throw gains {least - 1.0:.1g} of its distance only, too little for such cells"
+    gain = f"{least - 1.0:.1g} of its distance"
+    slow = f"; beyond the jog's fixed point a throw gains {gain} only, too little for such cells"
     few = len(found.unresolved) and least - 1.0 < 0.01
     return Claim("attracts-all", "undecided", found.reason + (slow if few else ""), {})
 
@@ -298,10 +299,10 @@ def certify(
         A scene, or what `limitsets.load` takes.
     claims : sequence of str, optional
         Of "attracts-all" (every start on the arm enters the attracting cells and stays; with the arm's surface above
-        the joint, every start beyond the jog's unstable fixed point, and those before it tend to the joint), "invariant", "expanding"
-        (every slope on the attracting cells exceeds 1), "trapping" (the attracting cells are mapped into their
-        interior), "end-points" (those of the limit set, in brackets), "cycles" (periodic orbits exist, and attract or
-        repel) and "goal".  Default: attracts-all, and the goal if there is one.
+        the joint, every start beyond the jog's unstable fixed point, and those before it tend to the joint),
+        "invariant", "expanding" (every slope on the attracting cells exceeds 1), "trapping" (the attracting cells are
+        mapped into their interior), "end-points" (those of the limit set, in brackets), "cycles" (periodic orbits
+        exist, and attract or repel) and "goal".  Default: attracts-all, and the goal if there is one.
     noise : mapping of str to str, optional
         ``{"throw.speed": "0.3 %"}``: what may differ at every throw; the claims are then proved for every sequence of
         throws.

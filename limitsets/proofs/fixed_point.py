@@ -165,7 +165,7 @@ def _find(lo: Any, hi: Any, side: int, out: Any) -> None:
 
 @proof_kernel
 def _decided(b: SideBox, lo: float, hi: float) -> float:
-    """Number that is positive if every start that lands between two angles jogs; R(phi) grows between them."""
+    """Return a number that is positive if every start that lands between two angles jogs; R(phi) grows there."""
     x = (_start(b, lo)[0], _start(b, hi)[1])
     omega, barrier = strike_box(b.flight, b, x, (lo, hi))
     return -decide_box(b.flip, b, omega, barrier)[1]
@@ -240,7 +240,9 @@ def _fixed_point(box: ParameterBox, side: int) -> FixedPoint:
     if not box.hi.a[side] < lo:
         return none("the fixed point of the jog is too near to the joint to be told from it")
     if not hi < box.lo.arm_length:
-        return none(f"the fixed point of the jog, x = {hi:.6g}, is not on the arm: up to it jogs go inward (h > 0)")
+        return none(
+            f"the fixed point of the jog, x = {hi:.6g}, is not on the arm: up to it jogs go inward (h > 0)"
+        )
     return FixedPoint(lo, hi, phi_lo, phi_hi, "")
 
 

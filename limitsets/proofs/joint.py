@@ -114,7 +114,7 @@ def near_joint(found: Cover) -> tuple[NearJoint, ...]:
 
 
 def _beyond(found: Cover, side: int, x: float) -> NearJoint:
-    """The same where the arm's surface is above the joint."""
+    """Prove it where the arm's surface is above the joint."""
     point = found.points[side]
     if point.reason:
         return NearJoint(x, np.nan, False, point.reason)

@@ -1150,7 +1150,9 @@ def check_fixed_point(s: Side, k_lo: Arb, k_hi: Arb, edge: float, q: float, said
             return "a jog is not proved"
     pieces = 16
     for k in range(pieces):
-        r = ratios((below.p + (top - below.p) * k / pieces).union(below.p + (top - below.p) * (k + 1) / pieces))
+        r = ratios(
+            (below.p + (top - below.p) * k / pieces).union(below.p + (top - below.p) * (k + 1) / pieces)
+        )
         sin, cos = r.p.sin_cos()
         rise = s.a * sin - s.d * (1 - cos) - s.h
         if not (q > 1 and rise > 0 and rise >= (arb(q) - 1) * its_slope(s, r, k_hi)):
@@ -1175,15 +1177,22 @@ def fixed_points_in_words(section: dict[str, Any], noisy: bool) -> str:
     """Put attracts-all in words where the arm's surface is above the joint."""
     said = "; ".join(f"side {i}: [{lo!r}, {hi!r}]" for i, (lo, hi) in enumerate(section["fixed"]))
     if noisy:
-        what = "for each speed of the noise the jog has an unstable fixed point, all of them in an interval [lo_i, hi_i]"
+        what = (
+            "for each speed of the noise the jog has an unstable fixed point, all in an interval [lo_i, hi_i]"
+        )
         beyond, before, rest = "hi_i", "lo_i", "; nothing is claimed of starts between lo_i and hi_i"
     else:
-        what, beyond, before, rest = "the jog has an unstable fixed point R*_i in an interval", "R*_i", "R*_i", ""
+        what, beyond, before, rest = (
+            "the jog has an unstable fixed point R*_i in an interval",
+            "R*_i",
+            "R*_i",
+            "",
+        )
     return (
         f"attracts-all, with the arm's surface above the joint: on every side i {what} ({said});"
         f" every start {beyond} < x <= arm.length on every side i enters the attracting cells and stays in them, within"
-        f" {section['max_rank']} throws where x is in the cells; nearer to it x - {beyond} grows by a factor of at least"
-        f" {min(section['q']):.9g} with every throw; every start a_i < x < {before} stays on side i and tends to"
+        f" {section['max_rank']} throws where x is in the cells; nearer to it x - {beyond} grows by a factor of at"
+        f" least {min(section['q']):.9g} with every throw; every start a_i < x < {before} stays on side i and tends to"
         f" a_i{rest}"
     )
 

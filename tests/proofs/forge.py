@@ -118,7 +118,6 @@ class Plain:
     def slope(self, i: int, R: np.ndarray, kappa: float) -> np.ndarray:
         return (self.jog(i, R * (1 + 1e-6), kappa) - self.jog(i, R * (1 - 1e-6), kappa)) / (2e-6 * R)
 
-
     def fixed_point(self, i: int) -> float:
         """Where a jog moves the part neither in nor out, for h > 0, by bisection."""
         lo, hi = self.a[i] * (1 + 1e-6), self.a[i] + 4 * self.h * self.kappa / self.a[i]

@@ -497,7 +497,9 @@ class AboveSpoiler(Spoiler):
         edges[0] = a + (lo - a) * self.rng.uniform(0.05, 0.9999)
 
     def other_height(self):
-        h = self.rng.choice([0.0, -0.2, 1.0, 0.1 + 10 ** self.rng.uniform(-6, -1), 0.1 - 10 ** self.rng.uniform(-6, -1)])
+        h = self.rng.choice(
+            [0.0, -0.2, 1.0, 0.1 + 10 ** self.rng.uniform(-6, -1), 0.1 - 10 ** self.rng.uniform(-6, -1)]
+        )
         self.scene["arm"]["surface_height"] = f"{h:.9f} in"
         self.wide_parameters()
         del self.f.header["claims"][1:]
@@ -511,7 +513,9 @@ class AboveSpoiler(Spoiler):
         del self.f.header["claims"][1:]
 
 
-WAYS_ABOVE = sorted({*WAYS, *(name for name in vars(AboveSpoiler) if name not in ("__doc__", "__module__", "near"))})
+WAYS_ABOVE = sorted(
+    {*WAYS, *(name for name in vars(AboveSpoiler) if name not in ("__doc__", "__module__", "near"))}
+)
 OWN = vars(AboveSpoiler)
 
 
