@@ -107,7 +107,7 @@ def _words(proof: Proof, claim: Claim) -> list[str]:
         return [claim.reason[:1].upper() + claim.reason[1:] + "."]
     scene = proof.scene
     if claim.claim == "attracts-all":
-        return _attraction(proof)
+        return _attraction(proof, claim)
     if claim.claim == "goal":
         goal = claim.section
         return [
@@ -139,21 +139,43 @@ def _words(proof: Proof, claim: Claim) -> list[str]:
     return ["No throw leads out of the attracting cells."]
 
 
-def _attraction(proof: Proof) -> list[str]:
-    from limitsets.proofs.answer import max_throws, outer_extents
+def _attraction(proof: Proof, claim: Claim) -> list[str]:
+    from limitsets.proofs.answer import jog_fixed_points, max_throws, outer_extents
 
-    unit, bound = proof.scene.unit, max_throws(proof)
+    unit, bound, points = proof.scene.unit, max_throws(proof), jog_fixed_points(claim)
     extents = {
         side: ", ".join(f"{_down(lo, 3)} to {_up(hi, 3)}" for lo, hi in parts)
         for side, parts in outer_extents(proof).items()
     }
     growth = _down(bound["near_joint"], 6)
     starts = ", ".join(f"{_up(x, 6)} {unit} on side {side}" for side, x in bound["beyond"].items())
+    first = "From every position on the arm and every side, a part comes into the attracting cells and stays there:"
+    near = f"Nearer to the joint more come before; each moves the part out, x - a by a factor of {growth} at least."
+    if points is not None:
+        first = "From every position on the arm beyond R*, a part comes into the attracting cells and stays there:"
+        near = f"Nearer to R* more come before; each moves the part out, x - R* by a factor of {growth} at least."
     return [
-        "From every position on the arm and every side, a part comes into the attracting cells and stays there:",
+        *(_two_basins(proof, points) if points is not None else ()),
+        first,
         *(f"side {side}: x = {parts} {unit}" for side, parts in extents.items()),
         f"It takes {bound['throws']} throws at most from x = {starts}, or beyond.",
-        f"Nearer to the joint more come before; each moves the part out, x - a by a factor of {growth} at least.",
+        near,
+    ]
+
+
+def _two_basins(proof: Proof, points: dict[str, list[float]]) -> list[str]:
+    """Say what becomes of parts near the joint where the arm's surface is above it."""
+    unit = proof.scene.unit
+    lines = [
+        f"side {side}: R* between x = {_down(lo, 10)} and {_up(hi, 10)} {unit}"
+        for side, (lo, hi) in points.items()
+    ]
+    between = ["Between the two ends nothing is claimed: it depends on the throws."] if proof.noise else []
+    return [
+        "The arm's surface is above the joint: jogs move a part out beyond R*, and in nearer than R*.",
+        *lines,
+        "From every position nearer than R*, jogs bring the part ever closer to x = a: it never leaves its side.",
+        *between,
     ]
 
 

@@ -15,7 +15,7 @@ from limitsets.graph.ranges import Ranges, box_rows, row_start
 from limitsets.jit import kernel
 from limitsets.maps import codes
 
-__all__ = ["Survey", "survey"]
+__all__ = ["Survey", "attracting_of", "survey"]
 
 # Components per sweep; the other bits of a 64-bit mark are for the ways out.
 SETS_PER_SWEEP = 56
@@ -85,6 +85,12 @@ def _destinations(
     return merged
 
 
+def attracting_of(r: Ranges, components: Components, sets: Sequence[NDArray[np.int32]]) -> NDArray[np.bool_]:
+    """Whether each recurrent component is attracting: no edge and no way out leads from it; of any number of them."""
+    leads_out = wide.leaves if wide.is_wide(r) else _leaves
+    return np.array([not leads_out(r, components.label, cells) for cells in sets], dtype=bool)
+
+
 def survey(
     r: Ranges, components: Components, exits: dict[str, int], sets: Sequence[NDArray[np.int32]]
 ) -> Survey:
@@ -107,8 +113,7 @@ def survey(
         Order, attracting components, destinations.
     """
     k = len(sets)
-    leads_out = wide.leaves if wide.is_wide(r) else _leaves
-    attracting = np.array([not leads_out(r, components.label, cells) for cells in sets], dtype=bool)
+    attracting = attracting_of(r, components, sets)
     number = np.cumsum(attracting) - 1
     order, out = np.zeros((k, k), dtype=bool), np.zeros((k, len(exits)), dtype=bool)
     destination: NDArray[np.int32] | None = None

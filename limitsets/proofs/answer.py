@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from limitsets.proofs.certify import Claim, Proof
     from limitsets.proofs.goal import State
 
-__all__ = ["max_throws", "outer_extents", "to_json", "values"]
+__all__ = ["jog_fixed_points", "max_throws", "outer_extents", "to_json", "values"]
 
 
 def to_json(proof: Proof) -> list[dict[str, Any]]:
@@ -47,6 +47,7 @@ def _claim(proof: Proof, claim: Claim) -> dict[str, Any]:
         "noise": proof.noise or None,
         "tolerance": proof.tolerance or None,
         "max_throws": max_throws(proof) if proved and claim.claim == "attracts-all" else None,
+        "jog_fixed_points": jog_fixed_points(claim),
         "extents": _extents(proof, claim) if proved else None,
         "least_slope": slope,
         "entropy": math.log(slope) if slope is not None and not proof.noise else None,
@@ -96,7 +97,8 @@ def max_throws(proof: Proof) -> dict[str, Any]:
     Returns
     -------
     dict
-        `throws` from `beyond` (x by side) on; below it, x - a grows by a factor of `near_joint` at least with each.
+        `throws` from `beyond` (x by side) on; below it, x - a grows by a factor of `near_joint` at least with each, or
+        with the arm's surface above the joint x - R* does, down to the jog's fixed point R*.
     """
     starts = [[float(edges[0]) for (edges,) in found.cover.grid.edges] for found in proof.attractions]
     return {
@@ -104,6 +106,13 @@ def max_throws(proof: Proof) -> dict[str, Any]:
         "throws": max(found.max_rank for found in proof.attractions),
         "near_joint": min(near.q for found in proof.attractions for near in found.joint),
     }
+
+
+def jog_fixed_points(claim: Claim) -> dict[str, list[float]] | None:
+    """Brackets of the jog's unstable fixed point by side, where the claim rests on them."""
+    near = claim.section.get("near_joint", {})
+    found = {side: [float.fromhex(end) for end in each.get("fixed_point", ())] for side, each in near.items()}
+    return found if found and all(found.values()) else None
 
 
 def outer_extents(proof: Proof) -> dict[int, list[tuple[float, float]]]:

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from limitsets.cells import CellSet
 from limitsets.graph.components import ranks
+from limitsets.graph.survey import attracting_of
 from limitsets.proofs.cover import Cover
 from limitsets.proofs.joint import NearJoint, near_joint
 
@@ -74,12 +75,12 @@ def attraction(found: Cover) -> Attraction:
         With the reason where it is not proved.
     """
     graph = found.graph
-    survey, parts = graph.survey(), graph.components()
-    sets = graph.recurrent_components()
+    parts, sets = graph.components(), graph.recurrent_components()
+    good = attracting_of(graph.ranges, parts, sets)  # a survey's order is quadratic in their number
     component = np.full(graph.n_cells, -1, dtype=np.int32)
-    for number, cells in enumerate(k for k, good in zip(sets, survey.attracting, strict=True) if good):
+    for number, cells in enumerate(k for k, attracts in zip(sets, good, strict=True) if attracts):
         component[cells] = number
-    lost = [cells for cells, good in zip(sets, survey.attracting, strict=True) if not good]
+    lost = [cells for cells, attracts in zip(sets, good, strict=True) if not attracts]
     unresolved = CellSet.of(found.grid, np.concatenate([np.zeros(0, np.int64), *lost]))
     joint = near_joint(found)
     return Attraction(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -147,16 +148,37 @@ class Proof:
         return Path(path)
 
 
-def _attracts_all(found: Attraction, _: Scene) -> Claim:
+def _attracts_all(found: Attraction, scene: Scene) -> Claim:
     if not found.proved:
-        if not found.cover.box.hi.surface_height < 0.0:  # no matter how fine the cells are
-            reason = (
-                "the arm's surface is not below the joint: near the joint no throw is proved to go outward"
-            )
-            return Claim("attracts-all", "undecided", f"{reason}; {found.reason}", {}, final=True)
-        return Claim("attracts-all", "undecided", found.reason, {})
-    joint = {str(side): {"q": near.q.hex()} for side, near in enumerate(found.joint)}
+        return _not_attracted(found, scene)
+    joint: dict[str, dict[str, Any]] = {}
+    for side, near in enumerate(found.joint):
+        joint[str(side)] = {"q": near.q.hex()}
+        if near.fixed_point is not None:
+            joint[str(side)]["fixed_point"] = [end.hex() for end in near.fixed_point]
     return Claim("attracts-all", "proved", "", {"near_joint": joint, "max_rank": found.max_rank})
+
+
+def _not_attracted(found: Attraction, scene: Scene) -> Claim:
+    """Say why attraction is not proved: first what no finer cells can change."""
+    box = found.cover.box
+    if box.lo.surface_height <= 0.0 <= box.hi.surface_height:
+        reason = "the arm's surface is not proved to be below the joint nor above it"
+        return Claim("attracts-all", "undecided", f"{reason}; {found.reason}", {}, final=True)
+    for side, point in enumerate(found.cover.points):
+        if point.reason:
+            # of a narrower piece of a tolerance it may be found
+            alone = box.scene == dict(scene.text)
+            return Claim("attracts-all", "undecided", f"side {side}: {point.reason}", {}, final=alone)
+    for side, near in enumerate(found.joint):
+        if found.cover.points and not near.proved:
+            reason = f"side {side}, up to x = {near.x:.6g}: {near.reason}"
+            return Claim("attracts-all", "undecided", f"{reason}; {found.reason}", {})
+    least = min((near.q for near in found.joint if found.cover.points), default=math.inf)
+    gain = f"{least - 1.0:.1g} of its distance"
+    slow = f"; beyond the jog's fixed point a throw gains {gain} only, too little for such cells"
+    few = len(found.unresolved) and least - 1.0 < 0.01
+    return Claim("attracts-all", "undecided", found.reason + (slow if few else ""), {})
 
 
 def _invariant(found: Attraction, _: Scene) -> Claim:
@@ -276,10 +298,11 @@ def certify(
     scene : Scene, str or Path
         A scene, or what `limitsets.load` takes.
     claims : sequence of str, optional
-        Of "attracts-all" (every start on the arm enters the attracting cells and stays), "invariant", "expanding"
-        (every slope on the attracting cells exceeds 1), "trapping" (the attracting cells are mapped into their
-        interior), "end-points" (those of the limit set, in brackets), "cycles" (periodic orbits exist, and attract or
-        repel) and "goal".  Default: attracts-all, and the goal if there is one.
+        Of "attracts-all" (every start on the arm enters the attracting cells and stays; with the arm's surface above
+        the joint, every start beyond the jog's unstable fixed point, and those before it tend to the joint),
+        "invariant", "expanding" (every slope on the attracting cells exceeds 1), "trapping" (the attracting cells are
+        mapped into their interior), "end-points" (those of the limit set, in brackets), "cycles" (periodic orbits
+        exist, and attract or repel) and "goal".  Default: attracts-all, and the goal if there is one.
     noise : mapping of str to str, optional
         ``{"throw.speed": "0.3 %"}``: what may differ at every throw; the claims are then proved for every sequence of
         throws.
@@ -414,9 +437,19 @@ def _joined(claims: Sequence[Claim]) -> Claim:
     if "max_rank" in section:
         section["max_rank"] = max(other["max_rank"] for other in sections)
         section["near_joint"] = {
-            side: {"q": min((other["near_joint"][side]["q"] for other in sections), key=float.fromhex)}
+            side: _weakest([other["near_joint"][side] for other in sections])
             for side in section["near_joint"]
         }
     if "least_slope" in section:
         section["least_slope"] = min((other["least_slope"] for other in sections), key=float.fromhex)
     return Claim(claims[0].claim, "proved", "", section)
+
+
+def _weakest(near: Sequence[dict[str, Any]]) -> dict[str, Any]:
+    """Near the joint on one side of every piece: the least factor, and a bracket of all fixed points."""
+    joined: dict[str, Any] = {"q": min((each["q"] for each in near), key=float.fromhex)}
+    if "fixed_point" in near[0]:  # or in none of them: h = 0 would lie in a piece between
+        ends = [each["fixed_point"] for each in near]
+        lowest, highest = (lo for lo, _ in ends), (hi for _, hi in ends)
+        joined["fixed_point"] = [min(lowest, key=float.fromhex), max(highest, key=float.fromhex)]
+    return joined

@@ -1,7 +1,8 @@
 """Cells for a proof, and the enclosures of their images.
 
 The cells of side i run from just beyond a_i to the arm's end, graded towards a_i; what lies nearer to a_i is the
-business of `joint.py`.  Wanted borders (the x of a goal) are cut in.
+business of `joint.py`.  Where the arm's surface is above the joint they begin just beyond the unstable fixed point of
+the jog instead, if one is found.  Wanted borders (the x of a goal) are cut in.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ from limitsets.graph.images.enclosed import Enclosures, boxes_of, enclosures
 from limitsets.graph.ranges import build
 from limitsets.graph.target import Target
 from limitsets.maps import kind_of
+from limitsets.proofs.fixed_point import FixedPoint, fixed_points
 from limitsets.proofs.parameters import ParameterBox
 
 __all__ = ["Cover", "cover"]
@@ -44,12 +46,15 @@ class Cover:
         Per side, widened by `SLACK`.
     graph : TransitionGraph
         The same as a graph; the sinks are reached by images that may leave.
+    points : tuple of FixedPoint
+        Where the arm's surface is above the joint: the fixed points of the jog, one per side; otherwise none.
     """
 
     box: ParameterBox
     grid: Grid
     images: tuple[Enclosures, ...]
     graph: TransitionGraph
+    points: tuple[FixedPoint, ...]
 
 
 def _widened(found: Enclosures, edges: NDArray[np.float64]) -> Enclosures:
@@ -82,8 +87,12 @@ def cover(box: ParameterBox, cells: int, cuts: Mapping[int, Sequence[float]] | N
     foot, end = box.hi.a, np.full(box.hi.a.size, box.hi.arm_length)
     if not (foot < box.lo.arm_length).all():
         raise AnswerError("the arm", box.lo.arm_length, f"longer than a = {foot.max()}", "lengthen it")
+    foot, anchor, points = foot.copy(), box.lo.a.copy(), fixed_points(box)
+    for side, point in enumerate(points):
+        if not point.reason:
+            foot[side] = anchor[side] = point.hi
     lo = foot + NEAREST * (end - foot)
-    plain = grid(Domain(lo[:, None], end[:, None], box.lo.a), cells=cells)
+    plain = grid(Domain(lo[:, None], end[:, None], anchor), cells=cells)
     sides = []
     for side, (edges,) in enumerate(plain.edges):
         wanted = [x for x in (cuts or {}).get(side, ()) if edges[0] < x < edges[-1]]
@@ -92,7 +101,7 @@ def cover(box: ParameterBox, cells: int, cuts: Mapping[int, Sequence[float]] | N
     found = tuple(
         _widened(enclosures(box.lo, box.hi, edges, side), edges) for side, (edges,) in enumerate(sides)
     )
-    return Cover(box, cells_of, found, _graph(box, cells_of, found))
+    return Cover(box, cells_of, found, _graph(box, cells_of, found), points)
 
 
 def _graph(box: ParameterBox, cells: Grid, found: Sequence[Enclosures]) -> TransitionGraph:

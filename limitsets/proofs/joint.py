@@ -8,6 +8,7 @@ w = phi - sin phi, and
 
 so R' - a >= q r with q = 1 + 2 |h| / kappa > 1: the orbit leaves the interval after ln(delta/r) / ln q throws at most.
 The small-angle flights have phi >= 2 r / kappa and no v and w in the displacement, so the same q serves.
+For h > 0 see `fixed_point.py`.
 Source: docs/model.md, "Conventions": near a_i.
 """
 
@@ -21,6 +22,7 @@ import numpy as np
 import limitsets.interval as iv
 from limitsets.jit import proof_kernel
 from limitsets.proofs.cover import Cover
+from limitsets.proofs.fixed_point import leaves
 from limitsets.thrower.throw_box import bracket, decide_box, displacement_box, gather_box, strike_box
 
 __all__ = ["NearJoint", "near_joint"]
@@ -35,17 +37,21 @@ class NearJoint:
     x : float
         Where the cells begin.
     q : float
-        R' - a >= q (R - a) on (a_i, x].
+        R' - a >= q (R - a) on (a_i, x]; or, if there is a fixed point R*, R' - R* >= q (R - R*) on (R*, x], and starts
+        in (a_i, R*) tend to a_i.
     proved : bool
         Whether q > 1 and all that it rests on is proved.
     reason : str
         What is missing, empty if nothing.
+    fixed_point : (float, float) or None
+        With the arm's surface above the joint: R* lies between them.
     """
 
     x: float
     q: float
     proved: bool
     reason: str
+    fixed_point: tuple[float, float] | None = None
 
 
 @proof_kernel(entry=True)
@@ -82,7 +88,7 @@ REASONS = (
 
 
 def near_joint(found: Cover) -> tuple[NearJoint, ...]:
-    """Prove the expansion near a_i on every side.
+    """Prove the expansion near a_i, or from the fixed point of the jog on, on every side.
 
     Parameters
     ----------
@@ -96,9 +102,21 @@ def near_joint(found: Cover) -> tuple[NearJoint, ...]:
     """
     answers = []
     for side, (edges,) in enumerate(found.grid.edges):
+        if found.points:
+            answers.append(_beyond(found, side, float(edges[0])))
+            continue
         out = np.full(6, np.nan)
         _near(found.box.lo, found.box.hi, side, float(edges[0]), out)
         good = [*(out[:5] > 0.0), out[5] > 1.0]
         reason = "" if all(good) else REASONS[good.index(False)]
         answers.append(NearJoint(float(edges[0]), float(out[5]), all(good), reason))
     return tuple(answers)
+
+
+def _beyond(found: Cover, side: int, x: float) -> NearJoint:
+    """Prove it where the arm's surface is above the joint."""
+    point = found.points[side]
+    if point.reason:
+        return NearJoint(x, np.nan, False, point.reason)
+    q, reason = leaves(found.box, side, point, x)
+    return NearJoint(x, q, not reason, reason, (point.lo, point.hi))

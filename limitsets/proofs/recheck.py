@@ -1511,6 +1511,167 @@ def check_near_joint(s: Side, k_lo: Arb, k_hi: Arb, edge: float, q: float) -> st
     return ""
 
 
+# ------------------------------------------------------------------------------- the surface above the joint (h > 0)
+
+
+class Ratios(NamedTuple):
+    """Of an angle p in [0, 3]: sin(p)/p, V = (1 - cos p)/p^2 and W = (p - sin p)/p^3."""
+
+    p: Arb
+    sine: Arb
+    V: Arb
+    W: Arb
+
+
+def ratios(p: Arb) -> Ratios:
+    """Evaluate them; W between the sums 1/6 - p^2/120 (+ p^4/5040), whose terms alternate and fall for p^2 < 42."""
+    low = ONE / 6 - p * p / 120
+    return Ratios(p, p.sinc(), HALF * (HALF * p).sinc() ** 2, low.union(low + p**4 / 5040))
+
+
+def landing_at(s: Side, r: Ratios, kappa: Arb) -> Arb:
+    """Evaluate R(p), the start whose f has the root p: f = (R - R(p)) p."""
+    return s.a * r.sine + r.p * (HALF * kappa - s.d * r.V)
+
+
+def its_slope(s: Side, r: Ratios, kappa: Arb) -> Arb:
+    """Evaluate dR(p)/dp = kappa/2 - a (V - W) p - d (sin p/p - V)."""
+    return HALF * kappa - s.a * (r.V - r.W) * r.p - s.d * (r.sine - r.V)
+
+
+def gain_at(a: Arb, d: Arb, h: Arb, r: Ratios) -> Arb:
+    """Evaluate E(p) = (R' - R)/p of a jog; it rises with a and falls with d and h."""
+    return a * r.p * r.V - d * (ONE - r.sine) - h
+
+
+def gain_slope(a: Arb, d: Arb, r: Ratios) -> Arb:
+    """Evaluate dE/dp."""
+    return a * (r.sine - r.V) - d * (r.V - r.W) * r.p
+
+
+def fixed_angles(s: Side) -> tuple[Ratios, Ratios] | None:
+    """Find angles with E < 0 at the first and E > 0 at the second for all parameters: guessed by Newton, proved."""
+    found = []
+    for sign, a, d, h in (
+        (-1, s.a.upper(), s.d.lower(), s.h.lower()),
+        (1, s.a.lower(), s.d.upper(), s.h.upper()),
+    ):
+        p = 2 * h / a
+        for _ in range(60):
+            r = ratios(p)
+            slope = gain_slope(a, d, r).mid()
+            if not (slope > 0 and p < 3):
+                return None
+            p = (p - gain_at(a, d, h, r).mid() / slope).mid()
+        if not (p > 0 and p < 3):
+            return None
+        for k in range(10):
+            r = ratios(arb(float(p) * (1 + sign * 2.0 ** (3 * k - 46))))
+            if sign * gain_at(s.a, s.d, s.h, r) > 0:
+                break
+        else:
+            return None
+        found.append(r)
+    return found[0], found[1]
+
+
+def last_angle(s: Side, x: float, k_lo: Arb) -> Ratios | None:
+    """Find an angle p with R(p) > x for all parameters."""
+    guess = guess_root(s, x, float(k_lo), 4 * (x - s.floats[0]) / float(k_lo) + 0.1)
+    for k in range(20):
+        p = guess * (1 + 2.0 ** (2 * k - 38))
+        if 0 < p < 3:
+            r = ratios(arb(p))
+            if landing_at(s, r, k_lo) > arb(x):
+                return r
+    return None
+
+
+def check_fixed_point(s: Side, k_lo: Arb, k_hi: Arb, edge: float, q: float, said: tuple[float, float]) -> str:
+    """Prove the claims about starts up to the edge where the arm's surface is above the joint; "" or what fails.
+
+    They are: on (a, edge] a throw is a jog; it has one fixed point R* there, with said[0] <= R* <= said[1]; starts in
+    (a, R*) tend to a; and R' - R* >= q (R - R*), R' <= arm on (R*, edge].
+
+    f(p) = (R - R(p)) p.  Where dR/dp > 0 on (0, top] and R(top) > edge, each start in (a, edge] has one root there, its
+    first, and they grow together: all is said by the angle.  dE/dp > 0 with E < 0 at one angle and E > 0 at a later one
+    leaves one zero p* between, R* = R(p*); E has the sign of p - p*.  (R' - a)/p = kappa/2 - h + a (V - W) p
+    - d (V + 1 - sin p/p) > 0 keeps a jog right of a: below R* starts fall and stay above a, to a limit, which is fixed
+    and so a.  (With another kappa at every throw they fall too, on any closed interval in there by a least step.)
+    Beyond, R' - R = D(p), dD/dR = (dD/dp)/(dR/dp) >= q - 1 from the first angle on, and D = 0 at R*.
+    """
+    if not s.exact:
+        return "every jog goes inward in this flight, where the arm's surface is above the joint"
+    angles, last = fixed_angles(s), last_angle(s, edge, k_lo)
+    if angles is None or last is None:
+        return "the fixed point of the jog is not found"
+    below, above = angles
+    top, kappa = last.p, k_lo.union(k_hi)
+    least, most = landing_at(s, below, k_lo), landing_at(s, above, k_hi)
+    if not (below.p < above.p and above.p < top and most < arb(edge)):
+        return "the cells do not begin beyond the fixed point of the jog"
+    if not (least >= arb(said[0]) and most <= arb(said[1])):
+        return f"the fixed point of the jog is not proved to lie in [{said[0]!r}, {said[1]!r}]"
+    pieces = 256
+    for k in range(pieces):
+        ends = ratios(top * k / pieces), ratios(top * (k + 1) / pieces)
+        r = ratios(ends[0].p.union(ends[1].p))
+        if not (its_slope(s, r, k_lo) > 0 and gain_slope(s.a, s.d, r) > 0):
+            return "the fixed point of the jog is not proved to be the only one"
+        if not HALF * k_lo - s.h + s.a * (r.V - r.W) * r.p - s.d * (r.V + ONE - r.sine) > 0:
+            return "R' > a is not proved"
+        R = landing_at(s, ends[0], k_lo).union(landing_at(s, ends[1], k_hi))
+        if over_angles(s, r.p, R, kappa)[0] != 0:
+            return "a jog is not proved"
+    pieces = 16
+    for k in range(pieces):
+        r = ratios(
+            (below.p + (top - below.p) * k / pieces).union(below.p + (top - below.p) * (k + 1) / pieces)
+        )
+        sin, cos = r.p.sin_cos()
+        rise = s.a * sin - s.d * (1 - cos) - s.h
+        if not (q > 1 and rise > 0 and rise >= (arb(q) - 1) * its_slope(s, r, k_hi)):
+            return f"R' - R* >= q (R - R*) is not proved for q = {q!r}"
+    if not arb(edge) + at_angle(s, top).D <= s.arm:
+        return "R' <= arm.length is not proved"
+    return ""
+
+
+def check_below_cells(s: Side, scene: Scene, edge: float, q: float, said: tuple[float, float] | None) -> str:
+    """Check what is said of starts before the first cell: whichever the sign of h asks for; "" or what fails."""
+    if s.h > 0:
+        if said is None:
+            return "the arm's surface is above the joint, and no fixed point of the jog is given"
+        return check_fixed_point(s, scene.k_lo, scene.k_hi, edge, q, said)
+    if said is not None:
+        return "a fixed point of the jog is given, but the arm's surface is not above the joint"
+    return check_near_joint(s, scene.k_lo, scene.k_hi, edge, q)
+
+
+def fixed_points_in_words(section: dict[str, Any], noisy: bool) -> str:
+    """Put attracts-all in words where the arm's surface is above the joint."""
+    said = "; ".join(f"side {i}: [{lo!r}, {hi!r}]" for i, (lo, hi) in enumerate(section["fixed"]))
+    if noisy:
+        what = (
+            "for each speed of the noise the jog has an unstable fixed point, all in an interval [lo_i, hi_i]"
+        )
+        beyond, before, rest = "hi_i", "lo_i", "; nothing is claimed of starts between lo_i and hi_i"
+    else:
+        what, beyond, before, rest = (
+            "the jog has an unstable fixed point R*_i in an interval",
+            "R*_i",
+            "R*_i",
+            "",
+        )
+    return (
+        f"attracts-all, with the arm's surface above the joint: on every side i {what} ({said});"
+        f" every start {beyond} < x <= arm.length on every side i enters the attracting cells and stays in them, within"
+        f" {section['max_rank']} throws where x is in the cells; nearer to it x - {beyond} grows by a factor of at"
+        f" least {min(section['q']):.9g} with every throw; every start a_i < x < {before} stays on side i and tends to"
+        f" a_i{rest}"
+    )
+
+
 # --------------------------------------------------------------------------------------------------------- the claims
 
 SECTIONS = {  # the claims that are known, and the keys of their sections
@@ -1633,9 +1794,11 @@ def read_section(name: str, section: dict[str, Any], n_sides: int) -> dict[str, 
     """Read the numbers of a section."""
     if name == "attracts-all":
         near = table(section["near_joint"], "near_joint", " ".join(str(i) for i in range(n_sides)))
-        q = [hex_float(table(near[str(i)], "near_joint", "q")["q"], "q") for i in range(n_sides)]
+        each = [table(near[str(i)], "near_joint", "q", "fixed_point") for i in range(n_sides)]
+        q = [hex_float(one["q"], "q") for one in each]
+        fixed = [read_bracket(one["fixed_point"]) if "fixed_point" in one else None for one in each]
         require(type(section["max_rank"]) is int, "max_rank is not an integer")
-        return {"q": q, "max_rank": section["max_rank"]}
+        return {"q": q, "fixed": fixed, "max_rank": section["max_rank"]}
     if name == "goal":
         x = quantity(section["x"], "length", "goal.x")
         require(x.lo == x.hi, "goal.x is not one number")
@@ -1650,6 +1813,13 @@ def read_section(name: str, section: dict[str, Any], n_sides: int) -> dict[str, 
     if name == "cycles":
         return read_orbits(section, n_sides)
     return {}
+
+
+def read_bracket(value: object) -> tuple[float, float]:
+    """Read two numbers that enclose one."""
+    lo, hi = (hex_float(end, "fixed_point") for end in rows(value, "fixed_point", 2, 2))
+    require(lo <= hi, "fixed_point is an empty interval")
+    return lo, hi
 
 
 def extents(c: Cells) -> str:
@@ -1667,6 +1837,8 @@ def extents(c: Cells) -> str:
 def statement_of(name: str, section: dict[str, Any], noisy: bool) -> str:
     """Put a claim in words."""
     if name == "attracts-all":
+        if None not in section["fixed"]:
+            return fixed_points_in_words(section, noisy)
         return (
             f"attracts-all: every start a_i < x <= arm.length on every side i enters the attracting cells and stays in"
             f" them, within {section['max_rank']} throws where x is in the cells; nearer to the joint x - a_i grows by"
@@ -1710,7 +1882,8 @@ def check_box_claims(
         bad = check_ranks(c, scene, claims["attracts-all"]["max_rank"])
         for i, s in enumerate(scene.sides):
             edge = float(c.edges[i][0])
-            near = check_near_joint(s, scene.k_lo, scene.k_hi, edge, claims["attracts-all"]["q"][i])
+            said = claims["attracts-all"]["fixed"][i]
+            near = check_below_cells(s, scene, edge, claims["attracts-all"]["q"][i], said)
             bad = bad or (f"side {i}, near the joint, x in (a, {edge!r}]: {near}" if near else "")
         if bad:
             attracts = False

@@ -48,6 +48,26 @@ def test_proved_is_exit_0_and_rechecks(capfd):
     assert json.loads(Path("report.json").read_text()) == record
 
 
+def test_two_basins_in_words(capfd):
+    """With h = 0.1 in the jog's fixed points lie at 3.16349, 3.19076 and 4.80947 in: see test_fixed_point.py."""
+    ls.dump(ls.load("paper-designed").with_values({"arm.surface_height": 0.1}), "above.toml")
+    code, out, _ = run(capfd, "certify", "above.toml")
+    assert code == 0
+    assert "attracts-all: PROVED" in out
+    assert "From every position on the arm beyond R*" in out
+    assert "From every position nearer than R*, jogs bring the part ever closer to x = a" in out
+    assert "From every position on the arm and every side" not in out
+    for side, want in enumerate((3.1634862212551690, 3.1907626017464787, 4.8094728969963149)):
+        line = next(line for line in out.splitlines() if line.strip().startswith(f"side {side}: R* between"))
+        lo, hi = (float(word) for word in line.split("=")[1].removesuffix(" in").split(" and "))
+        assert lo < want < hi < lo + 1e-9
+    code, out, _ = run(capfd, "recheck", "paper-designed.proof.zip")
+    assert code == 0
+    assert "every start a_i < x < R*_i stays on side i and tends to a_i" in out
+    _, out, _ = run(capfd, "certify", "above.toml", "--noise", "throw.speed=0.1 %")
+    assert "Between the two ends nothing is claimed" in out
+
+
 def test_printed_bounds_are_no_stronger_than_the_proved_ones(capfd):
     """Extents rounded outward, throws as they are; the limit set's own ends lie inside (test_paper.py)."""
     _, out, _ = run(capfd, "certify", "paper-designed")

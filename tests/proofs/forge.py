@@ -17,6 +17,7 @@ import numpy as np
 SLACK = 2.0**-34
 MODELS = {  # flight, flip, along, above, kappa, height, arm
     "designed": ("exact", "signed", "4.2255778 in", "0.7082490 in", "25.3778518 in", "-0.2 in", "28 in"),
+    "above": ("exact", "signed", "4.2255778 in", "0.7082490 in", "25.3778518 in", "0.1 in", "28 in"),
     "energy": ("exact", "energy", "4.2255778 in", "0.7082490 in", "25.3778518 in", "-0.2 in", "28 in"),
     "initial": ("exact", "signed", "3.9867006 in", "1.8835981 in", "33.3605945 in", "-0.2 in", "28 in"),
     "initial-small": (
@@ -117,6 +118,14 @@ class Plain:
     def slope(self, i: int, R: np.ndarray, kappa: float) -> np.ndarray:
         return (self.jog(i, R * (1 + 1e-6), kappa) - self.jog(i, R * (1 - 1e-6), kappa)) / (2e-6 * R)
 
+    def fixed_point(self, i: int) -> float:
+        """Where a jog moves the part neither in nor out, for h > 0, by bisection."""
+        lo, hi = self.a[i] * (1 + 1e-6), self.a[i] + 4 * self.h * self.kappa / self.a[i]
+        for _ in range(100):
+            mid = np.array([0.5 * (lo + hi)])
+            lo, hi = (mid[0], hi) if self.jog(i, mid, self.kappa)[0] < mid[0] else (lo, mid[0])
+        return float(hi)
+
 
 class Forged:
     """A header and arrays that can be spoiled before they are written."""
@@ -177,13 +186,25 @@ def sampled(m: Plain, i: int, x0: float, x1: float) -> tuple[int, dict[int, tupl
     return (2 if len(images) == 2 else next(iter(images))), images
 
 
+def near_joint(m: Plain, i: int, begin: float, edge: float) -> dict:
+    """What is said of starts before the first cell; for h > 0 begin is the fixed point of the jog."""
+    if m.h < 0:
+        return {"q": float(1 + 2 * abs(m.h) / m.k_hi * (1 - 1e-9)).hex()}
+    least = m.slope(i, np.linspace(begin, edge, 9), m.kappa).min()
+    return {
+        "q": float(1 + 0.98 * (least - 1)).hex(),
+        "fixed_point": [float(begin - 1e-9).hex(), float(begin + 1e-9).hex()],
+    }
+
+
 def forge(
     model: str, *, noise: float = 0.0, first: float = 0.02, ratio: float = 0.012, widest: float = 0.04
 ) -> Forged:
     """A certificate with all claims that are known; noise is a share of the speed."""
     data = scene(model)
     m = Plain(data, noise)
-    edges = [graded(m.a[i], m.arm, first, ratio, widest) for i in range(3)]
+    begin = [m.fixed_point(i) if m.h > 0 else m.a[i] for i in range(3)]
+    edges = [graded(begin[i], m.arm, first, ratio, widest) for i in range(3)]
     starts = np.concatenate([[0], np.cumsum([len(e) - 1 for e in edges])])
     n = int(starts[-1])
     jog, flip = np.full((n, 2), -1, np.int32), np.full((n, 2), -1, np.int32)
@@ -239,9 +260,7 @@ def forge(
         {
             "claim": "attracts-all",
             "section": {
-                "near_joint": {
-                    str(i): {"q": float(1 + 2 * abs(m.h) / m.k_hi * (1 - 1e-9)).hex()} for i in range(3)
-                },
+                "near_joint": {str(i): near_joint(m, i, begin[i], edges[i][0]) for i in range(3)},
                 "max_rank": int(rank.max()),
             },
         },

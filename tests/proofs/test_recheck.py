@@ -58,7 +58,9 @@ def precision():
 @pytest.fixture(scope="module")
 def good():
     """Certificates of both models that are right, forged once."""
-    return {model: forge.forge(model, **COARSE) for model in ("designed", "small")}
+    found = {model: forge.forge(model, **COARSE) for model in ("designed", "small")}
+    above = forge.forge("above", first=0.1, ratio=0.005, widest=0.05)
+    return found | {"above": above}
 
 
 def verdict(forged, tmp_path):
@@ -71,7 +73,7 @@ def verdict(forged, tmp_path):
 # ------------------------------------------------------------------------------------------------- what is accepted
 
 
-@pytest.mark.parametrize("model", ["designed", "small"])
+@pytest.mark.parametrize("model", ["designed", "small", "above"])
 def test_a_right_certificate_is_proved(good, tmp_path, model):
     report = verdict(good[model], tmp_path)
     assert report.reason == ""
@@ -449,6 +451,117 @@ def test_claims_it_does_not_know_are_not_rechecked(good, tmp_path):
     report = verdict(f, tmp_path)
     assert report.verdict == "failed"
     assert report.claims[-1] == ("ergodic", "not rechecked", "this checker does not know the claim")
+
+
+# ------------------------------------------------------------------------------- the surface above the joint (h > 0)
+
+
+class AboveSpoiler(Spoiler):
+    """Of a certificate with h > 0, what is said of the fixed points of the jog; the rest as before."""
+
+    def near(self):
+        return self.sections["attracts-all"]["near_joint"][str(self.rng.randrange(3))]
+
+    def steeper_near_joint(self):
+        """The slope of the map at R* bounds q, and the forged one has 98 % of what it is above 1."""
+        near = self.near()
+        q = 1 + (float.fromhex(near["q"]) - 1) * (1.03 + 10 ** self.rng.uniform(-3, 2))
+        near["q"] = self.rng.choice([q, 1.0, 0.5, 1e300]).hex()
+
+    def bracket_moved(self):
+        near = self.near()
+        shift = self.rng.choice([-1, 1]) * 10 ** self.rng.uniform(-8.5, 0.5)
+        near["fixed_point"] = [(float.fromhex(end) + shift).hex() for end in near["fixed_point"]]
+
+    def bracket_beside_it(self):
+        """Wide, and touching nothing but its neighbourhood."""
+        near = self.near()
+        lo, hi = (float.fromhex(end) for end in near["fixed_point"])
+        near["fixed_point"] = self.rng.choice([[hi.hex(), (hi + 5).hex()], [(lo - 1).hex(), lo.hex()]])
+
+    def bracket_empty(self):
+        self.near()["fixed_point"].reverse()
+
+    def no_fixed_point_on_a_side(self):
+        del self.near()["fixed_point"]
+
+    def no_fixed_point_at_all(self):
+        for near in self.sections["attracts-all"]["near_joint"].values():
+            del near["fixed_point"]
+
+    def cells_from_the_joint_on(self):
+        """The first cell reaches below R*, where jogs go inward."""
+        side = self.rng.randrange(3)
+        a, edges = self.m.a[side], self.A[f"edges.{side}"]
+        lo = float.fromhex(self.sections["attracts-all"]["near_joint"][str(side)]["fixed_point"][0])
+        edges[0] = a + (lo - a) * self.rng.uniform(0.05, 0.9999)
+
+    def other_height(self):
+        h = self.rng.choice(
+            [0.0, -0.2, 1.0, 0.1 + 10 ** self.rng.uniform(-6, -1), 0.1 - 10 ** self.rng.uniform(-6, -1)]
+        )
+        self.scene["arm"]["surface_height"] = f"{h:.9f} in"
+        self.wide_parameters()
+        del self.f.header["claims"][1:]
+
+    def goal_nearer(self):
+        self.sections["goal"]["x"] = f"{self.rng.uniform(1, 15):.6f} in"
+
+    def noise_added(self):
+        """The bracket holds the fixed point for one speed: noise moves it, by its share of kappa phi/2."""
+        super().noise_added()
+        del self.f.header["claims"][1:]
+
+
+WAYS_ABOVE = sorted(
+    {*WAYS, *(name for name in vars(AboveSpoiler) if name not in ("__doc__", "__module__", "near"))}
+)
+OWN = vars(AboveSpoiler)
+
+
+@pytest.mark.parametrize("way", WAYS_ABOVE)
+def test_no_spoiled_certificate_with_the_surface_above_the_joint_is_proved(good, tmp_path, way):
+    for seed in range(8 if way in OWN else 2):
+        f = good["above"].copy()
+        getattr(AboveSpoiler(f, "above", random.Random(f"{way} {seed}")), way)()
+        report = verdict(f.seal(), tmp_path)
+        assert report.verdict in ("failed", "bad file"), (way, seed)
+        assert report.reason
+
+
+def test_a_fixed_point_where_the_surface_is_below_the_joint_is_refused(good, tmp_path):
+    for sides in ("0", "012"):
+        f = good["designed"].copy()
+        for side in sides:
+            f.header["claims"][0]["section"]["near_joint"][side]["fixed_point"] = [(3.0).hex(), (4.0).hex()]
+        report = verdict(f.seal(), tmp_path)
+        assert report.verdict == "failed"
+        assert "the arm's surface is not above the joint" in report.reason
+
+
+def test_the_two_basins_are_stated_in_words(good, tmp_path):
+    """Brackets of a right certificate may be wider, never elsewhere; both basins are named."""
+    f = good["above"].copy()
+    near = f.header["claims"][0]["section"]["near_joint"]
+    near["1"]["fixed_point"] = [(3.1).hex(), (3.2).hex()]  # R*_1 = 3.1907626...
+    report = verdict(f.seal(), tmp_path)
+    assert (report.verdict, report.reason) == ("proved", "")
+    said = report.statement[0]
+    assert "side 1: [3.1, 3.2]" in said
+    assert "every start R*_i < x <= arm.length on every side i enters the attracting cells" in said
+    assert "every start a_i < x < R*_i stays on side i and tends to a_i" in said
+
+
+def test_series_of_the_angle_hold_the_functions():
+    """sin p/p, (1 - cos p)/p^2, (p - sin p)/p^3 at 60 digits."""
+    mp = pytest.importorskip("mpmath").mp
+    with mp.workdps(60):
+        for p in (1e-9, 1e-3, 0.2, 1.0, 2.9):
+            x = mp.mpf(p)
+            want = mp.sin(x) / x, (1 - mp.cos(x)) / x**2, (x - mp.sin(x)) / x**3
+            for around in (arb(p), arb(p * 0.99).union(arb(p * 1.01)), arb(0).union(arb(p))):
+                for ball, value in zip(checker.ratios(around)[1:], want, strict=True):
+                    assert ball.contains(arb(mp.nstr(value, 50)))
 
 
 # --------------------------------------------------------------------------------------------------- damaged files

@@ -1,0 +1,282 @@
+"""The unstable fixed point of the jog where the arm's surface lies above the joint (h > 0): one on each side.
+
+In the exact flight the landing angle phi parametrises everything: with V = (1 - cos phi)/phi^2 and
+W = (phi - sin phi)/phi^3, which both fall on (0, 2 pi), f(phi) = phi (R - R(phi)) and
+
+    R(phi)      = a (1 - phi^2 W) + phi (kappa/2 - d V),       the start that lands at phi,
+    E(phi)      = (R' - R)/phi = -h + a phi V - d phi^2 W,     the displacement of a jog,
+    (R' - a)/phi = kappa/2 - h + a Q - d (V + phi^2 W),        P = 1 - phi^2 W - V,   Q = phi (V - W),
+    dR/dphi     = kappa/2 - a Q - d P,       dE/dphi = a P - d Q.
+
+None of them cancels near phi = 0.  On (0, top], where R(top) > x for a wanted x, it is proved that
+
+1. dR/dphi > 0.  Then a start R <= x lands at the one phi with R(phi) = R, for f > 0 before it, and phi grows with R.
+2. dE/dphi > 0.  With E < 0 at phi_lo and E > 0 at phi_hi there is one fixed angle phi* between them; a jog goes inward
+   before it and outward beyond it.  The fixed point R* = R(phi*) lies between R(phi_lo) and R(phi_hi).
+3. the throw is a decided jog, and (R' - a)/phi > 0.  So a start in (a, R*) stays there for ever and moves inward with
+   every throw: its limit L >= a would be a fixed point if L > a were true, for the map is continuous.  Hence L = a.
+4. on [phi_lo, top]:  1 + (d(R' - R)/dphi)/(dR/dphi) >= q > 1, and no jog from there ends beyond the arm.  By the mean
+   value theorem R' - R* >= q (R - R*) on (R*, x]: such a start is beyond x after ln((x - R*)/(R - R*))/ln q + 1 throws.
+
+For a box of parameters each of them has its own R* in the bracket, and all this holds with it.  If they differ at every
+throw (noise), 4 still holds with the bracket's upper end B in place of R*: R' - R >= (q - 1)(R - R*) >= (q - 1)(R - B).
+And in 3 a start below the lower end moves inward for whichever parameters, on any [L, R] by at least some step > 0, the
+box being compact: L > a is no limit either.  Of starts between the two ends nothing is claimed then.
+
+The small-angle flights have E = -h: every jog goes inward, there is no fixed point.
+Source: docs/model.md, "The sign of h".
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+import limitsets.interval as iv
+from limitsets.interval.arithmetic import Interval
+from limitsets.jit import proof_kernel
+from limitsets.proofs.parameters import ParameterBox
+from limitsets.thrower import Exact
+from limitsets.thrower.throw_box import SideBox, bracket, decide_box, gather_box, strike_box
+from limitsets.thrower.turn_box import exact_turn, turn_point
+
+__all__ = ["FixedPoint", "fixed_points", "leaves"]
+
+# The angles that enclose phi* are so far, relative to it, from what Newton's method proposes: wide against the bounds
+# of sine and cosine (2^-45), narrow against the 1e-9 wanted of the bracket of R*.
+MARGIN = 2.0**-41
+
+# The bracket of R* is widened by these shares of R* - a and of its own width (balls have coarse radii), and q - 1 is
+# lowered by the last, so that other arithmetic can confirm.
+SLACK, SLACK_OF_WIDTH, SLACK_OF_Q = 2.0**-36, 2.0**-20, 2.0**-10
+
+# The largest angle is looked for so far, relative to it, beyond the impact: wide against the rounding of R(phi).
+BEYOND = 2.0**-30
+
+# Angles up to this are looked at: other arithmetic may sum series.
+LARGEST = 3.0
+
+# Pieces of (0, top], and of [phi_lo, top].
+PIECES, PIECES_BEYOND = 128, 8
+
+
+@dataclass(frozen=True)
+class FixedPoint:
+    """Where a jog moves the part neither inward nor outward.
+
+    Attributes
+    ----------
+    lo, hi : float
+        R* lies between them, for each of the parameters; nan where none is found.
+    phi_lo, phi_hi : float
+        Angles between which it lands [rad].
+    reason : str
+        Why none is found, empty if one is.
+    """
+
+    lo: float
+    hi: float
+    phi_lo: float
+    phi_hi: float
+    reason: str
+
+
+# ---------------------------------------------------------------- functions of the angle
+
+
+@proof_kernel
+def _ratios(phi: float) -> tuple[Interval, Interval]:
+    """V and W at one angle, and their limits 1/2 and 1/6 at 0."""
+    _, v, w = turn_point(phi)
+    p = (phi, phi)
+    square = iv.sqr(p)
+    big, small = iv.div(v, square), iv.div(w, iv.mul(square, p))
+    start = phi == 0.0
+    sixth = iv.div((1.0, 1.0), (6.0, 6.0))
+    return (
+        (0.5 if start else big[0], 0.5 if start else big[1]),
+        (sixth[0] if start else small[0], sixth[1] if start else small[1]),
+    )
+
+
+@proof_kernel
+def _terms(lo: float, hi: float) -> tuple[Interval, Interval, Interval, Interval]:
+    """V, phi^2 W, P and Q over angles in [lo, hi], from 0 to 2 pi: V and W fall."""
+    first, last = _ratios(lo), _ratios(hi)
+    p = (lo, hi)
+    big, small = (last[0][0], first[0][1]), (last[1][0], first[1][1])
+    short = iv.mul(iv.sqr(p), small)
+    return (
+        big,
+        short,
+        iv.sub(iv.sub((1.0, 1.0), short), big),
+        iv.mul(p, iv.sub(big, small)),
+    )
+
+
+@proof_kernel
+def _start(b: SideBox, phi: float) -> Interval:
+    """R(phi), for all parameters."""
+    big, short, _, _ = _terms(phi, phi)
+    fall = iv.sub(iv.mul((0.5, 0.5), b.kappa), iv.mul(b.d, big))
+    return iv.add(iv.mul(b.a, iv.sub((1.0, 1.0), short)), iv.mul((phi, phi), fall))
+
+
+@proof_kernel
+def _gain(b: SideBox, phi: float) -> Interval:
+    """E(phi), for all parameters."""
+    big, short, _, _ = _terms(phi, phi)
+    out = iv.sub(iv.mul(iv.mul(b.a, (phi, phi)), big), iv.mul(b.d, short))
+    return iv.sub(out, b.h)
+
+
+@proof_kernel
+def _growth(b: SideBox, p: Interval, q: Interval) -> Interval:
+    """dR/dphi."""
+    return iv.sub(iv.mul((0.5, 0.5), b.kappa), iv.add(iv.mul(b.a, q), iv.mul(b.d, p)))
+
+
+@proof_kernel
+def _guess(a: float, d: float, h: float) -> float:
+    """Root of E by Newton's method from below: E is concave there, so it climbs. Believed by nobody."""
+    phi = 2.0 * h / a
+    for _ in range(60):
+        _, v, w = exact_turn(phi)
+        big, small = v / (phi * phi), w / (phi * phi * phi)
+        slope = a * (1.0 - phi * phi * small - big) - d * phi * (big - small)
+        gain = a * phi * big - d * phi * phi * small - h
+        phi = phi - gain / slope if (slope > 0.0) & (phi <= LARGEST) else np.nan
+    return phi
+
+
+@proof_kernel(entry=True)
+def _find(lo: Any, hi: Any, side: int, out: Any) -> None:
+    """Two angles, -E at the first and E at the second (both to be positive), and R at both."""
+    b = gather_box(lo, hi, side)
+    # E grows with a and falls with d and h
+    first = _guess(b.a[1], b.d[0], b.h[0]) * (1.0 - MARGIN)
+    last = _guess(b.a[0], b.d[1], b.h[1]) * (1.0 + MARGIN)
+    out[0], out[1] = first, last
+    out[2], out[3] = -_gain(b, first)[1], _gain(b, last)[0]
+    out[4], out[5] = _start(b, first)[0], _start(b, last)[1]
+
+
+@proof_kernel
+def _decided(b: SideBox, lo: float, hi: float) -> float:
+    """Return a number that is positive if every start that lands between two angles jogs; R(phi) grows there."""
+    x = (_start(b, lo)[0], _start(b, hi)[1])
+    omega, barrier = strike_box(b.flight, b, x, (lo, hi))
+    return -decide_box(b.flip, b, omega, barrier)[1]
+
+
+@proof_kernel(entry=True)
+def _examine(lo: Any, hi: Any, side: int, x: float, phi: Any, pieces: Any, ends: Any, rates: Any) -> None:
+    """Numbers that have to be positive: `pieces` over (0, top], `ends` there; and slopes of R' over [phi_lo, top]."""
+    b = gather_box(lo, hi, side)
+    top = bracket(b.flight, b, x)[0][1] * (1.0 + BEYOND)
+    ends[0] = _start(b, top)[0] - x
+    ends[1], ends[2] = top - phi[1], LARGEST - top
+    shift = iv.mul((top, top), _gain(b, top))
+    ends[3] = iv.sub((lo.arm_length, lo.arm_length), iv.add((x, x), shift))[0]
+    n = pieces.shape[1]
+    for k in range(n):
+        near, far = top * (k / n), top * ((k + 1) / n)
+        big, short, p, q = _terms(near, far)
+        left = iv.sub(iv.mul((0.5, 0.5), b.kappa), b.h)
+        left = iv.sub(iv.add(left, iv.mul(b.a, q)), iv.mul(b.d, iv.add(big, short)))
+        pieces[0, k] = _growth(b, p, q)[0]
+        pieces[1, k] = iv.sub(iv.mul(b.a, p), iv.mul(b.d, q))[0]
+        pieces[2, k] = left[0]
+        pieces[3, k] = _decided(b, near, far)
+    n = rates.size
+    for k in range(n):
+        near, far = phi[0] + (top - phi[0]) * (k / n), phi[0] + (top - phi[0]) * ((k + 1) / n)
+        far = top if k == n - 1 else far  # the sum need not round to it
+        big, short, p, q = _terms(near, far)
+        angle = (near, far)
+        rise = iv.mul(iv.mul(b.a, angle), iv.sub((1.0, 1.0), short))
+        rise = iv.sub(iv.sub(rise, iv.mul(b.d, iv.mul(iv.sqr(angle), big))), b.h)
+        rates[k] = iv.add((1.0, 1.0), iv.div(rise, _growth(b, p, q)))[0]
+
+
+# ---------------------------------------------------------------- answers
+
+
+def fixed_points(box: ParameterBox) -> tuple[FixedPoint, ...]:
+    """Enclose the fixed point of the jog on every side, if the surface is above the joint; without claims about it.
+
+    Parameters
+    ----------
+    box : ParameterBox
+        The parameters.
+
+    Returns
+    -------
+    tuple of FixedPoint
+        One per side; none unless h > 0 for all parameters.
+    """
+    if not box.lo.surface_height > 0.0:
+        return ()
+    return tuple(_fixed_point(box, side) for side in range(box.lo.a.size))
+
+
+def _fixed_point(box: ParameterBox, side: int) -> FixedPoint:
+    def none(reason: str) -> FixedPoint:
+        return FixedPoint(np.nan, np.nan, np.nan, np.nan, reason)
+
+    if not isinstance(box.lo.flight, Exact):
+        return none("with this flight every jog goes inward where the arm's surface is above the joint")
+    out = np.full(6, np.nan)
+    _find(box.lo, box.hi, side, out)
+    phi_lo, phi_hi, before, after, least, most = out.tolist()
+    if not (0.0 < phi_lo < phi_hi <= LARGEST and before > 0.0 and after > 0.0):
+        return none(
+            "near the joint jogs go inward (h > 0), and no unstable fixed point of the jog is found up to which they do"
+        )
+    slack = SLACK * (most - float(box.lo.a[side])) + SLACK_OF_WIDTH * (most - least) + 2.0**-48 * most
+    lo, hi = least - slack, most + slack
+    if not box.hi.a[side] < lo:
+        return none("the fixed point of the jog is too near to the joint to be told from it")
+    if not hi < box.lo.arm_length:
+        return none(
+            f"the fixed point of the jog, x = {hi:.6g}, is not on the arm: up to it jogs go inward (h > 0)"
+        )
+    return FixedPoint(lo, hi, phi_lo, phi_hi, "")
+
+
+def leaves(box: ParameterBox, side: int, point: FixedPoint, x: float) -> tuple[float, str]:
+    """Prove that starts in (R*, x] are thrown outward by a factor, and that starts in (a, R*) tend to a.
+
+    Parameters
+    ----------
+    box : ParameterBox
+        The parameters.
+    side : int
+        The side.
+    point : FixedPoint
+        Its fixed point, that is found.
+    x : float
+        Where the cells begin, beyond it.
+
+    Returns
+    -------
+    float
+        q: R' - R* >= q (R - R*).
+    str
+        What is missing, empty if nothing.
+    """
+    pieces, ends, rates = np.full((4, PIECES), np.nan), np.full(4, np.nan), np.full(PIECES_BEYOND, np.nan)
+    _examine(box.lo, box.hi, side, x, np.array([point.phi_lo, point.phi_hi]), pieces, ends, rates)
+    q = 1.0 + (float(rates.min()) - 1.0) * (1.0 - SLACK_OF_Q)  # numpy's least is nan if one is
+    missing = (
+        ((ends[:3] > 0.0).all(), "the impact is not enclosed"),
+        ((pieces[0] > 0.0).all(), "the impact angle is not proved to grow with the start"),
+        ((pieces[1] > 0.0).all(), "the displacement is not proved to grow with the impact angle"),
+        ((pieces[2] > 0.0).all(), "a jog may end left of a"),
+        ((pieces[3] > 0.0).all(), "not every start up to the fixed point of the jog is proved to jog"),
+        (1.0 < q < np.inf, "no expansion is proved at the fixed point of the jog"),
+        (ends[3] > 0.0, "the throw may reach beyond the arm"),
+    )
+    return q, next((reason for good, reason in missing if not good), "")

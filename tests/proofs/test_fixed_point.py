@@ -1,0 +1,247 @@
+"""The arm's surface above the joint: fixed points of the jog, and what starts on both sides of them do.
+
+The fixed points are computed apart, from the decimals of the scene by plane geometry at 40 digits: phi* from
+-h + a (1 - cos phi)/phi - d (phi - sin phi)/phi = 0, and R* from f(phi*) = 0.  docs/model.md has them
+to 5 digits.
+"""
+
+import math
+
+import numpy as np
+import pytest
+
+import limitsets as ls
+from limitsets.errors import LimitsetsError
+from limitsets.maps import images
+from limitsets.proofs.fixed_point import fixed_points, leaves
+from limitsets.proofs.parameters import parameter_box
+
+mpmath = pytest.importorskip("mpmath")
+mp, mpf = mpmath.mp, mpmath.mpf
+
+KAPPA = "25.3778518"
+PAPER = {
+    "0.1": (3.16, 3.19, 4.81),
+    "0.2": (4.64, 4.55, 5.39),
+}  # docs/model.md
+
+
+def scene(h, **more):
+    return ls.load("paper-designed").with_values({"arm.surface_height": float(h), **more})
+
+
+def sides(along="4.2255778"):
+    """(a, d) of every side of the designed part, from its decimals."""
+    low, left, right = mpf("6.75"), mpf("5.75"), mpf("3.6")
+    x = (low**2 + left**2 - right**2) / (2 * low)
+    apex, corner, far = (x, mp.sqrt(left**2 - x**2)), (mpf(0), mpf(0)), (low, mpf(0))
+    com = mpf(along), mpf("0.7082490")
+    found = []
+    for (px, py), (qx, qy) in ((apex, corner), (far, apex), (corner, far)):
+        length = mp.hypot(qx - px, qy - py)
+        ex, ey = (qx - px) / length, (qy - py) / length
+        u, v = com[0] - px, com[1] - py
+        found.append((u * ex + v * ey, abs(ex * v - ey * u)))
+    return found
+
+
+def exact_fixed_point(a, d, h, kappa):
+    """R* at 40 digits."""
+    h, kappa = mpf(h), mpf(kappa)
+    phi = mp.findroot(lambda p: -h + a * (1 - mp.cos(p)) / p - d * (p - mp.sin(p)) / p, 2 * h / a)
+    return kappa * phi / 2 + (a * mp.sin(phi) - d * (1 - mp.cos(phi))) / phi
+
+
+@pytest.fixture(autouse=True)
+def digits():
+    with mp.workdps(40):
+        yield
+
+
+@pytest.fixture(scope="module", params=["0.05", "0.1", "0.2"])
+def proved(request):
+    return request.param, ls.certify(scene(request.param), ["attracts-all"])
+
+
+def record(proof):
+    return proof.to_json()[0]
+
+
+# ---------------------------------------------------------------- what is proved
+
+
+def test_both_basins_are_proved_and_rechecked(proved, tmp_path):
+    _, proof = proved
+    assert proof.proved
+    report = ls.recheck(proof.save(tmp_path / "x.proof.zip"))
+    assert (report.verdict, report.reason) == ("proved", "")
+    assert "tends to a_i" in report.statement[0]
+
+
+def test_brackets_hold_the_fixed_points_and_are_narrow(proved):
+    h, proof = proved
+    points = record(proof)["jog_fixed_points"]
+    for side, (a, d) in enumerate(sides()):
+        want = exact_fixed_point(a, d, h, KAPPA)
+        lo, hi = points[str(side)]
+        assert mpf(lo) < want < mpf(hi)
+        assert hi - lo < 1e-9
+        if h in PAPER:
+            assert float(want) == pytest.approx(PAPER[h][side], abs=0.01)
+
+
+def test_orbits_from_beyond_enter_in_time_and_stay(proved):
+    _, proof = proved
+    found, scene_ = record(proof), proof.scene
+    bound = found["max_throws"]
+    rng = np.random.default_rng(3)
+    for side in range(3):
+        hi, begin = found["jog_fixed_points"][str(side)][1], bound["beyond"][str(side)]
+        assert hi < begin < hi + 1e-3
+        for x in (hi + 1e-7, begin, scene_.arm_length, *rng.uniform(begin, scene_.arm_length, 5)):
+            more = max(0.0, math.log((begin - hi) / (x - hi)) / math.log(bound["near_joint"]))
+            late = bound["throws"] + 1 + math.ceil(more)
+            path = ls.orbit(scene_.map, x, side, late + 200)
+            assert path.stopped is None
+            for number, parts in found["extents"].items():
+                there = path.x[late:][path.side[late:] == int(number)]
+                assert np.any([(a[0] <= there) & (there <= b[1]) for a, b in parts], axis=0).all()
+
+
+def test_orbits_from_nearer_fall_to_the_joint(proved):
+    _, proof = proved
+    points = record(proof)["jog_fixed_points"]
+    for side, (a, _) in enumerate(sides()):
+        lo, foot = points[str(side)][0], float(a)
+        for share in (0.01, 0.5, 0.9, 0.999):
+            path = ls.orbit(proof.scene.map, foot + share * (lo - foot), side, 8000)
+            assert (path.side == side).all()
+            assert (np.diff(path.x[path.x > foot + 1e-9]) < 0.0).all()
+            assert foot - 1e-12 < path.x[-1] < foot + 1e-3
+
+
+# ---------------------------------------------------------------- noise and tolerance
+
+
+def test_with_noise_the_bracket_holds_the_fixed_points_of_every_speed(tmp_path):
+    proof = ls.certify(scene("0.1"), ["attracts-all"], noise={"throw.speed": "0.3 %"})
+    assert proof.proved
+    points = record(proof)["jog_fixed_points"]
+    kappas = [mpf(KAPPA) / (1 + s * mpf("0.003")) ** 2 for s in (-1, 1)]
+    rng = np.random.default_rng(8)
+    for side, (a, d) in enumerate(sides()):
+        least, most = sorted(exact_fixed_point(a, d, "0.1", kappa) for kappa in kappas)
+        lo, hi = points[str(side)]
+        assert mpf(lo) < least < most < mpf(hi)
+        assert hi - lo < 1.001 * float(most - least) + 1e-9
+        x = np.concatenate([rng.uniform(float(a) + 0.01, lo, 50), rng.uniform(hi + 1e-6, hi + 0.5, 50)])
+        for _ in range(300):  # the speed anew at every throw, at one of its ends or between
+            kappa = float(rng.choice([*map(float, kappas), rng.uniform(*sorted(map(float, kappas)))]))
+            got = images(proof.scene.map._replace(kappa=kappa), x, side)
+            assert (got.code == 0).all()
+            assert (got.x[:50] < x[:50]).all()
+            assert (got.x[50:] > x[50:]).all()
+            x = np.concatenate([got.x[:50], np.minimum(got.x[50:], hi + 0.5)])
+    report = ls.recheck(proof.save(tmp_path / "x.proof.zip"))
+    assert report.verdict == "proved"
+    assert "nothing is claimed of starts between lo_i and hi_i" in report.statement[0]
+
+
+def test_with_a_tolerance_each_value_has_its_own_fixed_point_in_the_bracket(tmp_path):
+    proof = ls.certify(scene("0.1"), ["attracts-all"], tolerance={"arm.surface_height": "0.01 in"})
+    assert proof.proved
+    for side, (a, d) in enumerate(sides()):
+        lo, hi = record(proof)["jog_fixed_points"][str(side)]
+        for share in ("-0.01", "-0.003", "0", "0.01"):
+            assert lo < exact_fixed_point(a, d, mpf("0.1") + mpf(share), KAPPA) < hi
+    assert ls.recheck(proof.save(tmp_path / "x.proof.zip")).verdict == "proved"
+
+
+def test_the_bracket_of_a_tolerance_in_pieces_holds_those_of_all_pieces():
+    proof = ls.certify(scene("0.1"), ["attracts-all"], tolerance={"part.mass.center.along": "0.01 in"})
+    assert proof.proved
+    assert len(proof.attractions) > 1
+    for along in ("4.2155778", "4.22", "4.2355778"):
+        for side, (a, d) in enumerate(sides(along)):
+            lo, hi = record(proof)["jog_fixed_points"][str(side)]
+            assert lo < exact_fixed_point(a, d, "0.1", KAPPA) < hi
+
+
+# ---------------------------------------------------------------- random parts
+
+
+def test_random_parts_do_what_is_proved_of_them():
+    """Inward below the bracket and right of a; outward by q at least beyond it: in floats, with room for rounding."""
+    rng = np.random.default_rng(14)
+    met = 0
+    while met < 60:
+        values = {
+            "arm.surface_height": math.exp(rng.uniform(math.log(0.003), math.log(0.6))),
+            "throw.kappa": math.exp(rng.uniform(math.log(4.0), math.log(90.0))),
+            "part.mass.center.along": rng.uniform(1.0, 6.0),
+            "part.mass.center.above": rng.uniform(0.1, 3.0),
+            "part.mass.radius_of_gyration": rng.uniform(0.3, 3.0),
+        }
+        try:
+            one = ls.load("paper-designed").with_values(values)
+        except LimitsetsError:
+            continue
+        box = parameter_box(one)
+        for side, point in enumerate(fixed_points(box)):
+            if point.reason:
+                continue
+            foot = float(box.hi.a[side])
+            edge = point.hi + 0.05 * (point.hi - foot)
+            q, reason = leaves(box, side, point, edge)
+            if reason:
+                continue
+            met += 1
+            below = foot + np.linspace(0.01, 0.999, 200) * (point.lo - foot)
+            beyond = point.hi + np.linspace(0.01, 1.0, 200) * (edge - point.hi)
+            inward, outward = images(one.map, below, side), images(one.map, beyond, side)
+            assert (inward.code == 0).all()
+            assert (outward.code == 0).all()
+            assert (foot < inward.x).all()
+            assert (inward.x < below).all()
+            assert (outward.x - point.hi >= q * (beyond - point.hi) - 1e-12).all()
+            assert (outward.x - point.hi <= (1 + 2 * (q - 1)) * (beyond - point.hi) + 0.05).all()
+
+
+# ---------------------------------------------------------------- what is not
+
+
+UNDECIDED = [
+    # no fixed point where a (1 - cos phi) - d (phi - sin phi) < h phi for all phi: 40 digits find none on sides 0 and 1
+    ({"arm.surface_height": 1.0}, "no unstable fixed point of the jog is found"),
+    # R*_0 = 10.79 lies beyond the first critical point, 9.445: parts flip before
+    ({"arm.surface_height": 0.5}, "not every start up to the fixed point of the jog is proved to jog"),
+    ({"arm.surface_height": 0.0}, "not proved to be below the joint nor above it"),
+    ({"arm.surface_height": 1e-4}, "too little for such cells"),  # 2 h/(kappa - d) = 8e-6
+    ({"arm.surface_height": 0.1, "arm.length": 4.5}, "is not on the arm"),  # R*_2 = 4.81
+]
+
+
+@pytest.mark.parametrize(("values", "why"), UNDECIDED, ids=[why for _, why in UNDECIDED])
+def test_what_is_undecided_says_why(values, why):
+    tree = ls.load("paper-designed").as_dict()
+    del tree["goal"]  # beyond the end of a short arm
+    proof = ls.certify(ls.load(tree).with_values(values), ["attracts-all"])
+    (claim,) = proof.claims
+    assert claim.verdict == "undecided"
+    assert why in claim.reason
+    assert record(proof)["jog_fixed_points"] is None
+
+
+def test_in_the_small_angle_flight_every_jog_goes_inward():
+    """R' = R - h phi: nothing parts the two basins there."""
+    one = ls.load("paper-designed-small-angle").with_values({"arm.surface_height": 0.1})
+    (claim,) = ls.certify(one, ["attracts-all"]).claims
+    assert claim.verdict == "undecided"
+    assert "every jog goes inward" in claim.reason
+
+
+def test_a_tolerance_across_the_joint_is_undecided():
+    proof = ls.certify(scene("0.01"), ["attracts-all"], tolerance={"arm.surface_height": "0.02 in"})
+    (claim,) = proof.claims
+    assert claim.verdict == "undecided"
+    assert "not proved to be below the joint nor above it" in claim.reason
