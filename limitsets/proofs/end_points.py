@@ -42,7 +42,8 @@ from limitsets.maps import codes
 from limitsets.proofs.attraction import Attraction
 from limitsets.proofs.orbits import follow
 from limitsets.proofs.parameters import ParameterBox
-from limitsets.thrower.throw_box import BOTH, NOTHING, gather_box, throw_box
+from limitsets.thrower.side_box import gather_box
+from limitsets.thrower.throw_box import BOTH, NOTHING, throw_box
 
 __all__ = ["CriticalBracket", "ProvedEnd", "ProvedEnds", "proved_ends"]
 
