@@ -1,8 +1,23 @@
-"""``python -m limitsets``."""
+"""``python -m limitsets``, and the command `limitsets`.
+
+The rest is imported in `main`: a Ctrl-C that comes while that lasts ends as quietly as a later one.
+"""
 
 import sys
 
-from limitsets.cli import main
+INTERRUPTED = 130
+
+
+def main() -> int:
+    """Run the command line; the exit code."""
+    try:
+        from limitsets.cli import main as run
+
+        return run()
+    except KeyboardInterrupt:
+        print("limitsets: interrupted", file=sys.stderr, flush=True)
+        return INTERRUPTED
+
 
 if __name__ == "__main__":
     sys.exit(main())

@@ -52,6 +52,12 @@ def test_only_jit_imports_numba(source):
     assert not numba or source == PACKAGE / "jit.py"
 
 
+def test_the_checker_imports_nothing_of_ours():
+    """So that it can be copied, shares no error with the prover, and cannot reach compiled code."""
+    checker = PACKAGE / "proofs" / "recheck.py"
+    assert imported_names(checker) <= {*sys.stdlib_module_names, "numpy", "flint"}
+
+
 def test_import_loads_none_of_the_late_packages():
     loaded = run_python("import sys, limitsets; print(*sys.modules)").split()
     assert "limitsets" in loaded

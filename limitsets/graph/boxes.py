@@ -35,8 +35,7 @@ def _place_hulls(
         out, meets = 0, True
         for axis in range(lo.shape[1]):
             k, m, leaves = place(target, np.int64(side[box]), axis, lo[box, axis], hi[box, axis], pad, hint)
-            if leaves >= 0:
-                out |= 1 << leaves
+            out |= leaves
             meets &= m >= k
             first[box, axis], last[box, axis] = k, m
             hint = k

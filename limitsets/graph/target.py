@@ -82,16 +82,16 @@ def holding(target: Target, side: Any, axis: Any, x: Any, hint: Any) -> Any:
 def place(
     target: Target, side: Any, axis: Any, lo: Any, hi: Any, pad: int, hint: Any
 ) -> tuple[Any, Any, Any]:
-    """First and last position that [lo, hi] meets along one axis, and the exit it reaches past (-1: none).
+    """First and last position that [lo, hi] meets along one axis, and the exits it reaches past, a bit each.
 
     Cells are closed, so an interval that ends on a border meets both cells there.  First larger than last: no cell.
     """
     begin, n = target.begin[side, axis], target.cells[side, axis]
-    leaves = -1
+    leaves = 0
     if lo < target.edges[begin]:
-        leaves = target.sink_below
+        leaves |= 1 << target.sink_below
     if hi > target.edges[begin + n]:
-        leaves = target.sink_above
+        leaves |= 1 << target.sink_above
     first = holding(target, side, axis, lo, hint)
     while first > 0 and target.edges[begin + first] >= lo:
         first -= 1

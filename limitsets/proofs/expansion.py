@@ -13,7 +13,8 @@ import numpy as np
 from limitsets.cells import CellSet
 from limitsets.jit import proof_kernel
 from limitsets.proofs.cover import Cover
-from limitsets.thrower.throw_box import NOTHING, gather_box, throw_box
+from limitsets.thrower.side_box import gather_box
+from limitsets.thrower.throw_box import NOTHING, throw_box
 
 __all__ = ["least_slope"]
 

@@ -39,7 +39,9 @@ from limitsets.interval.arithmetic import Interval
 from limitsets.jit import proof_kernel
 from limitsets.proofs.parameters import ParameterBox
 from limitsets.thrower import Exact
-from limitsets.thrower.throw_box import SideBox, bracket, decide_box, gather_box, strike_box
+from limitsets.thrower.flight_box import bracket
+from limitsets.thrower.impact_box import decide_box, strike_box
+from limitsets.thrower.side_box import SideBox, gather_box
 from limitsets.thrower.turn_box import exact_turn, turn_point
 
 __all__ = ["FixedPoint", "fixed_points", "leaves"]

@@ -23,7 +23,9 @@ import limitsets.interval as iv
 from limitsets.jit import proof_kernel
 from limitsets.proofs.cover import Cover
 from limitsets.proofs.fixed_point import leaves
-from limitsets.thrower.throw_box import bracket, decide_box, displacement_box, gather_box, strike_box
+from limitsets.thrower.flight_box import bracket
+from limitsets.thrower.impact_box import decide_box, displacement_box, strike_box
+from limitsets.thrower.side_box import gather_box
 
 __all__ = ["NearJoint", "near_joint"]
 

@@ -26,7 +26,8 @@ from limitsets.maps import codes
 from limitsets.proofs.attraction import Attraction
 from limitsets.proofs.parameters import ParameterBox
 from limitsets.sets import Cycle, cycles_of
-from limitsets.thrower.throw_box import NOTHING, gather_box, throw_box
+from limitsets.thrower.side_box import gather_box
+from limitsets.thrower.throw_box import NOTHING, throw_box
 
 __all__ = ["PERIODS", "Followed", "ProvedCycle", "ProvedCycles", "follow", "proved_cycle", "proved_cycles"]
 

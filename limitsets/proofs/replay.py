@@ -11,7 +11,8 @@ import limitsets.interval as iv
 from limitsets.jit import proof_kernel
 from limitsets.maps import codes
 from limitsets.proofs.parameters import ParameterBox
-from limitsets.thrower.throw_box import gather_box, throw_box, with_kappa
+from limitsets.thrower.side_box import gather_box, with_kappa
+from limitsets.thrower.throw_box import throw_box
 
 __all__ = ["replay"]
 

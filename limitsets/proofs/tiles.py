@@ -23,7 +23,8 @@ import limitsets.interval as iv
 from limitsets.jit import proof_kernel
 from limitsets.maps import codes
 from limitsets.proofs.parameters import ParameterBox
-from limitsets.thrower.throw_box import BOTH, NOTHING, gather_box, throw_box
+from limitsets.thrower.side_box import gather_box
+from limitsets.thrower.throw_box import BOTH, NOTHING, throw_box
 
 __all__ = ["Intervals", "Pair", "Part", "Tile", "UnionImages", "at_rest", "joined", "tiles_of"]
 

@@ -16,8 +16,8 @@ from limitsets.thrower.flight import impact_angle, sure_impact_angle
 from limitsets.thrower.impact import decide, strike
 from limitsets.thrower.landing import jog_displacement
 from limitsets.thrower.params import Side, Throw, gather
+from limitsets.thrower.side_box import SideBox
 from limitsets.thrower.throw_box import (
-    SideBox,
     gather_pair,
     side_fallback_box,
     side_image_box,

@@ -5,9 +5,11 @@ from __future__ import annotations
 import importlib
 import importlib.util
 import os
+import random
 import subprocess
 import sys
 from pathlib import Path
+from time import perf_counter
 
 import numpy as np
 import pytest
@@ -17,12 +19,13 @@ from limitsets.maps import images
 from limitsets.proofs.recheck import recheck
 from tests.bench.measure import limit, take_turns, versus
 from tests.bench.python_proofs import cells, with_arb
+from tests.proofs import forge, test_recheck
 
 pytestmark = pytest.mark.bench
 
 enclosed = importlib.import_module("limitsets.graph.images.enclosed")
 
-CELLS = 20_000
+CELLS = 200_000
 
 
 def test_rigorous_images(benchmark, table):
@@ -39,7 +42,7 @@ def test_rigorous_images(benchmark, table):
     found = turns.answer
     assert not found.lost.any()
     per_cell = turns.ours / CELLS
-    table.append(limit("rigorous images, decided cells (1e6 a second)", 1e-6 / per_cell, "M/s", None))
+    table.append(limit("rigorous images, the whole call (asked: 5e6 a second)", 1e-6 / per_cell, "M/s", None))
     table.append(limit("rigorous images: ns a cell (asked: 5 million a second)", per_cell * 1e9, "ns", 200))
     table.append(versus("rigorous images, a cell", turns, "python-flint", unit="ns", per=CELLS))
 
@@ -74,6 +77,37 @@ def test_the_proof_and_its_recheck(benchmark, table, tmp_path):
         counted = report.cells
     each = np.array(seconds) / counted * 1e6
     table.append(limit("recheck, one core: us a cell (asked: 25 000 a second)", each, "us", 40))
+
+
+def test_the_recheck_of_damaged_and_forged_files(table, tmp_path):
+    """Each kind of file of the checker's own tests: how long the worst takes, imports apart."""
+    good = {model: forge.forge(model, **test_recheck.COARSE) for model in ("designed", "small")}
+    path = tmp_path / "x.proof.zip"
+
+    def worst_of(files, verdict):
+        slowest = 0.0, ""
+        for name, data in files:
+            path.write_bytes(data)
+            begin = perf_counter()
+            found = test_recheck.checker.recheck(path, workers=1).verdict
+            slowest = max(slowest, (perf_counter() - begin, name))
+            assert found in verdict, name
+        return slowest
+
+    def forged():
+        for way in test_recheck.WAYS:
+            rng = random.Random(f"{way} 0")
+            model = rng.choice(["designed", "small"])
+            spoiler = test_recheck.Spoiler(good[model].copy(), model, rng)
+            getattr(spoiler, way)()
+            yield way, spoiler.f.seal().bytes()
+
+    for what, files, verdict in (
+        ("damaged", test_recheck.damaged_files(good["designed"]), {"bad file"}),
+        ("forged", forged(), {"bad file", "failed"}),
+    ):
+        seconds, name = worst_of(files, verdict)
+        table.append(limit(f"recheck of {what} files, the slowest ({name})", seconds, "s", 1.0))
 
 
 def test_no_enclosure_is_violated(table):

@@ -279,6 +279,24 @@ def test_a_full_disk():
     assert done.stderr == "limitsets: No space left on device\n"
 
 
+@pytest.mark.parametrize("module", ["limitsets.cli", "limitsets.cli.run", "typer", "limitsets.cli.app"])
+def test_ctrl_c_while_the_package_is_imported(module):
+    """A finder sends the signal where the module is asked for."""
+    code = (
+        "import runpy, signal, sys\n"
+        "signal.signal(signal.SIGINT, signal.default_int_handler)\n"
+        "class Finder:\n"
+        "    def find_spec(name, path=None, target=None):\n"
+        f"        if name == {module!r}:\n"
+        "            signal.raise_signal(signal.SIGINT)\n"
+        "sys.meta_path.insert(0, Finder)\n"
+        "sys.argv = ['limitsets', 'scenes']\n"
+        "runpy.run_module('limitsets', run_name='__main__', alter_sys=True)\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout, done.stderr) == (130, "", "limitsets: interrupted\n")
+
+
 @pytest.mark.skipif(sys.platform == "win32", reason="signals")
 def test_ctrl_c_leaves_the_old_files_whole(tmp_path):
     folder = tmp_path / "report"

@@ -288,7 +288,7 @@ def test_place_finds_every_closed_cell_that_an_interval_meets(graded):
     domain = Domain([[0.1]], [[3.0]], [0.05]) if graded else Domain([[0.1]], [[3.0]])
     cells = ls.grid(domain, cells=37)
     edges = cells.edges[0][0]
-    target = Target.of(cells, {"outside": -2})
+    target = Target.of(cells, {"inward": ls.maps.INWARD, "outward": ls.maps.OUTWARD})
     rng = np.random.default_rng(7)
     borders = np.concatenate([edges, np.nextafter(edges, -9), np.nextafter(edges, 9), [-1e9, 1e9, 0.0, 3.5]])
     for _ in range(20_000):
@@ -297,7 +297,7 @@ def test_place_finds_every_closed_cell_that_an_interval_meets(graded):
         k, m, leaves = place_one(target, lo, hi, int(rng.integers(0, 37)))
         met = np.flatnonzero((edges[1:] >= lo) & (edges[:-1] <= hi))
         assert (list(range(k, m + 1)) if k <= m else []) == met.tolist(), (lo, hi)
-        assert (leaves >= 0) == (lo < edges[0] or hi > edges[-1])
+        assert leaves == (lo < edges[0]) + 2 * (hi > edges[-1])
 
 
 def place_one(target, lo, hi, hint):

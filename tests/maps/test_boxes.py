@@ -1,6 +1,5 @@
 """Box images of the textbook maps against exact rationals (Arb for the exponential): nothing missed, little added."""
 
-import importlib
 import itertools
 import math
 from fractions import Fraction
@@ -11,14 +10,12 @@ import pytest
 
 import limitsets as ls
 from limitsets import maps
+from limitsets.graph.images.hulls import Images
 from limitsets.jit import proof_kernel
 from limitsets.maps.contract import image_box
 from limitsets.maps.drivers import pick
 from limitsets.maps.textbook.domains import DOMAINS
 from tests.interval.exact import arb
-
-# The name of the module is hidden by that of its function.
-enclosed = importlib.import_module("limitsets.graph.images.enclosed")
 
 POINTS = 6000
 HALF = Fraction(1, 2)
@@ -108,7 +105,7 @@ def violations(cls, width, count, seed):
     bad = lost = 0
     for low, high in param_boxes(rng, params, width):
         lo, hi = boxes_in(rng, DOMAINS[cls], count // 20, 0.3)
-        got = enclosed._Images(low, high, 0, lo, hi)
+        got = Images(low, high, 0, lo, hi)
         lost += int((got.count == -1).sum())
         corners = list(itertools.product((0.0, 1.0), repeat=len(lo)))
         for k in range(lo[0].size):
@@ -120,7 +117,8 @@ def violations(cls, width, count, seed):
             images = EXACT[cls][1](*map(Fraction, p), *map(Fraction, x))
             for branch, image in images:
                 slots = [(s, int(got.to[2 * s + 1, k])) for s in range(got.count[k])]
-                held = [b for s, b in slots if inside(got.slots[s][0][k], got.slots[s][1][k], image)]
+                boxes = [np.stack(got.slots[s], axis=0)[:, :, k] for s in range(2)]
+                held = [b for s, b in slots if inside(*boxes[s], image)]
                 named = branch is None or branch in held or (cls is maps.ThreeState and len(slots) == 2)
                 bad += not (held and named)
     return bad, lost
@@ -176,7 +174,7 @@ def test_boxes_of_small_cells_are_tight(cls, size):
     params = DEFAULTS.get(cls, cls())
     lo = tuple(rng.uniform(a + 0.01 * (b - a), b - 0.01 * (b - a), 400) for a, b in DOMAINS[cls])
     hi = tuple(x + size for x in lo)
-    got = enclosed._Images(params, params, 0, lo, hi)
+    got = Images(params, params, 0, lo, hi)
     assert (got.count == 1).all()
     for k in range(400):
         corners = itertools.product(*((Fraction(a[k]), Fraction(b[k])) for a, b in zip(lo, hi, strict=True)))
@@ -186,16 +184,16 @@ def test_boxes_of_small_cells_are_tight(cls, size):
             values = [float(u[branch][axis].mid() if cls is maps.Leslie else u[branch][axis]) for u in found]
             slack = 1e-12 * max(1.0, *map(abs, values))
             turns = 1e-3 * size if cls is maps.Leslie else 0.0  # near a crest the corners are not the range
-            assert got.slots[0][0][k, axis] >= min(values) - slack
-            assert got.slots[0][1][k, axis] <= max(values) + slack + turns
+            assert got.slots[0][0][axis][k] >= min(values) - slack
+            assert got.slots[0][1][axis][k] <= max(values) + slack + turns
 
 
 def test_wide_cells_are_exact_where_a_map_turns():
     def one(params, *pairs):
         lo, hi = zip(*pairs, strict=True)
-        got = enclosed._Images(params, params, 0, *(tuple(np.array([v]) for v in c) for c in (lo, hi)))
+        got = Images(params, params, 0, *(tuple(np.array([v]) for v in c) for c in (lo, hi)))
         assert got.count[0] == 1
-        return list(zip(got.slots[0][0][0], got.slots[0][1][0], strict=True))
+        return [(low[0], high[0]) for low, high in zip(*got.slots[0], strict=True)]
 
     assert one(maps.Logistic(4.0), (0.0, 1.0)) == [(0.0, 1.0)]
     assert one(maps.Logistic(3.0), (0.2, 0.6))[0] == pytest.approx((0.48, 0.75), abs=1e-14)
@@ -222,7 +220,7 @@ def test_nothing_is_claimed_beyond_a_pole_or_off_the_circle():
     ]:
         dimension = maps.kind_of(params).dimension
         lo, hi = (tuple(np.array([end]) for _ in range(dimension)) for end in pair)
-        assert enclosed._Images(params, params, 0, lo, hi).count[0] == -1
+        assert Images(params, params, 0, lo, hi).count[0] == -1
 
 
 def test_parameters_that_are_no_numbers_prove_nothing():
@@ -230,7 +228,7 @@ def test_parameters_that_are_no_numbers_prove_nothing():
     for bad in (math.nan, math.inf):
         for cls in (maps.Logistic, maps.Cubic, maps.ThreeState):
             params = cls(bad, 1.0) if cls is maps.ThreeState else cls(bad)
-            assert (enclosed._Images(params, params, 0, lo, hi).count == -1).all()
+            assert (Images(params, params, 0, lo, hi).count == -1).all()
 
 
 @proof_kernel(entry=True)

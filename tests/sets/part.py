@@ -24,9 +24,10 @@ DATA = {
 class Part:
     """The part of a scene and how it is thrown; docs/model.md, with its letters."""
 
-    def __init__(self, name: str) -> None:
+    def __init__(self, name: str, data: Any = None) -> None:
         self.small = "small" in name
-        self.h, along, above, self.kappa = (mp.mpf(text) for text in DATA[name])
+        self.lengths = SIDES
+        self.h, along, above, self.kappa = (mp.mpf(text) for text in data or DATA[name])
         # Side 2 from (0, 0) to (6.75, 0); the apex joins side 0 (left) and side 1 (right).
         left, right = (mp.mpf(0), mp.mpf(0)), (SIDES[2], mp.mpf(0))
         apex_x = (SIDES[0] ** 2 - SIDES[1] ** 2 + SIDES[2] ** 2) / (2 * SIDES[2])
@@ -74,4 +75,4 @@ class Part:
         if branch == "jog":
             return jog, i
         k = (i + 1) % 3
-        return jog - a - (SIDES[k] - self.a[k]), k
+        return jog - a - (self.lengths[k] - self.a[k]), k

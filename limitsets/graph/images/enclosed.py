@@ -17,95 +17,21 @@ from numpy.typing import NDArray
 from limitsets.cells import Grid
 from limitsets.errors import AnswerError
 from limitsets.graph.boxes import Boxes, merged, placed
+from limitsets.graph.images.hulls import BOTH, DECIDED, NOTHING, Columns, Hulls, Images
 from limitsets.graph.target import Target
 from limitsets.interval import guard
-from limitsets.jit import proof_kernel
 from limitsets.maps import kind_of
-from limitsets.maps.contract import fallback_box, image_box, on_side_box
-from limitsets.maps.drivers import pick, put
 
 __all__ = ["Enclosures", "boxes_of", "enclosed", "enclosures"]
 
 Floats: TypeAlias = NDArray[np.float64]
-Columns: TypeAlias = tuple[Floats, ...]
 
-NOTHING, DECIDED, BOTH = -1, 1, 2
+# Cells done at a time: few enough for the processor's cache, and for memory that is used again.
+BATCH = 16384
 
 # Pieces of an undecided cell along each axis, and along the parameter where one is not known exactly, by dimension.
 PIECES_OF_X = {1: 4, 2: 4, 3: 2}
 PIECES_OF_PARAMETER = {1: 256, 2: 16, 3: 8}
-
-
-@proof_kernel
-def _store(answer: Any, k: int, count: Any, first: Any, second: Any, to: Any, witness: Any) -> None:
-    """Keep an answer: corners of the slots in `first` and `second`, their sides and branches in `to`."""
-    n, a, b, w = answer
-    count[k] = n
-    put(first[0], k, a[0])
-    put(first[1], k, a[1])
-    put(second[0], k, b[0])
-    put(second[1], k, b[1])
-    to[0, k], to[1, k], to[2, k], to[3, k] = a[2], a[3], b[2], b[3]
-    witness[0, k], witness[1, k] = w
-
-
-@proof_kernel(entry=True)
-def _enclose(lo_map: Any, hi_map: Any, side: int, lo: Any, hi: Any, kept: Any) -> None:
-    """Images of boxes."""
-    one, two = on_side_box(lo_map, hi_map, side)
-    for k in range(lo[0].size):
-        _store(image_box(one, two, pick(lo, k), pick(hi, k), side), k, *kept)
-
-
-@proof_kernel(entry=True)
-def _enclose_surely(lo_map: Any, hi_map: Any, side: int, lo: Any, hi: Any, again: Any, kept: Any) -> None:
-    """Images of some of them, the slow and sure way."""
-    one, two = on_side_box(lo_map, hi_map, side)
-    for k in again:
-        _store(fallback_box(one, two, pick(lo, k), pick(hi, k), side), k, *kept)
-
-
-class _Images:
-    """Images of boxes: `count`, and per slot the corners, shape (n, dimension), the sides and the branches.
-
-    `count` is NOTHING too where the answer is none of the three, or no finite box.
-    """
-
-    def __init__(self, lo_map: Any, hi_map: Any, side: int, lo: Columns, hi: Columns) -> None:
-        n, axes = lo[0].size, range(len(lo))
-        count, self.to, self.witness = np.empty(n, np.int8), np.empty((4, n), np.int32), np.empty((2, n))
-        slots = [tuple(tuple(np.empty(n) for _ in axes) for _ in range(2)) for _ in range(2)]
-        kept = (count, *slots, self.to, self.witness)
-        _enclose(lo_map, hi_map, side, lo, hi, kept)
-        again = np.flatnonzero(count == NOTHING)
-        if again.size and type(lo_map) in fallback_box.methods:  # type: ignore[attr-defined]  # a generic function has them
-            _enclose_surely(lo_map, hi_map, side, lo, hi, again, kept)
-        self.slots = [tuple(np.stack(corner, axis=1) for corner in slot) for slot in slots]
-        real = [
-            ((low <= high) & np.isfinite(low) & np.isfinite(high)).all(axis=1) for low, high in self.slots
-        ]
-        sound = ((count == DECIDED) & real[0]) | ((count == BOTH) & real[0] & real[1])
-        self.count = np.where(sound, count, NOTHING)
-
-    def join(
-        self, hulls: dict[tuple[int, int], Any], n: int, cells: NDArray[np.int64], some: Any, slot: int
-    ) -> None:
-        """Widen the hulls of `cells` by the images in one slot of `some` of their pieces, which follow each other."""
-        side, branch = self.to[2 * slot], self.to[2 * slot + 1]
-        lo, hi = self.slots[slot]
-        dimension = lo.shape[1]
-        shape = (cells.size, -1, dimension)
-        rest = some.copy()
-        while rest.any():
-            k = int(rest.argmax())
-            key = int(side[k]), int(branch[k])
-            mine = rest & (side == key[0]) & (branch == key[1])
-            rest &= ~mine
-            empty = (n, dimension)
-            least, most = hulls.setdefault(key, (np.full(empty, np.inf), np.full(empty, -np.inf)))
-            low, high = np.where(mine[:, None], lo, np.inf), np.where(mine[:, None], hi, -np.inf)
-            least[cells] = np.minimum(least[cells], low.reshape(shape).min(axis=1))
-            most[cells] = np.maximum(most[cells], high.reshape(shape).max(axis=1))
 
 
 def _least_known(lo_map: Any, hi_map: Any) -> str | None:
@@ -198,23 +124,25 @@ def enclosures(map: Any, upper: Any, edges: Floats | Columns, side: int) -> Encl
     lo = tuple(m.ravel() for m in np.meshgrid(*(axis[:-1] for axis in axes), indexing="ij"))
     hi = tuple(m.ravel() for m in np.meshgrid(*(axis[1:] for axis in axes), indexing="ij"))
     n = lo[0].size
-    whole = _Images(map, upper, side, lo, hi)
-    hulls: dict[tuple[int, int], Any] = {}
-    whole.join(hulls, n, np.arange(n), whole.count == DECIDED, 0)
-    rest = np.flatnonzero(whole.count != DECIDED)
-    lost = np.zeros(n, dtype=bool)
+    hulls, witness = Hulls(n, len(axes)), np.empty((2, n))
+    decided, lost = np.empty(n, dtype=bool), np.zeros(n, dtype=bool)
+    for begin in range(0, n, BATCH):
+        cells = np.arange(begin, min(begin + BATCH, n))
+        some = slice(begin, begin + BATCH)
+        part = Images(map, upper, side, tuple(x[some] for x in lo), tuple(x[some] for x in hi))
+        decided[some], witness[:, some] = part.count == DECIDED, part.witness
+        hulls.join(part, decided[some], 0, cells)
+    rest = np.flatnonzero(~decided)
     if rest.size:
         pieces = PIECES_OF_X[len(axes)]
         below, above = _cut(tuple(x[rest] for x in lo), tuple(x[rest] for x in hi), pieces)
         owner = np.repeat(rest, pieces ** len(axes))
         for one, two in _parameter_pieces(map, upper, PIECES_OF_PARAMETER[len(axes)]):
-            part = _Images(one, two, side, below, above)
+            part = Images(one, two, side, below, above)
             lost[owner[part.count == NOTHING]] = True
-            part.join(hulls, n, rest, part.count != NOTHING, 0)
-            part.join(hulls, n, rest, part.count == BOTH, 1)
-    if len(axes) == 1:
-        hulls = {key: (low[:, 0], high[:, 0]) for key, (low, high) in hulls.items()}
-    return Enclosures(hulls, whole.witness, lost)
+            hulls.join(part, part.count != NOTHING, 0, rest)
+            hulls.join(part, part.count == BOTH, 1, rest)
+    return Enclosures(hulls.arrays(), witness, lost)
 
 
 def enclosed(map: Any, grid: Grid, side: int, target: Target, *, upper: Any = None) -> Boxes:  # noqa: A002  # the field's word
@@ -248,8 +176,7 @@ def boxes_of(found: Enclosures, target: Target, exits: int) -> Boxes:
             )
         lo, hi = (corner.reshape(n, dimension) for corner in hull)
         cell = np.flatnonzero((lo <= hi).all(axis=1) & ~found.lost)
-        part = placed(target, cell, np.full(cell.size, side), lo[cell], hi[cell], 0, inside=False)
-        parts += [part, _past_both_ends(target, side, cell, lo[cell], hi[cell])]
+        parts.append(placed(target, cell, np.full(cell.size, side), lo[cell], hi[cell], 0, inside=False))
     lost = np.flatnonzero(found.lost)
     everywhere = np.full(int(lost.max(initial=-1)) + 1, 0, np.uint8)
     everywhere[lost] = 2**exits - 1
@@ -258,15 +185,3 @@ def boxes_of(found: Enclosures, target: Target, exits: int) -> Boxes:
         of_side = np.full(lost.size, side, np.int32)
         parts.append(Boxes(lost, of_side, np.zeros_like(last), last, everywhere, 0.0))
     return merged(parts, n, 0.0)
-
-
-def _past_both_ends(target: Target, side: int, cell: NDArray[np.int64], lo: Floats, hi: Floats) -> Boxes:
-    """Ways out of hulls: `place` names one for each axis, but a hull may reach past both ends."""
-    begin = target.begin[side]
-    below = (lo < target.edges[begin]).any(axis=1)
-    above = (hi > target.edges[begin + target.cells[side]]).any(axis=1)
-    bits = (below * (1 << target.sink_below)) | (above * (1 << target.sink_above))
-    found = np.zeros(int(cell.max(initial=-1)) + 1, np.uint8)
-    found[cell] = bits
-    none = np.empty((0, lo.shape[1]), np.int32)
-    return Boxes(cell[:0], np.empty(0, np.int32), none, none, found, 0.0)

@@ -103,8 +103,7 @@ def _hulls(
                 value = after[axis][base + offsets[s]]
                 lo, hi = min(lo, value), max(hi, value)
             k, m, leaves = place(target, to, axis, lo, hi, pad, hint)
-            if leaves >= 0:
-                out |= 1 << leaves
+            out |= leaves
             if m < k:
                 state[cell] = EMPTY
             lo_out[cell, axis], hi_out[cell, axis] = k, m

@@ -1,0 +1,181 @@
+"""The box twin of `flight.py`: brackets of the impact angle, and its derivative.
+
+The impact is enclosed by a bracket: numbers proposed by Halley's method, accepted only when the height of the vertex
+is proved positive at (and, being concave, before) the lower one and negative at the upper one.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import limitsets.interval as iv
+from limitsets.interval.arithmetic import Interval
+from limitsets.jit import generic, proof_kernel
+from limitsets.thrower.params import Exact, SmallAngle, SmallAngle2
+from limitsets.thrower.side_box import SideBox
+from limitsets.thrower.turn_box import exact_turn, turn_box, turn_point
+
+__all__ = ["angle_slope", "bracket", "sure_bracket"]
+
+# The bracket of an impact reaches this far, relative to phi, beyond what Halley's method proposes: wide against the
+# rounding of f (some 2^-46 of its terms), narrow against the 1e-9 asked of end points.
+SLACK = 2.0**-43
+
+FULL_TURN = 2.0 * math.pi
+
+
+def bracket(flight: Any, b: SideBox, x: float) -> tuple[Interval, bool]:
+    """Interval that holds the impact angle of a start x for all parameters, and whether that is proved."""
+
+
+bracket = generic(bracket, proof=True)
+
+
+def sure_bracket(flight: Any, b: SideBox, x: float) -> tuple[Interval, bool]:
+    """Return the same, however long it takes."""
+
+
+sure_bracket = generic(sure_bracket, proof=True)
+
+
+def angle_slope(flight: Any, b: SideBox, x: Interval, phi: Interval) -> Interval:
+    """Return the derivative of the impact angle with respect to x."""
+
+
+angle_slope = generic(angle_slope, proof=True)
+
+
+@proof_kernel
+def _right_of_root(kappa: float, a: float, d: float, ell: float, reach: float) -> float:
+    """Right of the root: w <= phi^3/6 and v <= phi^2/2 in f, or f <= R phi + 2 ell - (kappa/2) phi^2."""
+    b = 0.5 * (kappa - d)
+    under = b * b - (2.0 / 3.0) * a * reach
+    cubic = 2.0 * reach / (b + math.sqrt(max(under, 0.0)))
+    x = reach + a
+    far = (x + math.sqrt(x * x + 4.0 * kappa * ell)) / kappa
+    return min(cubic, far) if under > 0.0 else far
+
+
+@proof_kernel
+def _nearer(kappa: float, a: float, d: float, reach: float, phi: float) -> float:
+    """One step of Halley's method: f'' costs little beside f, and three steps do what takes Newton's four to five."""
+    s, v, w = exact_turn(phi)
+    f = phi * (reach - 0.5 * kappa * phi) + a * w + d * v
+    slope = reach + a * v + d * s - kappa * phi
+    bend = a * s + d * (1.0 - v) - kappa
+    return phi - f * slope / (slope * slope - 0.5 * f * bend)
+
+
+@proof_kernel
+def _height(kappa: float, a: float, d: float, reach: float, phi: float) -> Interval:
+    """f at one angle for one set of parameters."""
+    _, v, w = turn_point(phi)
+    p = (phi, phi)
+    fall = iv.sub((reach, reach), iv.mul((kappa, kappa), (0.5 * phi, 0.5 * phi)))
+    return iv.add(iv.mul(p, fall), iv.add(iv.mul((a, a), w), iv.mul((d, d), v)))
+
+
+@proof_kernel
+def _least_height(b: SideBox, reach: Interval, phi: float) -> float:
+    """Bound on f from below, for all parameters: f grows with reach, a and d (v, w >= 0) and falls with kappa."""
+    return _height(b.kappa[1], b.a[0], b.d[0], reach[0], phi)[0]
+
+
+@proof_kernel
+def _most_height(b: SideBox, reach: Interval, phi: float) -> float:
+    """Bound on f from above."""
+    return _height(b.kappa[0], b.a[1], b.d[1], reach[1], phi)[1]
+
+
+@proof_kernel
+def _exact_bracket(flight: Any, b: SideBox, x: float) -> tuple[Interval, bool]:
+    reach = iv.sub((x, x), b.a)
+    # As f, its root is smallest at one corner of the parameters and largest at the other.
+    phi = _right_of_root(b.kappa[1], b.a[0], b.d[0], b.ell[1], reach[0])
+    for _ in range(3):
+        phi = _nearer(b.kappa[1], b.a[0], b.d[0], reach[0], phi)
+    other = phi
+    for _ in range(2):
+        other = _nearer(b.kappa[0], b.a[1], b.d[1], reach[1], other)
+    lo, hi = phi - SLACK * phi, other + SLACK * other
+    proved = (reach[0] > 0.0) & (lo > 0.0) & (hi <= flight.full_turn) & b.single_root
+    proved &= (_least_height(b, reach, lo) > 0.0) & (_most_height(b, reach, hi) < 0.0)
+    return (lo, hi), proved
+
+
+@proof_kernel
+def _marched(b: SideBox, x: float) -> tuple[Interval, bool]:
+    """As `_exact_bracket`, however many roots there are: a march that cannot step over the smallest.
+
+    With M >= |f''|, f(t + s) >= f(t) + f'(t) s - M s^2/2, so f stays positive up to the positive root of that parabola,
+    shrunk by 2^-20 against rounding.  At the start f(s) >= f'(0) s - M s^2/2.  Where no step is left the lower end is
+    reached; the upper end is the next angle tried at which f is proved negative.  Near a double root, or where the
+    first root jumps within the parameters, the bracket is wide and still right.
+    """
+    reach = iv.sub((x, x), b.a)
+    bound = iv.add((b.kappa[1], b.kappa[1]), (b.ell[1], b.ell[1]))[1]
+    shrink = 1.0 - 2.0**-20
+    t = shrink * 2.0 * reach[0] / bound
+    going = reach[0] > 0.0
+    while going and t < FULL_TURN:
+        f = _least_height(b, reach, t)
+        s, v, _ = turn_point(t)
+        slope = iv.add(reach, iv.add(iv.mul(b.a, v), iv.mul(b.d, s)))
+        low = iv.sub(slope, iv.mul(b.kappa, (t, t)))[0]
+        inside = low * low + 2.0 * bound * f
+        step = shrink * (low + math.sqrt(max(inside, 0.0))) / bound
+        going = (f > 0.0) & (step > 2.0**-40 * t)
+        t = t + step if going else t
+    width = 2.0**-36 * t
+    while t + width < FULL_TURN and not _most_height(b, reach, t + width) < 0.0:
+        width *= 1.25
+    hi = t + width
+    proved = (reach[0] > 0.0) & (t > 0.0) & (hi <= FULL_TURN) & (_most_height(b, reach, hi) < 0.0)
+    return (t, hi), proved
+
+
+@proof_kernel
+def _exact_slope(flight: Any, b: SideBox, x: Interval, phi: Interval) -> Interval:
+    s, v, _ = turn_box(phi[0], phi[1])
+    reach = iv.sub(x, b.a)
+    below = iv.sub(iv.mul(b.kappa, phi), iv.add(reach, iv.add(iv.mul(b.a, v), iv.mul(b.d, s))))
+    return iv.div(phi, below)
+
+
+@proof_kernel
+def _small_bracket(flight: Any, b: SideBox, x: float) -> tuple[Interval, bool]:
+    phi = iv.div(iv.mul((2.0, 2.0), iv.sub((x, x), b.a)), b.kappa)
+    return phi, (phi[0] > 0.0) & (phi[1] <= flight.full_turn)
+
+
+@proof_kernel
+def _small_slope(flight: Any, b: SideBox, x: Interval, phi: Interval) -> Interval:
+    return iv.div((2.0, 2.0), b.kappa)
+
+
+@proof_kernel
+def _small2_bracket(flight: Any, b: SideBox, x: float) -> tuple[Interval, bool]:
+    phi = iv.div(iv.mul((2.0, 2.0), iv.sub((x, x), b.a)), iv.sub(b.kappa, b.d))
+    return phi, (phi[0] > 0.0) & (phi[1] <= flight.full_turn)
+
+
+@proof_kernel
+def _small2_slope(flight: Any, b: SideBox, x: Interval, phi: Interval) -> Interval:
+    return iv.div((2.0, 2.0), iv.sub(b.kappa, b.d))
+
+
+@proof_kernel
+def _exact_surely(flight: Any, b: SideBox, x: float) -> tuple[Interval, bool]:
+    return _marched(b, x)
+
+
+sure_bracket.on(Exact, _exact_surely)  # type: ignore[attr-defined]
+sure_bracket.on(SmallAngle, _small_bracket)  # type: ignore[attr-defined]
+sure_bracket.on(SmallAngle2, _small2_bracket)  # type: ignore[attr-defined]
+bracket.on(Exact, _exact_bracket)  # type: ignore[attr-defined]  # generic functions carry `on`
+bracket.on(SmallAngle, _small_bracket)  # type: ignore[attr-defined]
+bracket.on(SmallAngle2, _small2_bracket)  # type: ignore[attr-defined]
+angle_slope.on(Exact, _exact_slope)  # type: ignore[attr-defined]
+angle_slope.on(SmallAngle, _small_slope)  # type: ignore[attr-defined]
+angle_slope.on(SmallAngle2, _small2_slope)  # type: ignore[attr-defined]
