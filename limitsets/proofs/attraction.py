@@ -105,6 +105,8 @@ def _verdict(
     lost = np.concatenate([images.lost for images in found.images])
     if lost.any():
         return False, f"nothing is proved of the image of {place(int(np.flatnonzero(lost)[0]))}"
+    if found.box.landing > 0.0:
+        return False, f"near the joint: {joint[0].reason}"
     leaving = np.flatnonzero(found.graph.ranges.exits)
     if leaving.size:
         return False, f"the image of {place(int(leaving[0]))} may leave the cells"

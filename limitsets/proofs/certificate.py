@@ -23,7 +23,7 @@ from limitsets.proofs.attraction import Attraction
 from limitsets.proofs.cover import Cover
 from limitsets.thrower import Energy, Exact, Signed, SmallAngle, SmallAngle2
 
-__all__ = ["FORMAT", "VERSION", "arrays_of", "write"]
+__all__ = ["FORMAT", "VERSION", "arrays_of", "targets", "write"]
 
 FORMAT, VERSION = "limitsets-proof", 1
 
@@ -44,7 +44,7 @@ FORMULAS = [
 ]
 
 
-def _targets(found: Cover, branch: int) -> NDArray[np.int32]:
+def targets(found: Cover, branch: int) -> NDArray[np.int32]:
     """First and last target cell of one branch, -1 -1 where it is impossible."""
     grid = found.grid
     out = np.full((grid.n_cells, 2), -1, dtype=np.int32)
@@ -64,7 +64,7 @@ def _targets(found: Cover, branch: int) -> NDArray[np.int32]:
 def arrays_of(proof: Attraction, prefix: str) -> dict[str, NDArray[Any]]:
     """Arrays of one box of parameters."""
     found = proof.cover
-    jog, flip = _targets(found, 0), _targets(found, 1)
+    jog, flip = targets(found, 0), targets(found, 1)
     jogs, flips = jog[:, 0] >= 0, flip[:, 0] >= 0
     phi = np.concatenate([images.witness for images in found.images], axis=1).T
     slack = SLACK * np.abs(phi)

@@ -36,6 +36,10 @@ class NearJoint:
         Where the cells begin.
     q : float
         R' - a >= q (R - a) on (a_i, x].
+    reach : float
+        No throw from (a_i, x] lands beyond it.
+    rises : bool
+        Whether R' is proved to grow with R on (a_i, x] at least as fast: the displacement grows with the angle.
     proved : bool
         Whether q > 1 and all that it rests on is proved.
     reason : str
@@ -44,13 +48,15 @@ class NearJoint:
 
     x: float
     q: float
+    reach: float
+    rises: bool
     proved: bool
     reason: str
 
 
 @proof_kernel(entry=True)
 def _near(lo: Any, hi: Any, side: int, x: float, out: Any) -> None:
-    """Numbers that have to be positive, and q: root found, jog decided, bracket, -h, room on the arm, q."""
+    """Root found, jog decided, bracket, -h, room on the arm: positive if proved; q, reach, slope of the displacement."""
     b = gather_box(lo, hi, side)
     last, good = bracket(b.flight, b, x)
     phi = (0.0, last[1])
@@ -60,7 +66,7 @@ def _near(lo: Any, hi: Any, side: int, x: float, out: Any) -> None:
     square = iv.mul(b.a, iv.sqr(phi))
     left = iv.sub(iv.mul(b.a, (0.5, 0.5)), iv.div(square, (24.0, 24.0)))
     left = iv.sub(left, iv.div(iv.mul(b.d, phi), (6.0, 6.0)))
-    shift, _ = displacement_box(b.flight, b, phi)
+    shift, rise = displacement_box(b.flight, b, phi)
     reached = iv.add((x, x), shift)[1]
     out[0] = 1.0 if good else -1.0
     out[1] = -margin[1]
@@ -69,6 +75,8 @@ def _near(lo: Any, hi: Any, side: int, x: float, out: Any) -> None:
     out[4] = iv.sub((lo.arm_length, lo.arm_length), (reached, reached))[0]
     gain = iv.div(iv.mul((2.0, 2.0), iv.neg(b.h)), b.kappa)
     out[5] = iv.add((1.0, 1.0), gain)[0]
+    out[6] = reached
+    out[7] = rise[0]
 
 
 REASONS = (
@@ -78,6 +86,10 @@ REASONS = (
     "the arm's surface is not below the joint (h < 0)",
     "the throw may reach beyond the arm",
     "no expansion is proved",
+)
+
+SCATTERED = (
+    "with noise of landing.x a part that lies nearer to a than that may land at x <= a, and leave inward"
 )
 
 
@@ -96,9 +108,12 @@ def near_joint(found: Cover) -> tuple[NearJoint, ...]:
     """
     answers = []
     for side, (edges,) in enumerate(found.grid.edges):
-        out = np.full(6, np.nan)
+        out = np.full(8, np.nan)
         _near(found.box.lo, found.box.hi, side, float(edges[0]), out)
         good = [*(out[:5] > 0.0), out[5] > 1.0]
         reason = "" if all(good) else REASONS[good.index(False)]
-        answers.append(NearJoint(float(edges[0]), float(out[5]), all(good), reason))
+        if found.box.landing > 0.0:
+            reason = SCATTERED
+        rises = bool(out[7] > 0.0)
+        answers.append(NearJoint(float(edges[0]), float(out[5]), float(out[6]), rises, not reason, reason))
     return tuple(answers)
