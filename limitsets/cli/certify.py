@@ -24,9 +24,7 @@ HELP_CLAIM = (
     "What to prove: attracts-all, invariant, trapping, end-points, cycles, expanding or goal; repeatable."
 )
 HELP_TOLERANCE = "A quantity that is fixed but unknown, like throw.speed='0.7 %'; repeatable."
-HELP_NOISE = (
-    "What differs at every throw, like throw.speed='0.3 %': throw.speed, gravity.tilt or landing.x; repeatable."
-)
+HELP_NOISE = "What differs at every throw: throw.speed, gravity.tilt or landing.x, like throw.speed='0.3 %'; repeatable"
 
 
 def certify(

@@ -56,7 +56,7 @@ class NearJoint:
 
 @proof_kernel(entry=True)
 def _near(lo: Any, hi: Any, side: int, x: float, out: Any) -> None:
-    """Root found, jog decided, bracket, -h, room on the arm: positive if proved; q, reach, slope of the displacement."""
+    """Root found, jog decided, bracket, -h, room on the arm: positive if proved; q, reach, slope."""
     b = gather_box(lo, hi, side)
     last, good = bracket(b.flight, b, x)
     phi = (0.0, last[1])

@@ -230,9 +230,8 @@ def parameter_box(
                 "the noise", name, ", ".join(VARYING), "what is fixed but unknown is a tolerance"
             )
     kappa = reader.kappa(noise or {})
-    landing = (
-        reader.deviation("landing.x", noise or {})[1].outward()[1] if "landing.x" in (noise or {}) else 0.0
-    )
+    scatter = reader.deviation("landing.x", noise or {})[1]
+    landing = scatter.outward()[1] if scatter.hi > 0 else 0.0
     try:
         sides, radius = reader.body()
     except ZeroDivisionError:  # so wide that a length may be nothing

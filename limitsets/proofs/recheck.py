@@ -1436,8 +1436,8 @@ def check_thinning(c: Cells, scene: Scene, left: Array, throws: int) -> str:
     """Check that almost every orbit leaves some cells; "" or what fails.
 
     Spread starts evenly over the cells, and look at those that have not left them.  After a throw their density is, at
-    y, the sum over all x thrown to y of the density at x over dR'/dR.  On neighbouring cells of a side where that slope is
-    positive a jog rises and is continuous, and so is a flip: at most one x for each run of such cells and each branch.
+    y, the sum over all x thrown to y of the density at x over dR'/dR.  On neighbouring cells of a side where that slope
+    is positive a jog rises and is continuous, and so is a flip: at most one x for each run of such cells and branch.
     The density is bounded by numbers, one for each cell; those at a target are at most the sum, over runs and branches,
     of the largest number over slope that leads to it.  This rises with the numbers and is proportional to them, so once
     all are below 1 they fall to 0 by repetition, and what never leaves has length zero.  Slopes are lower bounds, sums

@@ -140,6 +140,7 @@ class Reached:
 
     @classmethod
     def of(cls, x: NDArray[np.float64], side: NDArray[np.int64]) -> Reached:
+        """Begin with some starts."""
         none = np.full(x.size, -1)
         return cls([x], [side], [none], [none])
 

@@ -1,4 +1,4 @@
-"""Starts anywhere on the arm that refute a goal: one throw that lands where it should not, or an orbit that leaves the arm."""
+"""Starts anywhere on the arm that refute a goal: by the landing of one throw, or by an orbit that leaves the arm."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ def leaving(found: Attraction) -> tuple[State, ...]:
 
 
 def _starts(found: Attraction) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    """Some starts on all of the arm; with scattered landings also one nearer to the joint than these scatter."""
+    """Choose starts on all of the arm; with scattered landings also one nearer to the joint than these scatter."""
     box, x, side = found.cover.box, [], []
     for s, (edges,) in enumerate(found.cover.grid.edges):
         centres = 0.5 * (edges[:-1] + edges[1:])
