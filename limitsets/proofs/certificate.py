@@ -10,6 +10,7 @@ from __future__ import annotations
 import hashlib
 import io
 import json
+import math
 import zipfile
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -76,9 +77,21 @@ def arrays_of(proof: Attraction, prefix: str) -> dict[str, NDArray[Any]]:
         "component": proof.component,
         "phi": np.stack([phi[:, 0] - slack[:, 0], phi[:, 1] + slack[:, 1]], axis=1),
     }
+    _say_nothing(arrays, found)
     for side, (edges,) in enumerate(found.grid.edges):
         arrays[f"edges.{side}"] = edges
     return {prefix + name: np.ascontiguousarray(value) for name, value in arrays.items()}
+
+
+def _say_nothing(arrays: dict[str, NDArray[Any]], found: Cover) -> None:
+    """Of cells of which nothing is proved: they land within a turn if at all, and may go anywhere."""
+    offset, sides = found.grid.offset, found.grid.sides
+    for side, images in enumerate(found.images):
+        cells, after = offset[side] + np.flatnonzero(images.lost), (side + 1) % sides
+        arrays["jog"][cells] = offset[side], offset[side + 1] - 1
+        arrays["flip"][cells] = offset[after], offset[after + 1] - 1
+        arrays["branch"][cells] = 2
+        arrays["phi"][cells] = SLACK, 2.0 * math.pi
 
 
 def _parameters(found: Cover) -> dict[str, Any]:

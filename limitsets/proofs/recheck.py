@@ -1475,6 +1475,8 @@ def check_thinning(c: Cells, scene: Scene, left: Array, throws: int) -> str:
         density = np.bincount(owner, most, minlength=len(left)).astype(np.float64) * (1 + 2.0**-30)
         if (density < 1).all():
             return ""
+        if not (density < 1e100).all():
+            break
     return f"what has not arrived is not proved to thin out within {throws} throws"
 
 

@@ -1,7 +1,7 @@
 """Noise of the speed, the tilt and the landing place at every throw: what is proved, refuted, replayed and refused.
 
-The sharp margin of the landing place is found twice, apart from the package: from the decision of side 2 by the 50-digit
-throw, and by following the ends of the intervals that can be reached, with the plain throw of `forge.py`.  That of the
+The sharp margin of the landing place is found twice, apart from the package: from the decision of side 2 by the throw at
+50 digits, and by following the ends of the intervals that can be reached, with the plain throw of `forge.py`.  That of the
 tilt follows from the one of the speed: either multiplies kappa.
 """
 
@@ -78,7 +78,7 @@ def require_thrown(proof, word="goal"):
 
 
 def sharp_landing():
-    """Largest e for which no part is beyond 20 in on side 0: from just below r_2 a jog, e too far, then a flip, e too far."""
+    """Largest e with no part beyond 20 in on side 0: from just below r_2 a jog, e too far, then a flip, e too far."""
     facts = reference.paper("designed")
 
     def margin(e):
@@ -122,9 +122,7 @@ def test_the_margin_of_the_landing_place_is_the_same_by_a_formula_and_by_reachab
 
 def test_the_landing_place_is_proved_below_its_margin_and_refuted_above(tmp_path):
     sharp = sharp_landing()
-    proof = ls.certify(
-        "paper-designed", EVERYWHERE_INSIDE, noise={"landing.x": f"{0.97 * sharp:.6f} in"}
-    )
+    proof = ls.certify("paper-designed", EVERYWHERE_INSIDE, noise={"landing.x": f"{0.97 * sharp:.6f} in"})
     assert verdicts(proof) == dict.fromkeys(EVERYWHERE_INSIDE, "proved")
     require_rechecked(proof, tmp_path)
     proof = ls.certify("paper-designed", ["goal"], noise={"landing.x": f"{1.02 * sharp:.6f} in"})
@@ -305,7 +303,7 @@ def test_noise_that_cannot_be(scene, noise, words):
 
 def test_an_acceleration_has_no_tilt():
     tree = ls.load("paper-designed").as_dict() | {"gravity": {"acceleration": "193.045 in/s^2"}}
-    with pytest.raises(LimitsetsError, match="noise of gravity.tilt"):
+    with pytest.raises(LimitsetsError, match=r"noise of gravity\.tilt"):
         ls.certify(ls.load(tree), noise={"gravity.tilt": "1 deg"})
 
 

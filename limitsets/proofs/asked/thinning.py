@@ -28,6 +28,9 @@ Mask = NDArray[np.bool_]
 # Throws after which it is given up.
 MOST = 4000
 
+# It is given up, too, where a bound has grown so large.
+HOPELESS = 1e100
+
 # Slopes are lessened by this share of them, and bounds enlarged, against rounding and so that others can confirm them.
 SLACK = 2.0**-20
 
@@ -69,7 +72,9 @@ def thinned(found: Attraction, cells: Mask, wanted: Mask) -> tuple[int, str]:
         bound = np.bincount(count, most, minlength=left.size)
         if bound.max() < 1.0:
             return throws, ""
-    return 0, f"after {MOST} throws the orbits that have not arrived are not proved to thin out"
+        if bound.max() > HOPELESS:
+            break
+    return 0, f"after {throws} throws the orbits that have not arrived are not proved to thin out"
 
 
 def _groups(found: Attraction, left: Mask) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
