@@ -1,8 +1,8 @@
 """Noise of the speed, the tilt and the landing place at every throw: what is proved, refuted, replayed and refused.
 
-The sharp margin of the landing place is found twice, apart from the package: from the decision of side 2 by the throw at
-50 digits, and by following the ends of the intervals that can be reached, with the plain throw of `forge.py`.  That of the
-tilt follows from the one of the speed: either multiplies kappa.
+The sharp margin of the landing place is found twice, apart from the package: from the decision of side 2 by the throw
+at 50 digits, and by following the ends of the intervals that can be reached, with the plain throw of `forge.py`.  That
+of the tilt follows from the one of the speed: either multiplies kappa.
 """
 
 import math
