@@ -13,6 +13,7 @@ from limitsets.errors import LimitsetsError
 
 if TYPE_CHECKING:
     from limitsets.proofs import Claim, Proof
+    from limitsets.proofs.asked import State
 
 __all__ = ["certify"]
 
@@ -23,7 +24,7 @@ HELP_CLAIM = (
     "What to prove: attracts-all, invariant, trapping, end-points, cycles, expanding or goal; repeatable."
 )
 HELP_TOLERANCE = "A quantity that is fixed but unknown, like throw.speed='0.7 %'; repeatable."
-HELP_NOISE = "A quantity that differs at every throw, like throw.speed='0.3 %'; repeatable."
+HELP_NOISE = "What differs at every throw: throw.speed, gravity.tilt or landing.x, like throw.speed='0.3 %'; repeatable"
 
 
 def certify(
@@ -80,7 +81,8 @@ def _text(proof: Proof, file: Path | None) -> None:
     for name, (lo, hi) in proof.spans.items():
         typer.echo(f"for every {name} from {_short(lo)} to {_short(hi)}, the same at every throw")
     for name, text in proof.noise.items():
-        typer.echo(f"for every sequence of throws, {name} within {text} of its value, anew at every throw")
+        value = "the model's place" if name == "landing.x" else "its value"
+        typer.echo(f"for every sequence of throws, {name} within {text} of {value}, anew at every throw")
     for claim in proof.claims:
         typer.echo(f"\n{claim.claim}: {claim.verdict.upper()}")
         for line in _words(proof, claim):
@@ -109,10 +111,9 @@ def _words(proof: Proof, claim: Claim) -> list[str]:
     if claim.claim == "attracts-all":
         return _attraction(proof, claim)
     if claim.claim == "goal":
-        goal = claim.section
-        return [
-            f"In the attracting cells, every part at rest beyond x = {goal['x']} lies on side {goal['side']}."
-        ]
+        from limitsets.proofs.asked import sentence
+
+        return [sentence(claim.section)]
     if claim.claim == "expanding":
         slope = float.fromhex(claim.section["least_slope"])
         entropy = "" if proof.noise else f"; topological entropy {_down(math.log(slope), 5)} at least"
@@ -196,18 +197,41 @@ def _orbit(proof: Proof, claim: Claim) -> None:
     for name, (lo, hi) in claim.fixed.items():
         value = _short(lo) if _short(lo) == _short(hi) else f"any value from {_short(lo)} to {_short(hi)}"
         typer.echo(f"  {name} = {value}")
-    heads = ["throws", f"x [{scene.unit}]", "side"]
+    heads = ["throws", f"x [{scene.unit}]", "side", *_heads(proof)]
     rows: list[list[str]] = []
-    if proof.noise:
-        heads.append("speed of the next throw")
     for k, state in enumerate(states):
         if 0 < k < len(states) - LAST:
             if k == 1:
                 rows.append(["..."] + [""] * (len(heads) - 1))
             continue
         row = [str(k), f"{0.5 * (state.lo + state.hi):.6f}", str(state.side)]
-        if proof.noise:
-            share = None if state.kappa is None else 100.0 * (math.sqrt(scene.kappa / state.kappa) - 1.0)
-            row.append("" if share is None else f"{share:+.4f} %")
-        rows.append(row)
+        rows.append(row + (_thrown(proof, state) if state.kappa is not None else [""] * (len(heads) - 3)))
     table(heads, rows)
+
+
+def _heads(proof: Proof) -> list[str]:
+    """Name what differs from throw to throw."""
+    unit = proof.scene.unit
+    both = "throw.speed" in proof.noise and "gravity.tilt" in proof.noise
+    words = {
+        "throw.speed": f"kappa of the next throw [{unit}]" if both else "speed of the next throw",
+        "gravity.tilt": "tilt of the next throw",
+        "landing.x": f"lands off by [{unit}]",
+    }
+    return [
+        word for name, word in words.items() if name in proof.noise and not (both and name == "gravity.tilt")
+    ]
+
+
+def _thrown(proof: Proof, state: State) -> list[str]:
+    """Say what a throw was like, one word for each of `_heads`."""
+    from limitsets.proofs.answer import thrown
+
+    said, noise, row = thrown(proof, state), proof.noise, []
+    if "throw.speed" in noise and "gravity.tilt" in noise:
+        row.append(f"{state.kappa:.6f}")
+    elif "throw.speed" in noise and state.kappa is not None:
+        row.append(f"{100.0 * (math.sqrt(proof.scene.kappa / state.kappa) - 1.0):+.4f} %")
+    elif "gravity.tilt" in noise:
+        row.append(_short(said["gravity.tilt"]))
+    return row + ([f"{state.landing:+.6f}"] if "landing.x" in noise and state.landing is not None else [])

@@ -10,13 +10,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from limitsets.scene.quantities import NAMES
+from limitsets.scene.units import convert, parse
 
 if TYPE_CHECKING:
+    from limitsets.proofs.asked import State
     from limitsets.proofs.attraction import Attraction
     from limitsets.proofs.certify import Claim, Proof
-    from limitsets.proofs.goal import State
 
-__all__ = ["jog_fixed_points", "max_throws", "outer_extents", "to_json", "values"]
+__all__ = ["jog_fixed_points", "max_throws", "outer_extents", "thrown", "to_json", "values"]
 
 
 def to_json(proof: Proof) -> list[dict[str, Any]]:
@@ -82,13 +83,31 @@ def _texts(node: Any, name: str) -> Iterator[tuple[str, str]]:
 
 def _state(proof: Proof, claim: Claim, state: State) -> dict[str, Any]:
     fixed: dict[str, Any] = dict(claim.fixed)
-    thrown = {} if state.kappa is None else fixed | {"throw.kappa": f"{state.kappa!r} {proof.scene.unit}"}
     return {
         "x": state.lo if state.lo == state.hi else 0.5 * (state.lo + state.hi),
         "between": [state.lo, state.hi],
         "side": state.side,
-        "parameters": thrown or None,
+        "parameters": None if state.kappa is None else fixed | thrown(proof, state),
     }
+
+
+def thrown(proof: Proof, state: State) -> dict[str, str]:
+    """Say what a throw was like, by quantity.
+
+    kappa always, as it was replayed; the tilt that makes it, where the tilt alone differs; how far beyond the model's
+    place it landed, where that differs.
+    """
+    found = {"throw.kappa": f"{state.kappa!r} {proof.scene.unit}"}
+    if "gravity.tilt" in proof.noise and "throw.speed" not in proof.noise and state.kappa is not None:
+        given = parse(proof.scene.text["gravity"]["tilt"], "angle")
+        nominal = convert(given, "rad")
+        # kappa goes with the sine of the tilt
+        tilt = math.asin(min(1.0, math.sin(nominal) * state.kappa / proof.scene.kappa))
+        degrees = given.unit == "deg"
+        found["gravity.tilt"] = f"{math.degrees(tilt) if degrees else tilt!r} {given.unit}"
+    if state.landing is not None:
+        found["landing.x"] = f"{state.landing!r} {proof.scene.unit}"
+    return found
 
 
 def max_throws(proof: Proof) -> dict[str, Any]:

@@ -17,7 +17,10 @@ from limitsets.graph.survey import attracting_of
 from limitsets.proofs.cover import Cover
 from limitsets.proofs.joint import NearJoint, near_joint
 
-__all__ = ["Attraction", "attraction"]
+__all__ = ["BELOW", "Attraction", "attraction"]
+
+
+BELOW = "with the arm's surface above the joint, starts nearer to it than the fixed point of the jog go there"
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,6 +57,11 @@ class Attraction:
     def cells(self) -> CellSet:
         """The attracting cells."""
         return CellSet(self.cover.grid, self.component >= 0)
+
+    @property
+    def missing(self) -> str:
+        """What is missing for every start on the arm, those next to the joint included; empty if nothing."""
+        return self.reason or (BELOW if self.cover.points else "")
 
     @property
     def max_rank(self) -> int:
@@ -106,6 +114,8 @@ def _verdict(
     lost = np.concatenate([images.lost for images in found.images])
     if lost.any():
         return False, f"nothing is proved of the image of {place(int(np.flatnonzero(lost)[0]))}"
+    if found.box.landing > 0.0:
+        return False, f"near the joint: {joint[0].reason}"
     leaving = np.flatnonzero(found.graph.ranges.exits)
     if leaving.size:
         return False, f"the image of {place(int(leaving[0]))} may leave the cells"

@@ -10,6 +10,7 @@ from __future__ import annotations
 import hashlib
 import io
 import json
+import math
 import zipfile
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -23,7 +24,7 @@ from limitsets.proofs.attraction import Attraction
 from limitsets.proofs.cover import Cover
 from limitsets.thrower import Energy, Exact, Signed, SmallAngle, SmallAngle2
 
-__all__ = ["FORMAT", "VERSION", "arrays_of", "write"]
+__all__ = ["FORMAT", "VERSION", "arrays_of", "targets", "write"]
 
 FORMAT, VERSION = "limitsets-proof", 1
 
@@ -44,7 +45,7 @@ FORMULAS = [
 ]
 
 
-def _targets(found: Cover, branch: int) -> NDArray[np.int32]:
+def targets(found: Cover, branch: int) -> NDArray[np.int32]:
     """First and last target cell of one branch, -1 -1 where it is impossible."""
     grid = found.grid
     out = np.full((grid.n_cells, 2), -1, dtype=np.int32)
@@ -64,7 +65,7 @@ def _targets(found: Cover, branch: int) -> NDArray[np.int32]:
 def arrays_of(proof: Attraction, prefix: str) -> dict[str, NDArray[Any]]:
     """Arrays of one box of parameters."""
     found = proof.cover
-    jog, flip = _targets(found, 0), _targets(found, 1)
+    jog, flip = targets(found, 0), targets(found, 1)
     jogs, flips = jog[:, 0] >= 0, flip[:, 0] >= 0
     phi = np.concatenate([images.witness for images in found.images], axis=1).T
     slack = SLACK * np.abs(phi)
@@ -76,9 +77,21 @@ def arrays_of(proof: Attraction, prefix: str) -> dict[str, NDArray[Any]]:
         "component": proof.component,
         "phi": np.stack([phi[:, 0] - slack[:, 0], phi[:, 1] + slack[:, 1]], axis=1),
     }
+    _say_nothing(arrays, found)
     for side, (edges,) in enumerate(found.grid.edges):
         arrays[f"edges.{side}"] = edges
     return {prefix + name: np.ascontiguousarray(value) for name, value in arrays.items()}
+
+
+def _say_nothing(arrays: dict[str, NDArray[Any]], found: Cover) -> None:
+    """Of cells of which nothing is proved: they land within a turn if at all, and may go anywhere."""
+    offset, sides = found.grid.offset, found.grid.sides
+    for side, images in enumerate(found.images):
+        cells, after = offset[side] + np.flatnonzero(images.lost), (side + 1) % sides
+        arrays["jog"][cells] = offset[side], offset[side + 1] - 1
+        arrays["flip"][cells] = offset[after], offset[after + 1] - 1
+        arrays["branch"][cells] = 2
+        arrays["phi"][cells] = SLACK, 2.0 * math.pi
 
 
 def _parameters(found: Cover) -> dict[str, Any]:

@@ -43,7 +43,7 @@ class Cover:
     grid : Grid
         The cells.
     images : tuple of Enclosures
-        Per side, widened by `SLACK`.
+        Per side, widened by `SLACK` and by the noise of the landing place.
     graph : TransitionGraph
         The same as a graph; the sinks are reached by images that may leave.
     points : tuple of FixedPoint
@@ -57,9 +57,13 @@ class Cover:
     points: tuple[FixedPoint, ...]
 
 
-def _widened(found: Enclosures, edges: NDArray[np.float64]) -> Enclosures:
-    slack = SLACK * np.diff(edges)
-    hulls = {key: (lo - slack, hi + slack) for key, (lo, hi) in found.hulls.items()}
+def _widened(found: Enclosures, edges: NDArray[np.float64], landing: float) -> Enclosures:
+    """Widen the images by the slack and by the scatter of the landing place, which no decision depends on."""
+    more = np.nextafter(landing + SLACK * np.diff(edges), np.inf)
+    hulls = {
+        key: (np.nextafter(lo - more, -np.inf), np.nextafter(hi + more, np.inf))
+        for key, (lo, hi) in found.hulls.items()
+    }
     return Enclosures(hulls, found.witness, found.lost)
 
 
@@ -99,7 +103,8 @@ def cover(box: ParameterBox, cells: int, cuts: Mapping[int, Sequence[float]] | N
         sides.append((np.union1d(edges, wanted),))
     cells_of = Grid(plain.domain, tuple(sides))
     found = tuple(
-        _widened(enclosures(box.lo, box.hi, edges, side), edges) for side, (edges,) in enumerate(sides)
+        _widened(enclosures(box.lo, box.hi, edges, side), edges, box.landing)
+        for side, (edges,) in enumerate(sides)
     )
     return Cover(box, cells_of, found, _graph(box, cells_of, found), points)
 

@@ -6,9 +6,11 @@ grows until it meets a critical point, so the topological entropy is at least th
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from limitsets.cells import CellSet
 from limitsets.jit import proof_kernel
@@ -16,7 +18,7 @@ from limitsets.proofs.cover import Cover
 from limitsets.thrower.side_box import gather_box
 from limitsets.thrower.throw_box import NOTHING, throw_box
 
-__all__ = ["least_slope"]
+__all__ = ["least_slope", "slopes"]
 
 # Cells are cut into this many pieces, so that the slope is not lost in the width of a cell.
 PIECES = 8
@@ -41,6 +43,23 @@ def least_slope(found: Cover, cells: CellSet) -> tuple[float, str]:
         The side and cell of the least slope.
     """
     least, place = np.inf, ""
+    for side, _, lo, hi, out in _pieces(found, cells):
+        worst = int(out.argmin())
+        if out[worst] < least:
+            least, place = float(out[worst]), f"side {side}, x in [{lo[worst]:.6g}, {hi[worst]:.6g}]"
+    return least, place
+
+
+def slopes(found: Cover, cells: CellSet) -> NDArray[np.float64]:
+    """Lower bounds of the slope on each of the given cells; nan on the others, -1 where nothing is proved."""
+    least = np.full(found.grid.n_cells, np.nan)
+    for side, k, _, _, out in _pieces(found, cells):
+        least[found.grid.offset[side] + k] = out.reshape(k.size, PIECES).min(axis=1)
+    return least
+
+
+def _pieces(found: Cover, cells: CellSet) -> Iterator[tuple[int, Any, Any, Any, Any]]:
+    """Per side: the cells, both ends of their pieces, and a lower bound of the slope on each piece."""
     for side, (edges,) in enumerate(found.grid.edges):
         k = np.flatnonzero(cells.mask[found.grid.of_side(side)])
         if not k.size:
@@ -51,7 +70,4 @@ def least_slope(found: Cover, cells: CellSet) -> tuple[float, str]:
         out = np.empty(k.size * PIECES)
         lo, hi = np.ascontiguousarray(cuts[:, :-1].ravel()), np.ascontiguousarray(cuts[:, 1:].ravel())
         _slopes(found.box.lo, found.box.hi, side, lo, hi, out)
-        worst = int(out.argmin())
-        if out[worst] < least:
-            least, place = float(out[worst]), f"side {side}, x in [{lo[worst]:.6g}, {hi[worst]:.6g}]"
-    return least, place
+        yield side, k, lo, hi, out

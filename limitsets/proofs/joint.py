@@ -41,6 +41,10 @@ class NearJoint:
     q : float
         R' - a >= q (R - a) on (a_i, x]; or, if there is a fixed point R*, R' - R* >= q (R - R*) on (R*, x], and starts
         in (a_i, R*) tend to a_i.
+    reach : float
+        No throw from (a_i, x] lands beyond it.
+    rises : bool
+        Whether R' is proved to grow with R on (a_i, x] at least as fast: the displacement grows with the angle.
     proved : bool
         Whether q > 1 and all that it rests on is proved.
     reason : str
@@ -51,6 +55,8 @@ class NearJoint:
 
     x: float
     q: float
+    reach: float
+    rises: bool
     proved: bool
     reason: str
     fixed_point: tuple[float, float] | None = None
@@ -58,7 +64,7 @@ class NearJoint:
 
 @proof_kernel(entry=True)
 def _near(lo: Any, hi: Any, side: int, x: float, out: Any) -> None:
-    """Numbers that have to be positive, and q: root found, jog decided, bracket, -h, room on the arm, q."""
+    """Root found, jog decided, bracket, -h, room on the arm: positive if proved; q, reach, slope."""
     b = gather_box(lo, hi, side)
     last, good = bracket(b.flight, b, x)
     phi = (0.0, last[1])
@@ -68,7 +74,7 @@ def _near(lo: Any, hi: Any, side: int, x: float, out: Any) -> None:
     square = iv.mul(b.a, iv.sqr(phi))
     left = iv.sub(iv.mul(b.a, (0.5, 0.5)), iv.div(square, (24.0, 24.0)))
     left = iv.sub(left, iv.div(iv.mul(b.d, phi), (6.0, 6.0)))
-    shift, _ = displacement_box(b.flight, b, phi)
+    shift, rise = displacement_box(b.flight, b, phi)
     reached = iv.add((x, x), shift)[1]
     out[0] = 1.0 if good else -1.0
     out[1] = -margin[1]
@@ -77,6 +83,8 @@ def _near(lo: Any, hi: Any, side: int, x: float, out: Any) -> None:
     out[4] = iv.sub((lo.arm_length, lo.arm_length), (reached, reached))[0]
     gain = iv.div(iv.mul((2.0, 2.0), iv.neg(b.h)), b.kappa)
     out[5] = iv.add((1.0, 1.0), gain)[0]
+    out[6] = reached
+    out[7] = rise[0]
 
 
 REASONS = (
@@ -86,6 +94,14 @@ REASONS = (
     "the arm's surface is not below the joint (h < 0)",
     "the throw may reach beyond the arm",
     "no expansion is proved",
+)
+
+SCATTERED = (
+    "with noise of landing.x a part that lies nearer to a than that may land at x <= a, and leave inward"
+)
+
+SCATTERED_BEYOND = (
+    "with noise of landing.x a part may come to either side of the unstable fixed point of the jog"
 )
 
 
@@ -107,11 +123,14 @@ def near_joint(found: Cover) -> tuple[NearJoint, ...]:
         if found.points:
             answers.append(_beyond(found, side, float(edges[0])))
             continue
-        out = np.full(6, np.nan)
+        out = np.full(8, np.nan)
         _near(found.box.lo, found.box.hi, side, float(edges[0]), out)
         good = [*(out[:5] > 0.0), out[5] > 1.0]
         reason = "" if all(good) else REASONS[good.index(False)]
-        answers.append(NearJoint(float(edges[0]), float(out[5]), all(good), reason))
+        if found.box.landing > 0.0:
+            reason = SCATTERED
+        rises = bool(out[7] > 0.0)
+        answers.append(NearJoint(float(edges[0]), float(out[5]), float(out[6]), rises, not reason, reason))
     return tuple(answers)
 
 
@@ -119,6 +138,7 @@ def _beyond(found: Cover, side: int, x: float) -> NearJoint:
     """Prove it where the arm's surface is above the joint."""
     point = found.points[side]
     if point.reason:
-        return NearJoint(x, np.nan, False, point.reason)
+        return NearJoint(x, np.nan, np.inf, False, False, point.reason)
     q, reason = leaves(found.box, side, point, x)
-    return NearJoint(x, q, not reason, reason, (point.lo, point.hi))
+    reason = SCATTERED_BEYOND if found.box.landing > 0.0 else reason
+    return NearJoint(x, q, np.inf, False, not reason, reason, (point.lo, point.hi))

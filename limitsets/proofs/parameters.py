@@ -22,9 +22,12 @@ from limitsets.scene.quantities import find
 from limitsets.scene.units import exact_factor, parse
 from limitsets.thrower import Throw
 
-__all__ = ["ParameterBox", "parameter_box"]
+__all__ = ["VARYING", "ParameterBox", "parameter_box"]
 
 NARROWER = "lower the tolerance or noise"
+
+VARYING = ("throw.speed", "gravity.tilt", "landing.x")
+"""What may differ from throw to throw; a part's geometry does not."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,12 +42,15 @@ class ParameterBox:
         The scene as written; a quantity with a tolerance is a pair of texts.
     noise : dict of str to str
         Quantities that differ at every throw, and by how much.
+    landing : float
+        A part lands within this of where the throw would put it; in the scene's unit, 0 without such noise.
     """
 
     lo: Throw
     hi: Throw
     scene: dict[str, Any]
     noise: dict[str, str]
+    landing: float = 0.0
 
 
 def _at(tree: Mapping[str, Any], name: str) -> Any:
@@ -79,40 +85,69 @@ class _Reader:
         target = {"acceleration": f"{self.unit}/s^2", "mass": "kg", "mass per area": f"kg/{self.unit}^2"}
         return Span.of(number * exact_factor(quantity.unit, target.get(dimension, self.unit)))
 
+    def deviation(self, name: str, noise: Mapping[str, str]) -> tuple[Span, Span]:
+        """Return the noise of a quantity as a share of it, and in its own dimension; one of the two is 0."""
+        text = noise.get(name)
+        if text is None:
+            return Span.of(0), Span.of(0)
+        if text.rstrip().endswith("%"):
+            return Span.of(Fraction(parse(text, "share").number) / 100), Span.of(0)
+        return Span.of(0), self.one(text, find(name).dimension)
+
     def kappa(self, noise: Mapping[str, str]) -> Span:
-        """Return kappa = g / w^2, with the noise of the speed w: in percent, or of its own dimension."""
-        share = more = Span.of(0)
-        for name, text in noise.items():
-            if name != "throw.speed":
-                raise AnswerError(
-                    "the noise", name, "throw.speed", "other noise cannot be enclosed in this version"
-                )
-            if text.rstrip().endswith("%"):
-                share = Span.of(Fraction(parse(text, "share").number) / 100)
-            else:
-                more = self.one(text, "angular speed")
+        """Return kappa = g / w^2, with the noise of the speed w and of the tilt."""
+        share, more = self.deviation("throw.speed", noise)
         slow, fast = 1 - share, 1 + share
         if self.has("throw", "kappa"):
             if more.hi > 0:
                 raise AnswerError(
                     "the noise", noise, "percent, for a scene given by kappa", "give it in percent"
                 )
-            kappa = self.span("throw.kappa")
+            kappa = self.span("throw.kappa") * self.share_of_gravity(noise)
             return Span((kappa / (fast * fast)).lo, (kappa / (slow * slow)).hi)
         if self.has("gravity", "acceleration"):
-            gravity = self.span("gravity.acceleration")
+            gravity = self.span("gravity.acceleration") * self.share_of_gravity(noise)
         else:
-            tilt = self.span("gravity.tilt")
-            if not (tilt.lo > 0 and tilt.hi <= (pi() / 2).hi):
-                raise AnswerError(
-                    "gravity.tilt", self.tree["gravity"]["tilt"], "from 0 to 90 degrees", NARROWER
-                )
+            tilt = self.tilt(noise)
             gravity = self.one("9.80665 m/s^2", "acceleration") * sine(tilt)
         speed = self.span("throw.speed")
         slow, fast = speed * slow - more, speed * fast + more
         if not (gravity.lo > 0 and slow.lo > 0):
             raise AnswerError("the speed or gravity", self.tree["throw"], "above 0 throughout", NARROWER)
         return Span((gravity / (fast * fast)).lo, (gravity / (slow * slow)).hi)
+
+    def tilt(self, noise: Mapping[str, str]) -> Span:
+        """Return the tilt with its noise: all of it between level and upright."""
+        share, more = self.deviation("gravity.tilt", noise)
+        nominal = self.span("gravity.tilt")
+        tilt = Span((nominal * (1 - share) - more).lo, (nominal * (1 + share) + more).hi)
+        most = (pi() / 2).lo if "gravity.tilt" in noise else (pi() / 2).hi
+        if not (tilt.lo > 0 and tilt.hi <= most):
+            shown = self.tree["gravity"]["tilt"]
+            text = f"{shown} +- {noise['gravity.tilt']}" if "gravity.tilt" in noise else shown
+            raise AnswerError("gravity.tilt", text, "from 0 to 90 degrees", NARROWER)
+        return tilt
+
+    def share_of_gravity(self, noise: Mapping[str, str]) -> Span:
+        """Return what the noise of the tilt multiplies g by: sin(tilt +- dev) / sin(tilt).
+
+        Both ends are farthest from 1 at the smallest tilt: (1 +- p) cot((1 +- p) t) against cot(t), and cot(t) alone.
+        """
+        if "gravity.tilt" not in noise:
+            return Span.of(1)
+        if not self.has("gravity", "tilt"):
+            raise AnswerError(
+                "the noise of gravity.tilt",
+                noise["gravity.tilt"],
+                "noise of a quantity that the scene gives",
+                "give the scene [gravity] tilt, or leave this noise out",
+            )
+        self.tilt(noise)
+        share, more = self.deviation("gravity.tilt", noise)
+        found = _at(self.tree, "gravity.tilt")
+        least = self.one(found[0] if isinstance(found, list) else found, "angle")
+        flat, steep = sine(least * (1 - share) - more), sine(least * (1 + share) + more)
+        return Span((flat / sine(least)).lo, (steep / sine(least)).hi)
 
     def body(self) -> tuple[list[tuple[Any, ...]], Span]:
         """Return (a, d, length) of every side, and the radius of gyration."""
@@ -168,12 +203,17 @@ def parameter_box(
     tree : mapping, optional
         Its text with some quantities replaced by pairs of texts; default as written.
     noise : mapping of str to str, optional
-        ``{"throw.speed": "0.3 %"}``: differs at every throw.
+        ``{"throw.speed": "0.3 %"}``: differs at every throw; of `VARYING`.
 
     Returns
     -------
     ParameterBox
         Doubles around the exact numbers.
+
+    Raises
+    ------
+    AnswerError
+        Noise of anything else or of what the scene does not give, or parameters some of which cannot be.
 
     Examples
     --------
@@ -184,7 +224,14 @@ def parameter_box(
     """
     text: Any = copy.deepcopy(dict(scene.text if tree is None else tree))
     reader = _Reader(scene, text)
+    for name in noise or {}:
+        if name not in VARYING:
+            raise AnswerError(
+                "the noise", name, ", ".join(VARYING), "what is fixed but unknown is a tolerance"
+            )
     kappa = reader.kappa(noise or {})
+    scatter = reader.deviation("landing.x", noise or {})[1]
+    landing = scatter.outward()[1] if scatter.hi > 0 else 0.0
     try:
         sides, radius = reader.body()
     except ZeroDivisionError:  # so wide that a length may be nothing
@@ -206,4 +253,4 @@ def parameter_box(
         )
         for end in (0, 1)
     )
-    return ParameterBox(lo, hi, text, dict(noise or {}))
+    return ParameterBox(lo, hi, text, dict(noise or {}), landing)

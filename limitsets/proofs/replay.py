@@ -18,7 +18,7 @@ __all__ = ["replay"]
 
 
 @proof_kernel(entry=True)
-def _replay(lo_map: Any, hi_map: Any, kappa: Any, lo: Any, hi: Any, side: Any) -> int:
+def _replay(lo_map: Any, hi_map: Any, kappa: Any, landing: Any, lo: Any, hi: Any, side: Any) -> int:
     """Fill the enclosures after the first; the number of throws whose decision is proved."""
     for k in range(lo.size - 1):
         b = with_kappa(gather_box(lo_map, hi_map, side[k]), kappa[0, k], kappa[1, k])
@@ -30,11 +30,12 @@ def _replay(lo_map: Any, hi_map: Any, kappa: Any, lo: Any, hi: Any, side: Any) -
             side[k + 1] = b.next
         else:
             return k
+        lo[k + 1], hi[k + 1] = iv.add((lo[k + 1], hi[k + 1]), (landing[k], landing[k]))
     return int(lo.size - 1)
 
 
 def replay(
-    box: ParameterBox, x: float, side: int, kappa: NDArray[np.float64]
+    box: ParameterBox, x: float, side: int, kappa: NDArray[np.float64], landing: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]]:
     """Enclose an orbit.
 
@@ -48,6 +49,8 @@ def replay(
         Its side.
     kappa : ndarray, shape (2, throws)
         Bounds of kappa at each throw; fewer throws are returned where a decision cannot be proved.
+    landing : ndarray, shape (throws,)
+        How far beyond the model's place each throw lands.
 
     Returns
     -------
@@ -59,5 +62,5 @@ def replay(
     throws = kappa.shape[1]
     lo, hi, sides = np.empty(throws + 1), np.empty(throws + 1), np.empty(throws + 1, np.int64)
     lo[0], hi[0], sides[0] = x, x, side
-    made = _replay(box.lo, box.hi, np.ascontiguousarray(kappa), lo, hi, sides)
+    made = _replay(box.lo, box.hi, np.ascontiguousarray(kappa), landing, lo, hi, sides)
     return lo[: made + 1], hi[: made + 1], sides[: made + 1]

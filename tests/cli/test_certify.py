@@ -112,6 +112,37 @@ def test_noise_and_tolerance(capfd):
     assert run(capfd, "recheck", "b.zip")[0] == 0
 
 
+def test_scattered_landings_and_tilts_name_their_throws(capfd):
+    code, out, _ = run(
+        capfd, "certify", "paper-designed", "--claim", "goal", "--noise", "landing.x=0.15 in", "-o", "a.zip"
+    )
+    assert code == 1
+    assert "landing.x within 0.15 in of the model's place" in out
+    assert "lands off by [in]" in out
+    assert "+0.150000" in out
+    scene = ls.load("paper-designed").as_dict() | {"gravity": {"tilt": "30 deg"}}
+    ls.dump(ls.load(scene), "tilt.toml")
+    code, out, _ = run(capfd, "certify", "tilt.toml", "--claim", "goal", "--noise", "gravity.tilt=0.3 deg")
+    assert code == 1
+    assert "tilt of the next throw" in out
+    assert "29.7 deg" in out
+    both = ["--noise", "gravity.tilt=0.3 deg", "--noise", "throw.speed=0.1 %"]
+    code, out, _ = run(capfd, "certify", "tilt.toml", "--claim", "goal", *both)
+    assert code == 1
+    assert "kappa of the next throw [in]" in out
+
+
+def test_a_goal_of_another_kind_is_put_in_words(capfd):
+    scene = ls.load("paper-designed").as_dict() | {"goal": {"flip_order": [0, 1, 2]}}
+    ls.dump(ls.load(scene), "order.toml")
+    code, out, _ = run(capfd, "certify", "order.toml", "--claim", "goal", "-o", "a.zip")
+    assert code == 0
+    assert "parts come to lie on sides 0, 1, 2 in turn" in out
+    code, out, _ = run(capfd, "recheck", "a.zip")
+    assert code == 0
+    assert "in the order 0 1 2, again and again" in out
+
+
 def test_nothing_proved_writes_nothing_and_says_why(capfd):
     ls.dump(ls.load("paper-designed").with_values({"throw.kappa": 2.0}), "fast.toml")
     before = {path.name for path in Path().iterdir()}
@@ -139,7 +170,8 @@ BAD = [
     ["certify", "paper-designed", "--noise", "throw.speed"],
     ["certify", "paper-designed", "--noise", "throw.speed=fast"],
     ["certify", "paper-designed", "--noise", "throw.speeed=1 %"],
-    ["certify", "paper-designed", "--noise", "landing.x=0.1 in"],
+    ["certify", "paper-designed", "--noise", "landing.x=1 %"],
+    ["certify", "paper-designed", "--noise", "gravity.tilt=1 deg"],
     ["certify", "paper-designed", "--tolerance", "throw.speed=-1 %"],
     ["certify", "paper-designed", "--tolerance", "throw.speed=1 %", "--tolerance", "throw.speed=2 %"],
     ["certify", "paper-designed", "-o", "."],

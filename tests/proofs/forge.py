@@ -198,9 +198,18 @@ def near_joint(m: Plain, i: int, begin: float, edge: float) -> dict:
 
 
 def forge(
-    model: str, *, noise: float = 0.0, first: float = 0.02, ratio: float = 0.012, widest: float = 0.04
+    model: str,
+    *,
+    noise: float = 0.0,
+    landing: float = 0.0,
+    first: float = 0.02,
+    ratio: float = 0.012,
+    widest: float = 0.04,
 ) -> Forged:
-    """A certificate with all claims that are known; noise is a share of the speed."""
+    """A certificate with all claims that are known; noise is a share of the speed, landing of the landing place.
+
+    With scattered landings some cells lead off the arm: of them the certificate says too little, and no rank is right.
+    """
     data = scene(model)
     m = Plain(data, noise)
     begin = [m.fixed_point(i) if m.h > 0 else m.a[i] for i in range(3)]
@@ -209,6 +218,7 @@ def forge(
     n = int(starts[-1])
     jog, flip = np.full((n, 2), -1, np.int32), np.full((n, 2), -1, np.int32)
     branch, phi = np.empty(n, np.int8), np.empty((n, 2))
+    leaving: set[int] = set()
     for i in range(3):
         x0, x1 = edges[i][:-1], edges[i][1:]
         own = slice(starts[i], starts[i + 1])
@@ -223,7 +233,7 @@ def forge(
             branch[own][cell], reached[cell] = sampled(m, i, x0[cell], x1[cell])
         for array, image, j, mine in ((jog, m.jog, i, 0), (flip, m.flip, (i + 1) % 3, 1)):
             values = np.array([image(i, x, k) for x, k in corners])
-            margin = 1e-3 * (x1 - x0)
+            margin = 1e-3 * (x1 - x0) + landing
             lo, hi = values.min(axis=0) - margin, values.max(axis=0) + margin
             for cell, images in reached.items():
                 if mine in images:
@@ -233,6 +243,10 @@ def forge(
                 axis=1,
             )
             used = (branch[own] == mine) | (branch[own] == 2)
+            if landing:
+                off = used & ((ranges[:, 0] < 0) | (ranges[:, 1] > len(edges[j]) - 2))
+                leaving.update((starts[i] + np.flatnonzero(off)).tolist())
+                ranges = np.clip(ranges, 0, len(edges[j]) - 2)
             assert ((ranges[used] >= 0) & (ranges[used] < len(edges[j]) - 1)).all()
             array[own][used] = ranges[used] + starts[j]
 
@@ -240,12 +254,14 @@ def forge(
     for cell in range(n):
         for first_cell, last_cell in (jog[cell], flip[cell]):
             graph.add_edges_from((cell, t) for t in range(first_cell, last_cell + 1) if t >= 0)
+    graph.add_edges_from((cell, -1) for cell in leaving)  # -1: off the arm
     component, rank = np.full(n, -1, np.int32), np.zeros(n, np.int32)
     last = [c for c in nx.strongly_connected_components(graph) if all(t in c for v in c for t in graph[v])]
+    last = [c for c in last if -1 not in c]
     for number, cells in enumerate(last):
         component[list(cells)] = number
     outside = graph.subgraph(np.flatnonzero(component < 0).tolist())
-    for cell in reversed(list(nx.topological_sort(outside))):
+    for cell in [] if landing else reversed(list(nx.topological_sort(outside))):
         rank[cell] = 1 + max(rank[t] for t in graph[cell])
 
     inside = component >= 0

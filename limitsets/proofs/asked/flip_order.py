@@ -1,0 +1,86 @@
+"""The sides follow each other in one cyclic order.
+
+In the minimal map a flip leads from side i to side i + 1, so the only question is whether every orbit leaves every side
+again: whether jogs alone, peeled off the attracting cells, come to an end.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from limitsets.goals import FlipOrder
+from limitsets.maps import orbit
+from limitsets.proofs.asked.cycling import cycle_that
+from limitsets.proofs.asked.kind import Answer, Kind, common, peeled, place, undecided
+from limitsets.proofs.asked.search import Choice, Path, State, middle, replayed
+from limitsets.proofs.attraction import Attraction
+from limitsets.scene import Scene
+
+__all__ = ["KIND"]
+
+# Throws of the orbit in which a flip against the order is looked for, and how many of the last are shown.
+THROWS, SHOWN = 10_000, 20
+
+
+def _ask(found: Attraction, scene: Scene, goal: FlipOrder) -> Answer:
+    sides = found.cover.grid.sides
+    missing = common(found, anywhere=False)
+    if missing:
+        return undecided(missing)
+    inside = found.component >= 0
+    if len(goal.order) == 1 and not goal.from_anywhere:
+        here = np.zeros_like(inside)
+        here[found.cover.grid.of_side(goal.order[0])] = True
+        if not (inside & ~here).any():
+            return Answer("proved", "", {"kind": goal.kind, "order": list(goal.order), "jogs": 0})
+    if not _is_cycle(goal.order, sides):
+        against = _against(found, goal.order)
+        reason = "a flip leads from each side to the one that is next in number, and the last one's to side 0"
+        return Answer("refuted" if against else "undecided", reason, {}, against, True)
+    if goal.from_anywhere and found.missing:
+        return undecided(found.missing, final=found.cover.box.landing > 0.0)
+    visits, left = peeled(found, inside, np.zeros_like(inside), (0,))
+    if left.size:
+        stays = cycle_that(found, scene, lambda cycle: not cycle.branches.any())
+        reason = f"orbits may jog for ever on {place(found, int(left[0]))}"
+        return Answer("refuted" if stays else "undecided", reason, {}, stays)
+    section = {"kind": goal.kind, "order": list(goal.order), "jogs": max(visits - 1, 0)}
+    return Answer("proved", "", section | ({"from_anywhere": True} if goal.from_anywhere else {}))
+
+
+def _is_cycle(order: tuple[int, ...], sides: int) -> bool:
+    """Whether these are all sides, each followed by the one that a flip leads to."""
+    return len(order) == sides and all(
+        (a + 1) % sides == b for a, b in zip(order, (*order[1:], order[0]), strict=True)
+    )
+
+
+def _against(found: Attraction, order: tuple[int, ...]) -> tuple[State, ...]:
+    """Find an orbit in the attracting cells with a flip that the order has not, and prove it."""
+    box = found.cover.box
+    choice = Choice(0.5 * (box.lo.kappa + box.hi.kappa), 0.0)
+    start, on = middle(found, found.cells.numbers())
+    path = orbit(box.lo._replace(kappa=choice.kappa), start, on, THROWS)
+    allowed = set(zip(order, (*order[1:], order[0]), strict=True))
+    pairs = list(zip(path.side[:-1].tolist(), path.side[1:].tolist(), strict=True))
+    bad = [k + 1 for k, (a, b) in enumerate(pairs) if a != b and (a, b) not in allowed]
+    if not bad:
+        return ()
+    begin = max(0, bad[0] - SHOWN)
+    cut = slice(begin, bad[0] + 1)
+    return replayed(box, Path(path.x[cut].tolist(), path.side[cut].tolist(), [choice] * (bad[0] - begin)))
+
+
+def _sentence(section: Mapping[str, Any]) -> str:
+    order = ", ".join(str(side) for side in section["order"])
+    if len(section["order"]) == 1:
+        return f"In the attracting cells, a part stays on side {order}."
+    where = "From anywhere on the arm" if section.get("from_anywhere") else "In the attracting cells"
+    jogs = f"in the attracting cells {section['jogs']} jogs at most follow each other"
+    return f"{where}, parts come to lie on sides {order} in turn, again and again; {jogs}."
+
+
+KIND = Kind(_ask, _sentence, lambda _: ())

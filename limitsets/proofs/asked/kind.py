@@ -1,0 +1,129 @@
+"""What a file of this room gives, and what all of them share: answers, borders next to a decimal, and peeling.
+
+*Peeling*: cells all of whose images lie in the cells wanted are one throw away from them; cells all of whose images
+lie in those or in the cells wanted, two; and so on.  Every orbit that starts in a cell so peeled comes to the cells
+wanted, whatever it does in between and whether or not the map is continuous.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from fractions import Fraction
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from limitsets.proofs.asked.search import State
+from limitsets.proofs.attraction import BELOW, Attraction
+from limitsets.proofs.certificate import targets
+from limitsets.scene import Scene
+
+__all__ = ["Answer", "Kind", "above", "below", "common", "peeled", "place", "undecided"]
+
+Mask = NDArray[np.bool_]
+
+
+class Answer(NamedTuple):
+    """What became of a goal; the words are those of `limitsets.proofs.certify.Claim`."""
+
+    verdict: str
+    reason: str = ""
+    section: Mapping[str, Any] = {}
+    counterexample: tuple[State, ...] = ()
+    final: bool = False
+
+
+class Kind(NamedTuple):
+    """One kind of goal.
+
+    Attributes
+    ----------
+    ask : callable
+        From an `Attraction`, the scene and the goal to an `Answer`.
+    sentence : callable
+        From the section of a proved goal to a sentence.
+    borders : callable
+        From the goal to the borders of cells that it needs.
+    """
+
+    ask: Callable[[Attraction, Scene, Any], Answer]
+    sentence: Callable[[Mapping[str, Any]], str]
+    borders: Callable[[Any], Sequence[float]]
+
+
+def undecided(reason: str, *, final: bool = False) -> Answer:
+    """Answer that nothing is proved."""
+    return Answer("undecided", reason, final=final)
+
+
+def common(found: Attraction, *, anywhere: bool) -> str:
+    """Say what is missing that every goal needs: attracting cells, or that no start leaves; empty if nothing."""
+    if not anywhere:
+        return "" if (found.component >= 0).any() else "there are no attracting cells"
+    if found.cover.points:
+        return BELOW
+    for side, near in enumerate(found.joint):
+        if not near.proved:
+            return f"near the joint on side {side}: {near.reason}"
+    leaving = np.flatnonzero(found.cover.graph.ranges.exits)
+    return f"the image of {place(found, int(leaving[0]))} may leave the cells" if leaving.size else ""
+
+
+def place(found: Attraction, cell: int) -> str:
+    """Name a cell."""
+    side = int(found.cover.grid.side_of(cell))
+    lo, hi = found.cover.grid.boxes([cell], side)
+    return f"side {side}, x in [{lo[0, 0]:.6g}, {hi[0, 0]:.6g}]"
+
+
+def below(x: float) -> float:
+    """Largest float that is not above the decimal that a certificate has for x."""
+    return x if Fraction(x) <= Fraction(repr(x)) else math.nextafter(x, -math.inf)
+
+
+def above(x: float) -> float:
+    """Smallest float that is not below the decimal that a certificate has for x."""
+    return x if Fraction(x) >= Fraction(repr(x)) else math.nextafter(x, math.inf)
+
+
+def peeled(
+    found: Attraction, cells: Mask, wanted: Mask, branches: Sequence[int] = (0, 1)
+) -> tuple[int, NDArray[np.int64]]:
+    """Count the throws after which every orbit from the cells has come to those wanted.
+
+    Parameters
+    ----------
+    found : Attraction
+        Cells and images.
+    cells : ndarray of bool, shape (n_cells,)
+        Where orbits begin.
+    wanted : ndarray of bool, shape (n_cells,)
+        Where they have to come; a start there has arrived.
+    branches : sequence of int
+        Branches to follow; a throw of another one has arrived.
+
+    Returns
+    -------
+    int
+        Throws, at most.
+    ndarray of int64
+        Cells from which it is not proved.
+    """
+    ends = [targets(found.cover, branch) for branch in branches]
+    done = cells & wanted
+    left = np.flatnonzero(cells & ~done & (found.cover.graph.ranges.exits == 0))
+    throws = 0
+    while left.size:
+        missing = np.concatenate([[0], np.cumsum(~done)])
+        falls = np.ones(left.size, dtype=bool)
+        for rows in ends:
+            first, last = rows[left, 0], rows[left, 1]
+            falls &= (first < 0) | (missing[last + 1] == missing[first])
+        if not falls.any():
+            break
+        done[left[falls]] = True
+        left = left[~falls]
+        throws += 1
+    return throws, np.flatnonzero(cells & ~done)

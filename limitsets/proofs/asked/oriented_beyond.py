@@ -1,0 +1,79 @@
+"""Beyond x every part lies on one side: of the attracting cells, or of every throw from anywhere on the arm."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from limitsets.goals import OrientedBeyond
+from limitsets.proofs.asked.kind import Answer, Kind, below, common, place
+from limitsets.proofs.asked.search import from_attracting
+from limitsets.proofs.asked.starts import one_throw
+from limitsets.proofs.attraction import Attraction
+from limitsets.proofs.certificate import targets
+from limitsets.scene import Scene
+
+__all__ = ["KIND"]
+
+
+def _exceptions(found: Attraction, goal: OrientedBeyond) -> NDArray[np.bool_]:
+    """Cells that lie, in part, beyond x on another side."""
+    bad = np.zeros(found.component.size, dtype=bool)
+    for side, (edges,) in enumerate(found.cover.grid.edges):
+        if side != goal.side:
+            bad[found.cover.grid.of_side(side)] = edges[1:] > below(goal.x)
+    return bad
+
+
+def _ask(found: Attraction, scene: Scene, goal: OrientedBeyond) -> Answer:
+    def wrong(x: Any, side: Any) -> Any:
+        return (x > goal.x) & (side != goal.side)
+
+    missing = common(found, anywhere=goal.from_anywhere)
+    bad = _exceptions(found, goal)
+    if goal.from_anywhere:
+        reason = _thrown_there(found, goal, bad)
+        orbit = one_throw(found, wrong) if reason else ()
+        reason = reason or missing
+    else:
+        bad &= found.component >= 0
+        reason = (
+            f"{int(bad.sum())} attracting cells reach beyond x = {goal.x:g} on other sides than {goal.side}"
+        )
+        reason = missing or (reason if bad.any() else "")
+        orbit = from_attracting(found, wrong) if reason and not missing else ()
+    if reason:
+        return Answer("refuted" if orbit else "undecided", reason, {}, orbit)
+    section = {"kind": goal.kind, "x": f"{goal.x!r} {scene.unit}", "side": goal.side}
+    return Answer("proved", "", section | ({"from_anywhere": True} if goal.from_anywhere else {}))
+
+
+def _thrown_there(found: Attraction, goal: OrientedBeyond, bad: NDArray[np.bool_]) -> str:
+    """Name a throw that may land beyond x on another side; empty if there is none."""
+    number = np.concatenate([[0], np.cumsum(bad)])
+    for branch in (0, 1):
+        ends = targets(found.cover, branch)
+        cells = np.flatnonzero(ends[:, 0] >= 0)
+        hit = cells[number[ends[cells, 1] + 1] > number[ends[cells, 0]]]
+        if hit.size:
+            return (
+                f"a throw from {place(found, int(hit[0]))} may land beyond x = {goal.x:g} on another side than"
+                f" {goal.side}"
+            )
+    for side, near in enumerate(found.joint):
+        if side != goal.side and not near.reach <= below(goal.x):
+            return f"a throw from near the joint on side {side} may land beyond x = {goal.x:g}"
+    return ""
+
+
+def _sentence(section: Mapping[str, Any]) -> str:
+    beyond = f"at rest beyond x = {section['x']} lies on side {section['side']}."
+    if section.get("from_anywhere"):
+        return f"After a throw from anywhere on the arm, every part {beyond}"
+    return f"In the attracting cells, every part {beyond}"
+
+
+KIND = Kind(_ask, _sentence, lambda goal: [below(goal.x)])

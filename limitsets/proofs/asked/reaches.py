@@ -1,0 +1,128 @@
+"""Orbits come to rest on a side at x or beyond: every one, or all but a set of starts of length zero."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from limitsets.cells import CellSet
+from limitsets.goals import Reaches
+from limitsets.proofs.asked.cycling import cycle_that
+from limitsets.proofs.asked.kind import Answer, Kind, Mask, above, common, peeled, place, undecided
+from limitsets.proofs.asked.search import State, long_orbit, replayed
+from limitsets.proofs.asked.thinning import thinned
+from limitsets.proofs.attraction import Attraction
+from limitsets.proofs.expansion import slopes
+from limitsets.proofs.orbits import ProvedCycle
+from limitsets.scene import Scene
+
+__all__ = ["KIND"]
+
+# Throws of the orbit that is shown of a component that does not get there.
+SHOWN = 20
+
+
+def _wanted(found: Attraction, goal: Reaches) -> Mask:
+    """Cells on the side that lie at x or beyond."""
+    wanted = np.zeros(found.component.size, dtype=bool)
+    edges = found.cover.grid.edges[goal.side][0]
+    wanted[found.cover.grid.of_side(goal.side)] = edges[:-1] >= above(goal.x)
+    return wanted
+
+
+def _ask(found: Attraction, scene: Scene, goal: Reaches) -> Answer:
+    missing = common(found, anywhere=False)
+    if missing:
+        return undecided(missing)
+    wanted, inside = _wanted(found, goal), found.component >= 0
+    short = _falls_short(found, goal)
+    if short is not None:
+        return short
+    if goal.every_orbit:
+        return _every(found, scene, goal, wanted)
+    missing = _not_null(found) if goal.from_anywhere else ""
+    if missing:
+        return undecided(missing, final=found.cover.box.landing > 0.0)
+    throws, reason = thinned(found, inside, wanted)
+    if reason:
+        attracts = cycle_that(found, scene, lambda cycle: cycle.attracts and not _arrives(cycle, goal))
+        quiet = not found.cover.box.noise  # throws that differ may carry a part away from it
+        return Answer("refuted" if attracts and quiet else "undecided", reason, {}, attracts if quiet else ())
+    # a little more, so that other arithmetic can confirm it
+    return Answer("proved", "", _section(scene, goal, throws + throws // 8 + 1))
+
+
+def _not_null(found: Attraction) -> str:
+    """Say what is missing for this: almost every start on the arm comes to almost every place in the attracting cells.
+
+    Where the slope is positive, what is thrown to a set of length zero has length zero.
+    """
+    if found.missing:
+        return found.missing
+    for side, near in enumerate(found.joint):
+        if not near.rises:
+            return f"near the joint on side {side}: the landing is not proved to rise with the start"
+    off = found.component < 0
+    flat = np.flatnonzero(off & ~(slopes(found.cover, CellSet(found.cover.grid, off)) > 0.0))
+    return f"the slope is not proved positive on {place(found, int(flat[0]))}" if flat.size else ""
+
+
+def _every(found: Attraction, scene: Scene, goal: Reaches, wanted: Mask) -> Answer:
+    missing = common(found, anywhere=True) if goal.from_anywhere else ""
+    cells = np.ones_like(wanted) if goal.from_anywhere else found.component >= 0
+    throws, left = peeled(found, cells, wanted)
+    if left.size:
+        never = cycle_that(found, scene, lambda cycle: not _arrives(cycle, goal))
+        reason = f"an orbit from {place(found, int(left[0]))} may never get there"
+        return Answer("refuted" if never else "undecided", reason, {}, never)
+    if missing:
+        return undecided(missing, final=found.cover.box.landing > 0.0)
+    return Answer("proved", "", _section(scene, goal, throws))
+
+
+def _section(scene: Scene, goal: Reaches, throws: int) -> dict[str, Any]:
+    section = {
+        "kind": goal.kind,
+        "x": f"{goal.x!r} {scene.unit}",
+        "side": goal.side,
+        "every_orbit": goal.every_orbit,
+        "throws": throws,
+    }
+    return section | ({"from_anywhere": True} if goal.from_anywhere else {})
+
+
+def _arrives(cycle: ProvedCycle, goal: Reaches) -> bool:
+    """Whether it is not excluded that a periodic orbit gets there."""
+    return bool(((cycle.side == goal.side) & (cycle.hi >= goal.x)).any())
+
+
+def _falls_short(found: Attraction, goal: Reaches) -> Answer | None:
+    """Refute the goal by an attracting component that ends below x: no orbit in it gets there."""
+    edges = found.cover.grid.edges[goal.side][0]
+    reach = np.zeros(found.component.size, dtype=bool)
+    reach[found.cover.grid.of_side(goal.side)] = edges[1:] >= goal.x
+    for number in range(int(found.component.max()) + 1):
+        mine = found.component == number
+        if not (mine & reach).any():
+            orbit = _any_orbit(found, np.flatnonzero(mine))
+            reason = f"no orbit in the attracting component of {place(found, int(np.flatnonzero(mine)[0]))} gets there"
+            return Answer("refuted" if orbit else "undecided", reason, {}, orbit)
+    return None
+
+
+def _any_orbit(found: Attraction, cells: Any) -> tuple[State, ...]:
+    path = long_orbit(found, lambda x, _: np.arange(x.size) == x.size - 1, cells, SHOWN)
+    return () if path is None else replayed(found.cover.box, path)
+
+
+def _sentence(section: Mapping[str, Any]) -> str:
+    where = "on the arm" if section.get("from_anywhere") else "in the attracting cells"
+    there = f"comes to rest on side {section['side']} at x = {section['x']} or beyond"
+    if section["every_orbit"]:
+        return f"From every start {where} a part {there}, after {section['throws']} throws at most."
+    return f"From every start {where}, but for starts of total length zero, a part {there}."
+
+
+KIND = Kind(_ask, _sentence, lambda goal: [above(goal.x)])

@@ -1,0 +1,279 @@
+"""Orbits that refute a goal: proposed in floats, with the noise chosen at every throw, and proved in intervals.
+
+Random throws miss what the noise can do at its worst; reachability, one state per cell, does not.  An orbit found is
+replayed from its start with every decision proved and every state enclosed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, NamedTuple, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from limitsets.cells import Grid
+from limitsets.maps import codes, images, orbit
+from limitsets.proofs.attraction import Attraction
+from limitsets.proofs.parameters import ParameterBox
+from limitsets.proofs.replay import replay
+
+__all__ = [
+    "MORE_THAN_ROUNDING",
+    "Choice",
+    "Path",
+    "Reached",
+    "State",
+    "Wrong",
+    "choices",
+    "from_attracting",
+    "long_orbit",
+    "middle",
+    "replayed",
+    "throws",
+]
+
+Wrong: TypeAlias = Callable[[Any, Any], Any]
+"""From places and sides to whether each violates the goal; of an enclosure, its lower end is asked."""
+
+# Values of kappa tried at every throw where it may differ.
+CHOICES = 33
+
+# Throws from the start at which the search gives up.
+MOST_THROWS = 2000
+
+# Without a choice: throws of the orbit that is searched, and how many of the last are shown and replayed.
+SEARCHED, SHOWN = 200_000, 20
+
+# Violations by less than this, relative to x, may be rounding.
+MORE_THAN_ROUNDING = 1.0 - 1e-9
+
+
+@dataclass(frozen=True)
+class State:
+    """One state of a counterexample.
+
+    Attributes
+    ----------
+    lo, hi : float
+        Enclosure of x.
+    side : int
+        The side.
+    kappa : float or None
+        Gravity over squared speed of the throw made from here; None for the last state.
+    landing : float or None
+        How far beyond the model's place that throw lands; None for the last state, and without such noise.
+    """
+
+    lo: float
+    hi: float
+    side: int
+    kappa: float | None
+    landing: float | None = None
+
+
+class Choice(NamedTuple):
+    """What one throw may be like: kappa, and how far beyond the model's place it lands."""
+
+    kappa: float
+    landing: float
+
+
+class Path(NamedTuple):
+    """States and, one fewer, what each throw was like."""
+
+    x: list[float]
+    side: list[int]
+    thrown: list[Choice]
+
+
+def choices(box: ParameterBox, kappas: int = CHOICES) -> list[Choice]:
+    """List what a throw may be like: values of kappa across its noise, the ends and the middle of the landing's.
+
+    A little inside the bounds, so that each is one of the noise's whatever the last digit.
+    """
+    ends, shift = (box.lo.kappa, box.hi.kappa), box.landing * (1.0 - 1e-9)
+    varies = "throw.speed" in box.noise or "gravity.tilt" in box.noise
+    margin = 1e-9 * (ends[1] - ends[0])
+    values = np.linspace(ends[0] + margin, ends[1] - margin, kappas) if varies else [0.5 * sum(ends)]
+    shifts = (-shift, 0.0, shift) if shift > 0.0 else (0.0,)
+    return [Choice(float(kappa), landing) for kappa in values for landing in shifts]
+
+
+class Thrown(NamedTuple):
+    """Images of some states: x', side', number of the state, number of the choice, whether it stays on the arm."""
+
+    x: NDArray[np.float64]
+    side: NDArray[np.int64]
+    state: NDArray[np.int64]
+    choice: NDArray[np.int64]
+    stays: NDArray[np.bool_]
+
+
+def throws(box: ParameterBox, x: Any, side: Any, options: list[Choice]) -> Thrown:
+    """Images of all states under all choices."""
+    found = []
+    for kappa in sorted({option.kappa for option in options}):
+        map_now = box.lo._replace(kappa=kappa)
+        for s in np.unique(side).tolist():
+            mine = np.flatnonzero(side == s)
+            got = images(map_now, x[mine], s)
+            landed = got.code != codes.OUTSIDE_MODEL
+            to, state = got.side[landed], mine[landed]
+            for number, option in enumerate(options):
+                if option.kappa == kappa:
+                    after = got.x[landed] + option.landing
+                    stays = (after > box.hi.a[to]) & (after <= box.lo.arm_length)
+                    found.append((after, to, state, np.full(to.size, number), stays))
+    return Thrown(*(np.concatenate(part) for part in zip(*found, strict=True)))
+
+
+@dataclass(eq=False)
+class Reached:
+    """States met so far, with where each came from."""
+
+    x: list[NDArray[np.float64]]
+    side: list[NDArray[np.int64]]
+    parent: list[NDArray[np.int64]]
+    choice: list[NDArray[np.int64]]
+
+    @classmethod
+    def of(cls, x: NDArray[np.float64], side: NDArray[np.int64]) -> Reached:
+        """Begin with some starts."""
+        none = np.full(x.size, -1)
+        return cls([x], [side], [none], [none])
+
+    def add(self, thrown: Thrown, keep: NDArray[np.int64]) -> None:
+        """Take some images of the states added last."""
+        before = sum(part.size for part in self.x[:-1])
+        self.x.append(thrown.x[keep])
+        self.side.append(thrown.side[keep])
+        self.parent.append(thrown.state[keep] + before)
+        self.choice.append(thrown.choice[keep])
+
+    def plus(self, thrown: Thrown, keep: NDArray[np.int64]) -> Reached:
+        """Return the same with some more, leaving this as it is."""
+        more = Reached([*self.x], [*self.side], [*self.parent], [*self.choice])
+        more.add(thrown, keep)
+        return more
+
+    def path(self, last: int, options: list[Choice]) -> Path:
+        """States and throws from the start to number `last` of those added last."""
+        x, side = np.concatenate(self.x), np.concatenate(self.side)
+        parent, choice = np.concatenate(self.parent), np.concatenate(self.choice)
+        order = [x.size - self.x[-1].size + last]
+        while parent[order[-1]] >= 0:
+            order.append(int(parent[order[-1]]))
+        order.reverse()
+        return Path(x[order].tolist(), side[order].tolist(), [options[k] for k in choice[order[1:]]])
+
+
+def middle(found: Attraction, cells: NDArray[np.int64]) -> tuple[float, int]:
+    """Middle of the middle one of some cells, and its side."""
+    cell = int(cells[cells.size // 2])
+    side = int(found.cover.grid.side_of(cell))
+    lo, hi = found.cover.grid.boxes([cell], side)
+    return 0.5 * float(lo[0, 0] + hi[0, 0]), side
+
+
+def _search(found: Attraction, wrong: Wrong) -> Path | None:
+    """Breadth first from an attracting cell, one state per cell, until a state violates the goal."""
+    grid: Grid = found.cover.grid
+    start, on = middle(found, found.cells.numbers())
+    x, side = np.array([start]), np.array([on])
+    seen = np.zeros(grid.n_cells, dtype=bool)
+    reached, options = Reached.of(x, side), choices(found.cover.box)
+    for _ in range(MOST_THROWS):
+        thrown = throws(found.cover.box, x, side, options)
+        bad = np.flatnonzero(wrong(thrown.x * MORE_THAN_ROUNDING, thrown.side) & thrown.stays)
+        if bad.size:
+            reached.add(thrown, bad[np.argmax(thrown.x[bad])][None])
+            return reached.path(0, options)
+        cells = np.full(thrown.x.size, -1)
+        for s in np.unique(thrown.side).tolist():
+            cells[thrown.side == s] = grid.index(thrown.x[thrown.side == s], s)
+        new = np.flatnonzero((cells >= 0) & ~seen[cells] & thrown.stays)
+        _, where = np.unique(cells[new], return_index=True)
+        keep = new[where]
+        if not keep.size:
+            return None
+        seen[cells[keep]] = True
+        reached.add(thrown, keep)
+        x, side = thrown.x[keep], thrown.side[keep]
+    return None
+
+
+def long_orbit(
+    found: Attraction, wrong: Wrong, cells: NDArray[np.int64] | None = None, throws: int = SEARCHED
+) -> Path | None:
+    """Last throws of one long orbit of the scene without noise, up to the first state that violates the goal.
+
+    Parameters
+    ----------
+    found : Attraction
+        Cells and images.
+    wrong : callable
+        From places and sides to whether each violates the goal.
+    cells : ndarray of int64, optional
+        Where it begins; default, the attracting cells.
+    throws : int
+        Length at most.
+    """
+    start, on = middle(found, found.cells.numbers() if cells is None else cells)
+    (choice,) = {Choice(0.5 * (found.cover.box.lo.kappa + found.cover.box.hi.kappa), 0.0)}
+    path = orbit(found.cover.box.lo._replace(kappa=choice.kappa), start, on, throws)
+    bad = np.flatnonzero(wrong(path.x * MORE_THAN_ROUNDING, path.side))
+    if not bad.size:
+        return None
+    k = int(bad[0])
+    begin = k - min(SHOWN, k)
+    return Path(path.x[begin : k + 1].tolist(), path.side[begin : k + 1].tolist(), [choice] * (k - begin))
+
+
+def from_attracting(found: Attraction, wrong: Wrong) -> tuple[State, ...]:
+    """Find an orbit in the attracting cells that comes to violate the goal, and prove it.
+
+    Parameters
+    ----------
+    found : Attraction
+        Cells and images.
+    wrong : callable
+        From places and sides to whether each violates the goal: it has to do so of all larger places, too.
+
+    Returns
+    -------
+    tuple of State
+        The orbit, enclosed; empty if the search finds none.
+    """
+    box = found.cover.box
+    path = _search(found, wrong) if box.noise else long_orbit(found, wrong)
+    if path is None:
+        return ()
+    (cell,) = found.cover.grid.index([path.x[0]], path.side[0])
+    states = replayed(box, path)
+    if cell < 0 or found.component[cell] < 0 or not states:
+        return ()
+    return states if wrong(np.array([states[-1].lo]), np.array([states[-1].side])).all() else ()
+
+
+def replayed(box: ParameterBox, path: Path) -> tuple[State, ...]:
+    """Prove an orbit: its states enclosed, all but the last proved to be on the arm; empty if it cannot be.
+
+    Parameters
+    ----------
+    box : ParameterBox
+        The scene's parameters; where kappa does not differ from throw to throw the orbit is one of every kappa in it.
+    path : Path
+        The orbit as found.
+    """
+    varies = "throw.speed" in box.noise or "gravity.tilt" in box.noise
+    ends = [[t.kappa, t.kappa] if varies else [box.lo.kappa, box.hi.kappa] for t in path.thrown]
+    bounds = np.array(ends, dtype=float).reshape(-1, 2).T
+    shifts = np.array([t.landing for t in path.thrown], dtype=float)
+    lo, hi, sides = replay(box, path.x[0], path.side[0], bounds, shifts)
+    if lo.size < len(path.x) or not (hi[:-1] <= box.lo.arm_length).all():
+        return ()
+    thrown = [(t.kappa, t.landing if box.landing > 0.0 else None) for t in path.thrown]
+    rows = zip(lo.tolist(), hi.tolist(), sides.tolist(), [*thrown, (None, None)], strict=True)
+    return tuple(State(low, high, side, *how) for low, high, side, how in rows)

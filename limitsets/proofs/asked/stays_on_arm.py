@@ -1,0 +1,32 @@
+"""No throw carries a part off the arm or into the joint: from the attracting cells, or from anywhere on the arm."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from limitsets.goals import StaysOnArm
+from limitsets.proofs.asked.kind import Answer, Kind, common
+from limitsets.proofs.asked.starts import leaving
+from limitsets.proofs.attraction import Attraction
+from limitsets.scene import Scene
+
+__all__ = ["KIND"]
+
+
+def _ask(found: Attraction, _: Scene, goal: StaysOnArm) -> Answer:
+    missing = common(found, anywhere=goal.from_anywhere)
+    if missing:
+        # of attracting cells nothing can leave: where there are none, the question is whether anything stays
+        orbit = leaving(found) if goal.from_anywhere else ()
+        return Answer("refuted" if orbit else "undecided", missing, {}, orbit)
+    return Answer("proved", "", {"kind": goal.kind} | ({"from_anywhere": True} if goal.from_anywhere else {}))
+
+
+def _sentence(section: Mapping[str, Any]) -> str:
+    if section.get("from_anywhere"):
+        return "From every position on the arm and every side, no throw ever leads off the arm or into the joint."
+    return "No throw leads out of the attracting cells, so none leads off the arm."
+
+
+KIND = Kind(_ask, _sentence, lambda _: ())

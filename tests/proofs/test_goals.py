@@ -1,0 +1,301 @@
+"""Goals of every kind: proved where they hold, refuted by orbits where they do not, and rechecked.
+
+Truths come from the tables of `test_paper.py`, from the plain throw of `forge.py`, sampled, and from 50-digit throws.
+"""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+import limitsets as ls
+from limitsets.proofs.asked import sentence
+from tests.proofs import forge
+from tests.test_paper import LIMIT_SETS
+from tests.thrower import reference
+
+# A part thrown so fast that jogs have an attracting fixed point on side 1, and one with two such, on sides 1 and 2.
+ONE_FIXED = ("5.107240 in", "0.797946 in", "1.322505 in", "-0.894829 in", "40.470052 in", "10.211373 in")
+TWO_FIXED = ("3.339860 in", "1.925104 in", "0.474104 in", "-1.891994 in", "32.154965 in", "3.756025 in")
+
+PERIOD_13_UP_TO = (
+    20.103  # the designed scene's orbit of period 13 never exceeds it: known apart from this package
+)
+
+
+def scene_with(goal, name="paper-designed", **more):
+    tree = ls.load(name).as_dict()
+    tree["goal"] = goal
+    for table, values in more.items():
+        tree[table] = tree.get(table, {}) | values
+    return ls.load(tree)
+
+
+def part_of(numbers, goal):
+    along, above, rho, height, arm, kappa = numbers
+    tree = ls.load("paper-designed").as_dict() | {"goal": goal, "name": "fast"}
+    tree["part"]["mass"] = {
+        "center": {"side": 2, "along": along, "above": above}, "radius_of_gyration": rho,
+    }  # fmt: skip
+    tree["arm"] = {"surface_height": height, "length": arm}
+    tree["throw"] = {"kappa": kappa}
+    return ls.load(tree)
+
+
+def asked(scene, tmp_path=None, **more):
+    """Certify the goal alone; recheck it if it is proved."""
+    proof = ls.certify(scene, ["goal"], **more)
+    (claim,) = proof.claims
+    if claim.verdict == "proved" and tmp_path is not None:
+        report = ls.recheck(proof.save(tmp_path / "x.proof.zip"))
+        assert report.reason == ""
+        assert report.claims == [("goal", "proved", "")]
+    else:
+        assert claim.verdict == "proved" or claim.reason
+    return proof, claim
+
+
+def require_orbit(proof, facts):
+    """Throw the orbit again at 50 digits; return its states."""
+    states = proof.to_json()[0]["counterexample"]
+    assert len(states) > 1
+    for before, after in pairwise(states):
+        thrown = reference.throw(facts, before["side"], before["x"])
+        width = 1e-9 + 4 * (before["between"][1] - before["between"][0])
+        assert thrown.side == after["side"]
+        assert after["between"][0] - width <= thrown.x <= after["between"][1] + width
+    return states
+
+
+def facts_of(scene):
+    """Facts of a scene for the 50-digit throw: the numbers of its map, which test_geometry compares with others."""
+    m = scene.map
+    names = ("a", "d", "length", "kappa", "surface_height", "arm_length", "radius_of_gyration")
+    known = reference.paper("designed").numbers
+    return reference.Facts({**known, **{name: getattr(m, name) for name in names if name in known}})
+
+
+def orbits(m, starts, throws):
+    """Throw starts (x, side) with the plain throw; yields x, side after each throw."""
+    x, side = np.array([s[0] for s in starts]), np.array([s[1] for s in starts])
+    for _ in range(throws):
+        after, to = np.empty_like(x), np.empty_like(side)
+        for i in range(3):
+            mine = side == i
+            flips = m.decision(i, x[mine], m.kappa) > 0
+            after[mine] = np.where(flips, m.flip(i, x[mine], m.kappa), m.jog(i, x[mine], m.kappa))
+            to[mine] = np.where(flips, (i + 1) % 3, i)
+        x, side = after, to
+        yield x, side
+
+
+def starts_in(name, rng, count):
+    parts = [(lo, hi, side) for side, spans in LIMIT_SETS[name].items() for lo, hi in spans]
+    return [(rng.uniform(lo, hi), side) for lo, hi, side in parts for _ in range(count)]
+
+
+DESIGNED = "paper-designed"
+
+
+# ---------------------------------------------------------------- oriented_beyond
+
+
+def test_oriented_beyond_from_anywhere_is_sharp_at_the_farthest_landing_on_another_side(tmp_path):
+    m = forge.Plain(forge.scene("designed"))
+    farthest = 0.0
+    for side in range(3):
+        x = np.linspace(m.a[side] + 1e-6, m.arm, 20_001)
+        ((after, to),) = orbits(m, [(v, side) for v in x], 1)
+        farthest = max(farthest, float(after[to != 2].max()))
+    assert 24 < farthest < 28
+    goal = {"oriented_beyond": {"x": f"{farthest + 0.05:.6f} in", "side": 2}, "from_anywhere": True}
+    _, claim = asked(scene_with(goal), tmp_path)
+    assert claim.verdict == "proved"
+    assert "After a throw from anywhere on the arm" in sentence(claim.section)
+    goal["oriented_beyond"]["x"] = f"{farthest - 0.05:.6f} in"
+    proof, claim = asked(scene_with(goal))
+    assert claim.verdict == "refuted"
+    _, end = require_orbit(proof, reference.paper("designed"))
+    assert end["between"][0] > farthest - 0.05
+    assert end["side"] != 2
+
+
+# ---------------------------------------------------------------- attracts_all, stays_on_arm
+
+
+@pytest.mark.parametrize("goal", [{"attracts_all": True}, {"stays_on_arm": True, "from_anywhere": True}])
+def test_everything_stays_on_the_arm_and_comes_to_one_component(tmp_path, goal):
+    """No start of the paper's scenes escapes; with h = -3 in every one does (docs/model.md)."""
+    for name in ("paper-designed", "paper-initial-small-angle"):
+        assert asked(scene_with(goal, name), tmp_path)[1].verdict == "proved"
+    leaving = scene_with(goal, arm={"surface_height": "-3 in"})
+    proof, claim = asked(leaving)
+    assert claim.verdict == "refuted"
+    states = require_orbit(proof, reference.paper("designed", surface_height=-3.0))
+    assert states[-1]["between"][0] > 28.0
+    assert all(state["between"][1] <= 28.0 for state in states[:-1])
+
+
+def test_of_the_attracting_cells_no_throw_leads_off_the_arm(tmp_path):
+    _, claim = asked(scene_with({"stays_on_arm": True}), tmp_path, noise={"landing.x": "0.05 in"})
+    assert claim.verdict == "proved"
+    # near the joint scattered landings leave inward
+    proof, claim = asked(
+        scene_with({"stays_on_arm": True, "from_anywhere": True}), noise={"landing.x": "0.05 in"}
+    )
+    assert claim.verdict == "refuted"
+    end = proof.to_json()[0]["counterexample"][-1]
+    assert end["between"][1] <= float(reference.paper("designed").a[end["side"]])
+    assert (
+        asked(scene_with({"stays_on_arm": True}, arm={"surface_height": "-3 in"}))[1].verdict == "undecided"
+    )
+
+
+def test_two_attracting_components_are_never_one():
+    """Starts at two attracting fixed points of the jogs of sides 1 and 2 stay where they are."""
+    scene = part_of(TWO_FIXED, {"attracts_all": True})
+    ends = {side: ls.orbit(scene.map, x, side, 500).x[-1] for side, x in ((1, 9.18), (2, 8.9))}
+    assert all(ls.orbit(scene.map, x, side, 500).side[-1] == side for side, x in ends.items())
+    _, claim = asked(scene)
+    assert claim.verdict == "undecided"
+    assert claim.final
+    assert "2 attracting components" in claim.reason
+
+
+# ---------------------------------------------------------------- flip_order
+
+
+@pytest.mark.parametrize("anywhere", [False, True])
+@pytest.mark.parametrize("order", [[0, 1, 2], [2, 0, 1]])
+def test_the_flip_order_of_the_designed_scene(tmp_path, order, anywhere):
+    goal = {"flip_order": order} | ({"from_anywhere": True} if anywhere else {})
+    _, claim = asked(scene_with(goal), tmp_path)
+    assert claim.verdict == "proved"
+    assert 8 <= claim.section["jogs"] < 20  # 4 to 8 in a row on side 2 are seen
+
+
+def test_another_order_is_refuted_by_a_flip():
+    for order in ([0, 2, 1], [0, 1], [2]):
+        proof, claim = asked(scene_with({"flip_order": order}))
+        assert claim.verdict == "refuted"
+        states = require_orbit(proof, reference.paper("designed"))
+        allowed = set(zip(order, order[1:] + order[:1], strict=True))
+        last = states[-2]["side"], states[-1]["side"]
+        assert last[0] != last[1]
+        assert last not in allowed
+    assert asked(scene_with({"flip_order": [0, 1, 2, 0, 1, 2]}))[1].verdict == "undecided"
+
+
+def test_a_side_that_is_never_left_refutes_the_order_and_is_one_by_itself(tmp_path):
+    proof, claim = asked(part_of(ONE_FIXED, {"flip_order": [0, 1, 2]}))
+    assert claim.verdict == "refuted"
+    first, last = require_orbit(proof, facts_of(proof.scene))
+    assert first["side"] == last["side"] == 1
+    assert first["x"] == last["x"]
+    assert asked(part_of(ONE_FIXED, {"flip_order": [1]}), tmp_path)[1].verdict == "proved"
+
+
+# ---------------------------------------------------------------- reaches
+
+
+@pytest.mark.parametrize("anywhere", [False, True])
+def test_every_orbit_gets_as_far_as_none_fails_to(tmp_path, anywhere):
+    more = {"from_anywhere": True} if anywhere else {}
+    goal = {"reaches": {"x": "20 in", "side": 2, "every_orbit": True}} | more
+    proof, claim = asked(scene_with(goal), tmp_path)
+    assert claim.verdict == "proved"
+    m, rng = forge.Plain(forge.scene("designed")), np.random.default_rng(8)
+    starts = starts_in(DESIGNED, rng, 200)
+    if anywhere:
+        begin = [float(edges[0]) for (edges,) in proof.attractions[0].cover.grid.edges]
+        starts += [(x, side) for side in range(3) for x in rng.uniform(begin[side], m.arm, 300)]
+    arrived = np.zeros(len(starts), dtype=bool)
+    for x, side in orbits(m, starts, claim.section["throws"] + 1):
+        arrived |= (side == 2) & (x >= 20)
+    assert arrived.all()
+
+
+def test_every_orbit_is_refuted_by_a_periodic_one():
+    at = PERIOD_13_UP_TO + 0.002
+    goal = {"reaches": {"x": f"{at} in", "side": 2, "every_orbit": True}}
+    for noise in (None, {"throw.speed": "0.1 %"}):
+        proof, claim = asked(scene_with(goal), noise=noise)
+        assert claim.verdict == "refuted"
+        states = require_orbit(proof, reference.paper("designed"))
+        assert all(state["between"][1] < at for state in states if state["side"] == 2)
+        assert (states[0]["x"], states[0]["side"]) == (states[-1]["x"], states[-1]["side"])
+
+
+@pytest.mark.parametrize("noise", [None, {"landing.x": "0.05 in"}])
+def test_almost_every_orbit_gets_farther(tmp_path, noise):
+    """The limit set of side 2 ends at 23.383; the periodic orbits that stay below are of no length."""
+    at = 23.0 if noise is None else 22.0
+    for more in ({}, {"from_anywhere": True}):
+        goal = {"reaches": {"x": f"{at} in", "side": 2}} | more
+        _, claim = asked(scene_with(goal), tmp_path, noise=noise)
+        # from anywhere with scattered landings: near the joint parts leave
+        assert claim.verdict == ("undecided" if noise and more else "proved")
+    m, rng = forge.Plain(forge.scene("designed")), np.random.default_rng(9)
+    arrived = False
+    for x, side in orbits(m, starts_in(DESIGNED, rng, 50), 4000):
+        x += rng.uniform(-0.05, 0.05, x.size) if noise else 0.0
+        arrived |= (side == 2) & (x >= at)
+    assert arrived.all()
+
+
+@pytest.mark.parametrize("every", [False, True])
+def test_no_orbit_gets_beyond_the_limit_set(every):
+    proof, claim = asked(scene_with({"reaches": {"x": "23.45 in", "side": 2, "every_orbit": every}}))
+    assert claim.verdict == "refuted"
+    assert "no orbit in the attracting component" in claim.reason
+    assert all(state["between"][1] < 23.45 for state in require_orbit(proof, reference.paper("designed")))
+
+
+def test_an_attracting_orbit_keeps_almost_every_orbit_from_getting_there(tmp_path):
+    """The fixed point attracts: what comes near it never gets beyond it, though cells around it do."""
+    scene = part_of(ONE_FIXED, {"reaches": {"x": "20 in", "side": 1}})
+    fixed = float(ls.orbit(scene.map, 24.1, 1, 2000).x[-1])
+    x = reference.throw(facts_of(scene), 1, fixed).x
+    assert float(x) == pytest.approx(fixed, abs=1e-9)
+    for every in (False, True):
+        goal = {"reaches": {"x": f"{fixed - 0.5:.6f} in", "side": 1, "every_orbit": every}}
+        assert asked(part_of(ONE_FIXED, goal), tmp_path)[1].verdict == "proved"
+        goal["reaches"]["x"] = f"{fixed + 0.0005:.6f} in"
+        proof, claim = asked(part_of(ONE_FIXED, goal))
+        assert claim.verdict == "refuted"
+        states = require_orbit(proof, facts_of(scene))
+        assert all(state["between"][1] < fixed + 0.0005 for state in states)
+
+
+# ---------------------------------------------------------------- with a tolerance, and where nothing is proved
+
+
+@pytest.mark.parametrize(
+    "goal",
+    [
+        {"flip_order": [0, 1, 2]},
+        {"attracts_all": True},
+        {"reaches": {"x": "19 in", "side": 2, "every_orbit": True}, "from_anywhere": True},
+        {"reaches": {"x": "21 in", "side": 2}},
+        {"oriented_beyond": {"x": "27 in", "side": 2}, "from_anywhere": True},
+    ],
+    ids=str,
+)
+def test_goals_hold_for_every_value_of_a_tolerance(tmp_path, goal):
+    _, claim = asked(scene_with(goal), tmp_path, tolerance={"throw.speed": "0.2 %"})
+    assert claim.verdict == "proved"
+
+
+@pytest.mark.parametrize(
+    "goal",
+    [
+        {"flip_order": [0, 1, 2]},
+        {"stays_on_arm": True},
+        {"reaches": {"x": "19 in", "side": 2}},
+        {"oriented_beyond": {"x": "20 in", "side": 2}},
+    ],
+    ids=str,
+)
+def test_without_attracting_cells_nothing_is_said_of_them(goal):
+    _, claim = asked(scene_with(goal, arm={"surface_height": "-3 in"}))
+    assert (claim.verdict, claim.reason) == ("undecided", "there are no attracting cells")
