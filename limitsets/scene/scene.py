@@ -18,6 +18,7 @@ from limitsets.scene.facts import Deviation, Effects, World
 if TYPE_CHECKING:
     from limitsets.cells import Domain
     from limitsets.thrower import Throw
+    from limitsets.thrower.motion import FullThrow
 
 __all__ = ["Scene"]
 
@@ -94,8 +95,18 @@ class Scene:
         return hash((self.name, self.unit, self.kappa, self.arm_length))
 
     @cached_property
-    def map(self) -> Throw:
-        """The throw map of the scene, as kernels take it."""
+    def map(self) -> Throw | FullThrow:
+        """The throw map of the scene, as kernels take it, with the effects it switches on."""
+        on = self.effects.on()
+        if not on:
+            return self.bare_map
+        from limitsets.thrower.effects import with_effects  # lazily: it loads numba
+
+        return with_effects(self.bare_map, on, self.world)
+
+    @cached_property
+    def bare_map(self) -> Throw:
+        """The minimal model's map of the scene, whatever effects it switches on."""
         from limitsets.thrower import throw_map  # lazily: it loads numba
 
         return throw_map(
