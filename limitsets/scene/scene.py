@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -102,7 +102,15 @@ class Scene:
             return self.bare_map
         from limitsets.thrower.effects import with_effects  # lazily: it loads numba
 
-        return with_effects(self.bare_map, on, self.world)
+        return with_effects(self.bare_map, {name: getattr(self.effects, name) for name in on}, self._facts())
+
+    def _facts(self) -> World:
+        """Return the world with its scatter of the speed as a share, where the scene knows the speed."""
+        scatter = self.world.scatter
+        if scatter is None or scatter.speed is None or scatter.speed.relative:
+            return self.world
+        share = Deviation(scatter.speed.value / self.value("throw.speed"), relative=True)
+        return replace(self.world, scatter=replace(scatter, speed=share))
 
     @cached_property
     def bare_map(self) -> Throw:

@@ -11,11 +11,14 @@ from typing import Any
 from limitsets.jit import kernel
 from limitsets.maps import codes
 from limitsets.maps.contract import register
+from limitsets.thrower.effects.drive import driven, holds_in_stroke, rests_leant
 from limitsets.thrower.effects.landing import first_arrival
 from limitsets.thrower.effects.pivot import turned_down
 from limitsets.thrower.effects.roll import next_arrival
 from limitsets.thrower.effects.slip import struck
-from limitsets.thrower.motion import FullSide, FullThrow, gather_full, side_number
+from limitsets.thrower.effects.spread import moved_by, spread_over
+from limitsets.thrower.motion import FullSide, FullThrow, side_number
+from limitsets.thrower.params import gather
 from limitsets.thrower.throw import EXITS
 from limitsets.thrower.trace import details
 
@@ -25,11 +28,36 @@ __all__ = ["MOST_EVENTS"]
 MOST_EVENTS = 100_000
 
 
+_gather = kernel(gather)
+
+
+@kernel
+def gather_full(params: FullThrow, side: int) -> FullSide:
+    """Return what the kernels need to know of one side (`on_side` of the throw map with effects)."""
+    bare = params.bare
+    return FullSide(
+        _gather(driven(params.drive, bare), side),
+        bare.a,
+        bare.d,
+        bare.length,
+        bare.corner,
+        params.outline.p[side],
+        params.outline.q[side],
+        params.landing,
+        params.roll,
+        params.pivot,
+        params.slip,
+        params.bounce,
+        params.drive,
+        params.spread,
+    )
+
+
 @kernel
 def full_outcome(part: FullSide, x: float, side: int) -> tuple[float, int, int]:
     """Where a throw ends: shift of the centre of mass, sides turned, code."""
     hit, moving = first_arrival(part.landing, part, x)
-    if not moving:
+    if not (moving and holds_in_stroke(part.drive, part.own, part.length[side], x)):
         return 0.0, 0, codes.OUTSIDE_MODEL
     impacts, rolls, before = 0, -1, side - 1
     while moving and impacts < MOST_EVENTS:
@@ -39,15 +67,17 @@ def full_outcome(part: FullSide, x: float, side: int) -> tuple[float, int, int]:
         impacts += 1
         rolls += face.side != before or impacts == 1
         before = face.side
-    if moving:
+    k = side_number(part, face.side)
+    if moving or not rests_leant(part.drive, part.a[k], part.d[k]):
         return 0.0, 0, codes.OUTSIDE_MODEL
     turned = face.side - side
     code = codes.JOG if turned == 0 else codes.FLIP
     code = codes.ROLL if rolls > 0 or turned < 0 or turned > 1 else code
-    after = x + face.shift
-    code = codes.INWARD if after <= part.a[side_number(part, face.side)] else code
+    shift = moved_by(part.spread, face.shift)
+    after = x + shift
+    code = codes.INWARD if after <= part.a[k] else code
     code = codes.OUTWARD if after > part.own.arm_length else code
-    return face.shift, turned, code
+    return shift, turned, code
 
 
 @kernel
@@ -83,6 +113,10 @@ def _image(params: FullThrow, x: float, side: int) -> Any:
     return full_side_image(gather_full(params, side), x, side)
 
 
+def _scattered(params: FullThrow, start: int, step: int) -> Any:
+    return spread_over(params.spread, params, start, step)
+
+
 def _displacement(params: FullThrow, x: float, side: int) -> Any:
     return full_side_displacement(gather_full(params, side), x, side)
 
@@ -94,6 +128,7 @@ register(
     image=_image,
     on_side=gather_full,
     displacement=_displacement,
+    scattered=_scattered,
     branches=BRANCHES,
     exits=EXITS,
 )

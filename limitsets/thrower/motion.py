@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from limitsets.jit import kernel
-from limitsets.thrower.params import Side, Throw, gather
+from limitsets.thrower.params import Side, Throw
 from limitsets.thrower.turn import Turned
 
 __all__ = [
@@ -28,7 +28,6 @@ __all__ = [
     "FullThrow",
     "Outline",
     "above",
-    "gather_full",
     "on_to_next",
     "outline_of",
     "right_of",
@@ -95,30 +94,7 @@ class FullSide(NamedTuple):
     slip: Any
     bounce: Any
     drive: Any
-
-
-_gather = kernel(gather)
-
-
-@kernel
-def gather_full(params: FullThrow, side: int) -> FullSide:
-    """Return what the kernels need to know of one side (`on_side` of the throw map with effects)."""
-    bare = params.bare
-    return FullSide(
-        _gather(bare, side),
-        bare.a,
-        bare.d,
-        bare.length,
-        bare.corner,
-        params.outline.p[side],
-        params.outline.q[side],
-        params.landing,
-        params.roll,
-        params.pivot,
-        params.slip,
-        params.bounce,
-        params.drive,
-    )
+    spread: Any
 
 
 class Arrival(NamedTuple):

@@ -7,13 +7,15 @@ Source: docs/model.md, effects.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
 import limitsets.thrower.full  # noqa: F401 - registers the map
 from limitsets.errors import MapError
+from limitsets.thrower.effects.drive import drive_of
 from limitsets.thrower.effects.landing import Landing
 from limitsets.thrower.effects.roll import Roll
+from limitsets.thrower.effects.spread import spread_of
 from limitsets.thrower.motion import FullThrow, outline_of
 from limitsets.thrower.params import Exact, Throw
 
@@ -28,29 +30,31 @@ class Effect(NamedTuple):
     needs : tuple of str
         Facts of the world that have to be given.
     build : callable
-        From the world to the NamedTuple that its kernels take.
+        From the world, and what the scene writes after the effect's name, to the NamedTuple that its kernels take.
     """
 
     needs: tuple[str, ...]
-    build: Callable[[Any], Any]
+    build: Callable[[Any, Any], Any]
 
 
 BUILT: dict[str, Effect] = {
-    "landing": Effect((), lambda world: Landing()),
-    "roll": Effect((), lambda world: Roll()),
+    "drive": Effect(("stroke",), drive_of),
+    "landing": Effect((), lambda world, how: Landing()),
+    "roll": Effect((), lambda world, how: Roll()),
+    "spread": Effect(("scatter",), spread_of),
 }
 """The effects a scene may switch on, by name."""
 
 
-def with_effects(bare: Throw, names: tuple[str, ...], world: Any) -> FullThrow:
+def with_effects(bare: Throw, effects: Mapping[str, Any], world: Any) -> FullThrow:
     """Add effects to the minimal model.
 
     Parameters
     ----------
     bare : Throw
         Part, arm and throw; its flight is the exact one.
-    names : tuple of str
-        The effects, of `BUILT`.
+    effects : mapping
+        By name, of `BUILT`, what the scene writes after it: true, or a word.
     world : object
         The facts, as attributes.
 
@@ -68,7 +72,7 @@ def with_effects(bare: Throw, names: tuple[str, ...], world: Any) -> FullThrow:
         raise MapError(
             "the flight", type(bare.flight).__name__, "the exact one", 'effects need flight = "exact"'
         )
-    chosen = {name: BUILT[name].build(world) for name in names}
+    chosen = {name: BUILT[name].build(world, how) for name, how in effects.items()}
     full: Any = FullThrow  # mypy does not follow unpacked fields
     built: FullThrow = full(bare, outline_of(bare), **chosen)
     return built

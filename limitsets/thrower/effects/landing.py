@@ -13,6 +13,7 @@ import math
 from typing import Any, NamedTuple
 
 from limitsets.jit import kernel
+from limitsets.thrower.effects.drive import pulled
 from limitsets.thrower.landing import jog_displacement
 from limitsets.thrower.motion import Arrival, FullSide, side_number
 from limitsets.thrower.throw import settle
@@ -72,7 +73,8 @@ def first_arrival(landing: Any, part: FullSide, x: float) -> tuple[Arrival, bool
     own = part.own
     at, _ = settle(own, x)
     shift, _ = jog_displacement(own.flight, own, at)
-    left = Arrival(own.side, at, shift, -(own.h + own.d), x - own.kappa * at.phi, 1.0)
+    pull, speed = pulled(part.drive, own.kappa, at.phi)
+    left = Arrival(own.side, at, shift + pull, speed - (own.h + own.d), x - own.kappa * at.phi, 1.0)
     flies = (x > own.a) & (at.phi > 0.0) & (at.phi <= own.flight.full_turn)
     if landing is None:
         return left, flies
@@ -87,9 +89,10 @@ def first_arrival(landing: Any, part: FullSide, x: float) -> tuple[Arrival, bool
     now = turn(phi)
     # X, how far the centre is right of the vertex that lands, and its shift if the part fell back on side `vertex`
     right = part.q[k] * now.s - part.p[k] * (1.0 - now.v)
-    moved = -(own.h + own.d) * phi + (part.a[k] - right)
+    pull, speed = pulled(part.drive, own.kappa, phi)
+    moved = pull - (own.h + own.d) * phi + (part.a[k] - right)
     offset = own.corner
     for number in range(own.side + 1, vertex):
         offset += part.corner[side_number(part, number)]
     psi = turn(max(phi - offset, 0.0))
-    return Arrival(vertex, psi, moved, -(own.h + own.d), x - own.kappa * phi, 1.0), True
+    return Arrival(vertex, psi, moved, speed - (own.h + own.d), x - own.kappa * phi, 1.0), True

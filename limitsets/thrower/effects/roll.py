@@ -11,9 +11,11 @@ end.  Oracle: Housner's rocking block, whose rates are as 1 - (3/2) sin^2 alpha.
 
 from __future__ import annotations
 
+import math
 from typing import Any, NamedTuple
 
 from limitsets.jit import kernel
+from limitsets.thrower.effects.drive import leant
 from limitsets.thrower.motion import Arrival, Face, FullSide, on_to_next, side_number
 from limitsets.thrower.turn import turn
 
@@ -44,6 +46,12 @@ def next_arrival(roll: Any, part: FullSide, face: Face) -> tuple[Arrival, bool]:
     inertia = part.own.rho2 + d * d + (right * right if left_end else a * a)
     omega = face.omega * keeps / inertia
     kinetic = 0.5 * inertia * omega * omega
-    least = min(a, right)
-    lift = least * least / ((least * least + d * d) ** 0.5 + d)  # ell - d, of the nearer end
-    return hit, (keeps > 0.0) & (kinetic > part.own.kappa * lift)
+    lift = min(_lift(part, a, d), _lift(part, -right, d))
+    return hit, (keeps > 0.0) & (kinetic > lift)
+
+
+@kernel
+def _lift(part: FullSide, foot: float, d: float) -> float:
+    """Energy it takes from lying on a side to the top over one of its ends, which is `foot` left of the centre."""
+    gravity, right, high = leant(part.drive, part.own.kappa, foot, d)
+    return gravity * right * right / (math.sqrt(right * right + high * high) + high)  # ell - H
