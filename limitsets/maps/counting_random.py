@@ -16,7 +16,7 @@ from limitsets.jit import kernel
 
 __all__ = ["normal_pair", "philox", "uniform_pair"]
 
-Words: TypeAlias = tuple[int, int, int, int]
+Words: TypeAlias = tuple[np.uint64, np.uint64, np.uint64, np.uint64]
 
 # np.uint64 throughout: numba turns a mixture of signed and unsigned integers into floats.
 LOW = np.uint64(0xFFFFFFFF)

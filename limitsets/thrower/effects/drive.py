@@ -91,7 +91,8 @@ def rests_leant(drive: Any, a: float, d: float) -> bool:
     """Whether the part stays on a side of the stopped arm."""
     if drive is None:
         return True
-    return (a * drive.cosine > d * drive.sine) & (drive.sine <= drive.friction * drive.cosine)
+    over, slides = a * drive.cosine <= d * drive.sine, drive.sine > drive.friction * drive.cosine
+    return not (over or slides)
 
 
 @kernel

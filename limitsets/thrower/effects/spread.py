@@ -85,7 +85,7 @@ def moved_by(spread: Any, shift: float) -> float:
     """Return the displacement of a throw with what its landing place deviates by."""
     if spread is None:
         return shift
-    return shift + spread.shift
+    return shift + spread.shift  # type: ignore[no-any-return]  # effects are Any
 
 
 @kernel

@@ -61,7 +61,7 @@ def test_what_is_drawn_is_uniform_and_normal() -> None:
 def test_no_width_is_no_effect() -> None:
     still = scene("bounded", speed="0 %", landing="0 in")
     noisy, plain = orbit(still.map, 15.0, 2, 5000), orbit(DESIGNED.map, 15.0, 2, 5000)
-    # a throw with effects goes another way through the arithmetic: the same to rounding, for as long as that does not grow
+    # with effects the arithmetic is ordered otherwise: the same to rounding, until chaos has made that large
     assert np.array_equal(noisy.side[:60], plain.side[:60])
     assert noisy.x[:60] == pytest.approx(plain.x[:60], abs=1e-9)
 
@@ -109,5 +109,5 @@ def test_a_scatter_in_degrees_per_second_is_one_in_percent() -> None:
     tree["world"] = {"scatter": {"speed": f"{float(0.004 * speed)!r} deg/s"}}
     assert ls.load(tree).map.spread.speed == pytest.approx(0.004, rel=1e-12)
     del tree["gravity"]
-    with pytest.raises(ls.errors.SceneError, match="gravity|speed"):
+    with pytest.raises(ls.errors.SceneError, match="gravity"):
         _ = ls.load(tree).map
