@@ -17,6 +17,8 @@ written once, here and in the rooms above, and know maps only through these func
 ``fallback(params, x, side)``           as `image`, slow and sure; asked where `image` answers ``UNSETTLED``
 ``margin(params, x, side)``             a number whose sign decides between branch 0 (not positive) and branch 1
 ``displacement(params, x, side)``       x' - x computed without cancellation
+``scattered(params, start, step)``      the parameters as they are at step number `step` of start number `start`, where
+                                        they differ at every step; asked by orbits, not by the images of cells
 ======================================  =============================================================================
 
 In two and three dimensions x is a tuple and the slope a tuple of rows.
@@ -48,6 +50,7 @@ __all__ = [
     "on_side",
     "on_side_box",
     "register",
+    "scattered",
 ]
 
 
@@ -57,6 +60,10 @@ def _same(params: Any, side: int) -> Any:
 
 def _both(lo: Any, hi: Any, side: int) -> Any:
     return lo, hi
+
+
+def _as_they_are(params: Any, start: int, step: int) -> Any:
+    return params
 
 
 def _no_fallback_box(params_lo: Any, params_hi: Any, lo: Any, hi: Any, side: int) -> Any:
@@ -103,6 +110,10 @@ def displacement(params: Any, x: Any, side: int) -> Any:
     """x' - x without cancellation."""
 
 
+def scattered(params: Any, start: int, step: int) -> Any:
+    """Return the parameters of one step of one start."""
+
+
 image = generic(image)
 image_on = generic(image_on)
 image_box = generic(image_box, proof=True)
@@ -112,6 +123,7 @@ on_side_box = generic(on_side_box, proof=True, default=_both)
 fallback = generic(fallback, inlined=False, default=_no_fallback)
 margin = generic(margin)
 displacement = generic(displacement)
+scattered = generic(scattered, default=_as_they_are)
 
 EXITS_OF_A_MAP = {"outside": codes.OUTSIDE}
 
@@ -159,6 +171,7 @@ def register(
     fallback: Callable[..., Any] | None = None,
     margin: Callable[..., Any] | None = None,
     displacement: Callable[..., Any] | None = None,
+    scattered: Callable[..., Any] | None = None,
     dimension: int = 1,
     branches: tuple[str, ...] = ("map",),
     exits: dict[str, int] | None = None,
@@ -174,6 +187,7 @@ def register(
         ``image(params, x, side) -> (x', side', code)``; code is the index of the branch taken, or
         `limitsets.maps.OUTSIDE` (-2).  A module-level function, not decorated.
     image_on, image_box, on_side, on_side_box, fallback, fallback_box, margin, displacement : callable, optional
+    scattered : callable, optional
         See this module's table.
     dimension : int
         1, 2 or 3.
@@ -227,6 +241,7 @@ def register(
         "fallback": fallback,
         "margin": margin,
         "displacement": displacement,
+        "scattered": scattered,
     }
     kernels = {name: f for name, f in given.items() if f is not None}
     for name, function in kernels.items():

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from limitsets.errors import MapError
 from limitsets.jit import generic, kernel
 from limitsets.maps import codes
-from limitsets.maps.contract import displacement, fallback, image, image_on, kind_of, on_side
+from limitsets.maps.contract import displacement, fallback, image, image_on, kind_of, on_side, scattered
 
 __all__ = ["Images", "Orbit", "advance", "columns", "images", "images_on", "orbit", "rows", "step"]
 
@@ -97,10 +97,10 @@ def _images_on(params: Any, side: int, branch: int, xs: Any, after: Any, side_af
 
 
 @kernel(entry=True)
-def _orbit(params: Any, xs: Any, sides: Any, code_after: Any) -> Any:
+def _orbit(params: Any, start: int, xs: Any, sides: Any, code_after: Any) -> Any:
     """Fill an orbit from its first state; the number of steps made before an exit."""
     for k in range(code_after.size):
-        x, side, code = step(params, pick(xs, k), sides[k])
+        x, side, code = step(scattered(params, start, k), pick(xs, k), sides[k])
         put(xs, k + 1, x)
         sides[k + 1] = side
         code_after[k] = code
@@ -110,12 +110,12 @@ def _orbit(params: Any, xs: Any, sides: Any, code_after: Any) -> Any:
 
 
 @kernel(entry=True)
-def _advance(params: Any, count: int, xs: Any, sides: Any, code_after: Any, steps: Any) -> None:
+def _advance(params: Any, first: int, count: int, xs: Any, sides: Any, code_after: Any, steps: Any) -> None:
     for k in range(steps.size):
         x, side, code = pick(xs, k), sides[k], 0
         made = 0
         while made < count and code >= 0:
-            x, side, code = step(params, x, side)
+            x, side, code = step(scattered(params, first + k, made), x, side)
             made += 1
         put(xs, k, x)
         sides[k] = side
@@ -283,7 +283,7 @@ def orbit(params: Any, x: Any, side: int, count: int) -> Orbit:
         values[0] = value
     sides, code = np.empty(count + 1, np.int64), np.empty(count, np.int64)
     sides[0] = side
-    made = _orbit(params, xs, sides, code)
+    made = _orbit(params, 0, xs, sides, code)
     stopped = None
     if made and code[made - 1] < 0:
         stopped = next(name for name, exit_code in kind.exits.items() if exit_code == code[made - 1])
@@ -296,9 +296,12 @@ def orbit(params: Any, x: Any, side: int, count: int) -> Orbit:
 
 
 def advance(
-    params: Any, x: ArrayLike, side: ArrayLike, count: int
+    params: Any, x: ArrayLike, side: ArrayLike, count: int, *, first: int = 0
 ) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
     """Send many starts `count` steps ahead: states, sides, last codes, steps made before an exit.
+
+    Where the parameters scatter, the starts are numbered on from `first`, and what they draw depends on nothing else:
+    the same starts in several batches, or threads, do the same.
 
     Examples
     --------
@@ -310,5 +313,5 @@ def advance(
     xs = tuple(values.copy() for values in columns(x, kind_of(params).dimension))
     sides = np.array(np.broadcast_to(np.asarray(side, dtype=np.int64), xs[0].shape))
     code, steps = np.empty(sides.size, np.int64), np.empty(sides.size, np.int64)
-    _advance(params, count, xs, sides, code, steps)
+    _advance(params, first, count, xs, sides, code, steps)
     return rows(xs), sides, code, steps

@@ -68,7 +68,7 @@ def build(structure: object, file: str | None) -> Scene:
         flip=table.model.flip,
         goal=goal,
         world=world,
-        effects=resolve_effects(table.effects, world, resolver),
+        effects=resolve_effects(table.effects, world, table.model.flight, resolver),
         tolerance=_tolerance(tree, table, resolver),
         file=file,
         text=tree,

@@ -16,13 +16,6 @@ if TYPE_CHECKING:
 __all__ = ["resolve_effects", "resolve_goal", "resolve_world"]
 
 _GOALS = ("oriented_beyond", "reaches", "attracts_all", "flip_order", "stays_on_arm")
-_NEEDS = {
-    "pivot": ("friction",),
-    "slip": ("friction",),
-    "bounce": ("restitution", "bounce_threshold"),
-    "drive": ("stroke",),
-    "spread": ("scatter",),
-}
 
 
 def resolve_goal(table: GoalTable, count: int, arm_length: float, resolver: Resolver) -> Goal:
@@ -85,29 +78,30 @@ def _noise(text: str | None, name: str, key: str, resolver: Resolver) -> Deviati
     return deviation(text, name, resolver.unit, zero=True, key=key, file=resolver.file)
 
 
-def resolve_effects(table: EffectsTable, world: World, resolver: Resolver) -> Effects:
-    """Resolve ``[effects]``: refuse what lacks its facts, then what this version cannot simulate."""
+def resolve_effects(table: EffectsTable, world: World, flight: str, resolver: Resolver) -> Effects:
+    """Resolve ``[effects]``: refuse what this version cannot simulate, then what lacks its facts."""
     effects = Effects(**table.model_dump())
+    if not effects.on():
+        return effects
+    from limitsets.thrower.effects import BUILT  # lazily: its room loads numba
+
     for effect in effects.on():
-        for fact in _NEEDS.get(effect, ()):
+        key = f"effects.{effect}"
+        if effect not in BUILT:
+            allowed = f"the effects that this version can simulate: {', '.join(BUILT)}"
+            raise resolver.refusal(key, "the effect", effect, allowed, f"leave {key} out")
+        if flight != "exact":
+            allowed = 'flight = "exact" in [model]'
+            raise resolver.refusal(
+                key, "the flight", flight, allowed, f"{effect} has no meaning in it; use the exact one"
+            )
+        for fact in BUILT[effect].needs:
             if getattr(world, fact) is None:
                 raise resolver.refusal(
-                    f"effects.{effect}",
+                    key,
                     f"the fact world.{fact}",
                     "missing",
                     f"{fact} in [world]",
-                    f"{effect} needs it: add world.{fact}, or leave effects.{effect} out",
-                )
-    if effects.on():
-        from limitsets.thrower.effects import BUILT  # lazily: its room loads numba
-
-        for effect in effects.on():
-            if effect not in BUILT:
-                raise resolver.refusal(
-                    f"effects.{effect}",
-                    "the effect",
-                    effect,
-                    f"the effects that this version can simulate: {', '.join(BUILT) or 'none yet'}",
-                    f"leave effects.{effect} out",
+                    f"{effect} needs it: add world.{fact}, or leave {key} out",
                 )
     return effects

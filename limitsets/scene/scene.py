@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -18,6 +18,7 @@ from limitsets.scene.facts import Deviation, Effects, World
 if TYPE_CHECKING:
     from limitsets.cells import Domain
     from limitsets.thrower import Throw
+    from limitsets.thrower.motion import FullThrow
 
 __all__ = ["Scene"]
 
@@ -94,8 +95,26 @@ class Scene:
         return hash((self.name, self.unit, self.kappa, self.arm_length))
 
     @cached_property
-    def map(self) -> Throw:
-        """The throw map of the scene, as kernels take it."""
+    def map(self) -> Throw | FullThrow:
+        """The throw map of the scene, as kernels take it, with the effects it switches on."""
+        on = self.effects.on()
+        if not on:
+            return self.bare_map
+        from limitsets.thrower.effects import with_effects  # lazily: it loads numba
+
+        return with_effects(self.bare_map, {name: getattr(self.effects, name) for name in on}, self._facts())
+
+    def _facts(self) -> World:
+        """Return the world with its scatter of the speed as a share, where the scene knows the speed."""
+        scatter = self.world.scatter
+        if scatter is None or scatter.speed is None or scatter.speed.relative:
+            return self.world
+        share = Deviation(scatter.speed.value / self.value("throw.speed"), relative=True)
+        return replace(self.world, scatter=replace(scatter, speed=share))
+
+    @cached_property
+    def bare_map(self) -> Throw:
+        """The minimal model's map of the scene, whatever effects it switches on."""
         from limitsets.thrower import throw_map  # lazily: it loads numba
 
         return throw_map(

@@ -10,27 +10,43 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from limitsets.errors import MapError
-from limitsets.jit import kernel
+from limitsets.jit import generic, kernel
 from limitsets.maps import codes
 from limitsets.maps.drivers import orbit
 from limitsets.thrower.impact import strike
+from limitsets.thrower.motion import FullThrow
 from limitsets.thrower.params import Throw, gather
-from limitsets.thrower.throw import outcome, settle
+from limitsets.thrower.throw import flip_margin, outcome, settle
 
-__all__ = ["Flight", "Trace", "fly", "impact_angles", "trace"]
+__all__ = ["Flight", "Trace", "details", "fly", "impact_angles", "trace"]
 
 _gather = kernel(gather)
 
 
+def details(params: Any, x: float, side: int) -> tuple[float, float, int, bool]:
+    """Angle at the first impact, displacement, sides turned, whether another vertex would have landed first."""
+
+
+details = generic(details)
+
+
+@kernel
+def _details(params: Throw, x: float, side: int) -> tuple[float, float, int, bool]:
+    part = _gather(params, side)
+    at, _ = settle(part, x)
+    _, _, _, shift = outcome(part, x, at)
+    return at.phi, shift, int(flip_margin(part, x, at) > 0.0), at.phi > part.corner
+
+
+details.on(Throw, _details)  # type: ignore[attr-defined]  # generic functions carry `on`
+
+
 @kernel(entry=True)
-def _details(params: Throw, x: Any, side: Any, phi_out: Any, shift_out: Any, other: Any) -> None:
+def _all_details(
+    params: Any, x: Any, side: Any, phi_out: Any, shift_out: Any, turned: Any, other: Any
+) -> None:
     for k in range(x.size):
-        part = _gather(params, side[k])
-        at, _ = settle(part, x[k])
-        _, _, _, shift = outcome(part, x[k], at)
-        phi_out[k] = at.phi
-        shift_out[k] = shift
-        other[k] = at.phi > part.corner
+        phi_out[k], shift_out[k], turned[k], other[k] = details(params, x[k], side[k])
 
 
 @kernel(entry=True)
@@ -52,11 +68,11 @@ class Trace:
     code : ndarray of int, shape (m,)
         What each throw was (`limitsets.maps.codes`).
     phi : ndarray, shape (m,)
-        Angle at the impact [rad]; nan where the throw is outside the model.
+        Angle at the first impact [rad]; nan where the throw is outside the model.
     displacement : ndarray, shape (m,)
         Shift of the centre of mass [scene's unit], exact where x' - x has rounded away; nan outside the model.
     turned : ndarray of int, shape (m,)
-        Sides turned counterclockwise.
+        Sides turned, counterclockwise positive.
     other_vertex_first : ndarray of bool, shape (m,)
         Whether another vertex would have landed before the left one: an assumption of the model broken.
     stopped : str or None
@@ -93,19 +109,27 @@ class Flight:
     barrier: float
 
 
-def _check_side(params: Throw, side: int) -> None:
+def _seen(params: Any, x: Any, side: Any) -> tuple[Any, Any, Any, Any]:
+    """Return the details of many throws: angles, displacements, sides turned, flags."""
+    phi, shift = np.empty(x.size), np.empty(x.size)
+    turned, other = np.empty(x.size, np.int64), np.empty(x.size, np.bool_)
+    _all_details(params, x, side, phi, shift, turned, other)
+    return phi, shift, turned, other
+
+
+def _check_side(params: Throw | FullThrow, side: int) -> None:
     if not 0 <= side < params.a.size:
         raise MapError(
             "the side", side, f"an integer from 0 to {params.a.size - 1}", "name a side of the part"
         )
 
 
-def trace(params: Throw, x: float, side: int, count: int = 1) -> Trace:
+def trace(params: Throw | FullThrow, x: float, side: int, count: int = 1) -> Trace:
     """Throw a part `count` times, with the angle, displacement and broken assumptions of each throw.
 
     Parameters
     ----------
-    params : Throw
+    params : Throw or FullThrow
         The throw map.
     x : float
         Where the part rests [scene's unit].
@@ -134,21 +158,20 @@ def trace(params: Throw, x: float, side: int, count: int = 1) -> Trace:
     _check_side(params, side)
     path = orbit(params, x, side, count)
     made = path.code.size
-    phi, shift, other = np.empty(made), np.empty(made), np.empty(made, np.bool_)
-    _details(params, path.x[:made], path.side[:made], phi, shift, other)
+    phi, shift, turned, other = _seen(params, path.x[:made], path.side[:made])
     outside = path.code == codes.OUTSIDE_MODEL
     phi[outside] = shift[outside] = math.nan
     other &= ~outside
-    turned = (path.side[1:] - path.side[:-1]) % params.a.size
+    turned[outside] = 0
     return Trace(path.x, path.side, path.code, phi, shift, turned, other, path.stopped)
 
 
-def impact_angles(params: Throw, x: ArrayLike, side: int) -> NDArray[np.float64]:
+def impact_angles(params: Throw | FullThrow, x: ArrayLike, side: int) -> NDArray[np.float64]:
     """Angles by which the part has turned when it lands, for many starts on one side.
 
     Parameters
     ----------
-    params : Throw
+    params : Throw or FullThrow
         The throw map.
     x : array_like, shape (n,)
         Where the part rests [scene's unit].
@@ -175,14 +198,13 @@ def impact_angles(params: Throw, x: ArrayLike, side: int) -> NDArray[np.float64]
     _check_side(params, side)
     starts = np.ascontiguousarray(x, dtype=np.float64)
     count = starts.size
-    phi, shift, other = np.empty(count), np.empty(count), np.empty(count, np.bool_)
-    _details(params, starts, np.full(count, side, dtype=np.int64), phi, shift, other)
+    phi, _, _, _ = _seen(params, starts, np.full(count, side, dtype=np.int64))
     inside = (starts > params.a[side]) & (phi > 0.0) & (phi <= params.flight.full_turn)
     return np.where(inside, phi, math.nan)
 
 
-def fly(params: Throw, x: float, side: int) -> Flight:
-    """Return one throw's flight and impact.
+def fly(params: Throw | FullThrow, x: float, side: int) -> Flight:
+    """Return one throw's flight and impact in the minimal model.
 
     Examples
     --------
@@ -193,4 +215,5 @@ def fly(params: Throw, x: float, side: int) -> Flight:
     True
     """
     _check_side(params, side)
-    return Flight(*(float(value) for value in _fly(params, float(x), side)))
+    bare = params.bare if isinstance(params, FullThrow) else params
+    return Flight(*(float(value) for value in _fly(bare, float(x), side)))

@@ -1,0 +1,135 @@
+"""Effect `spread`: speed and landing place differ at every throw.
+
+    w' = w (1 + delta),  so kappa' = kappa / (1 + delta)^2;        R' = R' of that throw + e
+
+`bounded`: delta and e anywhere in their intervals, drawn evenly when an orbit is followed; a proof takes the whole
+interval (`certify` does for a scene with this effect).  `gaussian`: normal, with these standard deviations.  What throw
+number t of start number s draws depends on the seed, on s and on t alone.  The image of a cell or of a point asked for
+by itself is that of the throw without scatter.  Source: docs/model.md, effects.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+from limitsets.errors import MapError
+from limitsets.jit import generic, kernel
+from limitsets.maps.counting_random import normal_pair, uniform_pair
+from limitsets.thrower.motion import FullThrow
+from limitsets.thrower.params import Throw
+
+__all__ = ["Even", "Normal", "Spread", "moved_by", "spread_of", "spread_over"]
+
+
+class Even(NamedTuple):
+    """Anywhere between the bounds, equally likely."""
+
+    bound: float = 1.0
+
+
+class Normal(NamedTuple):
+    """Normal, with the given numbers as standard deviations."""
+
+    bound: float = math.inf
+
+
+class Spread(NamedTuple):
+    """How speed and landing place scatter.
+
+    Attributes
+    ----------
+    law : Even or Normal
+        How they are distributed.
+    speed : float
+        Largest, or standard, relative deviation of the angular speed.
+    landing : float
+        Largest, or standard, deviation of the landing place [length].
+    seed : float
+        A whole number; the same seed gives the same throws.
+    shift : float
+        By how much this throw's landing place deviates [length].
+    """
+
+    law: Any
+    speed: float
+    landing: float
+    seed: float = 0.0
+    shift: float = 0.0
+
+
+def drawn(law: Any, seed: int, start: int, step: int) -> tuple[float, float]:
+    """Return two independent deviations, in units of the largest or the standard one."""
+
+
+drawn = generic(drawn)
+
+
+@kernel
+def _even(law: Any, seed: int, start: int, step: int) -> tuple[float, float]:
+    u, v = uniform_pair(seed, start, step)
+    return 2.0 * u - 1.0, 2.0 * v - 1.0
+
+
+@kernel
+def _normal(law: Any, seed: int, start: int, step: int) -> tuple[float, float]:
+    return normal_pair(seed, start, step)
+
+
+drawn.on(Even, _even)  # type: ignore[attr-defined]  # generic functions carry `on`
+drawn.on(Normal, _normal)  # type: ignore[attr-defined]
+
+
+@kernel
+def moved_by(spread: Any, shift: float) -> float:
+    """Return the displacement of a throw with what its landing place deviates by."""
+    if spread is None:
+        return shift
+    return shift + spread.shift  # type: ignore[no-any-return]  # effects are Any
+
+
+@kernel
+def _at_kappa(bare: Throw, kappa: float) -> Throw:
+    return Throw(
+        bare.flight,
+        bare.flip,
+        kappa,
+        bare.surface_height,
+        bare.arm_length,
+        bare.radius_of_gyration,
+        bare.a,
+        bare.d,
+        bare.length,
+        bare.corner,
+    )
+
+
+@kernel
+def spread_over(spread: Any, params: FullThrow, start: int, step: int) -> FullThrow:
+    """Return the map of throw number `step` of start number `start`; without the effect the map as it is."""
+    if spread is None:
+        return params
+    speed, landing = drawn(spread.law, int(spread.seed), start, step)
+    factor = 1.0 + spread.speed * speed
+    return FullThrow(
+        _at_kappa(params.bare, params.bare.kappa / (factor * factor)),
+        params.outline,
+        params.landing,
+        params.roll,
+        params.pivot,
+        params.slip,
+        params.bounce,
+        params.drive,
+        Spread(spread.law, spread.speed, spread.landing, spread.seed, spread.landing * landing),
+    )
+
+
+def spread_of(world: Any, how: str) -> Spread:
+    """Build the effect from the facts of a scene and its word, "bounded" or "gaussian"."""
+    speed, landing = world.scatter.speed, world.scatter.landing
+    if speed is not None and not speed.relative:
+        raise MapError(
+            "the scatter of the speed", f"{speed.value} rad/s", "a share", "give it in percent of the speed"
+        )
+    law = Even() if how == "bounded" else Normal()
+    return Spread(law, 0.0 if speed is None else speed.value, 0.0 if landing is None else landing.value)

@@ -1,0 +1,212 @@
+"""The part between two events of a throw, as the kernels of the effects pass it on.
+
+Lengths in the scene's unit, rates divided by the throw's w, velocities by w as well, energies by m w^2.  Sides and
+vertices are counted on without end, counterclockwise: number k means side, or its left vertex, k mod n, so that k less
+the side a throw began on is how far the part has turned.  The part touches the arm with vertex k while it has turned
+from lying on side k by 0 <= psi <= the exterior angle there; then it lies on side k + 1.
+
+A place along the arm is given by `shift`: how far the centre of mass would have moved since the throw began, if the
+part came to lie on side k without its vertex k moving.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from limitsets.jit import kernel
+from limitsets.thrower.params import Side, Throw
+from limitsets.thrower.turn import Turned
+
+__all__ = [
+    "Arrival",
+    "Contact",
+    "Face",
+    "FullSide",
+    "FullThrow",
+    "Outline",
+    "above",
+    "on_to_next",
+    "outline_of",
+    "right_of",
+    "side_number",
+]
+
+
+class Outline(NamedTuple):
+    """Where the vertices are.
+
+    Attributes
+    ----------
+    p, q : ndarray, shape (n, n)
+        Of the part lying on side i: vertex k is p[i, k] right of the centre of mass and q[i, k] above it [length].
+    """
+
+    p: NDArray[np.float64]
+    q: NDArray[np.float64]
+
+
+class FullThrow(NamedTuple):
+    """The throw map with effects beyond the minimal model; build it with `effects.with_effects`.
+
+    Attributes
+    ----------
+    bare : Throw
+        The minimal model: part, arm and throw.
+    outline : Outline
+        The part's vertices.
+    landing, roll, pivot, slip, bounce, drive, spread : NamedTuple or None
+        What is simulated: each effect's numbers, None where it is not.
+    """
+
+    bare: Throw
+    outline: Outline
+    landing: Any = None
+    roll: Any = None
+    pivot: Any = None
+    slip: Any = None
+    bounce: Any = None
+    drive: Any = None
+    spread: Any = None
+
+    def __getattr__(self, name: str) -> Any:
+        """Give the numbers of the minimal model under their own names, for all who only read them."""
+        if name in Throw._fields:
+            return getattr(self.bare, name)
+        raise AttributeError(name)
+
+
+class FullSide(NamedTuple):
+    """What the kernels of one side need: the minimal model of this side and of all, and the effects."""
+
+    own: Side
+    a: NDArray[np.float64]
+    d: NDArray[np.float64]
+    length: NDArray[np.float64]
+    corner: NDArray[np.float64]
+    p: NDArray[np.float64]
+    q: NDArray[np.float64]
+    landing: Any
+    roll: Any
+    pivot: Any
+    slip: Any
+    bounce: Any
+    drive: Any
+    spread: Any
+
+
+class Arrival(NamedTuple):
+    """A vertex about to strike the arm.
+
+    Attributes
+    ----------
+    vertex : int
+        Which.
+    psi : Turned
+        How far the part has turned from lying on the side of that number.
+    shift : float
+        The place, see this module [length].
+    vx, vy, omega : float
+        Velocity of the centre of mass and rate of rotation just before [length, 1].
+    """
+
+    vertex: int
+    psi: Turned
+    shift: float
+    vx: float
+    vy: float
+    omega: float
+
+
+class Contact(NamedTuple):
+    """A vertex that has just struck.
+
+    Attributes
+    ----------
+    vertex, psi, shift
+        As in `Arrival`.
+    omega : float
+        Rate of rotation after the impact.
+    slide, lift : float
+        Velocity of the vertex along the arm and off it; the minimal model has 0 and 0 [length].
+    """
+
+    vertex: int
+    psi: Turned
+    shift: float
+    omega: float
+    slide: float
+    lift: float
+
+
+class Face(NamedTuple):
+    """A part that has just come down on a whole side.
+
+    Attributes
+    ----------
+    side : int
+        Which, counted on without end.
+    shift : float
+        How far its centre of mass has moved since the throw began [length].
+    vertex : int
+        The end of the side that touched before: `side` for its left end, `side - 1` for its right.
+    omega : float
+        Rate of rotation just before; its sign is that of the way to this side.
+    slide : float
+        Velocity along the arm [length].
+    """
+
+    side: int
+    shift: float
+    vertex: int
+    omega: float
+    slide: float
+
+
+@kernel
+def side_number(part: FullSide, k: int) -> int:
+    """Index of side or vertex number k."""
+    return k % part.a.size
+
+
+@kernel
+def right_of(part: FullSide, vertex: int, psi: Turned) -> float:
+    """X: how far the centre of mass is right of a vertex that touches [length]."""
+    k = side_number(part, vertex)
+    return part.a[k] * (1.0 - psi.v) - part.d[k] * psi.s  # type: ignore[no-any-return]
+
+
+@kernel
+def above(part: FullSide, vertex: int, psi: Turned) -> float:
+    """H: how far the centre of mass is above a vertex that touches [length]."""
+    k = side_number(part, vertex)
+    return part.a[k] * psi.s + part.d[k] * (1.0 - psi.v)  # type: ignore[no-any-return]
+
+
+@kernel
+def on_to_next(part: FullSide, vertex: int) -> float:
+    """How much farther inward the part lies on side `vertex` + 1 than on side `vertex`, turned about that vertex."""
+    k, after = side_number(part, vertex), side_number(part, vertex + 1)
+    return part.a[k] + (part.length[after] - part.a[after])  # type: ignore[no-any-return]
+
+
+def outline_of(bare: Throw) -> Outline:
+    """Lay the part on every side in turn, from what is known of each side, and say where its vertices are.
+
+    Vertex k is the left end of side k.  Walking clockwise along the outline from the left end of side i, the sides
+    i, i - 1, i - 2, ... follow each other, each turned from the last by the exterior angle between them.
+    """
+    n = bare.a.size
+    p, q = np.empty((n, n)), np.empty((n, n))
+    for side in range(n):
+        x, y, turned = -bare.a[side], -bare.d[side], 0.0
+        for step in range(n):
+            k = (side - step) % n
+            p[side, k], q[side, k] = x, y
+            x, y = x + bare.length[k] * np.cos(turned), y + bare.length[k] * np.sin(turned)
+            turned += bare.corner[(k - 1) % n]
+        # the two ends of the side that lies on the arm are at one height, to the last digit
+        q[side, (side - 1) % n] = -bare.d[side]
+    return Outline(p, q)

@@ -1,0 +1,155 @@
+"""The effect `drive` against the same throw followed in the frame of the room, and against forces sampled densely."""
+
+import math
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+
+import limitsets as ls
+from limitsets.maps import codes, images
+from limitsets.scene import Scene
+from limitsets.thrower.effects.drive import all_the_way
+
+DESIGNED = ls.load("paper-designed")
+
+
+def scene(stroke: float, friction: float | None = None, **changes: str) -> Scene:
+    tree = DESIGNED.with_values(changes).as_dict() if changes else DESIGNED.as_dict()
+    tree["effects"] = {"drive": True}
+    tree["world"] = {"stroke": f"{stroke!r} rad"} | ({} if friction is None else {"friction": friction})
+    return ls.load(tree)
+
+
+def in_the_room(case: Scene, stroke: float, x: float, side: int) -> tuple[float, int]:
+    """One throw in the frame of the room: the arm stands still at the angle `stroke`, gravity points down.
+
+    Everything by vectors from the joint; the landing by a root finder, the pivot by the law of energy.
+    """
+    a, d = case.sides.a[side], case.sides.d[side]
+    h, kappa, rho2 = case.surface_height, case.kappa, case.radius_of_gyration**2
+
+    def turn(vector: tuple[float, float], angle: float) -> np.ndarray:
+        c, s = math.cos(angle), math.sin(angle)
+        return np.array([c * vector[0] - s * vector[1], s * vector[0] + c * vector[1]])
+
+    along, across = turn((1.0, 0.0), stroke), turn((0.0, 1.0), stroke)
+    start = turn((x, h + d), stroke)
+    velocity = turn((-(h + d), x), stroke)  # omega = 1 about the joint
+
+    def centre(phi: float) -> np.ndarray:
+        return start + velocity * phi + np.array([0.0, -0.5 * kappa * phi * phi])
+
+    def vertex(phi: float) -> np.ndarray:
+        return centre(phi) + turn((-a, -d), stroke + phi)
+
+    # the left vertex over the arm's surface, which is h from the joint
+    grid = np.linspace(1e-3, 2 * math.pi, 20001)
+    height = np.array([vertex(t) @ across - h for t in grid])
+    first = int(np.flatnonzero((height[:-1] > 0) & (height[1:] <= 0))[0])
+    phi = brentq(lambda t: vertex(t) @ across - h, grid[first], grid[first + 1], xtol=1e-15)
+
+    v = velocity + np.array([0.0, -kappa * phi])
+    arm = centre(phi) - vertex(phi)  # from the vertex to the centre of mass
+    inertia = rho2 + arm @ arm
+    omega = (rho2 + arm[0] * v[1] - arm[1] * v[0]) / inertia
+    kinetic = 0.5 * inertia * omega**2
+    to_top = kappa * (math.sqrt(arm @ arm) - arm[1])
+    flips = omega > 0 and kinetic > to_top if arm[0] > 0 else not (omega < 0 and kinetic >= to_top)
+    place = float(vertex(phi) @ along)
+    if not flips:
+        return place + a, side
+    after = (side + 1) % len(case.sides)
+    return place - case.sides.right[after], after
+
+
+@pytest.mark.parametrize("stroke", [0.02, 0.1, 0.25])
+def test_is_the_throw_as_seen_from_the_room(stroke: float) -> None:
+    case = scene(stroke)
+    random = np.random.default_rng(5)
+    for side in range(3):
+        x = random.uniform(case.sides.a[side] + 2.0, 26.0, 40)
+        found = images(case.map, x, side)
+        seen = found.code != codes.OUTSIDE_MODEL
+        assert seen.sum() > 10
+        for k in np.flatnonzero(seen):
+            place, lies = in_the_room(case, stroke, float(x[k]), side)
+            assert found.side[k] == lies
+            assert found.x[k] == pytest.approx(place, abs=1e-11)
+
+
+def test_a_short_stroke_is_an_impulse() -> None:
+    """First order in the stroke: x' differs by (kappa/2) sin s phi^2 and smaller things."""
+    x = np.linspace(9.0, 15.0, 301)
+    bare = images(DESIGNED.map, x, 2).x
+    gaps = [np.abs(images(scene(s).map, x, 2).x - bare).max() for s in (1e-4, 1e-5, 1e-6)]
+    assert gaps[0] / gaps[1] == pytest.approx(10.0, rel=1e-3)
+    assert gaps[1] / gaps[2] == pytest.approx(10.0, rel=1e-3)
+
+
+@pytest.mark.parametrize(("stroke", "friction"), [(0.002, None), (0.4, 0.3)])
+def test_the_stroke_needs_a_force_that_pushes_within_the_side_and_within_friction(
+    stroke: float, friction: float | None
+) -> None:
+    """Force and its place from Newton's laws in the room's frame, at 4001 angles of the stroke."""
+    case = scene(stroke, friction)
+    h, kappa, rho2 = case.surface_height, case.kappa, case.radius_of_gyration**2
+    theta = np.linspace(0.0, stroke, 4001)
+    acceleration, rate2 = 0.5 / stroke, theta / stroke
+    answers = set()
+    for side in range(3):
+        a, d, right = case.sides.a[side], case.sides.d[side], case.sides.right[side]
+        for x in np.linspace(a + 0.1, 27.9, 60):
+            height = h + d
+            force = np.array(
+                [
+                    -acceleration * height - rate2 * x + kappa * np.sin(theta),
+                    acceleration * x - rate2 * height + kappa * np.cos(theta),
+                ]
+            )
+            # the moment about the centre of mass turns the part: c N + d T = rho^2 alpha
+            place = (rho2 * acceleration - d * force[0]) / force[1]
+            room = np.minimum.reduce([force[1], right - place, place + a])
+            if friction is not None:
+                room = np.minimum(room, friction * force[1] - np.abs(force[0]))
+            if abs(room.min()) < 1e-3:
+                continue
+            holds = bool(room.min() > 0)
+            code = int(images(case.map, [x], side).code[0])
+            leans = friction is not None and math.tan(stroke) > friction
+            if holds and not leans and code == codes.OUTSIDE_MODEL:
+                # the part flew, but lies nowhere: the side it came down on leans over too far
+                assert any(math.tan(stroke) > case.sides.a[s] / case.sides.d[s] for s in range(3))
+                continue
+            assert (code != codes.OUTSIDE_MODEL) == (holds and not leans)
+            answers.add(holds)
+    assert answers == {True, False}
+
+
+def test_the_least_value_is_found_inside_the_stroke() -> None:
+    random = np.random.default_rng(11)
+    theta = np.linspace(0.0, 1.5, 20001)
+    seen = set()
+    for _ in range(300):
+        stroke = random.uniform(0.05, 1.5)
+        a, b, c, d = random.normal(size=4)
+        at = theta[theta <= stroke]
+        least = (a + b * at + c * np.sin(at) + d * np.cos(at)).min()
+        if abs(least) > 1e-6:
+            assert all_the_way(stroke, a, b, c, d) == (least > 0)
+            seen.add(bool(least > 0))
+    assert seen == {True, False}
+
+
+def test_by_hand() -> None:
+    """Gravity along the arm takes (kappa/2) sin s phi^2 from a jog and leaves kappa cos s across."""
+    stroke = 0.1
+    case = scene(stroke)
+    # the same flight in the minimal model with kappa cos s
+    across = DESIGNED.with_values({"throw.kappa": DESIGNED.kappa * math.cos(stroke)})
+    from limitsets.thrower import trace
+
+    plain, leaning = trace(across.map, 12.0, 2), trace(case.map, 12.0, 2)
+    assert leaning.phi[0] == pytest.approx(plain.phi[0], rel=1e-13)
+    lost = 0.5 * DESIGNED.kappa * math.sin(stroke) * plain.phi[0] ** 2
+    assert leaning.displacement[0] == pytest.approx(plain.displacement[0] - lost, rel=1e-12)
