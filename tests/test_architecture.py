@@ -15,7 +15,7 @@ import limitsets
 ROOT = Path(__file__).resolve().parents[1]
 PACKAGE = ROOT / "limitsets"
 SOURCES = sorted(PACKAGE.rglob("*.py"))
-LATE = ["numba", "scipy", "networkx", "matplotlib", "pint", "pydantic", "typer", "rich"]
+LATE = ["numba", "scipy", "networkx", "matplotlib", "pint", "pydantic", "typer", "rich", "pymunk"]
 
 
 def run_python(code: str, cwd: Path = ROOT) -> str:
@@ -50,6 +50,11 @@ def imported_names(source: Path) -> set[str]:
 def test_only_jit_imports_numba(source):
     numba = {"numba", "llvmlite"} & imported_names(source)
     assert not numba or source == PACKAGE / "jit.py"
+
+
+@pytest.mark.parametrize("source", SOURCES, ids=lambda path: str(path.relative_to(PACKAGE)))
+def test_only_the_engine_room_imports_pymunk(source):
+    assert "pymunk" not in imported_names(source) or source.parent == PACKAGE / "engine"
 
 
 def test_import_loads_none_of_the_late_packages():
