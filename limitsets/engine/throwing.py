@@ -108,7 +108,7 @@ def throw(
     -----
     The joint acts within the step, so the solver finds the plastic impact by itself.  By the hinge, x' is off by about
     (omega^2 ell / 2) step^2, omega being the rate at which the face comes down, and critical points by a multiple of
-    step^2; by unilateral contact x' converges at first order.  The engine's restitution is Newton's, of
+    step^2; by unilateral contact x' converges at about first order.  The engine's restitution is Newton's, of
     velocities, and its friction bounds the impulse of a whole step: with both at once it differs from Poisson's and
     Routh's laws.
 
