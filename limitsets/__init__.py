@@ -18,7 +18,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:  # each from the file that holds it: most rooms have a file of the same name
-    from limitsets import interval, maps, plot
+    from limitsets import engine, interval, maps, plot
     from limitsets.analysis import analyse
     from limitsets.cells import grid
     from limitsets.graph.morse import morse_graph
@@ -44,6 +44,7 @@ _ROOMS = {
     "critical_points": "maps",
     "cycles": "sets.cycles",
     "dump": "scene",
+    "engine": "engine",
     "grid": "cells",
     "interval": "interval",
     "limit_set": "sets.limit_set",
@@ -66,6 +67,7 @@ __all__ = [
     "critical_points",
     "cycles",
     "dump",
+    "engine",
     "grid",
     "interval",
     "limit_set",

@@ -15,7 +15,7 @@ import limitsets
 ROOT = Path(__file__).resolve().parents[1]
 PACKAGE = ROOT / "limitsets"
 SOURCES = sorted(PACKAGE.rglob("*.py"))
-LATE = ["numba", "scipy", "networkx", "matplotlib", "pint", "pydantic", "typer", "rich"]
+LATE = ["numba", "scipy", "networkx", "matplotlib", "pint", "pydantic", "typer", "rich", "pymunk"]
 
 
 def run_python(code: str, cwd: Path = ROOT) -> str:
@@ -56,6 +56,11 @@ def test_the_checker_imports_nothing_of_ours():
     """So that it can be copied, shares no error with the prover, and cannot reach compiled code."""
     checker = PACKAGE / "proofs" / "recheck.py"
     assert imported_names(checker) <= {*sys.stdlib_module_names, "numpy", "flint"}
+
+
+@pytest.mark.parametrize("source", SOURCES, ids=lambda path: str(path.relative_to(PACKAGE)))
+def test_only_the_engine_room_imports_pymunk(source):
+    assert "pymunk" not in imported_names(source) or source.parent == PACKAGE / "engine"
 
 
 def test_import_loads_none_of_the_late_packages():

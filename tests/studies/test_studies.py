@@ -72,3 +72,42 @@ def test_the_table_in_the_readme_is_what_the_study_prints(four_scenes):
     intervals = [line.split("|")[3:5] for line in printed[2:]]
     shown = [line.split("|")[3:5] for line in text.splitlines() if line.startswith("| ")][1:]
     assert shown == intervals
+
+
+@pytest.fixture(scope="module")
+def physics_engine(tmp_path_factory):
+    pytest.importorskip("pymunk")
+    study = load_study("02_physics_engine")
+    out = tmp_path_factory.mktemp("physics-engine")
+    return study, study.main(seed=3, out=out, throws=150), out
+
+
+def test_the_engine_agrees_with_the_map(physics_engine):
+    study, numbers, out = physics_engine
+    expected = json.loads((STUDIES / "02_physics_engine" / "expected.json").read_text(encoding="utf-8"))
+    assert (out / "engine.png").stat().st_size > 20_000
+    for name in study.SCENES:
+        found, wanted = numbers[name], expected[name]
+        assert found["throws"] == 150
+        assert found["sides_that_differ"] == []
+        # the joint's drift, (omega^2 ell / 2) step^2: ell is at most 4.4 in, and these parts turn at less than 9 w
+        assert found["error"]["worst"] < 0.5 * 9.0**2 * 4.4 * study.STEP**2
+        assert found["critical_points"] == pytest.approx(wanted["critical_points"], abs=5e-6)
+        assert found["other_vertex"]["from"] == pytest.approx(wanted["other_vertex_from"], abs=1e-4)
+    errors = numbers["convergence"]
+    for kind in ("place", "critical_point"):
+        assert study.order(errors["step"], errors[kind]) == pytest.approx(expected["order"], abs=0.15)
+
+
+def test_unilateral_contact_in_the_engine(physics_engine):
+    study, numbers, _ = physics_engine
+    expected = json.loads((STUDIES / "02_physics_engine" / "expected.json").read_text(encoding="utf-8"))
+    rests = numbers["unilateral"]
+    assert rests["hinge"] == pytest.approx(expected["hinge"], abs=6e-4)
+    lo, hi = expected["unilateral_without_slip"]
+    assert [lo < rests["by_friction"][mu] < hi for mu in ("0.3", "0.5", "1.0", "2.0", "5.0")] == [
+        False
+    ] * 2 + [True] * 3
+    text = (STUDIES / "02_physics_engine" / "README.md").read_text(encoding="utf-8")
+    places = study.table(numbers).split("\n\n", 1)[1]  # what does not depend on the starts drawn
+    assert set(places.splitlines()) <= set(text.splitlines())
