@@ -39,7 +39,8 @@ def sure_impact_angle(flight: Any, part: Side, x: float) -> tuple[Turned, float]
     """Turn up to the impact (nan: none within a full turn) and the angle's derivative, however long it takes."""
 
 
-sure_impact_angle = generic(sure_impact_angle)
+# Not inlined: one piece of machine code then finds the angle for every caller, and x' is x plus the displacement told.
+sure_impact_angle = generic(sure_impact_angle, inlined=False)
 
 
 @kernel
