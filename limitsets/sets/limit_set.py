@@ -15,6 +15,8 @@ from dataclasses import dataclass
 from itertools import groupby
 from typing import Any, NamedTuple, Protocol
 
+import numpy as np
+
 from limitsets.errors import AnswerError
 from limitsets.graph.graph import TransitionGraph
 from limitsets.graph.morse import morse_graph
@@ -162,7 +164,8 @@ def limit_set_of(
     domain : Domain
         Where the map is looked at; what leaves it is dropped.
     tolerance : float
-        The ends are taken to rest when two images in turn move none of them by more, relative to its size.
+        The ends are taken to rest when two images in turn move none of them by more, relative to its size or to the
+        extent of the largest side, whichever is larger.
     most_iterations : int
         Images after which to give up.
 
@@ -194,10 +197,11 @@ def limit_set_of(
     """
     forward = IntervalMap(params, domain)
     union = read(extents, domain)
+    scale = float(np.max(domain.hi - domain.lo))
     rested, count, leaves = 0, 0, False
     while rested < 2 and count < most_iterations and union:
         image, out = forward.image(union)
-        rested = rested + 1 if same(union, image, tolerance) else 0
+        rested = rested + 1 if same(union, image, tolerance, scale) else 0
         union, count, leaves = image, count + 1, leaves or out
     return LimitSet(
         {side: [(lo.x, hi.x) for lo, hi in intervals] for side, intervals in union.items()},
