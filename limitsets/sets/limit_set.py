@@ -22,6 +22,7 @@ from limitsets.graph.graph import TransitionGraph
 from limitsets.graph.morse import morse_graph
 from limitsets.maps.contract import kind_of
 from limitsets.maps.critical import Sides
+from limitsets.sets.creeping import creeps
 from limitsets.sets.interval_map import IntervalMap
 from limitsets.sets.intervals import Extents, Track, Union, read, same
 
@@ -137,7 +138,9 @@ def _ends(names: tuple[str, ...], union: Union) -> tuple[End, ...]:
     )
 
 
-def _advice(converged: bool, leaves: bool, count: int) -> str | None:
+def _advice(converged: bool, crept: bool, leaves: bool, count: int) -> str | None:
+    if crept:
+        return "an end creeps on by less than the tolerance with no fixed point near: follow it with orbit"
     if not converged:
         return f"the ends still move after {count} images: start from one attractor, or raise most_iterations"
     if leaves:
@@ -203,13 +206,15 @@ def limit_set_of(
         image, out = forward.image(union)
         rested = rested + 1 if same(union, image, tolerance, scale) else 0
         union, count, leaves = image, count + 1, leaves or out
+    crept = rested == 2 and creeps(params, union, tolerance, scale)
+    converged = rested == 2 and not crept
     return LimitSet(
         {side: [(lo.x, hi.x) for lo, hi in intervals] for side, intervals in union.items()},
         _ends(kind_of(params).branches, union),
         count,
-        rested == 2,
+        converged,
         leaves,
-        _advice(rested == 2, leaves, count),
+        _advice(converged, crept, leaves, count),
     )
 
 
