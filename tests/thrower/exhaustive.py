@@ -162,7 +162,8 @@ def throw(part: Part, x: float) -> Exact | None:
     phi = first[0].phi
     height = Height(part, x)
     spread = sum((abs(term) for term in height.terms(phi)), arb(0))
-    phi_condition = max(1.0, float((spread / abs(height.slope(phi)) / phi).mid()))  # the angle is rounded as well
+    # The angle is rounded as well.
+    phi_condition = max(1.0, float((spread / abs(height.slope(phi)) / phi).mid()))
     omega, margin = margin_at(part, x, phi)
     flips = bool(margin > 0)
     terms = [

@@ -126,10 +126,9 @@ def test_the_barrier_keeps_its_digits_at_the_top() -> None:
 def turned_to(part: Part, phi: arb) -> tuple[arb, arb]:
     """R(phi), the start that is over the arm by nothing at phi, and its derivative."""
     a, d = arb(part.a), arb(part.d)
-    low = a * phi.sin() - 2 * d * (phi / 2).sin() ** 2
-    return low / phi + arb(part.kappa) * phi / 2, (
-        a * phi.cos() - d * phi.sin()
-    ) / phi - low / phi**2 + arb(part.kappa) / 2
+    low, rise = a * phi.sin() - 2 * d * (phi / 2).sin() ** 2, a * phi.cos() - d * phi.sin()
+    half = arb(part.kappa) / 2
+    return low / phi + half * phi, (rise - low / phi) / phi + half
 
 
 def grazings(part: Part) -> list[arb]:
