@@ -102,6 +102,7 @@ def _attractors(analysis: Analysis) -> list[dict[str, Any]]:
             "lyapunov": _number(attractor.lyapunov),
             "throws": attractor.throws,
             "in_cells": _number(attractor.in_cells),
+            "stopped": attractor.stopped,
             "advice": limit.advice,
         }
         for attractor, limit, extents, source in known

@@ -33,11 +33,33 @@ class Grid:
     domain : Domain
         What is covered.
     edges : tuple of tuple of ndarray
-        ``edges[side][axis]``, shape (n + 1,): ascending cell borders.
+        ``edges[side][axis]``, shape (n + 1,): ascending cell borders, float64.
+
+    Raises
+    ------
+    GridError
+        For borders that do not ascend, or of fewer digits: rounded to them, distinct borders become one.
     """
 
     domain: Domain
     edges: tuple[tuple[NDArray[np.float64], ...], ...]
+
+    def __post_init__(self) -> None:
+        axes = [axis for side in self.edges for axis in side]
+        if not all(axis.dtype == np.float64 for axis in axes):
+            raise GridError(
+                "the type of the cells' borders",
+                ", ".join(sorted({str(axis.dtype) for axis in axes})),
+                "float64",
+                "compute the borders in float64: narrower numbers may merge them",
+            )
+        if not all(axis.size > 1 and (axis[1:] > axis[:-1]).all() for axis in axes):
+            raise GridError(
+                "the cells",
+                [int(axis.size) - 1 for axis in axes],
+                "cells wider than the spacing of floating-point numbers",
+                "ask for fewer",
+            )
 
     def __repr__(self) -> str:
         return f"Grid({self.n_cells} cells: {', '.join('x'.join(map(str, n)) for n in self.shape.tolist())})"
@@ -245,12 +267,5 @@ def grid(
         else:
             pairs = zip(region.lo[side], region.hi[side], counts, strict=True)
             axes = tuple(np.linspace(lo, hi, n + 1) for lo, hi, n in pairs)
-        if not all((np.diff(axis) > 0).all() for axis in axes):
-            raise GridError(
-                "the number of cells",
-                counts,
-                "cells wider than the spacing of floating-point numbers",
-                "ask for fewer",
-            )
         sides.append(axes)
     return Grid(region, tuple(sides))

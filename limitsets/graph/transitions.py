@@ -13,6 +13,7 @@ from limitsets.graph.images import METHODS
 from limitsets.graph.ranges import build
 from limitsets.graph.target import Target
 from limitsets.maps import kind_of
+from limitsets.maps.contract import require_sides
 
 __all__ = ["transitions"]
 
@@ -40,7 +41,9 @@ def transitions(map: Any, grid: Grid, method: str | None = None, **options: Any)
     Raises
     ------
     AnswerError
-        For a method that is none, or does not fit the map.
+        For a method that is none, or does not fit the map, or an image on a side that the grid has not.
+    MapError
+        For a grid of more sides than the map's.
 
     Examples
     --------
@@ -59,6 +62,7 @@ def transitions(map: Any, grid: Grid, method: str | None = None, **options: Any)
             f"{kind.dimension}, that of {kind.name}",
             "cut another domain",
         )
+    require_sides(map, 0, grid.sides - 1)
     chosen = method or ("end-points" if grid.dimension == 1 else "corners-padded")
     if chosen not in METHODS:
         raise AnswerError("the image method", chosen, ", ".join(METHODS), "correct the word")

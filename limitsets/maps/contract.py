@@ -50,6 +50,7 @@ __all__ = [
     "on_side",
     "on_side_box",
     "register",
+    "require_sides",
     "scattered",
 ]
 
@@ -284,6 +285,31 @@ def kind_of(params: Any) -> MapKind:
             "register it with limitsets.register",
         )
     return kind
+
+
+def _fewest_entries(params: Any) -> int | None:
+    """Length of the shortest array among the parameters, None where there is none."""
+    counts = [
+        len(field) if isinstance(field, np.ndarray) else _fewest_entries(field)
+        for field in params
+        if isinstance(field, np.ndarray | tuple)
+    ]
+    return min((count for count in counts if count is not None), default=None)
+
+
+def require_sides(params: Any, least: int, most: int) -> None:
+    """Refuse sides that a map has not: compiled code would read whatever lies beyond its arrays.
+
+    A map whose parameters hold no array, with one entry per side, is not known to have a last side.
+    """
+    known = _fewest_entries(params)
+    if least < 0 or (known is not None and most >= known):
+        raise MapError(
+            "the side",
+            least if least < 0 else most,
+            "an integer from 0" if known is None else f"an integer from 0 to {known - 1}",
+            "name a side of the map",
+        )
 
 
 def coerce(params: Any) -> Any:

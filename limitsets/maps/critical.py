@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 
 from limitsets.errors import AnswerError
 from limitsets.jit import kernel
-from limitsets.maps.contract import kind_of, margin, on_side
+from limitsets.maps.contract import kind_of, margin, on_side, require_sides
 from limitsets.maps.drivers import images
 from limitsets.maps.search import Array, Codes, hidden, inserted, located, sign_code
 
@@ -79,6 +79,7 @@ def margins(params: Any, x: ArrayLike, side: int) -> Array:
     >>> margins(ls.load("paper-designed").map, [19.0, 21.0], 2) > 0  # r_2 = 20
     array([False,  True])
     """
+    require_sides(params, side, side)
     starts = np.ascontiguousarray(x, dtype=np.float64)
     out = np.empty(starts.size)
     _margins(params, side, starts, out)

@@ -15,9 +15,29 @@ from numpy.typing import ArrayLike, NDArray
 from limitsets.errors import MapError
 from limitsets.jit import generic, kernel
 from limitsets.maps import codes
-from limitsets.maps.contract import displacement, fallback, image, image_on, kind_of, on_side, scattered
+from limitsets.maps.contract import (
+    displacement,
+    fallback,
+    image,
+    image_on,
+    kind_of,
+    on_side,
+    require_sides,
+    scattered,
+)
 
-__all__ = ["Images", "Orbit", "advance", "columns", "images", "images_on", "orbit", "rows", "step"]
+__all__ = [
+    "Images",
+    "Orbit",
+    "advance",
+    "columns",
+    "displacements",
+    "images",
+    "images_on",
+    "orbit",
+    "rows",
+    "step",
+]
 
 
 def pick(xs: Any, k: int) -> Any:
@@ -128,6 +148,12 @@ def _displacement(params: Any, x: float, side: int) -> Any:
     return displacement(on_side(params, side), x, side)
 
 
+def displacements(params: Any, x: ArrayLike, side: int) -> NDArray[np.float64]:
+    """x' - x of many states on one side, without cancellation, for a map with `displacement`."""
+    require_sides(params, side, side)
+    return np.array([_displacement(params, float(at), side) for at in np.asarray(x, dtype=np.float64)])
+
+
 def columns(x: ArrayLike, dimension: int) -> tuple[NDArray[np.float64], ...]:
     """States of shape (n,) or (n, dimension) as a tuple of coordinate arrays, as kernels take them."""
     states = np.asarray(x, dtype=np.float64)
@@ -185,6 +211,11 @@ def images(params: Any, x: ArrayLike, side: int) -> Images:
     Images
         Where they land, and what happened.
 
+    Raises
+    ------
+    MapError
+        For states of another shape, or a side the map has not.
+
     Examples
     --------
     >>> from limitsets import maps
@@ -192,6 +223,7 @@ def images(params: Any, x: ArrayLike, side: int) -> Images:
     array([0.2, 0.2])
     """
     xs = columns(x, kind_of(params).dimension)
+    require_sides(params, side, side)
     count = xs[0].size
     after = tuple(np.empty(count) for _ in xs)
     side_after, code = np.empty(count, np.int64), np.empty(count, np.int64)
@@ -204,6 +236,7 @@ def images_on(
 ) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     """Images of many states on one side if they all took one branch: ``(x', side')``."""
     xs = columns(x, kind_of(params).dimension)
+    require_sides(params, side, side)
     after = tuple(np.empty(xs[0].size) for _ in xs)
     side_after = np.empty(xs[0].size, np.int64)
     _images_on(params, side, branch, xs, after, side_after)
@@ -239,8 +272,7 @@ def start_of(params: Any, x: Any, side: int) -> tuple[float, ...]:
     start = np.atleast_1d(np.asarray(x, dtype=np.float64))
     if start.shape != (kind.dimension,) or not np.isfinite(start).all():
         raise MapError("the start", x, f"{kind.dimension} finite numbers", "give one state")
-    if side < 0:
-        raise MapError("the side of the start", side, "an integer from 0", "count sides from 0")
+    require_sides(params, side, side)
     return tuple(float(v) for v in start)
 
 
@@ -300,6 +332,8 @@ def advance(
 ) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
     """Send many starts `count` steps ahead: states, sides, last codes, steps made before an exit.
 
+    Steps that round away are counted like all others; `orbit` tells them apart ("stalled").
+
     Where the parameters scatter, the starts are numbered on from `first`, and what they draw depends on nothing else:
     the same starts in several batches, or threads, do the same.
 
@@ -312,6 +346,8 @@ def advance(
     """
     xs = tuple(values.copy() for values in columns(x, kind_of(params).dimension))
     sides = np.array(np.broadcast_to(np.asarray(side, dtype=np.int64), xs[0].shape))
+    if sides.size:
+        require_sides(params, int(sides.min()), int(sides.max()))
     code, steps = np.empty(sides.size, np.int64), np.empty(sides.size, np.int64)
     _advance(params, first, count, xs, sides, code, steps)
     return rows(xs), sides, code, steps

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from limitsets.jit import kernel
-from limitsets.maps.contract import image_on
+from limitsets.maps.contract import image_on, require_sides
 
 __all__ = ["along"]
 
@@ -60,6 +60,8 @@ def along(
     """
     starts = np.ascontiguousarray(x, dtype=np.float64)
     sides = np.array(np.broadcast_to(np.asarray(side, dtype=np.int64), starts.shape))
+    if sides.size:
+        require_sides(params, int(sides.min()), int(sides.max()))
     words = np.ascontiguousarray(np.atleast_2d(np.asarray(branches, dtype=np.int64)))
     after, side_after, slope = np.empty(starts.size), np.empty(starts.size, np.int64), np.empty(starts.size)
     _along(params, starts, sides, words, after, side_after, slope)

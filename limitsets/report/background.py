@@ -50,6 +50,15 @@ def trust(analysis: Analysis) -> str:
             f"**Cells too coarse:** {len(analysis.spurious)} recurrent sets vanish when cells are cut finer. "
             "Ask for more cells."
         )
+    for k, attractor in enumerate(analysis.attractors):
+        if attractor.stopped is not None:
+            why = (
+                "came to a throw that moves the part by less than the spacing of numbers; in the model it moves on, "
+                "and what is shown may be no limit set"
+                if attractor.stopped == "stalled"
+                else f"left the arm ({attractor.stopped})"
+            )
+            lines.append(f"**Stopped:** after {attractor.throws} throws the orbit of limit set {k} {why}.")
     parts = [
         f"side {side}: {intervals(found)} {unit}"
         for side, found in analysis.other_vertex_first.items()

@@ -47,6 +47,8 @@ class Attractor:
         Steps that were counted.
     in_cells : float
         Share of the orbit's states in the cells: less than 1 shows cells that the images missed.
+    stopped : str or None
+        Why the orbit ended early: the exit it left by, or "stalled" where a step rounds away (`limitsets.orbit`).
     """
 
     cells: CellSet
@@ -57,6 +59,7 @@ class Attractor:
     lyapunov: float | None
     throws: int
     in_cells: float
+    stopped: str | None
 
 
 def _visits(side: NDArray[np.int64]) -> tuple[tuple[int, ...] | None, dict[int, tuple[int, int]]]:
@@ -106,7 +109,9 @@ def _attractor(graph: TransitionGraph, cells: CellSet, throws: int) -> Attractor
     kind = kind_of(graph.map)
     exponent = lyapunov(graph.map, x, side, throws, skip=TRANSIENT).exponent if kind.has_image_on else None
     flips = float((np.diff(sides) != 0).mean()) if sides.size > 1 else 0.0
-    return Attractor(cells, cells.extents(), order, jogs, flips, exponent, max(sides.size - 1, 0), inside)
+    return Attractor(
+        cells, cells.extents(), order, jogs, flips, exponent, max(sides.size - 1, 0), inside, path.stopped
+    )
 
 
 def attractors(graph: TransitionGraph, throws: int = 200_000) -> tuple[Attractor, ...]:

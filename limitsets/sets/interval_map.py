@@ -21,13 +21,16 @@ from limitsets.sets.intervals import BORDER, EPS, Interval, Track, Union, cut, m
 __all__ = ["IntervalMap"]
 
 
-def _critical_error(params: Any, side: int, x: float) -> float:
-    """How well a bisected change of branch is known: the noise of the margin over its slope, seen on nearby floats."""
+def _critical_error(params: Any, side: int, x: float, extent: float) -> float:
+    """How well a bisected change of branch is known: the noise of the margin over its slope, seen on nearby floats.
+
+    The slope is taken over a millionth of the side's extent.
+    """
     if not kind_of(params).has_margin:
         return float(np.spacing(abs(x)))
     offset = np.arange(-16, 17) * np.spacing(abs(x))
     near = margins(params, x + offset, side)
-    reach = 1e-6 * max(abs(x), 1.0)
+    reach = 1e-6 * extent
     wide = margins(params, [x - reach, x + reach], side)
     slope = (wide[1] - wide[0]) / (2.0 * reach)
     if not (np.isfinite(near).all() and np.isfinite(slope)) or slope == 0.0:
@@ -85,7 +88,8 @@ class IntervalMap:
         }
 
     def _born(self, side: int, x: float, kind: str) -> Track:
-        error = _critical_error(self.params, side, x) if kind == "critical" else 0.0
+        bottom, top = self.bounds[side]
+        error = _critical_error(self.params, side, x, top - bottom) if kind == "critical" else 0.0
         return Track.born(x, kind, side, error)
 
     def image(self, union: Union) -> tuple[Union, bool]:

@@ -121,8 +121,8 @@ def merged(intervals: Iterable[Interval]) -> list[Interval]:
     return union
 
 
-def same(old: Union, new: Union, tolerance: float) -> bool:
-    """Whether no end moved by more than the tolerance, relative to its size (to 1 below 1)."""
+def same(old: Union, new: Union, tolerance: float, scale: float) -> bool:
+    """Whether no end moved by more than the tolerance, relative to its size or to the scale, whichever is larger."""
     if {side: len(parts) for side, parts in old.items()} != {side: len(parts) for side, parts in new.items()}:
         return False
     pairs = (
@@ -131,4 +131,4 @@ def same(old: Union, new: Union, tolerance: float) -> bool:
         for before, after in zip(old[side], new[side], strict=True)
         for a, b in zip(before, after, strict=True)
     )
-    return all(abs(a - b) <= tolerance * max(1.0, abs(b)) for a, b in pairs)
+    return all(abs(a - b) <= tolerance * max(scale, abs(b)) for a, b in pairs)

@@ -15,11 +15,14 @@ from dataclasses import dataclass
 from itertools import groupby
 from typing import Any, NamedTuple, Protocol
 
+import numpy as np
+
 from limitsets.errors import AnswerError
 from limitsets.graph.graph import TransitionGraph
 from limitsets.graph.morse import morse_graph
 from limitsets.maps.contract import kind_of
 from limitsets.maps.critical import Sides
+from limitsets.sets.creeping import creeps
 from limitsets.sets.interval_map import IntervalMap
 from limitsets.sets.intervals import Extents, Track, Union, read, same
 
@@ -135,7 +138,9 @@ def _ends(names: tuple[str, ...], union: Union) -> tuple[End, ...]:
     )
 
 
-def _advice(converged: bool, leaves: bool, count: int) -> str | None:
+def _advice(converged: bool, crept: bool, leaves: bool, count: int) -> str | None:
+    if crept:
+        return "an end creeps on by less than the tolerance with no fixed point near: follow it with orbit"
     if not converged:
         return f"the ends still move after {count} images: start from one attractor, or raise most_iterations"
     if leaves:
@@ -162,7 +167,8 @@ def limit_set_of(
     domain : Domain
         Where the map is looked at; what leaves it is dropped.
     tolerance : float
-        The ends are taken to rest when two images in turn move none of them by more, relative to its size.
+        The ends are taken to rest when two images in turn move none of them by more, relative to its size or to the
+        extent of the largest side, whichever is larger.
     most_iterations : int
         Images after which to give up.
 
@@ -194,18 +200,21 @@ def limit_set_of(
     """
     forward = IntervalMap(params, domain)
     union = read(extents, domain)
+    scale = float(np.max(domain.hi - domain.lo))
     rested, count, leaves = 0, 0, False
     while rested < 2 and count < most_iterations and union:
         image, out = forward.image(union)
-        rested = rested + 1 if same(union, image, tolerance) else 0
+        rested = rested + 1 if same(union, image, tolerance, scale) else 0
         union, count, leaves = image, count + 1, leaves or out
+    crept = rested == 2 and creeps(params, union, tolerance, scale)
+    converged = rested == 2 and not crept
     return LimitSet(
         {side: [(lo.x, hi.x) for lo, hi in intervals] for side, intervals in union.items()},
         _ends(kind_of(params).branches, union),
         count,
-        rested == 2,
+        converged,
         leaves,
-        _advice(rested == 2, leaves, count),
+        _advice(converged, crept, leaves, count),
     )
 
 

@@ -24,6 +24,8 @@ __all__ = ["first_root", "impact_angle", "sure_impact_angle"]
 # leaves an error of its cube, below half an ulp.
 SMALL = 2.0**-4
 CONVERGED = 2.0**-18
+# A bound of the second derivative has to stay positive; any larger one is a bound too.
+LEAST_BEND = 2.0**-20
 # Steps of the march below this fraction of phi no longer move it.
 STILL = 2.0**-52
 
@@ -39,7 +41,8 @@ def sure_impact_angle(flight: Any, part: Side, x: float) -> tuple[Turned, float]
     """Turn up to the impact (nan: none within a full turn) and the angle's derivative, however long it takes."""
 
 
-sure_impact_angle = generic(sure_impact_angle)
+# Not inlined: one piece of machine code then finds the angle for every caller, and x' is x plus the displacement told.
+sure_impact_angle = generic(sure_impact_angle, inlined=False)
 
 
 @kernel
@@ -86,18 +89,25 @@ def first_root(part: Side, x: float) -> float:
     """Smallest positive root of f, nan where there is none within a full turn.
 
     A march that cannot step over a root: f'' >= -M with M = kappa + ell, so f stays positive up to the positive
-    root of the parabola f + f' t - M t^2/2.  Near a simple root the steps shrink quadratically; near a touching
-    one geometrically, and never to nothing while f is positive.
+    root of the parabola f + f' t - M t^2/2.  Over the next t <= phi the third derivative is -(a + 2 d phi) at least,
+    which bounds f'' by its value here: near the vertex, for kappa near d, that takes a dozen steps where M takes
+    millions.  Near a simple root the steps shrink quadratically; near a touching one geometrically, and never to
+    nothing while f is positive.
     """
     reach = x - part.a
-    bound = part.kappa + part.ell
-    phi = 2.0 * reach / bound
+    most = part.kappa + part.ell
+    phi = 2.0 * reach / most
     while phi <= 2.0 * math.pi:
-        f, slope = _height(part, reach, turn(phi))
+        at = turn(phi)
+        f, slope = _height(part, reach, at)
         if f <= 0.0:
             return phi
+        bend = (part.kappa - part.d) + part.d * at.v - part.a * at.s
+        here = max(bend + phi * (part.a + 2.0 * part.d * phi) / 3.0, LEAST_BEND * most)
+        bound = min(here, most)
         root = math.sqrt(slope * slope + 2.0 * bound * f)
         step = (slope + root) / bound if slope > 0.0 else 2.0 * f / (root - slope)
+        step = min(step, phi) if here < most else step
         if step <= STILL * phi:
             return phi
         phi += step

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import limitsets as ls
-from limitsets.cells import Domain
+from limitsets.cells import Domain, Grid, as_domain
 from limitsets.errors import GridError
 
 ANCHORED = Domain([[1.001], [2.0005]], [[28.0], [20.0]], [1.0, 2.0])
@@ -100,3 +100,30 @@ def test_grids_that_cannot_be_are_refused(domain, options, word):
 def test_an_anchor_inside_the_box_is_refused():
     with pytest.raises(GridError, match="anchor"):
         Domain([[1.0]], [[2.0]], [1.5])
+
+
+def test_borders_of_fewer_digits_are_refused_before_they_merge() -> None:
+    edges = np.linspace(1.0, 1.0 + 1e-7, 5)
+    domain = as_domain([(1.0, 1.0 + 1e-7)])
+    assert np.unique(edges.astype(np.float32)).size < edges.size  # what would happen
+    with pytest.raises(GridError, match="float64"):
+        Grid(domain, ((edges.astype(np.float32),),))
+    # Corners in float32 are taken as the numbers they are; equal ones are no box.
+    assert ls.grid(np.array([(0.1, 0.3)], dtype=np.float32), cells=2).edges[0][0][0] == float(np.float32(0.1))
+    with pytest.raises(GridError, match="lo < hi"):
+        ls.grid(np.array([(1.0, 1.0 + 1e-9)], dtype=np.float32), cells=2)
+
+
+def test_cells_narrower_than_the_spacing_of_numbers_are_refused_however_they_are_made() -> None:
+    lo, hi = 1.0, 1.0 + 64 * 2.0**-52
+    fine = ls.grid([(lo, hi)], cells=64)
+    with pytest.raises(GridError, match="spacing"):
+        fine.refine(2)
+    with pytest.raises(GridError, match="spacing"):
+        ls.grid([(lo, hi)], cells=128)
+    with pytest.raises(GridError, match="spacing"):
+        Grid(as_domain([(0.0, 1.0)]), ((np.array([0.0, 0.5, 0.5, 1.0]),),))
+    # The domain of a throw whose arm all but ends at a_i.
+    near = Domain([[2.0 + 1e-15]], [[2.0 + 3e-15]], [2.0])
+    with pytest.raises(GridError, match="spacing"):
+        ls.grid(near, cells=64)

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from limitsets.cells import Grid
+from limitsets.errors import AnswerError
 from limitsets.graph.boxes import Boxes, merged
 from limitsets.graph.images.samples import Samples
 from limitsets.graph.images.undecided import every_branch, split
@@ -120,6 +121,19 @@ def sampled(method: Callable[..., Samples]) -> Callable[..., Boxes]:
     return images_of
 
 
+def _require_sides(grid: Grid, to: Any, code: Any) -> None:
+    """Refuse images on sides that the grid has not: compiled code would read whatever lies beyond its edges."""
+    if to.size and (to.min() < 0 or to.max() >= grid.sides):
+        beyond = to[(code >= 0) & ((to < 0) | (to >= grid.sides))]
+        if beyond.size:
+            raise AnswerError(
+                "the side of an image",
+                int(beyond[0]),
+                f"one of the {grid.sides} of the grid",
+                "cut a domain with one box for each side of the map",
+            )
+
+
 def _boxes_of_side(params: Any, grid: Grid, side: int, target: Target, samples: Samples) -> Boxes:
     """Boxes of all cells of one side."""
     dimension, shape = grid.dimension, grid.shape[side]
@@ -136,6 +150,7 @@ def _boxes_of_side(params: Any, grid: Grid, side: int, target: Target, samples: 
         to, code = np.empty(count, np.int16), np.empty(count, np.int8)
         run = tuple(np.empty(samples.axes[-1].size) for _ in range(dimension))
         second = _images_of_product(params, side, samples.axes, run, after, to, code) / count
+    _require_sides(grid, to, code)
     state, side_out = np.empty(n, np.int8), np.zeros(n, np.int32)
     lo, hi = np.empty((n, dimension), np.int32), np.empty((n, dimension), np.int32)
     exits = np.zeros(n, np.uint8)

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from limitsets.errors import AnswerError
 from limitsets.graph.boxes import Boxes, leaving, placed
 from limitsets.graph.images.samples import Samples
 from limitsets.graph.target import Target
@@ -23,8 +24,8 @@ from limitsets.maps.drivers import step
 
 __all__ = ["every_branch", "split"]
 
-# Pieces that one cell may be cut into; a seventh would need cells far too coarse for anything.
-MOST_PIECES = 6
+# Pieces that one cell may be cut into, at first and at last: more than six are rare, more than the last an error.
+FEW_PIECES, MOST_PIECES = 6, 1536
 
 # A forced image this close to a real one, relative to the domain's size, comes from the same branch.
 SAME_IMAGE = 1e-9
@@ -33,16 +34,22 @@ SAME_IMAGE = 1e-9
 @kernel(entry=True)
 def _pieces(
     params: Any, side: int, lo: Any, hi: Any, most: int, x: Any, side_after: Any, code_after: Any
-) -> None:
-    """Cut [lo, hi] where the branch changes: images of the ends of up to `most` pieces, in the order met."""
+) -> int:
+    """Cut [lo, hi] where the branch changes: images of the ends of up to `most` pieces, in the order met.
+
+    Returns how many cells have more.
+    """
     here = on_side(params, side)
+    more = 0
     for cell in range(lo.size):
+        more += 1
         left = lo[cell]
         end, to_end, code_end = step(here, hi[cell], side)
         for piece in range(most):
             x[cell, piece, 0], side_after[cell, piece], code_after[cell, piece] = step(here, left, side)
             if code_after[cell, piece] == code_end and side_after[cell, piece] == to_end:
                 x[cell, piece, 1] = end
+                more -= 1
                 break
             a, b = left, hi[cell]
             while True:
@@ -56,17 +63,28 @@ def _pieces(
                     b = middle
             x[cell, piece, 1], _, _ = step(here, a, side)
             left = b
+    return more
 
 
 def split(params: Any, side: int, target: Target, samples: Samples, cells: NDArray[np.int64]) -> list[Boxes]:
     """Images of the pieces of undecided cells in one dimension."""
     edges = samples.axes[0]
-    shape = (cells.size, MOST_PIECES)
-    x = np.full((*shape, 2), np.nan)
-    to: NDArray[np.int64] = np.zeros(shape, np.int64)
-    code: NDArray[np.int64] = np.full(shape, codes.UNSETTLED, np.int64)
-    _pieces(params, side, edges[cells], edges[cells + 1], MOST_PIECES, x, to, code)
-    owner = np.repeat(cells, MOST_PIECES)
+    pieces, more = FEW_PIECES // 2, cells.size
+    while more:
+        pieces *= 2
+        if pieces > MOST_PIECES:
+            raise AnswerError(
+                "the number of changes of branch in one cell",
+                f"over {MOST_PIECES}",
+                f"at most {MOST_PIECES}",
+                "ask for more cells",
+            )
+        shape = (cells.size, pieces)
+        x = np.full((*shape, 2), np.nan)
+        to: NDArray[np.int64] = np.zeros(shape, np.int64)
+        code: NDArray[np.int64] = np.full(shape, codes.UNSETTLED, np.int64)
+        more = _pieces(params, side, edges[cells], edges[cells + 1], pieces, x, to, code)
+    owner = np.repeat(cells, pieces)
     code, to, ends = code.reshape(-1), to.reshape(-1), x.reshape(-1, 2)
     real = (code > codes.OUTSIDE_MODEL) & np.isfinite(ends).all(axis=1)
     found = [
@@ -99,7 +117,7 @@ def every_branch(
     """
     kind = kind_of(params)
     after, to, code = seen
-    size = max(float(np.ptp(target.edges)), 1.0)
+    size = float(np.ptp(target.edges))
     real = np.stack([values[numbers] for values in after], axis=-1)  # (cells, points, dimension)
     to, code = to[numbers].astype(np.int64), code[numbers].astype(np.int64)
     landed = (code > codes.OUTSIDE_MODEL) & np.isfinite(real).all(axis=-1)
