@@ -1,0 +1,49 @@
+"""What a scene does not ask for is not in its machine code: the bare map's is the same with the effects deleted."""
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import limitsets
+
+PACKAGE = Path(limitsets.__file__).parent
+
+# Prints a digest of the machine code of one compiled loop over throws; symbols carry counters, so they are left out.
+SCRIPT = """
+import hashlib, re, sys
+import numpy as np
+import limitsets as ls
+from limitsets.maps import drivers, images
+if sys.argv[1] == "with":
+    import limitsets.thrower.effects
+images(ls.load("paper-designed").map, np.linspace(9.0, 20.0, 8), 2)
+(signature,) = drivers._images.signatures
+code = drivers._images.inspect_asm(signature)
+lines = [line for line in code.splitlines() if not line.lstrip().startswith((".", "#"))]
+body = re.sub(r"[A-Za-z0-9_.$]*_ZN?[A-Za-z0-9_.$]*|\\.?numba[A-Za-z0-9_.$]*|NRT[A-Za-z0-9_]*", "symbol", "\\n".join(lines))
+print(len(lines), hashlib.sha256(body.encode()).hexdigest())
+"""
+
+
+def machine_code(folder: Path, word: str) -> str:
+    environment = {**os.environ, "PYTHONPATH": str(folder), "NUMBA_CACHE_DIR": str(folder / "cache")}
+    done = subprocess.run(
+        [sys.executable, "-c", SCRIPT, word], capture_output=True, text=True, check=False, env=environment
+    )
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+def test_the_bare_map_has_the_same_machine_code_without_the_effects(tmp_path: Path) -> None:
+    copies = []
+    for word in ("with", "without"):
+        copy = tmp_path / word / "limitsets"
+        shutil.copytree(PACKAGE, copy, ignore=shutil.ignore_patterns("__pycache__"))
+        if word == "without":
+            shutil.rmtree(copy / "thrower" / "effects")
+            (copy / "thrower" / "full.py").unlink()
+        copies.append(machine_code(copy.parent, word))
+    assert copies[0] == copies[1]
+    assert int(copies[0].split()[0]) > 500  # there is a loop in it
