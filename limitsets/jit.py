@@ -47,7 +47,7 @@ PACKAGE = Path(__file__).resolve().parent
 
 # Rooms without kernels: editing a picture must not throw away every compiled loop.  An import contract keeps
 # them from importing this file.
-KERNEL_FREE = {"scene", "goals", "analysis", "plot", "report", "cli"}
+KERNEL_FREE = {"scene", "goals", "auditing", "analysis", "plot", "report", "cli"}
 
 # Digests kept side by side; older ones are deleted when a new one appears.
 KEPT_DIGESTS = 8
