@@ -71,7 +71,7 @@ def _after_any_throw(graph: TransitionGraph) -> Extents:
 
 
 def _seen_after_a_throw(graph: TransitionGraph) -> Extents:
-    """The same, from the images of the cells' ends, for a map whose branches cannot be followed one by one."""
+    """Find the same from images of the cells' ends, where the map's branches cannot be followed one by one."""
     from limitsets.maps import images
 
     found: dict[int, list[tuple[float, float]]] = {}

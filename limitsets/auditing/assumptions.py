@@ -58,6 +58,8 @@ class Assumption:
         The effect that lifts it, or "release" and "arm", which no effect does.
     what : str
         Which of the effect's assumptions.
+    name : str
+        The assumption in three or four words.
     words : str
         The assumption, in the words of someone who builds a feeder.
     value : str
@@ -74,6 +76,7 @@ class Assumption:
 
     effect: str
     what: str
+    name: str
     words: str
     value: str
     dimension: str
@@ -106,18 +109,19 @@ def _friction(scene: Scene, _: ParameterBox) -> Terms:
 
 
 def _bounce(scene: Scene, _: ParameterBox) -> Terms:
-    """The height of the bounce is e^2 times that of the fall."""
+    """Compare the height of the bounce, e^2 times that of the fall, with the threshold."""
     e, threshold = scene.world.restitution, scene.world.bounce_threshold
     if e == 0.0:
         return Terms(_everywhere(scene, math.inf), scale=0.0)
     if e is None and threshold is None:
         return Terms(None, missing="restitution", matters=lambda fall: None)
     if e is None:
-
-        def least(fall: float) -> float | None:
-            return math.sqrt(threshold / fall) if threshold < fall else None
-
-        return Terms(None, missing="restitution", matters=least)
+        height = threshold or 0.0
+        return Terms(
+            None,
+            missing="restitution",
+            matters=lambda fall: math.sqrt(height / fall) if height < fall else None,
+        )
     if threshold is None:
         return Terms(None, scale=e * e, missing="bounce_threshold")
     return Terms(_everywhere(scene, threshold), scale=e * e)
@@ -154,6 +158,7 @@ ASSUMPTIONS = (
     Assumption(
         "release",
         "tipping",
+        "throw does not tip it",
         "the throw itself does not tip the part over an end of its side",
         "room between the throw's impulse and the side's end",
         "length",
@@ -164,6 +169,7 @@ ASSUMPTIONS = (
     Assumption(
         "release",
         "friction",
+        "no sliding in the throw",
         "the part does not slide on the arm while it is thrown",
         "friction the throw needs",
         "",
@@ -174,6 +180,7 @@ ASSUMPTIONS = (
     Assumption(
         "landing",
         "angle",
+        "left corner lands first",
         "the left corner lands first",
         "turned in the air",
         "angle",
@@ -184,6 +191,7 @@ ASSUMPTIONS = (
     Assumption(
         "slip",
         "press",
+        "landing presses",
         "the corner that lands is pressed onto the arm, and need not be held back",
         "impulse at the landing, in that of the throw",
         "",
@@ -194,6 +202,7 @@ ASSUMPTIONS = (
     Assumption(
         "slip",
         "friction",
+        "landing does not slide",
         "the corner that lands sticks",
         "friction the landing needs",
         "",
@@ -204,6 +213,7 @@ ASSUMPTIONS = (
     Assumption(
         "bounce",
         "height",
+        "no bounce",
         "the corner that lands does not bounce",
         "height of the bounce",
         "length",
@@ -214,6 +224,7 @@ ASSUMPTIONS = (
     Assumption(
         "pivot",
         "press",
+        "corner stays down",
         "the corner stays on the arm by itself while the part turns about it",
         "least force of the arm on the corner, in weights of the part",
         "",
@@ -224,6 +235,7 @@ ASSUMPTIONS = (
     Assumption(
         "pivot",
         "friction",
+        "corner does not slide",
         "the corner does not slide while the part turns about it",
         "friction the turning needs",
         "",
@@ -234,6 +246,7 @@ ASSUMPTIONS = (
     Assumption(
         "roll",
         "energy",
+        "lies still, no roll",
         "the part lies still once a side has come down",
         "energy left, in that needed to roll on or back",
         "",
@@ -244,7 +257,8 @@ ASSUMPTIONS = (
     Assumption(
         "drive",
         "stroke",
-        "the arm gets its speed at once, in no angle",
+        "throw needs no stroke",
+        "the arm has its speed at once, without a stroke",
         "shift of the landing by the stroke",
         "length",
         Assumed.STROKE,
@@ -254,6 +268,7 @@ ASSUMPTIONS = (
     Assumption(
         "spread",
         "scatter",
+        "throws all alike",
         "every throw and landing is like the other",
         "shift of the landing by scatter",
         "length",
@@ -264,6 +279,7 @@ ASSUMPTIONS = (
     Assumption(
         "arm",
         "reach",
+        "rests on the arm",
         "the part comes to rest on the arm",
         "room to the arm's end or the joint",
         "length",

@@ -152,7 +152,8 @@ class _Row:
             return pair
         pair = np.where(np.isfinite(pair), scale * pair + offset, pair)
         ends = np.array([-np.inf, np.inf])
-        return np.nextafter(np.nextafter(pair, ends), ends)
+        wider: Array = np.nextafter(np.nextafter(pair, ends), ends)
+        return wider
 
     def reached(self, found: Array) -> Array:
         """Give what is surely reached: the end of the enclosure that breaks the least."""
@@ -213,16 +214,19 @@ def _worst(row: _Row, found: Mapping[int, Array], samples: Mapping[int, Sample])
             if row.terms.limit is None:
                 matters = row.terms.matters(value) if math.isfinite(value) else None
                 threshold = math.nan if matters is None else matters
-            best = excess[k], {
-                "side": side,
-                "x": float(samples[side].x[k]),
-                "worst": value if math.isfinite(value) else None,
-                "threshold": threshold if math.isfinite(threshold) else None,
-            }
+            best = (
+                excess[k],
+                {
+                    "side": side,
+                    "x": float(samples[side].x[k]),
+                    "worst": value if math.isfinite(value) else None,
+                    "threshold": threshold if math.isfinite(threshold) else None,
+                },
+            )
     return best[1]
 
 
-def _shares(broken: Mapping[int, Flags], samples: Mapping[int, Sample]) -> dict[str, tuple[int, int]]:
+def _shares(broken: Mapping[int, Flags], samples: Mapping[int, Sample]) -> dict[str, Any]:
     from limitsets.maps import codes
 
     def count(wanted: int) -> tuple[int, int]:
@@ -233,7 +237,9 @@ def _shares(broken: Mapping[int, Flags], samples: Mapping[int, Sample]) -> dict[
     return {"jogs": count(codes.JOG), "flips": count(codes.FLIP), "others": count(codes.ROLL)}
 
 
-def _ranges(box: ParameterBox, row: _Row, found: Mapping[int, Array], domain: Mapping[int, Sample]) -> Extents:
+def _ranges(
+    box: ParameterBox, row: _Row, found: Mapping[int, Array], domain: Mapping[int, Sample]
+) -> Extents:
     ranges = {}
     for side, sample in domain.items():
 
@@ -251,16 +257,12 @@ def _findings(
 ) -> tuple[Finding, ...]:
     """Every assumption in one place."""
     limit = place == "limit-set"
-    samples, cells = (
-        (asked.orbits, asked.limit_cells) if limit else (asked.domain, asked.domain_cells)
-    )
+    samples, cells = (asked.orbits, asked.limit_cells) if limit else (asked.domain, asked.domain_cells)
     sound = asked.enclosed or not limit
     found = {side: _ask(box, side, sample.x) for side, sample in samples.items()}
     broken = [{side: row.broken(seen, side) for side, seen in found.items()} for row in rows]
     hit = [any(flags.any() for flags in each.values()) for each in broken]
-    hopeful = [
-        k for k, row in enumerate(rows) if not hit[k] and row.terms.limit is not None and bool(cells)
-    ]
+    hopeful = [k for k, row in enumerate(rows) if not hit[k] and row.terms.limit is not None and bool(cells)]
     proved = dict(zip(hopeful, _all_kept(box, cells, [rows[k] for k in hopeful]), strict=True))
     findings = []
     for k, row in enumerate(rows):

@@ -33,7 +33,9 @@ class Assumed(IntEnum):
     UNDER = 0  # how far inside the side's ends the throw's impulse acts [length]
     RELEASE_FRICTION = 1  # friction that the throw needs
     ANGLE = 2  # turned in the air [rad]
-    PRESS = 3  # normal impulse of the landing that sticks, in that of the throw; below 0 it would have to pull
+    PRESS = (
+        3  # normal impulse of the landing that sticks, in that of the throw; below 0 it would have to pull
+    )
     STICK_FRICTION = 4  # friction that sticking needs; inf where it would have to pull
     FORCE = 5  # least normal force at the vertex until a side lies flat, in weights
     HOLD_FRICTION = 6  # friction needed until then; inf where the force would have to pull
@@ -125,9 +127,7 @@ def _rolls(b: SideBox, rest: Rest, energy: Interval, jog: bool) -> Interval:
     share = iv.div(keeps, iv.mul(iv.add(own, iv.sqr(struck)), iv.add(own, iv.sqr(other))))
     kinetic = iv.mul(share, left)
     rocked = iv.mul(share, kinetic)
-    return iv.maximum(
-        iv.div(kinetic, _needed(b, rest, struck)), iv.div(rocked, _needed(b, rest, other))
-    )
+    return iv.maximum(iv.div(kinetic, _needed(b, rest, struck)), iv.div(rocked, _needed(b, rest, other)))
 
 
 @proof_kernel
@@ -259,7 +259,7 @@ def corner_bounds(lo: Throw, hi: Throw, side: int, guess: float) -> tuple[float,
     while width < 0.25:
         below, beyond = guess * (1.0 - width), guess * (1.0 + width)
         good = _beyond(lo, hi, side, below)[0] > 0.0 > _beyond(lo, hi, side, beyond)[1]
-        if good and 0.0 < below and beyond < 3.14:
+        if good and below > 0.0 and beyond < 3.14:
             return below, beyond
         width *= 4.0
     return 0.0, math.pi
