@@ -51,8 +51,7 @@ def _verdict(finding: Finding) -> str:
         return f"holds ({finding.how})"
     if finding.place == "limit-set":
         return f"BREAKS: {_share(finding)}"
-    ranges = "; ".join(f"side {side}: {intervals(parts, 1)}" for side, parts in finding.ranges.items())
-    return f"breaks on {ranges}"
+    return f"breaks on side {', '.join(map(str, finding.ranges))}"
 
 
 def _worst(finding: Finding, unit: str) -> str:
@@ -123,6 +122,17 @@ def summary(found: Audit) -> list[str]:
     return [*lines, where]
 
 
+def _broken_ranges(found: Audit) -> str:
+    """Say where on the arm each assumption breaks."""
+    rows = [
+        [finding.about.name, side, intervals(parts, 4)]
+        for finding in found.on("domain")
+        for side, parts in finding.ranges.items()
+    ]
+    heads = ["breaks", "on side", f"for x [{found.scene.unit}]"]
+    return "Where on the arm it breaks:\n\n" + table(heads, rows) if rows else ""
+
+
 def audit_page(found: Audit, figure: str | None = None) -> str:
     """Write the page.
 
@@ -155,6 +165,7 @@ def audit_page(found: Audit, figure: str | None = None) -> str:
         "" if figure is None else f"![Where along the arm each assumption holds and breaks]({figure})",
         "What is assumed, and how it is measured:",
         "\n".join(details),
+        _broken_ranges(found),
         HOW,
     ]
     return "\n\n".join(part for part in parts if part) + "\n"

@@ -108,7 +108,8 @@ def hinge_force(
         first = outer[0] + k * step
         last = outer[1] if k == SLICES - 1 else outer[0] + (k + 1) * step
         most = max(most, _friction(ell, rho2, energy, (first, last))[1])
-        for height in (first, last):
-            if inner[0] <= height <= inner[1]:
+        for border in (first, last):
+            height = min(max(border, inner[0]), inner[1])
+            if inner[0] <= inner[1]:
                 attained = max(attained, _friction(ell, rho2, energy, (height, height))[0])
     return force, (attained, most)
