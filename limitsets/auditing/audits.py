@@ -15,10 +15,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from limitsets.auditing.assumptions import ASSUMPTIONS, Assumption, Terms
-from limitsets.auditing.places import Cells, Places, Sample, places
+from limitsets.auditing.assumptions import ASSUMPTIONS, Assumption
+from limitsets.auditing.judging import Row, all_kept, ask
+from limitsets.auditing.places import Places, Sample, places
 from limitsets.auditing.stretches import where
-from limitsets.thrower.assumed_box import assumed
 
 if TYPE_CHECKING:
     from limitsets.proofs.parameters import ParameterBox
@@ -29,9 +29,6 @@ __all__ = ["Audit", "Finding", "audit"]
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 Extents = dict[int, list[tuple[float, float]]]
-
-# A cell on which an assumption is not proved is halved this often, as long as there are no more cells than these.
-HALVINGS, MOST_CELLS = 10, 200_000
 
 
 @dataclass(frozen=True)
@@ -135,70 +132,7 @@ class Audit:
         return [finding.to_json() for finding in self.findings]
 
 
-class _Row:
-    """One assumption with the facts of a scene."""
-
-    def __init__(self, about: Assumption, terms: Terms) -> None:
-        self.about, self.terms = about, terms
-
-    def limit(self, side: int) -> float:
-        return math.nan if self.terms.limit is None else float(self.terms.limit[side])
-
-    def values(self, found: Array) -> Array:
-        """Both ends of the number, widened by the rounding of scale and offset."""
-        pair: Array = found[:, self.about.column]
-        scale, offset = self.terms.scale, self.terms.offset
-        if scale == 1.0 and offset == 0.0:
-            return pair
-        pair = np.where(np.isfinite(pair), scale * pair + offset, pair)
-        ends = np.array([-np.inf, np.inf])
-        wider: Array = np.nextafter(np.nextafter(pair, ends), ends)
-        return wider
-
-    def reached(self, found: Array) -> Array:
-        """Give what is surely reached: the end of the enclosure that breaks the least."""
-        return self.values(found)[:, 0 if self.about.below else 1]
-
-    def broken(self, found: Array, side: int) -> Flags:
-        """Whether it is proved to be broken; never where nothing is known."""
-        reached = self.reached(found)
-        beyond = reached > self.limit(side) if self.about.below else reached < self.limit(side)
-        # no value of a missing fact is enough
-        hopeless = np.isposinf(reached) if self.about.below else np.isneginf(reached)
-        return beyond | (hopeless & (self.terms.limit is None))
-
-    def kept(self, found: Array, side: int) -> Flags:
-        """Whether it is proved to hold."""
-        values = self.values(found)
-        return values[:, 1] <= self.limit(side) if self.about.below else values[:, 0] >= self.limit(side)
-
-
-def _ask(box: ParameterBox, side: int, x: Array) -> Array:
-    return assumed(box.lo, box.hi, side, x, x)
-
-
-def _all_kept(box: ParameterBox, cells: Cells, rows: list[_Row]) -> list[bool]:
-    """Whether each assumption is proved to hold on all cells, halving those on which it is not."""
-    open_rows = np.ones(len(rows), dtype=bool)
-    for side, (lo, hi) in cells.items():
-        needed = np.tile(open_rows, (lo.size, 1))
-        for halving in range(HALVINGS + 1):
-            found = assumed(box.lo, box.hi, side, lo, hi)
-            kept = np.stack([row.kept(found, side) for row in rows], axis=1)
-            needed &= ~kept & open_rows
-            again = needed.any(axis=1)
-            if not again.any():
-                break
-            if halving == HALVINGS or 2 * int(again.sum()) > MOST_CELLS:
-                open_rows &= ~needed.any(axis=0)
-                break
-            lo, hi, needed = lo[again], hi[again], np.repeat(needed[again], 2, axis=0)
-            middle = lo + 0.5 * (hi - lo)
-            lo, hi = np.stack([lo, middle], axis=1).ravel(), np.stack([middle, hi], axis=1).ravel()
-    return open_rows.tolist()
-
-
-def _worst(row: _Row, found: Mapping[int, Array], samples: Mapping[int, Sample]) -> dict[str, Any]:
+def _worst(row: Row, found: Mapping[int, Array], samples: Mapping[int, Sample]) -> dict[str, Any]:
     """Find the throw whose number is farthest beyond its limit, or nearest to it."""
     best: tuple[float, dict[str, Any]] = (-math.inf, {})
     for side, seen in found.items():
@@ -237,14 +171,12 @@ def _shares(broken: Mapping[int, Flags], samples: Mapping[int, Sample]) -> dict[
     return {"jogs": count(codes.JOG), "flips": count(codes.FLIP), "others": count(codes.ROLL)}
 
 
-def _ranges(
-    box: ParameterBox, row: _Row, found: Mapping[int, Array], domain: Mapping[int, Sample]
-) -> Extents:
+def _ranges(box: ParameterBox, row: Row, found: Mapping[int, Array], domain: Mapping[int, Sample]) -> Extents:
     ranges = {}
     for side, sample in domain.items():
 
         def broken(x: Array, side: int = side) -> Flags:
-            return row.broken(_ask(box, side, x), side)
+            return row.broken(ask(box, side, x), side)
 
         parts = where(broken, sample.x, row.broken(found[side], side))
         if parts:
@@ -253,17 +185,17 @@ def _ranges(
 
 
 def _findings(
-    place: str, scene: Scene, box: ParameterBox, rows: list[_Row], asked: Places
+    place: str, scene: Scene, box: ParameterBox, rows: list[Row], asked: Places
 ) -> tuple[Finding, ...]:
     """Every assumption in one place."""
     limit = place == "limit-set"
     samples, cells = (asked.orbits, asked.limit_cells) if limit else (asked.domain, asked.domain_cells)
     sound = asked.enclosed or not limit
-    found = {side: _ask(box, side, sample.x) for side, sample in samples.items()}
+    found = {side: ask(box, side, sample.x) for side, sample in samples.items()}
     broken = [{side: row.broken(seen, side) for side, seen in found.items()} for row in rows]
     hit = [any(flags.any() for flags in each.values()) for each in broken]
     hopeful = [k for k, row in enumerate(rows) if not hit[k] and row.terms.limit is not None and bool(cells)]
-    proved = dict(zip(hopeful, _all_kept(box, cells, [rows[k] for k in hopeful]), strict=True))
+    proved = dict(zip(hopeful, all_kept(box, cells, [rows[k] for k in hopeful]), strict=True))
     findings = []
     for k, row in enumerate(rows):
         called = True if hit[k] else (None if row.terms.limit is None or not samples else False)
@@ -319,7 +251,7 @@ def audit(scene: str | Path | Mapping[str, Any] | Scene) -> Audit:
 
     chosen = scene if isinstance(scene, Scene) else load(scene)
     box = parameter_box(chosen)
-    rows = [_Row(about, about.terms(chosen, box)) for about in ASSUMPTIONS]
+    rows = [Row(about, about.terms(chosen, box)) for about in ASSUMPTIONS]
     asked = places(chosen, box)
     findings = [
         finding for place in ("limit-set", "domain") for finding in _findings(place, chosen, box, rows, asked)

@@ -255,7 +255,9 @@ def _require_minimal(scene: Scene) -> None:
     on = scene.effects.on()
     if on:
         allowed = "none: proofs are about the minimal model's map"
-        raise AnswerError("the effects", ", ".join(on), allowed, "leave [effects] out of the scene to be proved")
+        raise AnswerError(
+            "the effects", ", ".join(on), allowed, "leave [effects] out of the scene to be proved"
+        )
 
 
 def _deviations(scene: Scene, given: Mapping[str, str] | None) -> dict[str, str]:
