@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:  # each from the file that holds it: most rooms have a file of the same name
     from limitsets import engine, interval, maps, plot
     from limitsets.analysis import analyse
+    from limitsets.auditing import audit
     from limitsets.cells import grid
     from limitsets.graph.morse import morse_graph
     from limitsets.graph.transitions import transitions
@@ -39,6 +40,7 @@ __version__ = "0.1.0"
 _ROOMS = {
     "analyse": "analysis",
     "attractors": "sets.attractors",
+    "audit": "auditing",
     "basins": "sets.basins",
     "certify": "proofs.certify",
     "critical_points": "maps",
@@ -62,6 +64,7 @@ _ROOMS = {
 __all__ = [
     "analyse",
     "attractors",
+    "audit",
     "basins",
     "certify",
     "critical_points",

@@ -7,6 +7,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from limitsets.goals import Goal, OrientedBeyond, Reaches, Verdict, evaluate
 
 if TYPE_CHECKING:
@@ -51,8 +53,10 @@ def _may_leave(graph: TransitionGraph) -> float:
 
 def _after_any_throw(graph: TransitionGraph) -> Extents:
     """Where a part can rest after one throw or more: the image of the whole domain holds all later images."""
-    from limitsets.maps import along, monotone_pieces
+    from limitsets.maps import along, kind_of, monotone_pieces
 
+    if not kind_of(graph.map).has_image_on:
+        return _seen_after_a_throw(graph)
     domain = graph.grid.domain
     found: dict[int, list[tuple[float, float]]] = {}
     for side, pieces in monotone_pieces(graph.map, domain).items():
@@ -63,6 +67,19 @@ def _after_any_throw(graph: TransitionGraph) -> Extents:
             hi = min(float(ends.max()), float(domain.hi[to, 0]))
             if lo <= hi:
                 found.setdefault(to, []).append((lo, hi))
+    return found
+
+
+def _seen_after_a_throw(graph: TransitionGraph) -> Extents:
+    """Find the same from images of the cells' ends, where the map's branches cannot be followed one by one."""
+    from limitsets.maps import images
+
+    found: dict[int, list[tuple[float, float]]] = {}
+    for side, (edges,) in enumerate(graph.grid.edges):
+        there = images(graph.map, edges, side)
+        for to in np.unique(there.side[there.code >= 0]).tolist():
+            x = there.x[(there.code >= 0) & (there.side == to)]
+            found.setdefault(to, []).append((float(x.min()), float(x.max())))
     return found
 
 

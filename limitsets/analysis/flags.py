@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -20,26 +20,6 @@ Extents = Mapping[int, Sequence[Interval]]
 SAMPLES = 4096
 
 
-def where(true: Callable[[Array], NDArray[np.bool_]], x: Array) -> list[Interval]:
-    """Intervals on which a condition holds, seen at samples, their ends bisected down to adjacent floats."""
-    seen = true(x)
-    changes = np.flatnonzero(seen[1:] != seen[:-1])
-    lo, hi, before = x[changes], x[changes + 1], seen[changes]
-    while True:
-        middle = lo + 0.5 * (hi - lo)
-        if not ((middle > lo) & (middle < hi)).any():
-            break
-        same = true(middle) == before
-        lo, hi = np.where(same, middle, lo), np.where(same, hi, middle)
-    # The end of a true stretch is the last float where the condition holds.
-    ends = np.where(before, lo, hi).tolist()
-    if seen[0]:
-        ends.insert(0, float(x[0]))
-    if seen[-1]:
-        ends.append(float(x[-1]))
-    return list(zip(ends[::2], ends[1::2], strict=True))
-
-
 def other_vertex_first(scene: Scene) -> dict[int, list[tuple[float, float]]]:
     """Find the starts from which another vertex than the left one would land first.
 
@@ -55,7 +35,8 @@ def other_vertex_first(scene: Scene) -> dict[int, list[tuple[float, float]]]:
     -------
     dict of int to list of (lo, hi)
         Per side of the part the intervals of `scene.domain`, ascending [scene's unit]; an empty list where it never
-        happens.  Between 4096 samples a narrower interval may be missed.
+        happens, or where the scene simulates the effect `landing`.  Between 4096 samples a narrower interval may be
+        missed.
 
     Examples
     --------
@@ -65,8 +46,11 @@ def other_vertex_first(scene: Scene) -> dict[int, list[tuple[float, float]]]:
     >>> [(side, round(lo, 4)) for side, parts in found.items() for lo, _ in parts]
     [(0, 20.1517), (1, 26.4235)]
     """
+    from limitsets.auditing.stretches import where
     from limitsets.thrower import impact_angles
 
+    if scene.effects.landing:
+        return {side: [] for side in range(len(scene.sides))}
     found = {}
     for side in range(len(scene.sides)):
         corner = float(scene.sides.corner[side])

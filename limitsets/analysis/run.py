@@ -16,6 +16,7 @@ from limitsets.errors import AnswerError
 if TYPE_CHECKING:
     import networkx as nx
 
+    from limitsets.auditing import Choice
     from limitsets.cells import CellSet, Grid
     from limitsets.graph import TransitionGraph
     from limitsets.maps.critical import CriticalPoint
@@ -38,7 +39,9 @@ class Analysis:
     Attributes
     ----------
     scene : Scene
-        The scene.
+        The scene that was analysed: where it asks for effects by `auto`, with those chosen.
+    choice : Choice
+        How it came to its effects.
     grid : Grid
         The cells.
     graph : TransitionGraph
@@ -66,6 +69,7 @@ class Analysis:
     """
 
     scene: Scene
+    choice: Choice
     grid: Grid
     graph: TransitionGraph
     attractors: tuple[Attractor, ...]
@@ -119,6 +123,17 @@ class _Steps:
         self.timings[name] = time.perf_counter() - begin
 
 
+def _limit_set(graph: TransitionGraph, attractor: Attractor) -> LimitSet:
+    """Its end points; the cells where the map's branches cannot be followed one by one."""
+    from limitsets.maps import kind_of
+    from limitsets.sets import LimitSet, limit_set
+
+    if kind_of(graph.map).has_image_on:
+        return limit_set(graph, attractor)
+    advice = "with effects on a throw has more branches than this version follows"
+    return LimitSet(attractor.extents, (), 0, False, False, advice)
+
+
 def analyse(
     scene: str | Path | Mapping[str, Any] | Scene,
     cells: int = CELLS,
@@ -145,7 +160,8 @@ def analyse(
     Returns
     -------
     Analysis
-        Attractors, basins, limit sets, critical points, the goal's verdict.
+        Attractors, basins, limit sets, critical points, the goal's verdict.  With ``auto = true`` in ``[effects]``,
+        of the scene with the effects that the audit calls for on its limit set and whose facts are given.
 
     Raises
     ------
@@ -163,18 +179,20 @@ def analyse(
     >>> found.goal.holds, round(found.goal.threshold, 3)  # beyond 20 in every part lies on side 2
     (True, 19.753)
     """
+    from limitsets.auditing import choose
     from limitsets.cells import grid
     from limitsets.graph import morse_graph, transitions
     from limitsets.maps import critical_points
     from limitsets.scene import Scene, load
-    from limitsets.sets import attractors, basins, limit_set, spurious
+    from limitsets.sets import attractors, basins, spurious
     from limitsets.sets import cycles as cycles_of
 
     if cycles < 0:
         raise AnswerError("the longest period", cycles, "an integer from 0", "pass cycles=0 for none")
     steps = _Steps(9 + (cycles > 0), progress)
     with steps.step("scene"):
-        chosen = scene if isinstance(scene, Scene) else load(scene)
+        choice = choose(scene if isinstance(scene, Scene) else load(scene))
+        chosen = choice.scene
     with steps.step("transitions"):
         graph = transitions(chosen.map, grid(chosen.domain, cells=cells))
     with steps.step("attractors"):
@@ -182,7 +200,7 @@ def analyse(
     with steps.step("basins"):
         shares = basins(graph, found)
     with steps.step("limit sets"):
-        limits = tuple(limit_set(graph, attractor) for attractor in found)
+        limits = tuple(_limit_set(graph, attractor) for attractor in found)
     with steps.step("critical points"):
         critical = critical_points(chosen.map, chosen.domain)
     orbits: tuple[Cycle, ...] = ()
@@ -202,6 +220,7 @@ def analyse(
         flags = other_vertex_first(chosen)
     return Analysis(
         chosen,
+        choice,
         graph.grid,
         graph,
         found,

@@ -7,6 +7,7 @@ from typing import Annotated
 import typer
 
 from limitsets.cli.analyse import analyse
+from limitsets.cli.audit import audit
 from limitsets.cli.certify import certify
 from limitsets.cli.plot import plot
 from limitsets.cli.recheck import recheck
@@ -43,5 +44,5 @@ def limitsets(
     """
 
 
-for command in (scenes, analyse, throw, plot, certify, recheck):
+for command in (scenes, analyse, throw, plot, certify, recheck, audit):
     app.command()(command)

@@ -61,14 +61,14 @@ def flight(scene: Scene, x: float, side: int) -> Figure:
     'After the impact: a flip, 21.00 to 16.55 in, onto side 0'
     """
     seen = trace(scene.map, x, side, 1)
-    phi = fly(scene.map, x, side).phi
+    phi = float(seen.phi[0]) if seen.code.size else fly(scene.map, x, side).phi
     if seen.code.size == 0 or seen.code[0] == codes.OUTSIDE_MODEL or not math.isfinite(phi):
         least = float(scene.sides.a[side])
         allowed = f"more than {least:.6g} on side {side}"
         raise AnswerError("x of the throw", x, allowed, "start where a throw lifts the part")
     after, side_after = float(seen.x[1]), int(seen.side[1])
     air = [_in_air(scene, x, side, angle) for angle in np.linspace(0.0, phi, SHOWN + 2)]
-    rolled = _to_rest(scene, air[-1], (side, side_after), after, phi)
+    rolled = _to_rest(scene, air[-1], (side, side_after), after, phi, int(seen.code[0]))
     everything = np.concatenate([*air, *rolled])
     lo, hi = float(everything[:, 0].min()), float(everything[:, 0].max())
     height = float(everything[:, 1].max() - min(0.0, scene.surface_height))
@@ -92,7 +92,7 @@ def flight(scene: Scene, x: float, side: int) -> Figure:
         else " (small-angle formulas: the vertex need not be on the arm at the impact)"
     )
     style.title(figure, f"One throw of {scene.name}{gap}")
-    style.legend(figure, _legend(scene.flight == "exact"), 3)
+    style.legend(figure, _legend(len(rolled) > 2), 3)
     return figure
 
 
@@ -130,16 +130,18 @@ def _in_air(scene: Scene, x: float, side: int, phi: float) -> Array:
     return _turned(_outline(scene, side), phi) + _centre(scene, x, side, phi)
 
 
-def _to_rest(scene: Scene, landed: Array, sides: tuple[int, int], after: float, phi: float) -> list[Array]:
+def _to_rest(
+    scene: Scene, landed: Array, sides: tuple[int, int], after: float, phi: float, code: int
+) -> list[Array]:
     """Outlines from the impact to rest, turned about the struck vertex, which is the first.
 
     The last one is where the map says.  By the small-angle formulas the struck vertex is not on the arm, and no turning
-    about it leads there.
+    about it leads there; nor does one turning where the part rolls on, or has landed on another vertex.
     """
     side, side_after = sides
     at_rest = np.array([after, scene.surface_height + float(scene.sides.d[side_after])])
     rest = _outline(scene, side_after) + at_rest
-    if scene.flight != "exact":
+    if scene.flight != "exact" or code == codes.ROLL or _struck(scene, landed) != 0:
         return [landed, rest]
     turn = -phi if side_after == side else float(scene.sides.corner[side]) - phi
     pivot = landed[0]
@@ -147,6 +149,11 @@ def _to_rest(scene: Scene, landed: Array, sides: tuple[int, int], after: float, 
         *(_turned(landed - pivot, angle) + pivot for angle in np.linspace(0.0, turn, SHOWN + 1)[:-1]),
         rest,
     ]
+
+
+def _struck(scene: Scene, landed: Array) -> int:
+    """Vertex on the arm at the impact: the first, unless the scene lets another one land before it."""
+    return int(landed[:, 1].argmin()) if scene.effects.landing else 0
 
 
 def _arm(axes: Axes, scene: Scene, lo: float, hi: float) -> None:
@@ -174,7 +181,9 @@ def _flight(axes: Axes, scene: Scene, x: float, side: int, phi: float, air: list
     axes.plot(path[:, 0], path[:, 1], color=style.INK, lw=1.1, ls="-.", zorder=5, gid="path")
     stops = np.array([_centre(scene, x, side, angle) for angle in np.linspace(0.0, phi, len(air))])
     axes.plot(stops[:, 0], stops[:, 1], "o", ms=4, mfc="white", mec=style.INK, zorder=6, gid="centre of mass")
-    axes.plot(*air[-1][0], marker="v", ms=9, color=LANDED, zorder=7, gid="struck vertex")
+    axes.plot(
+        *air[-1][_struck(scene, air[-1])], marker="v", ms=9, color=LANDED, zorder=7, gid="struck vertex"
+    )
 
 
 def _landing(axes: Axes, scene: Scene, rolled: list[Array], after: float, side: int) -> None:
@@ -190,7 +199,9 @@ def _landing(axes: Axes, scene: Scene, rolled: list[Array], after: float, side: 
     _part(axes, rolled[0], facecolor=(0.72, 0.84, 0.93, 0.8), edgecolor=AIR, lw=2.2, zorder=1.5, gid="impact")
     for corners in rolled[1:-1]:
         _part(axes, corners, facecolor="none", edgecolor=LANDED, lw=1.0, ls=":", zorder=3, gid="turning")
-    axes.plot(*rolled[0][0], marker="v", ms=9, color=LANDED, zorder=7, gid="struck vertex")
+    axes.plot(
+        *rolled[0][_struck(scene, rolled[0])], marker="v", ms=9, color=LANDED, zorder=7, gid="struck vertex"
+    )
     height = scene.surface_height + float(scene.sides.d[side])
     axes.plot(after, height, "o", ms=4, mfc="white", mec=style.INK, zorder=6, gid="centre at rest")
 
@@ -207,7 +218,7 @@ def _titles(
     (x, side), (after, side_after) = start, end
     text = f"In the air: from x = {x:.2f} {scene.unit} on side {side}, turning by {math.degrees(phi):.1f}°"
     above.set_title(text, fontsize=style.TEXT, loc="left")
-    how = "flip" if side_after != side else "jog"
+    how = "roll" if code == codes.ROLL else ("flip" if side_after != side else "jog")
     where = f"onto side {side_after}" if side_after != side else f"still on side {side}"
     note = {codes.OUTWARD: "; off the arm's end", codes.INWARD: "; into the joint"}.get(code, "")
     text = f"After the impact: a {how}, {x:.2f} to {after:.2f} {scene.unit}, {where}{note}"

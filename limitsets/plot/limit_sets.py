@@ -11,7 +11,7 @@ from matplotlib.path import Path
 
 from limitsets.goals import OrientedBeyond
 from limitsets.maps import FLIP as FLIPS
-from limitsets.maps import Orbit, critical_points, images
+from limitsets.maps import ROLL, Orbit, critical_points, images
 from limitsets.plot import style
 from limitsets.plot.style import Extents
 
@@ -79,7 +79,8 @@ def limit_set(scene: Scene, found: Any, *, axes: Axes | None = None) -> Figure:
         f"Limit set of {scene.name}: where the part comes to rest", fontsize=style.TEXT + 1.5, loc="left"
     )
     if alone:
-        style.legend(figure, _legend(scene, len(sets)), 4)
+        rolls = any(patch.get_gid() == "roll" for patch in axes.patches)
+        style.legend(figure, _legend(scene, len(sets), rolls), 4)
     return axes.get_figure(root=True)  # type: ignore[return-value]
 
 
@@ -134,20 +135,25 @@ def _bands(axes: Axes, scene: Scene, extents: Extents) -> None:
 
 def _throws(axes: Axes, path: Orbit) -> None:
     wide = 0.06 * float(np.ptp(path.x)) or 1.0
-    for x, to, side, code in zip(path.x[:-1], path.x[1:], path.side[:-1], path.code, strict=True):
-        if code == FLIPS:
+    steps = zip(path.x[:-1], path.x[1:], path.side[:-1], path.side[1:], path.code, strict=True)
+    for x, to, side, after, code in steps:
+        rolls = code == ROLL and after != side
+        if code == FLIPS or rolls:
+            # a flip goes down by one lane, from the last to the first one's repetition; a roll to wherever it goes
+            lane = after if rolls else side + 1
+            up = BAR if lane < side else -BAR
             arrow = FancyArrowPatch(
-                (x, -side - BAR),
-                (to, -side - 1 + BAR),
+                (x, -side + up),
+                (to, -lane - up),
                 arrowstyle="-|>",
                 mutation_scale=9,
                 shrinkA=0,
                 shrinkB=0,
-                color=style.FLIP,
+                color=style.ROLL if rolls else style.FLIP,
                 lw=1.2,
-                ls=style.FLIP_LINE,
+                ls=style.ROLL_LINE if rolls else style.FLIP_LINE,
                 zorder=4,
-                gid="flip",
+                gid="roll" if rolls else "flip",
             )
         elif code >= 0:
             y, middle = -side + BAR, 0.5 * (x + to)
@@ -225,7 +231,7 @@ def _frame(axes: Axes, scene: Scene, sets: list[Extents], marked: list[float]) -
         )
 
 
-def _legend(scene: Scene, sets: int) -> list[Any]:
+def _legend(scene: Scene, sets: int, rolls: bool) -> list[Any]:
     handles: list[Any] = [
         Patch(
             facecolor=face,
@@ -238,6 +244,11 @@ def _legend(scene: Scene, sets: int) -> list[Any]:
     handles += [
         Line2D([], [], color=style.JOG, label="jog (stays on its side)"),
         Line2D([], [], color=style.FLIP, ls=style.FLIP_LINE, label="flip (to the next side)"),
+        *(
+            [Line2D([], [], color=style.ROLL, ls=style.ROLL_LINE, label="roll (on, or back)")]
+            if rolls
+            else []
+        ),
         Patch(facecolor="#e9e9e9", edgecolor="#cfcfcf", label="where the flipping part lands"),
         Line2D(
             [], [], color=style.INK, marker="o", mfc="white", ms=5, ls="", label="start of the orbit shown"

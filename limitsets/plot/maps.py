@@ -11,7 +11,7 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 
 from limitsets.analysis import other_vertex_first
-from limitsets.maps import FLIP, JOG, Orbit, critical_points, images
+from limitsets.maps import FLIP, JOG, ROLL, Orbit, critical_points, images
 from limitsets.plot import style
 from limitsets.plot.style import Extents
 
@@ -83,7 +83,8 @@ def map(scene: Scene, found: Any = None) -> Figure:  # noqa: A001 - ls.plot.map 
         if k % columns == 0:
             axes.set_ylabel(f"x after the throw [{scene.unit}]")
     style.title(figure, f"Map of {scene.name}: one throw, from each side")
-    handles = _legend(sets, path, _visible(panels[0], flags))
+    rolls = any(line.get_gid() == "roll" for axes in panels[:count] for line in axes.lines)
+    handles = _legend(sets, path, _visible(panels[0], flags), rolls)
     style.legend(figure, handles, 4)
     return figure
 
@@ -94,8 +95,11 @@ def _branches(axes: Axes, scene: Scene, side: int) -> None:
     looks: tuple[tuple[int, str, Any, str], ...] = (
         (JOG, style.JOG, style.JOG_LINE, "jog"),
         (FLIP, style.FLIP, style.FLIP_LINE, "flip"),
+        (ROLL, style.ROLL, style.ROLL_LINE, "roll"),
     )
     for code, colour, line, name in looks:
+        if code == ROLL and not (there.code == ROLL).any():
+            continue
         axes.plot(
             x,
             np.where(there.code == code, there.x, np.nan),
@@ -177,19 +181,30 @@ def _visible(axes: Axes, flags: Extents) -> bool:
     return any(first < hi and last > lo for parts in flags.values() for first, last in parts)
 
 
-def _legend(sets: list[Extents], path: Orbit | None, flagged: bool) -> list[Any]:
+def _legend(sets: list[Extents], path: Orbit | None, flagged: bool, rolls: bool) -> list[Any]:
     handles: list[Any] = [
         Line2D([], [], color=style.JOG, lw=1.8, label="jog"),
         Line2D([], [], color=style.FLIP, lw=1.8, ls=style.FLIP_LINE, label="flip"),
+        *([Line2D([], [], color=style.ROLL, lw=1.8, ls=style.ROLL_LINE, label="roll")] if rolls else []),
         Line2D([], [], color=style.INK, lw=0.9, ls=":", label="critical point"),
     ]
     if sets:
         handles.append(Patch(facecolor=style.SETS[0][0], edgecolor=style.INK, label="limit set"))
     if path is not None:
+        away = "rolls or flips away" if rolls else "flips away"
         handles += [
             Line2D([], [], color=style.INK, lw=0.8, label=f"orbit of {path.code.size} throws"),
             Line2D([], [], marker="o", ls="", mfc="white", mec=style.INK, ms=4.5, label="arrives"),
-            Line2D([], [], marker="s", ls="", mfc="white", mec=style.FLIP, ms=4.5, label="flips away"),
+            Line2D(
+                [],
+                [],
+                marker="s",
+                ls="",
+                mfc="white",
+                mec=style.FLIP,
+                ms=4.5,
+                label=away,
+            ),
         ]
     if flagged:
         handles.append(Patch(label="another vertex lands first", **{**FLAG, "edgecolor": "#8c8c8c"}))

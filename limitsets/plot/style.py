@@ -25,6 +25,7 @@ Extents: TypeAlias = Mapping[int, Sequence[tuple[float, float]]]
 INK = "#222222"
 JOG = "#0072B2"
 FLIP = "#C04A00"
+ROLL = "#8A3FA0"
 GOAL = "#007A5A"
 FAINT = "#8c8c8c"
 # Sets: face, hatch.  Light faces with dark hatches keep text and lines on them legible.
@@ -36,7 +37,7 @@ SETS = (
     ("#C9C9C9", "xxx"),
     ("#E8E1A0", "+++"),
 )
-JOG_LINE, FLIP_LINE = "-", (0, (4.5, 1.8))
+JOG_LINE, FLIP_LINE, ROLL_LINE = "-", (0, (4.5, 1.8)), (0, (4.5, 1.5, 1.0, 1.5))
 SMALL, TEXT = 8.5, 10.0
 
 # Steps before an orbit is taken to be on its attractor.

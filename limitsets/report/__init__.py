@@ -4,7 +4,8 @@ The page is for someone who builds a feeder: what comes to rest where, how far t
 assumed.  Numbers are read from the analysis, never computed anew here.
 """
 
+from limitsets.report.audits import audit_page, write_audit
 from limitsets.report.pages import page
 from limitsets.report.writing import write
 
-__all__ = ["page", "write"]
+__all__ = ["audit_page", "page", "write", "write_audit"]

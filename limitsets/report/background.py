@@ -76,12 +76,39 @@ def trust(analysis: Analysis) -> str:
             f"**Another vertex lands first** on throws from {'; '.join(parts)}. "
             f"There the model's formulas speak of a landing that does not take place. {where}."
         )
-    lines.append(
-        "**Assumed:** the throw is impulsive and does not tip the part; the left bottom vertex lands first, sticks "
-        "without slipping or bouncing, and acts as a hinge until a side lies flat; the part then stays where it is "
-        "until the next throw."
-    )
-    return "\n\n".join(lines)
+    return "\n\n".join([*lines, *_effects(analysis), _assumed(analysis.scene)])
+
+
+def _effects(analysis: Analysis) -> list[str]:
+    """Say what is simulated beyond the minimal model, and who asked for it."""
+    choice, lines = analysis.choice, []
+    names = analysis.scene.effects.on()
+    if names:
+        asked = f" The audit of the limit set switched on: {', '.join(choice.switched_on)}." * bool(
+            choice.switched_on
+        )
+        lines.append(f"**Simulated** beyond the minimal model: {', '.join(names)}.{asked}")
+    if choice.left_out:
+        reasons = "; ".join(f"{effect}: {reason}" for effect, reason in choice.left_out.items())
+        lines.append(f"**Not simulated**, though it may be called for: {reasons}.")
+    return lines
+
+
+def _assumed(scene: Scene) -> str:
+    """Say what is still assumed with the effects that are on."""
+    effects = scene.effects
+    kept = [
+        (effects.drive, "the throw is impulsive"),
+        (False, "it does not tip the part"),
+        (effects.landing, "the left bottom vertex lands first"),
+        (effects.slip, "the vertex that lands sticks without slipping"),
+        (effects.bounce, "it does not bounce"),
+        (effects.pivot, "it acts as a hinge until a side lies flat"),
+        (effects.roll, "the part then stays where it is until the next throw"),
+        (bool(effects.spread), "every throw is like the other"),
+    ]
+    words = "; ".join(text for lifted, text in kept if not lifted)
+    return f"**Assumed:** {words}. `limitsets audit` says which of this the scene breaks."
 
 
 def scene_of(scene: Scene) -> str:

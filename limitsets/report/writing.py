@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     from limitsets.analysis import Analysis
 
-__all__ = ["FIGURES", "figure", "require_place", "write"]
+__all__ = ["DPI", "FIGURES", "figure", "refusal", "require_place", "write"]
 
 Progress = Callable[[str, int, int], None]
 
@@ -84,12 +84,13 @@ def require_place(folder: str | Path) -> None:
     """
     nearest = next(path for path in (Path(folder), *Path(folder).absolute().parents) if path.exists())
     if not nearest.is_dir():
-        raise _refusal(folder, f"{nearest} is not a folder")
+        raise refusal(folder, f"{nearest} is not a folder")
     if not os.access(nearest, os.W_OK):
-        raise _refusal(folder, f"{nearest} may not be written")
+        raise refusal(folder, f"{nearest} may not be written")
 
 
-def _refusal(folder: str | Path, reason: str) -> LimitsetsError:
+def refusal(folder: str | Path, reason: str) -> LimitsetsError:
+    """Make the error for a folder that cannot be written."""
     return LimitsetsError("the folder of the report", str(folder), "a folder that can be written", reason)
 
 
@@ -139,5 +140,5 @@ def write(analysis: Analysis, folder: str | Path, *, progress: Progress | None =
             (draft / "analysis.json").write_text(record + "\n", encoding="utf-8", newline="\n")
             (draft / "report.md").write_text(page(analysis, figures), encoding="utf-8", newline="\n")
     except OSError as error:
-        raise _refusal(folder, f"it could not be: {error.strerror or error}") from None
+        raise refusal(folder, f"it could not be: {error.strerror or error}") from None
     return [Path(folder) / name for name in names]

@@ -174,7 +174,7 @@ def test_starts_that_leave_count_against_staying():
 
 WORDS = {
     "scene", "units", "cells", "critical_points", "attractors", "basins", "cycles", "goal", "other_vertex_first",
-    "spurious", "second_pass", "timings",
+    "effects", "spurious", "second_pass", "timings",
 }  # fmt: skip
 
 
@@ -205,6 +205,7 @@ def test_json(source):
     (attractor,) = record["attractors"]
     assert {"extents", "flip_order", "jogs_per_visit", "flips_per_throw", "lyapunov"} <= set(attractor)
     assert attractor["extents_from"] == "end points"
+    assert record["effects"] == {"simulated": [], "switched_on": [], "left_out": {}}
     assert attractor["extents"] == {
         str(side): [list(pair) for pair in parts] for side, parts in found.extents[0].items()
     }

@@ -364,3 +364,10 @@ def test_random_points_land_where_the_cells_say(flight, flip):
             total += POINTS
     assert total * len(MODELS) >= 100_000
     assert met > 0.3 * total  # most scenes keep most of their parts
+
+
+def test_effects_are_refused_rather_than_left_out():
+    """The enclosures are those of the minimal map: nothing of it may pass for the map with effects."""
+    tree = ls.load("paper-initial").as_dict() | {"effects": {"roll": True}}
+    with pytest.raises(AnswerError, match="minimal model"):
+        ls.certify(ls.load(tree))

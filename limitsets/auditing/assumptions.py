@@ -1,0 +1,291 @@
+"""The table of assumptions: what decides each, against which limit, and which fact of the world that takes.
+
+To audit another assumption: a column in `thrower/assumed_box.py`, and a row here.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from limitsets.thrower.assumed_box import Assumed, corner_bounds
+
+if TYPE_CHECKING:
+    from limitsets.proofs.parameters import ParameterBox
+    from limitsets.scene import Scene
+
+__all__ = ["ASSUMPTIONS", "NOTABLE", "Assumption", "Terms"]
+
+# A shift of the landing by the stroke or by scatter counts from this share of the arm's length.
+NOTABLE = 1e-3
+
+
+@dataclass(frozen=True)
+class Terms:
+    """What a scene's facts make of an assumption.
+
+    Attributes
+    ----------
+    limit : ndarray, shape (sides,), or None
+        What the value may be; None where a fact is missing.
+    scale, offset : float
+        The value is scale times the column plus offset; both are not negative.
+    missing : str
+        The fact that is missing, empty if none.
+    matters : callable
+        From the worst value to the value of the missing fact at which it would matter; None where there is no such.
+    """
+
+    limit: NDArray[np.float64] | None
+    scale: float = 1.0
+    offset: float = 0.0
+    missing: str = ""
+    matters: Callable[[float], float | None] = field(default=lambda worst: worst)
+
+
+@dataclass(frozen=True)
+class Assumption:
+    """A row of the table.
+
+    Attributes
+    ----------
+    effect : str
+        The effect that lifts it, or "release" and "arm", which no effect does.
+    what : str
+        Which of the effect's assumptions.
+    name : str
+        The assumption in three or four words.
+    words : str
+        The assumption, in the words of someone who builds a feeder.
+    value : str
+        What is measured.
+    dimension : str
+        "length", "angle" or "".
+    column : Assumed
+        What decides.
+    below : bool
+        Whether it holds below the limit, or above it.
+    terms : callable
+        From the scene and its box of parameters to `Terms`.
+    """
+
+    effect: str
+    what: str
+    name: str
+    words: str
+    value: str
+    dimension: str
+    column: Assumed
+    below: bool
+    terms: Callable[[Scene, ParameterBox], Terms]
+
+
+def _everywhere(scene: Scene, limit: float) -> NDArray[np.float64]:
+    return np.full(len(scene.sides), limit)
+
+
+def _positive(scene: Scene, _: ParameterBox) -> Terms:
+    return Terms(_everywhere(scene, 0.0))
+
+
+def _enough(scene: Scene, _: ParameterBox) -> Terms:
+    return Terms(_everywhere(scene, 1.0))
+
+
+def _corner(scene: Scene, box: ParameterBox) -> Terms:
+    corners = scene.sides.corner
+    known = [corner_bounds(box.lo, box.hi, side, float(corner)) for side, corner in enumerate(corners)]
+    return Terms(np.array([below for below, _ in known]))
+
+
+def _friction(scene: Scene, _: ParameterBox) -> Terms:
+    friction = scene.world.friction
+    return Terms(None, missing="friction") if friction is None else Terms(_everywhere(scene, friction))
+
+
+def _bounce(scene: Scene, _: ParameterBox) -> Terms:
+    """Compare the height of the bounce, e^2 times that of the fall, with the threshold."""
+    e, threshold = scene.world.restitution, scene.world.bounce_threshold
+    if e == 0.0:
+        return Terms(_everywhere(scene, math.inf), scale=0.0)
+    if e is None and threshold is None:
+        return Terms(None, missing="restitution", matters=lambda fall: None)
+    if e is None:
+        height = threshold or 0.0
+        return Terms(
+            None,
+            missing="restitution",
+            matters=lambda fall: math.sqrt(height / fall) if height < fall else None,
+        )
+    if threshold is None:
+        return Terms(None, scale=e * e, missing="bounce_threshold")
+    return Terms(_everywhere(scene, threshold), scale=e * e)
+
+
+def _drive(scene: Scene, _: ParameterBox) -> Terms:
+    """To first order in the stroke the landing moves by (kappa/2) sin(stroke) phi^2."""
+    notable, stroke = NOTABLE * scene.arm_length, scene.world.stroke
+    if stroke is None:
+
+        def least(shift: float) -> float | None:
+            return math.asin(notable / shift) if notable < shift else None
+
+        return Terms(None, missing="stroke", matters=least)
+    return Terms(_everywhere(scene, notable), scale=math.sin(stroke))
+
+
+def _spread(scene: Scene, _: ParameterBox) -> Terms:
+    notable, scatter = NOTABLE * scene.arm_length, scene.world.scatter
+    if scatter is None:
+        return Terms(None, missing="scatter", matters=lambda shift: notable / shift if shift > 0 else None)
+    share, landing = scatter.speed, scatter.landing
+    speed = None if scene.gravity is None else math.sqrt(scene.gravity / scene.kappa)
+    if share is not None and not share.relative and speed is None:
+        return Terms(None, missing="gravity", matters=lambda shift: None)
+    return Terms(
+        _everywhere(scene, notable),
+        scale=0.0 if share is None else share.of(speed or 1.0) / (speed or 1.0),
+        offset=0.0 if landing is None else landing.value,
+    )
+
+
+ASSUMPTIONS = (
+    Assumption(
+        "release",
+        "tipping",
+        "throw does not tip it",
+        "the throw itself does not tip the part over an end of its side",
+        "room between the throw's impulse and the side's end",
+        "length",
+        Assumed.UNDER,
+        False,
+        _positive,
+    ),
+    Assumption(
+        "release",
+        "friction",
+        "no sliding in the throw",
+        "the part does not slide on the arm while it is thrown",
+        "friction the throw needs",
+        "",
+        Assumed.RELEASE_FRICTION,
+        True,
+        _friction,
+    ),
+    Assumption(
+        "landing",
+        "angle",
+        "left corner lands first",
+        "the left corner lands first",
+        "turned in the air",
+        "angle",
+        Assumed.ANGLE,
+        True,
+        _corner,
+    ),
+    Assumption(
+        "slip",
+        "press",
+        "landing presses",
+        "the corner that lands is pressed onto the arm, and need not be held back",
+        "impulse at the landing, in that of the throw",
+        "",
+        Assumed.PRESS,
+        False,
+        _positive,
+    ),
+    Assumption(
+        "slip",
+        "friction",
+        "landing does not slide",
+        "the corner that lands sticks",
+        "friction the landing needs",
+        "",
+        Assumed.STICK_FRICTION,
+        True,
+        _friction,
+    ),
+    Assumption(
+        "bounce",
+        "height",
+        "no bounce",
+        "the corner that lands does not bounce",
+        "height of the bounce",
+        "length",
+        Assumed.DROP,
+        True,
+        _bounce,
+    ),
+    Assumption(
+        "pivot",
+        "press",
+        "corner stays down",
+        "the corner stays on the arm by itself while the part turns about it",
+        "least force of the arm on the corner, in weights of the part",
+        "",
+        Assumed.FORCE,
+        False,
+        _positive,
+    ),
+    Assumption(
+        "pivot",
+        "friction",
+        "corner does not slide",
+        "the corner does not slide while the part turns about it",
+        "friction the turning needs",
+        "",
+        Assumed.HOLD_FRICTION,
+        True,
+        _friction,
+    ),
+    Assumption(
+        "roll",
+        "energy",
+        "lies still, no roll",
+        "the part lies still once a side has come down",
+        "energy left, in that needed to roll on or back",
+        "",
+        Assumed.ROLL,
+        True,
+        _enough,
+    ),
+    Assumption(
+        "drive",
+        "stroke",
+        "throw needs no stroke",
+        "the arm has its speed at once, without a stroke",
+        "shift of the landing by the stroke",
+        "length",
+        Assumed.STROKE,
+        True,
+        _drive,
+    ),
+    Assumption(
+        "spread",
+        "scatter",
+        "throws all alike",
+        "every throw and landing is like the other",
+        "shift of the landing by scatter",
+        "length",
+        Assumed.SPEED,
+        True,
+        _spread,
+    ),
+    Assumption(
+        "arm",
+        "reach",
+        "rests on the arm",
+        "the part comes to rest on the arm",
+        "room to the arm's end or the joint",
+        "length",
+        Assumed.ON_ARM,
+        False,
+        _positive,
+    ),
+)
+"""In the order in which a throw meets them."""

@@ -1,0 +1,119 @@
+"""`[effects] auto = true`: switch on what the limit set calls for, and say what could not be."""
+
+from __future__ import annotations
+
+import copy
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from limitsets.auditing.audits import Finding, audit
+
+if TYPE_CHECKING:
+    from limitsets.scene import Scene
+
+__all__ = ["Choice", "choose"]
+
+# What no effect lifts: a scene that breaks it has to be changed.
+NO_EFFECT = ("release", "arm")
+
+
+@dataclass(frozen=True, eq=False)
+class Choice:
+    """The scene that is analysed, and how it came to its effects.
+
+    Attributes
+    ----------
+    scene : Scene
+        With the chosen effects switched on by name, and without `auto`.
+    switched_on : tuple of str
+        The effects that the audit switched on.
+    left_out : dict of str to str
+        Effects, or assumptions without one, that are called for or cannot be told, and why they are not simulated.
+    """
+
+    scene: Scene
+    switched_on: tuple[str, ...]
+    left_out: dict[str, str]
+
+    def to_json(self) -> dict[str, Any]:
+        """Give it as plain tables for JSON."""
+        return {
+            "simulated": list(self.scene.effects.on()),
+            "switched_on": list(self.switched_on),
+            "left_out": dict(self.left_out),
+        }
+
+
+def _hindrance(scene: Scene, finding: Finding) -> str:
+    """Why an effect that is called for, or may be, cannot be switched on; empty if it can."""
+    from limitsets.thrower.effects import BUILT
+
+    effect = finding.effect
+    if finding.called_for is None:
+        return (
+            f"world.{finding.missing} is missing: cannot tell"
+            if finding.missing
+            else "no limit set: cannot tell"
+        )
+    if effect in NO_EFFECT:
+        return "broken, and no effect simulates that: change the scene"
+    if effect not in BUILT:
+        return "called for, but this version cannot simulate it"
+    if scene.flight != "exact":
+        return 'called for, but it needs flight = "exact"'
+    missing = [fact for fact in BUILT[effect].needs if getattr(scene.world, fact) is None]
+    return f"called for, but {' and '.join(f'world.{fact}' for fact in missing)} missing" if missing else ""
+
+
+def _with(scene: Scene, effects: tuple[str, ...]) -> Scene:
+    """Switch effects on, and `auto` off."""
+    from limitsets.scene.build import build
+
+    tree = copy.deepcopy(dict(scene.text))
+    table = {key: value for key, value in tree.get("effects", {}).items() if key != "auto"}
+    table.update({effect: "bounded" if effect == "spread" else True for effect in effects})
+    tree["effects"] = table
+    return build(tree, scene.file)
+
+
+def choose(scene: Scene) -> Choice:
+    """Resolve `auto`.
+
+    An effect is switched on where the audit finds it called for on the limit set and its facts are given.  With it the
+    limit set is another, which may call for more: the audit is repeated until it asks for nothing new.
+
+    Parameters
+    ----------
+    scene : Scene
+        Any scene; without `auto` it stays as it is.
+
+    Returns
+    -------
+    Choice
+
+    Examples
+    --------
+    >>> import limitsets as ls
+    >>> text = ls.load("paper-initial").as_dict() | {"effects": {"auto": True}}
+    >>> choose(ls.load(text)).switched_on
+    ('roll',)
+    """
+    if not scene.effects.auto:
+        return Choice(scene, (), {})
+    chosen: list[str] = []
+    now = _with(scene, ())
+    while True:
+        wanted: list[str] = []
+        left: dict[str, str] = {}
+        for finding in audit(now).on("limit-set"):
+            if finding.called_for is False or finding.simulated or finding.effect in wanted:
+                continue
+            reason = _hindrance(now, finding)
+            if reason:
+                left[finding.effect] = left.get(finding.effect) or reason
+            else:
+                wanted.append(finding.effect)
+        if not wanted:
+            return Choice(now, tuple(chosen), left)
+        chosen += wanted
+        now = _with(scene, tuple(chosen))

@@ -1,0 +1,52 @@
+"""`limitsets audit`: what the model leaves out, and where the scene calls for it."""
+
+from __future__ import annotations
+
+import json as json_words
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from limitsets.cli.output import Json, Scene, progress, table
+
+__all__ = ["audit"]
+
+
+def audit(
+    scene: Scene,
+    out: Annotated[
+        Path | None,
+        typer.Option("--out", "-o", metavar="DIR", help="Write audit.md, audit.json and audit.png there."),
+    ] = None,
+    json: Json = False,
+) -> None:
+    """Ask which assumptions of the model a scene breaks: on its limit set, and on the whole arm."""
+    with progress() as tell:
+        from limitsets.scene import load
+
+        chosen = load(scene)
+        if out is not None:
+            from limitsets.report.writing import require_place
+
+            require_place(out)
+        tell("assumptions", 0, 1 + (out is not None))
+        from limitsets.auditing import audit as run
+
+        found = run(chosen)
+        files = []
+        if out is not None:
+            from limitsets.report import write_audit
+
+            tell("files", 1, 2)
+            files = write_audit(found, out)
+    if json:
+        print(json_words.dumps(found.to_json(), indent=2, allow_nan=False))
+        return
+    from limitsets.report.audits import HEADS, lines_of, summary
+
+    table(HEADS, lines_of(found))
+    for line in summary(found):
+        typer.echo(line)
+    if files:
+        typer.echo(f"report: {files[0]}")

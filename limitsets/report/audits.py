@@ -1,0 +1,191 @@
+"""An audit in words: the lines of its table, a page, and its files."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from limitsets import plot
+from limitsets.files import replaced
+from limitsets.report.tables import intervals, percent, table
+from limitsets.report.writing import DPI, refusal
+
+if TYPE_CHECKING:
+    from limitsets.auditing import Audit, Finding
+
+__all__ = ["HEADS", "audit_page", "lines_of", "summary", "write_audit"]
+
+HEADS = ("effect", "assumed", "on the limit set", "worst there", "on the whole arm")
+
+
+HOW = (
+    "Proved is by interval arithmetic on every cell, for the scene's decimals. A break was found at a throw; on the "
+    "limit set that throw is one of a long orbit."
+)
+
+
+def _measured(finding: Finding, value: float | None, unit: str) -> str:
+    if value is None:
+        return "-"
+    if finding.about.dimension == "angle":
+        return f"{math.degrees(value):.1f} deg"
+    return f"{value:.3g} {unit}" if finding.about.dimension == "length" else f"{value:.3g}"
+
+
+def _share(finding: Finding) -> str:
+    """Say which of the throws on the limit set are concerned."""
+    parts = []
+    kinds = (("jog", finding.jogs), ("flip", finding.flips), ("roll", finding.others))
+    for name, (hit, of) in kinds:
+        if hit:
+            parts.append(f"every {name}" if hit == of else f"{percent(hit / of)} of {name}s")
+    return " and ".join(parts)
+
+
+def _verdict(finding: Finding) -> str:
+    if finding.called_for is None:
+        return f"cannot tell: {finding.missing}?" if finding.missing else "cannot tell: no limit set"
+    if not finding.called_for:
+        return f"holds ({finding.how})"
+    if finding.place == "limit-set":
+        return f"BREAKS: {_share(finding)}"
+    return f"breaks on side {', '.join(map(str, finding.ranges))}"
+
+
+def _worst(finding: Finding, unit: str) -> str:
+    """Say what was found where it is worst; without a fact, which value of it would matter."""
+    if finding.x is None:
+        return "-"
+    place = f"side {finding.side}, x = {finding.x:.2f}"
+    if finding.worst is None:
+        return f"no friction is enough ({place})"
+    if finding.missing:
+        return f"{_needed(finding, unit)} ({place})"
+    value = _measured(finding, finding.worst, unit)
+    if finding.threshold is None:
+        return f"{value} ({place})"
+    sign = "at most" if finding.about.below else "at least"
+    return f"{value}, {sign} {_measured(finding, finding.threshold, unit)} ({place})"
+
+
+def _needed(finding: Finding, unit: str) -> str:
+    at = finding.threshold
+    if finding.missing == "friction":
+        return f"needs {finding.worst:.3g}"
+    if at is None:
+        fall = finding.missing == "restitution"
+        return f"falls from {_measured(finding, finding.worst, unit)}" if fall else "never matters"
+    if finding.missing == "stroke":
+        return f"matters from {math.degrees(at):.2g} deg"
+    if finding.missing == "scatter":
+        return f"matters from {100 * at:.2g} % of the speed"
+    return f"matters {'below' if finding.missing == 'bounce_threshold' else 'from'} {at:.2g}"
+
+
+def lines_of(found: Audit) -> list[list[str]]:
+    """Give the table, one line per assumption; columns as in `HEADS`."""
+    unit = found.scene.unit
+    return [
+        [
+            f"{here.effect} (on)" if here.simulated else here.effect,
+            here.about.name,
+            _verdict(here),
+            _worst(here, unit),
+            _verdict(everywhere),
+        ]
+        for here, everywhere in zip(found.on("limit-set"), found.on("domain"), strict=True)
+    ]
+
+
+def summary(found: Audit) -> list[str]:
+    """Say in a few sentences what the scene calls for."""
+    limit = found.on("limit-set")
+    called = dict.fromkeys(each.effect for each in limit if each.called_for and not each.simulated)
+    missing = dict.fromkeys(each.missing for each in limit if each.missing and each.called_for is None)
+    lines = [
+        f"Called for on the limit set: {', '.join(called)}."
+        if called
+        else "No throw on the limit set was seen to break an assumption that can be told."
+    ]
+    if missing:
+        lines.append(f"Give {', '.join(missing)} in [world] to have the rest told.")
+    if found.scene.effects.on():
+        names = ", ".join(found.scene.effects.on())
+        lines.append(f"Simulated: {names}. What is asked here is what the model without effects would need.")
+    where = (
+        "The limit set lies in cells that are proved to hold it."
+        if found.enclosed
+        else "The limit set was found from sampled images: nothing about it is proved."
+    )
+    return [*lines, where]
+
+
+def _broken_ranges(found: Audit) -> str:
+    """Say where on the arm each assumption breaks."""
+    rows = [
+        [finding.about.name, side, intervals(parts, 4)]
+        for finding in found.on("domain")
+        for side, parts in finding.ranges.items()
+    ]
+    heads = ["breaks", "on side", f"for x [{found.scene.unit}]"]
+    return "Where on the arm it breaks:\n\n" + table(heads, rows) if rows else ""
+
+
+def audit_page(found: Audit, figure: str | None = None) -> str:
+    """Write the page.
+
+    Parameters
+    ----------
+    found : Audit
+        From `limitsets.audit`.
+    figure : str, optional
+        File name of the picture.
+
+    Returns
+    -------
+    str
+        Markdown.
+
+    Examples
+    --------
+    >>> import limitsets as ls
+    >>> audit_page(ls.audit("paper-designed")).splitlines()[0]
+    '# paper-designed: what the model leaves out'
+    """
+    details = [
+        f"* **{each.about.name}**: {each.about.words}. Measured: {each.about.value}."
+        for each in found.on("limit-set")
+    ]
+    parts = [
+        f"# {found.scene.name}: what the model leaves out",
+        " ".join(summary(found)),
+        table(HEADS, lines_of(found)),
+        "" if figure is None else f"![Where along the arm each assumption holds and breaks]({figure})",
+        "What is assumed, and how it is measured:",
+        "\n".join(details),
+        _broken_ranges(found),
+        HOW,
+    ]
+    return "\n\n".join(part for part in parts if part) + "\n"
+
+
+def write_audit(found: Audit, folder: str | Path) -> list[Path]:
+    """Write audit.md, audit.json and audit.png into a folder, all of them or none.
+
+    Raises
+    ------
+    LimitsetsError
+        The folder cannot be written.
+    """
+    names = ["audit.md", "audit.json", "audit.png"]
+    try:
+        with replaced(folder) as draft:
+            plot.audit(found).savefig(draft / names[2], dpi=DPI)
+            record = json.dumps(found.to_json(), indent=2, allow_nan=False)
+            (draft / names[1]).write_text(record + "\n", encoding="utf-8", newline="\n")
+            (draft / names[0]).write_text(audit_page(found, names[2]), encoding="utf-8", newline="\n")
+    except OSError as error:
+        raise refusal(folder, f"it could not be: {error.strerror or error}") from None
+    return [Path(folder) / name for name in names]
