@@ -9,7 +9,7 @@ import limitsets as ls
 from limitsets.maps import drivers
 
 if sys.argv[1] == "with":
-    import limitsets.thrower.effects  # noqa: F401 - its methods are then in every table
+    import limitsets.thrower.effects
 
 COUNT, REPEATS = 4096, 50
 params = ls.load("paper-designed").map
