@@ -12,8 +12,11 @@ from typing import Any, NamedTuple
 
 import limitsets.thrower.full  # noqa: F401 - registers the map
 from limitsets.errors import MapError
+from limitsets.thrower.effects.bounce import Bounce
 from limitsets.thrower.effects.landing import Landing
+from limitsets.thrower.effects.pivot import Pivot
 from limitsets.thrower.effects.roll import Roll
+from limitsets.thrower.effects.slip import Slip
 from limitsets.thrower.motion import FullThrow, outline_of
 from limitsets.thrower.params import Exact, Throw
 
@@ -38,6 +41,12 @@ class Effect(NamedTuple):
 BUILT: dict[str, Effect] = {
     "landing": Effect((), lambda world: Landing()),
     "roll": Effect((), lambda world: Roll()),
+    "pivot": Effect(("friction",), lambda world: Pivot(float(world.friction))),
+    "slip": Effect(("friction",), lambda world: Slip(float(world.friction))),
+    "bounce": Effect(
+        ("restitution", "bounce_threshold"),
+        lambda world: Bounce(float(world.restitution), float(world.bounce_threshold)),
+    ),
 }
 """The effects a scene may switch on, by name."""
 

@@ -11,13 +11,19 @@ end.  Oracle: Housner's rocking block, whose rates are as 1 - (3/2) sin^2 alpha.
 
 from __future__ import annotations
 
+import math
 from typing import Any, NamedTuple
 
 from limitsets.jit import kernel
-from limitsets.thrower.motion import Arrival, Face, FullSide, on_to_next, side_number
+from limitsets.thrower.effects.bounce import struck
+from limitsets.thrower.motion import Arrival, Contact, Face, FullSide, on_to_next, right_of, side_number
 from limitsets.thrower.turn import turn
 
 __all__ = ["Roll", "next_arrival"]
+
+# A part that slides and turns with less than this share of the energy that would lift it lies flat: what is left is
+# rocking without end, by which it moves less than its size times the share's root.
+FLAT = 1e-12
 
 
 class Roll(NamedTuple):
@@ -27,8 +33,8 @@ class Roll(NamedTuple):
 
 
 @kernel
-def next_arrival(roll: Any, part: FullSide, face: Face) -> tuple[Arrival, bool]:
-    """Return the strike of the side's other end, and whether anything moves after it; without the effect it rests."""
+def _other_end(part: FullSide, face: Face) -> Arrival:
+    """Return the strike of the end of a side that comes down after the other."""
     k = side_number(part, face.side)
     a, d, right = part.a[k], part.d[k], part.length[k] - part.a[k]
     left_end = face.vertex == face.side
@@ -37,13 +43,32 @@ def next_arrival(roll: Any, part: FullSide, face: Face) -> tuple[Arrival, bool]:
     psi = turn(part.corner[side_number(part, other)]) if left_end else turn(0.0)
     # about the right end the part has turned by all of the angle there, and would lie one side back
     shift = face.shift + on_to_next(part, other) if left_end else face.shift
-    hit = Arrival(other, psi, shift, face.slide - face.omega * d, face.omega * reach, face.omega)
+    return Arrival(other, psi, shift, face.slide - face.omega * d, face.omega * reach, face.omega)
+
+
+@kernel
+def _rolls(roll: Any, part: FullSide, face: Face, after: Contact) -> bool:
+    """Whether a part that does not bounce moves on over the end that struck.
+
+    It has to turn on the same way, not against the side's other end, with energy enough to be lifted over the nearer
+    end, however much of that it has by sliding; but not just by sliding, flat on its side.
+    """
     if roll is None:
+        return False
+    k = side_number(part, face.side)
+    d, least = part.d[k], min(part.a[k], part.length[k] - part.a[k])
+    lift = part.own.kappa * least * least / (math.hypot(least, d) + d)  # kappa (ell - d), of the nearer end
+    right = right_of(part, after.vertex, after.psi)
+    along, up = after.slide - after.omega * d, after.omega * right
+    turning = part.own.rho2 * after.omega * after.omega + up * up
+    return (after.omega * face.omega > 0.0) & (turning + along * along > 2.0 * lift) & (turning > FLAT * lift)
+
+
+@kernel
+def next_arrival(roll: Any, bounce: Any, slip: Any, part: FullSide, face: Face) -> tuple[Arrival, bool]:
+    """Return the strike of the side's other end, and whether anything moves after it; without an effect it rests."""
+    hit = _other_end(part, face)
+    if roll is None and bounce is None:
         return hit, False
-    keeps = part.own.rho2 + d * d - a * right
-    inertia = part.own.rho2 + d * d + (right * right if left_end else a * a)
-    omega = face.omega * keeps / inertia
-    kinetic = 0.5 * inertia * omega * omega
-    least = min(a, right)
-    lift = least * least / ((least * least + d * d) ** 0.5 + d)  # ell - d, of the nearer end
-    return hit, (keeps > 0.0) & (kinetic > part.own.kappa * lift)
+    after = struck(bounce, slip, part, hit)
+    return hit, after.lift > 0.0 or _rolls(roll, part, face, after)
