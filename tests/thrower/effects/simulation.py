@@ -91,7 +91,7 @@ class Simulation:
     def __init__(self, body: Body, kappa: float, height: float, law: Law) -> None:
         self.body, self.kappa, self.height, self.law = body, kappa, height, law
         self.inverse = np.diag([1.0, 1.0, 1.0 / body.rho**2])
-        self.lost = 0.0  # energy lost in impacts and by friction
+        self.rubbed = 0.0  # energy lost by friction while sliding
         self.modes: list[str] = []
 
     # -------------------------------------------------------------- bodies and contacts
@@ -173,7 +173,6 @@ class Simulation:
             thrown = self._impact(y, corner, self.law.restitution)
             lift = (self.lever(y, corner) @ thrown[3:6])[1]
             after = thrown if lift > 0 and lift**2 / (2 * self.kappa) > self.law.threshold else plastic
-        self.lost += self.energy(y) - self.energy(after)
         return after
 
     def _impact(self, y: np.ndarray, corner: int, restitution: float) -> np.ndarray:
@@ -247,7 +246,7 @@ class Simulation:
         run = solve_ivp(rates, (0, 1e3), start, events=marks, max_step=0.02, **TIGHT)
         if not any(len(hits) for hits in run.t_events):
             raise Outside
-        self.lost += float(run.y[6, -1])
+        self.rubbed += float(run.y[6, -1])
         return run.y[:6, -1], next(k for k, hits in enumerate(run.t_events) if len(hits))
 
     def hinge(self, y: np.ndarray, corner: int) -> np.ndarray:
@@ -285,6 +284,9 @@ class Simulation:
 
             if mode != "stick" and not np.isfinite(force(y)).all():
                 raise Outside
+            if mode != "stick" and pushed(y) < 0:
+                self.modes.append("off")
+                return y, False
             y, event = self.integrate(y, corner, force, [cone] if mode == "stick" else [sliding, pushed])
             slid = True
             if event == (1 if mode == "stick" else 2):
@@ -324,7 +326,6 @@ class Simulation:
         theta = self.body.lying(side)
         d = float(-self.body.reach(theta)[self.body.edge(side)[0], 1])
         y = np.array([x, d, theta, -(self.height + d), x, 1.0])
-        self.started = self.energy(y)
         y, corner = self.flight(y)
         for _ in range(200):
             y = self.impact(y, corner)
@@ -346,9 +347,7 @@ class Simulation:
         """Whether anything moves after the other end of a side has struck."""
         if self.law.restitution is None and not self.law.roll:
             return False
-        lost = self.lost
         after = self.impact(y, other)
-        self.lost = lost
         if (self.lever(y, other) @ after[3:6])[1] > 1e-12:
             return True
         if not self.law.roll or (self.lever(y, corner) @ after[3:6])[1] <= 0:
