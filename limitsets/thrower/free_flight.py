@@ -42,7 +42,14 @@ def _just_off(slope: float, kappa: float, omega: float, right: float, high: floa
 
 @kernel
 def _descent(
-    kappa: float, omega: float, right: float, high: float, height: float, slope: float, begin: float, end: float
+    kappa: float,
+    omega: float,
+    right: float,
+    high: float,
+    height: float,
+    slope: float,
+    begin: float,
+    end: float,
 ) -> tuple[float, float]:
     """Time and height at the first root from `begin` on, or at `end` where there is none before; f as above."""
     bound = kappa + omega * omega * math.hypot(right, high)
@@ -100,7 +107,9 @@ def next_contact(part: FullSide, start: Contact) -> tuple[Arrival, bool]:
 
 
 @kernel
-def fly_on(pivot: Any, slip: Any, bounce: Any, part: FullSide, start: Contact, hit: Arrival) -> tuple[Arrival, bool]:
+def fly_on(
+    pivot: Any, slip: Any, bounce: Any, part: FullSide, start: Contact, hit: Arrival
+) -> tuple[Arrival, bool]:
     """Return the strike after a flight; without the effects by which a contact lets go there is none."""
     if pivot is None and slip is None and bounce is None:
         return hit, False

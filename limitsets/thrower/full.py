@@ -37,7 +37,9 @@ def full_outcome(part: FullSide, x: float, side: int) -> tuple[float, int, int]:
     impacts, rolls, before = 0, -1, side
     while moving and impacts < MOST_EVENTS:
         impacts += 1
-        contact, face, ends = turned_down(part.pivot, part.slip, part, struck(part.bounce, part.slip, part, hit))
+        contact, face, ends = turned_down(
+            part.pivot, part.slip, part, struck(part.bounce, part.slip, part, hit)
+        )
         if ends == LOST:
             return 0.0, 0, codes.OUTSIDE_MODEL
         if ends == OFF:

@@ -27,7 +27,7 @@ FACE, TURNS, SLIPS = range(3)
 @kernel
 def _inertia(part: FullSide, right: float, high: float) -> float:
     """M: of the part about a vertex."""
-    return part.own.rho2 + (right * right + high * high)  # type: ignore[no-any-return]
+    return part.own.rho2 + (right * right + high * high)
 
 
 @kernel
@@ -67,7 +67,14 @@ def gives_way(part: FullSide, mu: float, hit: Contact) -> tuple[int, int]:
 
 @kernel
 def _march(
-    part: FullSide, mu: float, right: float, high: float, energy: float, way: float, limit: float, rising: bool
+    part: FullSide,
+    mu: float,
+    right: float,
+    high: float,
+    energy: float,
+    way: float,
+    limit: float,
+    rising: bool,
 ) -> tuple[float, int]:
     """Return how far the part turns, `way` round, until friction no longer holds, or it turns back, or is down."""
     kappa, ell = part.own.kappa, math.hypot(right, high)

@@ -114,7 +114,9 @@ def _dip(f: float, slope: float, after: float, slope_after: float, h: float) -> 
 
 
 @kernel
-def _first_dip(part: FullSide, k: int, way: float, y: State, f: State, to: State, rate: State, h: float) -> float:
+def _first_dip(
+    part: FullSide, k: int, way: float, y: State, f: State, to: State, rate: State, h: float
+) -> float:
     """Return the time at which a step may have passed over an event and back; h if it did not."""
     corner = part.corner[k]
     t = min(_dip(way * y[2], way * f[2], way * to[2], way * rate[2], h), _dip(y[0], y[1], to[0], to[1], h))
@@ -122,7 +124,9 @@ def _first_dip(part: FullSide, k: int, way: float, y: State, f: State, to: State
 
 
 @kernel
-def _event(part: FullSide, k: int, drag: float, way: float, speed: float, y: State, f: State, h: float) -> State:
+def _event(
+    part: FullSide, k: int, drag: float, way: float, speed: float, y: State, f: State, h: float
+) -> State:
     """Return the state at the first event of a step from y, at whose end one is past: regula falsi (Illinois)."""
     to, _, _ = _step(part, k, drag, y, f, h)
     low, high, before, after = 0.0, h, _least(_still(part, k, way, speed, y)), 0.0

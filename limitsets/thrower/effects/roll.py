@@ -61,7 +61,7 @@ def _rolls(roll: Any, part: FullSide, face: Face, after: Contact) -> bool:
     right = right_of(part, after.vertex, after.psi)
     along, up = after.slide - after.omega * d, after.omega * right
     turning = part.own.rho2 * after.omega * after.omega + up * up
-    return (after.omega * face.omega > 0.0) & (turning + along * along > 2.0 * lift) & (turning > FLAT * lift)
+    return (after.omega * face.omega > 0.0) & (turning + along * along > 2.0 * lift) & (turning > FLAT * lift)  # type: ignore[no-any-return]
 
 
 @kernel

@@ -47,7 +47,7 @@ def _dragged(mu: float, a: float, b: float, slide: float, push: float) -> tuple[
 
 @kernel
 def dragged(slip: Any, part: FullSide, hit: Contact, push: float) -> tuple[float, float]:
-    """Return friction's impulse, and the sliding after it, while the normal impulse grows; without the effect it sticks."""
+    """Return friction's impulse, and the sliding after it, for a normal impulse; without the effect it sticks."""
     right, high, rho2 = right_of(part, hit.vertex, hit.psi), above(part, hit.vertex, hit.psi), part.own.rho2
     if slip is None:
         return right * high / (rho2 + high * high) * push, 0.0

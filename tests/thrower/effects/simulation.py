@@ -18,7 +18,7 @@ from scipy.optimize import brentq
 TIGHT: dict[str, Any] = {"method": "DOP853", "rtol": 3e-14, "atol": 1e-15}
 
 
-class Outside(Exception):
+class OutsideError(Exception):
     """The model does not say what happens."""
 
 
@@ -65,7 +65,9 @@ def random_body(rng: np.random.Generator) -> Body:
     while True:
         n = int(rng.integers(3, 6))
         angles = 2 * np.pi * (np.arange(n) + rng.uniform(-0.3, 0.3, n)) / n
-        corners = rng.uniform(1.5, 3.0) * np.stack([np.cos(angles), rng.uniform(0.5, 1.0) * np.sin(angles)], 1)
+        corners = rng.uniform(1.5, 3.0) * np.stack(
+            [np.cos(angles), rng.uniform(0.5, 1.0) * np.sin(angles)], 1
+        )
         corners -= rng.uniform(-0.4, 0.4, 2)
         body = Body(corners, rng.uniform(0.5, 0.9) * float(np.hypot(*corners.T).mean()))
         facts = body.numbers()
@@ -150,10 +152,12 @@ class Simulation:
                 return y, int(corner)
         times = np.concatenate([np.geomspace(1e-5, 1e-3, 200)[:-1], np.linspace(1e-3, 1.0, 20_000)]) * end
         theta = y[2] + y[5] * times
-        tall = np.outer(np.sin(theta), self.body.corners[:, 0]) + np.outer(np.cos(theta), self.body.corners[:, 1])
+        tall = np.outer(np.sin(theta), self.body.corners[:, 0]) + np.outer(
+            np.cos(theta), self.body.corners[:, 1]
+        )
         over = (y[1] + y[4] * times - 0.5 * self.kappa * times**2)[:, None] + tall
         if (over[0] < -1e-12).any():
-            raise Outside
+            raise OutsideError
         below = np.flatnonzero((over[1:] <= 0).any(1))
         k = int(below[0]) + 1
         roots = {
@@ -245,7 +249,7 @@ class Simulation:
             start = late.y[:, -1]
         run = solve_ivp(rates, (0, 1e3), start, events=marks, max_step=0.02, **TIGHT)
         if not any(len(hits) for hits in run.t_events):
-            raise Outside
+            raise OutsideError
         self.rubbed += float(run.y[6, -1])
         return run.y[:6, -1], next(k for k, hits in enumerate(run.t_events) if len(hits))
 
@@ -283,7 +287,7 @@ class Simulation:
                 return float(self.kappa + y[5] ** 2 * self.body.reach(y[2])[corner][1])
 
             if mode != "stick" and not np.isfinite(force(y)).all():
-                raise Outside
+                raise OutsideError
             if mode != "stick" and pushed(y) < 0:
                 self.modes.append("off")
                 return y, False
@@ -293,18 +297,20 @@ class Simulation:
                 return y, True
             if mode != "stick" and event == 1:
                 return y, False
-        raise Outside
+        raise OutsideError
 
     def mode(self, y: np.ndarray, corner: int) -> str:
         """Which mode a corner at rest goes over to: the one, of four, that its own force allows."""
         mu = self.law.pivot if self.law.pivot is not None else self.law.slip
         assert mu is not None
         forces = self.forces(y, corner)
-        free = -y[5] ** 2 * self.body.reach(y[2])[corner]
+        free = -(y[5] ** 2) * self.body.reach(y[2])[corner]
         allowed = []
         for name, pull in forces.items():
-            change = free + np.array([0.0, -self.kappa]) + (
-                self.lever(y, corner) @ self.inverse @ self.lever(y, corner).T @ pull
+            change = (
+                free
+                + np.array([0.0, -self.kappa])
+                + (self.lever(y, corner) @ self.inverse @ self.lever(y, corner).T @ pull)
             )
             fits = {
                 # just past the edge of the cone counts as past it: the event has been found there
@@ -316,7 +322,7 @@ class Simulation:
             if fits[name]:
                 allowed.append(name)
         if not allowed:
-            raise Outside
+            raise OutsideError
         return allowed[0]
 
     # -------------------------------------------------------------- a whole throw
@@ -341,7 +347,7 @@ class Simulation:
             if not self.moves(y, other, corner):
                 return self.stop(y, corner, other)
             corner = other
-        raise Outside
+        raise OutsideError
 
     def moves(self, y: np.ndarray, other: int, corner: int) -> bool:
         """Whether anything moves after the other end of a side has struck."""
@@ -371,6 +377,6 @@ class Simulation:
             if abs(velocity[0]) > 1e-12:
                 ahead = reach[right, 0] if velocity[0] > 0 else -reach[left, 0]
                 if mu == 0 or mu * d > ahead:
-                    raise Outside
+                    raise OutsideError
                 place += velocity[0] * abs(velocity[0]) / (2 * mu * self.kappa)
         return place, side

@@ -60,7 +60,7 @@ def test_a_bounce_off_a_corner_beside_the_centre_spins_the_part() -> None:
     part, rho2, t = wheel(), 0.49, math.pi / SIDES
     x, high = math.sin(t), math.cos(t)
     after = struck(Bounce(0.5, 0.0), None, part, Arrival(0, turn(0.0), 0.0, 0.0, -1.0, 0.0))
-    # plastic: J_n = (rho^2 + H^2)/M against the fall, J_t = X H/M; e = 1/2 as much again, friction sticking: M = rho^2 + 1
+    # plastic: J_n = (rho^2 + H^2)/M, J_t = X H/M; then e = 1/2 as much again, friction sticking; M = rho^2 + 1
     m = rho2 + x * x + high * high
     push, drag = 1.5 * (rho2 + high**2) / m, 1.5 * x * high / m
     assert after.omega == pytest.approx((-x * push + high * drag) / rho2, rel=1e-12)

@@ -12,7 +12,7 @@ from limitsets.maps.drivers import images
 from limitsets.thrower import Throw, throw_map
 from limitsets.thrower.effects import with_effects
 from limitsets.thrower.motion import FullThrow
-from tests.thrower.effects.simulation import Body, Law, Outside, Simulation, random_body
+from tests.thrower.effects.simulation import Body, Law, OutsideError, Simulation, random_body
 
 
 @dataclass(frozen=True)
@@ -28,9 +28,7 @@ class Case:
 
     @property
     def bare(self) -> Throw:
-        return throw_map(
-            **self.body.numbers(), kappa=self.kappa, surface_height=self.height, arm_length=1e3
-        )
+        return throw_map(**self.body.numbers(), kappa=self.kappa, surface_height=self.height, arm_length=1e3)
 
     def full(self, names: tuple[str, ...]) -> FullThrow:
         return with_effects(self.bare, names, self.world)
@@ -50,7 +48,7 @@ class Case:
         """Where the simulation sees the throw end; None outside the model."""
         try:
             return self.simulation(names).run(self.x, self.side)
-        except Outside:
+        except OutsideError:
             return None
 
     def mapped(self, names: tuple[str, ...]) -> tuple[float, int] | None:
