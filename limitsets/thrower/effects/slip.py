@@ -8,8 +8,8 @@ The vertex sticks if the impulse that stops it pushes and lies in the cone, |J_t
 impulse would have to pull, Routh's method: J_n grows and friction is -mu J_n against the sliding; when the sliding
 stops on the way, the vertex sticks if |B| <= mu A, else it slides the other way, that of B; compression ends when the
 contact no longer approaches the arm.  (The cone is asked first: with |B| > mu A Routh's path would slide back from some
-of the impulses in it, so that the law jumps there.)  With mu large enough nothing slips; with mu = 0 the centre of mass keeps its
-horizontal velocity.  A part that stays on a side slides on there by xdot^2/(2 mu kappa).
+of the impulses in it, so that the law jumps there.)  With mu large enough nothing slips; with mu = 0 the centre of mass
+keeps its horizontal velocity.  A part that stays on a side slides on there by xdot^2/(2 mu kappa).
 Source: docs/model.md, effects; Wang and Mason, J. Applied Mechanics 59, 1992.
 """
 
