@@ -95,6 +95,12 @@ def resolve_effects(table: EffectsTable, world: World, flight: str, resolver: Re
             raise resolver.refusal(
                 key, "the flight", flight, allowed, f"{effect} has no meaning in it; use the exact one"
             )
+        for other in BUILT[effect].excludes:
+            if other in effects.on():
+                allowed = f"{effect} or {other}"
+                raise resolver.refusal(
+                    key, "the effects", f"{effect} and {other}", allowed, "they cannot be simulated together"
+                )
         for fact in BUILT[effect].needs:
             if getattr(world, fact) is None:
                 raise resolver.refusal(

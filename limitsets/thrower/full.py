@@ -6,18 +6,21 @@ not ask for is dropped before it is typed and is not in the machine code.  The b
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 from limitsets.jit import kernel
 from limitsets.maps import codes
 from limitsets.maps.contract import register
+from limitsets.thrower.effects.bounce import struck
 from limitsets.thrower.effects.drive import driven, holds_in_stroke, rests_leant
 from limitsets.thrower.effects.landing import first_arrival
 from limitsets.thrower.effects.pivot import turned_down
 from limitsets.thrower.effects.roll import next_arrival
-from limitsets.thrower.effects.slip import struck
+from limitsets.thrower.effects.slip import slid_on
 from limitsets.thrower.effects.spread import moved_by, spread_over
-from limitsets.thrower.motion import FullSide, FullThrow, side_number
+from limitsets.thrower.free_flight import fly_on
+from limitsets.thrower.motion import LOST, OFF, FullSide, FullThrow, side_number
 from limitsets.thrower.params import gather
 from limitsets.thrower.throw import EXITS
 from limitsets.thrower.trace import details
@@ -25,7 +28,7 @@ from limitsets.thrower.trace import details
 __all__ = ["MOST_EVENTS"]
 
 # Impacts of one throw at which it is given up, as outside the model: far more than the energy of any allows.
-MOST_EVENTS = 100_000
+MOST_EVENTS = 10_000
 
 
 _gather = kernel(gather)
@@ -59,21 +62,29 @@ def full_outcome(part: FullSide, x: float, side: int) -> tuple[float, int, int]:
     hit, moving = first_arrival(part.landing, part, x)
     if not (moving and holds_in_stroke(part.drive, part.own, part.length[side], x)):
         return 0.0, 0, codes.OUTSIDE_MODEL
-    impacts, rolls, before = 0, -1, side - 1
+    impacts, rolls, before = 0, -1, side
     while moving and impacts < MOST_EVENTS:
-        contact = struck(part.slip, part, hit)
-        face = turned_down(part.pivot, part, contact)
-        hit, moving = next_arrival(part.roll, part, face)
         impacts += 1
-        rolls += face.side != before or impacts == 1
-        before = face.side
+        contact, face, ends = turned_down(
+            part.pivot, part.slip, part, struck(part.bounce, part.slip, part, hit)
+        )
+        if ends == LOST:
+            return 0.0, 0, codes.OUTSIDE_MODEL
+        if ends == OFF:
+            hit, moving = fly_on(part.pivot, part.slip, part.bounce, part, contact, hit)
+            if not moving:
+                return 0.0, 0, codes.OUTSIDE_MODEL
+        else:
+            hit, moving = next_arrival(part.roll, part.bounce, part.slip, part, face)
+            rolls += rolls < 0 or face.side != before
+            before = face.side
     k = side_number(part, face.side)
-    if moving or not rests_leant(part.drive, part.a[k], part.d[k]):
+    shift = moved_by(part.spread, face.shift + slid_on(part.slip, part, face))
+    if moving or not math.isfinite(shift) or not rests_leant(part.drive, part.a[k], part.d[k]):
         return 0.0, 0, codes.OUTSIDE_MODEL
     turned = face.side - side
     code = codes.JOG if turned == 0 else codes.FLIP
     code = codes.ROLL if rolls > 0 or turned < 0 or turned > 1 else code
-    shift = moved_by(part.spread, face.shift)
     after = x + shift
     code = codes.INWARD if after <= part.a[k] else code
     code = codes.OUTWARD if after > part.own.arm_length else code

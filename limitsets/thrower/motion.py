@@ -21,6 +21,10 @@ from limitsets.thrower.params import Side, Throw
 from limitsets.thrower.turn import Turned
 
 __all__ = [
+    "DOWN",
+    "LOST",
+    "OFF",
+    "ON",
     "Arrival",
     "Contact",
     "Face",
@@ -33,6 +37,9 @@ __all__ = [
     "right_of",
     "side_number",
 ]
+
+# What a vertex on the arm comes to: it stays there, a side comes down, it lets go, or the model does not say.
+ON, DOWN, OFF, LOST = range(4)
 
 
 class Outline(NamedTuple):

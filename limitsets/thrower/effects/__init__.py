@@ -12,9 +12,12 @@ from typing import Any, NamedTuple
 
 import limitsets.thrower.full  # noqa: F401 - registers the map
 from limitsets.errors import MapError
+from limitsets.thrower.effects.bounce import Bounce
 from limitsets.thrower.effects.drive import drive_of
 from limitsets.thrower.effects.landing import Landing
+from limitsets.thrower.effects.pivot import Pivot
 from limitsets.thrower.effects.roll import Roll
+from limitsets.thrower.effects.slip import Slip
 from limitsets.thrower.effects.spread import spread_of
 from limitsets.thrower.motion import FullThrow, outline_of
 from limitsets.thrower.params import Exact, Throw
@@ -31,16 +34,25 @@ class Effect(NamedTuple):
         Facts of the world that have to be given.
     build : callable
         From the world, and what the scene writes after the effect's name, to the NamedTuple that its kernels take.
+    excludes : tuple of str
+        Effects whose kernels do not know this one.
     """
 
     needs: tuple[str, ...]
     build: Callable[[Any, Any], Any]
+    excludes: tuple[str, ...] = ()
 
 
 BUILT: dict[str, Effect] = {
-    "drive": Effect(("stroke",), drive_of),
+    "drive": Effect(("stroke",), drive_of, excludes=("slip", "pivot", "bounce")),
     "landing": Effect((), lambda world, how: Landing()),
     "roll": Effect((), lambda world, how: Roll()),
+    "pivot": Effect(("friction",), lambda world, how: Pivot(float(world.friction))),
+    "slip": Effect(("friction",), lambda world, how: Slip(float(world.friction))),
+    "bounce": Effect(
+        ("restitution", "bounce_threshold"),
+        lambda world, how: Bounce(float(world.restitution), float(world.bounce_threshold)),
+    ),
     "spread": Effect(("scatter",), spread_of),
 }
 """The effects a scene may switch on, by name."""

@@ -1,21 +1,76 @@
-"""Effect `pivot`: the struck vertex is held by friction and its own weight only, not by a hinge."""
+"""Effect `pivot`: the struck vertex is held by friction and the part's own weight only, not by a hinge.
+
+It is held while the force that takes lies in the cone of friction (`held.py`), slides where it does not
+(`sliding.py`), and leaves the arm where that force would have to pull; the part then flies on to its next contact.
+Where the force stays in the cone until a side is down, that is the hinge, to the last digit.
+
+With `slip` but without this effect a vertex that slides after its impact slides on in the same way, until it stops at
+a moment at which friction can hold it: from there on it is a hinge, as one that has stuck from the impact on.
+Source: docs/model.md, effects.
+"""
 
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 from limitsets.jit import kernel
 from limitsets.thrower.effects.drive import leant
+from limitsets.thrower.held import gives_way, holds_now, lets_go
 from limitsets.thrower.impact import decide
-from limitsets.thrower.motion import Contact, Face, FullSide, above, on_to_next, right_of, side_number
+from limitsets.thrower.motion import (
+    DOWN,
+    LOST,
+    OFF,
+    ON,
+    Contact,
+    Face,
+    FullSide,
+    above,
+    on_to_next,
+    right_of,
+    side_number,
+)
+from limitsets.thrower.sliding import slide_on
 
-__all__ = ["turned_down"]
+__all__ = ["Pivot", "turned_down"]
+
+# Times that a vertex may stop and slide again before a side is down.
+MOST_SLIDES = 1000
+
+
+class Pivot(NamedTuple):
+    """Friction that holds a vertex."""
+
+    friction: float
 
 
 @kernel
-def turned_down(pivot: Any, part: FullSide, hit: Contact) -> Face:
-    """Turn the part about its vertex until a side comes down; without the effect the vertex is a hinge.
+def _held_by(pivot: Any) -> float:
+    if pivot is None:
+        return 0.0
+    return pivot.friction  # type: ignore[no-any-return]
+
+
+@kernel
+def _friction(pivot: Any, slip: Any) -> float:
+    """Of whichever effect is there: both read the one fact."""
+    if slip is None:
+        return _held_by(pivot)
+    return slip.friction  # type: ignore[no-any-return]
+
+
+@kernel
+def _margin(pivot: Any, part: FullSide, omega: float, kinetic: float, barrier: float) -> float:
+    """Positive where the part gets over its vertex; one that is held by no hinge does not ask for a criterion."""
+    if pivot is None:
+        return decide(part.own.flip, omega, kinetic, barrier)
+    return (kinetic if omega > 0.0 else -kinetic) - barrier
+
+
+@kernel
+def _hinged(pivot: Any, part: FullSide, hit: Contact) -> Face:
+    """Turn the part about its vertex until a side comes down.
 
     By energy: over the top or back, then down with what was there at the start and the height lost.
     """
@@ -27,7 +82,7 @@ def turned_down(pivot: Any, part: FullSide, hit: Contact) -> Face:
     near = right * abs(right) / (ell + abs(high))  # sgn(X) (ell - H), see impact.py
     far = (ell - high) if right > 0.0 else (high - ell)
     barrier = gravity * (near if high > 0.0 else far)
-    over = decide(part.own.flip, hit.omega, kinetic, barrier) > 0.0
+    over = _margin(pivot, part, hit.omega, kinetic, barrier) > 0.0
     side = hit.vertex + 1 if over else hit.vertex
     k = side_number(part, side)
     foot = part.a[k] - part.length[k] if over else part.a[k]
@@ -36,3 +91,42 @@ def turned_down(pivot: Any, part: FullSide, hit: Contact) -> Face:
     rate = math.sqrt(max(2.0 * energy / inertia, 0.0))
     shift = hit.shift - on_to_next(part, hit.vertex) if over else hit.shift
     return Face(side, shift, hit.vertex, rate if over else -rate, hit.slide)
+
+
+@kernel
+def _come_down(part: FullSide, hit: Contact) -> Face:
+    """Return the side that has come down about a sliding vertex."""
+    over = hit.psi.phi > 0.5 * part.corner[side_number(part, hit.vertex)]
+    shift = hit.shift - on_to_next(part, hit.vertex) if over else hit.shift
+    return Face(hit.vertex + 1 if over else hit.vertex, shift, hit.vertex, hit.omega, hit.slide)
+
+
+@kernel
+def _holds(pivot: Any, part: FullSide, mu: float, hit: Contact, slid: bool) -> tuple[Contact, bool]:
+    """Whether a vertex at rest stays there until a side is down, and if not, where it lets go."""
+    if pivot is None:
+        return hit, not slid or holds_now(part, mu, hit)
+    at, slips = lets_go(part, mu, hit)
+    return at, not slips
+
+
+@kernel
+def turned_down(pivot: Any, slip: Any, part: FullSide, struck: Contact) -> tuple[Contact, Face, int]:
+    """Turn the part about its vertex until a side comes down (DOWN), the vertex lets go (OFF), or it is LOST."""
+    hit, ends = struck, OFF if struck.lift > 0.0 else ON
+    if pivot is None and slip is None:
+        return hit, _hinged(pivot, part, hit), DOWN if ends == ON else OFF
+    mu = _friction(pivot, slip)
+    way = 0 if hit.slide == 0.0 else int(math.copysign(1.0, hit.slide))
+    for slides in range(MOST_SLIDES):
+        if ends == ON and way == 0:
+            hit, holds = _holds(pivot, part, mu, hit, slides > 0)
+            if holds:
+                return hit, _hinged(pivot, part, hit), DOWN
+            way, ends = gives_way(part, mu, hit)
+        if ends == ON:
+            hit, ends = slide_on(part, mu, way, hit)
+            way = 0
+        if ends != ON:
+            return hit, _come_down(part, hit), ends
+    return hit, _come_down(part, hit), LOST

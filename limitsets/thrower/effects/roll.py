@@ -15,11 +15,16 @@ import math
 from typing import Any, NamedTuple
 
 from limitsets.jit import kernel
+from limitsets.thrower.effects.bounce import struck
 from limitsets.thrower.effects.drive import leant
-from limitsets.thrower.motion import Arrival, Face, FullSide, on_to_next, side_number
+from limitsets.thrower.motion import Arrival, Contact, Face, FullSide, on_to_next, right_of, side_number
 from limitsets.thrower.turn import turn
 
 __all__ = ["Roll", "next_arrival"]
+
+# A part that slides and turns with less than this share of the energy that would lift it lies flat: what is left is
+# rocking without end, by which it moves less than its size times the share's root.
+FLAT = 1e-12
 
 
 class Roll(NamedTuple):
@@ -29,8 +34,8 @@ class Roll(NamedTuple):
 
 
 @kernel
-def next_arrival(roll: Any, part: FullSide, face: Face) -> tuple[Arrival, bool]:
-    """Return the strike of the side's other end, and whether anything moves after it; without the effect it rests."""
+def _other_end(part: FullSide, face: Face) -> Arrival:
+    """Return the strike of the end of a side that comes down after the other."""
     k = side_number(part, face.side)
     a, d, right = part.a[k], part.d[k], part.length[k] - part.a[k]
     left_end = face.vertex == face.side
@@ -39,19 +44,39 @@ def next_arrival(roll: Any, part: FullSide, face: Face) -> tuple[Arrival, bool]:
     psi = turn(part.corner[side_number(part, other)]) if left_end else turn(0.0)
     # about the right end the part has turned by all of the angle there, and would lie one side back
     shift = face.shift + on_to_next(part, other) if left_end else face.shift
-    hit = Arrival(other, psi, shift, face.slide - face.omega * d, face.omega * reach, face.omega)
+    return Arrival(other, psi, shift, face.slide - face.omega * d, face.omega * reach, face.omega)
+
+
+@kernel
+def _rolls(roll: Any, part: FullSide, face: Face, after: Contact) -> bool:
+    """Whether a part that does not bounce moves on over the end that struck.
+
+    It has to turn on the same way, not against the side's other end, with energy enough to be lifted over the nearer
+    end, however much of that it has by sliding; but not just by sliding, flat on its side.
+    """
     if roll is None:
+        return False
+    k = side_number(part, face.side)
+    a, d = part.a[k], part.d[k]
+    lift = min(_lift(part, a, d), _lift(part, a - part.length[k], d))  # over the nearer end
+    right = right_of(part, after.vertex, after.psi)
+    along, up = after.slide - after.omega * d, after.omega * right
+    turning = part.own.rho2 * after.omega * after.omega + up * up
+    return (after.omega * face.omega > 0.0) & (turning + along * along > 2.0 * lift) & (turning > FLAT * lift)  # type: ignore[no-any-return]
+
+
+@kernel
+def next_arrival(roll: Any, bounce: Any, slip: Any, part: FullSide, face: Face) -> tuple[Arrival, bool]:
+    """Return the strike of the side's other end, and whether anything moves after it; without an effect it rests."""
+    hit = _other_end(part, face)
+    if roll is None and bounce is None:
         return hit, False
-    keeps = part.own.rho2 + d * d - a * right
-    inertia = part.own.rho2 + d * d + (right * right if left_end else a * a)
-    omega = face.omega * keeps / inertia
-    kinetic = 0.5 * inertia * omega * omega
-    lift = min(_lift(part, a, d), _lift(part, -right, d))
-    return hit, (keeps > 0.0) & (kinetic > lift)
+    after = struck(bounce, slip, part, hit)
+    return hit, after.lift > 0.0 or _rolls(roll, part, face, after)
 
 
 @kernel
 def _lift(part: FullSide, foot: float, d: float) -> float:
     """Energy it takes from lying on a side to the top over one of its ends, which is `foot` left of the centre."""
     gravity, right, high = leant(part.drive, part.own.kappa, foot, d)
-    return gravity * right * right / (math.sqrt(right * right + high * high) + high)  # ell - H
+    return gravity * right * right / (math.hypot(right, high) + high)  # ell - H

@@ -1,0 +1,173 @@
+"""What every effect has to pass, as a table: a row for each effect.
+
+Absent it changes nothing; in a limit it changes nothing; the energy of a throw is accounted for.  Worked numbers and
+the simulation written apart have their places in the files of the effects.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import pytest
+
+from limitsets.jit import kernel
+from limitsets.maps.drivers import images
+from limitsets.thrower.effects import BUILT
+from limitsets.thrower.effects.bounce import struck
+from limitsets.thrower.effects.landing import first_arrival
+from limitsets.thrower.effects.pivot import turned_down
+from limitsets.thrower.effects.roll import next_arrival
+from limitsets.thrower.free_flight import fly_on
+from limitsets.thrower.full import gather_full
+from limitsets.thrower.motion import DOWN, LOST, above, right_of
+from tests.thrower.effects.simulation import Law, OutsideError, Simulation
+from tests.thrower.effects.throws import Case, cases, same_end
+
+
+def _modes(case: Case, law: Law) -> set[str]:
+    """Which modes of contact the simulation sees in a throw."""
+    simulation = Simulation(case.body, case.kappa, case.height, law)
+    try:
+        simulation.run(case.x, case.side)
+    except OutsideError:
+        return {"outside"}
+    return set(simulation.modes)
+
+
+@dataclass(frozen=True)
+class Row:
+    """An effect: the facts in whose limit it changes nothing, and for which throws that is said."""
+
+    effect: str
+    limit: dict[str, float] = field(default_factory=dict)
+    applies: Callable[[Case], bool] = lambda case: True
+
+
+ROWS = [
+    Row("slip", {"friction": 1e9}, lambda case: _modes(case, Law(slip=1e9)) == {"hinge"}),
+    Row("pivot", {"friction": 1e9}, lambda case: _modes(case, Law(pivot=1e9)) == {"stick"}),
+    Row("bounce", {"restitution": 0.0}),
+]
+
+
+@pytest.mark.parametrize("row", ROWS, ids=lambda row: row.effect)
+def test_it_is_built(row: Row) -> None:
+    assert row.effect in BUILT
+
+
+def test_absent_effects_are_the_bare_map() -> None:
+    for case in cases(20, 20):
+        xs = np.linspace(case.x, 2 * case.x, 50)
+        full, bare = images(case.full(()), xs, case.side), images(case.bare, xs, case.side)
+        inside = bare.code != -3
+        assert (full.side[inside] == bare.side[inside]).all()
+        assert ((full.code == -3) == ~inside).all()
+        np.testing.assert_allclose(full.x[inside], bare.x[inside], rtol=1e-12)
+
+
+@pytest.mark.parametrize("row", ROWS, ids=lambda row: row.effect)
+def test_in_its_limit_it_changes_nothing(row: Row) -> None:
+    seen = 0
+    for case in cases(40, 21, **row.limit):
+        if row.applies(case):
+            seen += 1
+            assert same_end(case.mapped(("landing", row.effect)), case.mapped(("landing",)))
+    assert seen > 5
+
+
+IMPACT, TURN, FLIGHT = range(3)
+
+
+@kernel
+def _note(book: Any, line: int, column: int, one: float, two: float, three: float, four: float) -> None:
+    book[line, column] = one
+    book[line, column + 1] = two
+    book[line, column + 2] = three
+    book[line, column + 3] = four
+
+
+@kernel(entry=True)
+def ledger(params: Any, x: float, side: int, book: Any) -> int:
+    """Fill a book with the steps of a throw: kind, X and H, then height, velocities and rate before and after."""
+    part = gather_full(params, side)
+    hit, moving = first_arrival(part.landing, part, x)
+    line = 0
+    while moving and line + 3 < book.shape[0]:
+        right, high = right_of(part, hit.vertex, hit.psi), above(part, hit.vertex, hit.psi)
+        start = struck(part.bounce, part.slip, part, hit)
+        # the height, fourth, is written again by the next line
+        _note(book, line, 0, IMPACT, right, high, high)
+        _note(book, line, 3, high, hit.vx, hit.vy, hit.omega)
+        vx, vy = start.slide - start.omega * high, start.lift + start.omega * right
+        _note(book, line, 7, high, vx, vy, start.omega)
+        contact, face, ends = turned_down(part.pivot, part.slip, part, start)
+        if ends == LOST:
+            return -1
+        book[line + 1, 0] = TURN
+        _note(book, line + 1, 3, high, vx, vy, start.omega)
+        if ends == DOWN:
+            hit, moving = next_arrival(part.roll, part.bounce, part.slip, part, face)
+            d = above(part, hit.vertex, hit.psi)
+            _note(book, line + 1, 7, d, hit.vx, hit.vy, hit.omega)
+            line += 2
+        else:
+            right, high = (
+                right_of(part, contact.vertex, contact.psi),
+                above(part, contact.vertex, contact.psi),
+            )
+            vx, vy = contact.slide - contact.omega * high, contact.lift + contact.omega * right
+            _note(book, line + 1, 7, high, vx, vy, contact.omega)
+            hit, moving = fly_on(part.pivot, part.slip, part.bounce, part, contact, hit)
+            book[line + 2, 0] = FLIGHT
+            _note(book, line + 2, 3, high, vx, vy, contact.omega)
+            _note(book, line + 2, 7, above(part, hit.vertex, hit.psi), hit.vx, hit.vy, hit.omega)
+            line += 3
+    return line
+
+
+ALL = ("landing", "roll", "slip", "pivot", "bounce")
+
+
+def test_the_energy_of_a_throw_is_accounted_for() -> None:
+    kinds = {IMPACT: 0, TURN: 0, FLIGHT: 0}
+    rubbing = 0
+    for case in cases(60, 22):
+        book = np.zeros((4000, 11))
+        lines = ledger(case.full(ALL), case.x, case.side, book)
+        simulation = case.simulation(ALL)
+        try:
+            simulation.run(case.x, case.side)
+        except OutsideError:
+            continue
+        rho2, kappa = case.body.rho**2, case.kappa
+        d = case.body.numbers()["d"][case.side]
+        # thrown with the arm: the velocity of rotation about the joint
+        started = 0.5 * ((case.height + d) ** 2 + case.x**2 + rho2) + kappa * d
+        ended, lost = 0.0, 0.0
+        for kind, right, high, *states in book[:lines]:
+            before, after = np.reshape(states, (2, 4))
+            kinds[int(kind)] += 1
+            energy = [
+                0.5 * (vx**2 + vy**2 + rho2 * rate**2) + kappa * height
+                for height, vx, vy, rate in (before, after)
+            ]
+            ended = energy[1]
+            if kind == FLIGHT:
+                assert energy[1] == pytest.approx(energy[0], rel=1e-12)
+            if kind == IMPACT:
+                drag, push = after[1:3] - before[1:3]
+                # the impulse acts at the vertex, and its work is its product with the vertex's mean velocity
+                assert rho2 * (after[3] - before[3]) == pytest.approx(
+                    high * drag - right * push, abs=1e-12 * started
+                )
+                along = before[1] + after[1] + high * (before[3] + after[3])
+                off = before[2] + after[2] - right * (before[3] + after[3])
+                lost -= 0.5 * (drag * along + push * off)
+                assert energy[1] <= energy[0] * (1 + 1e-13)
+        rubbing += simulation.rubbed > 1e-6 * started
+        assert started == pytest.approx(ended + lost + simulation.rubbed, rel=1e-12)
+    assert min(kinds.values()) > 30
+    assert rubbing > 20
