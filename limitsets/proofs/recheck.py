@@ -1062,8 +1062,9 @@ def check_task(task: Task) -> tuple[int, Failure | None, int]:
 def tasks_of(c: Cells, scene: Scene, box: int, chosen: Array, least: float | None) -> Iterator[Task]:
     """Cut the chosen cells (ascending) into tasks of one side each."""
     lower, upper = c.lower(), c.upper()
-    reach = float(scene.arm[1])
-    reach = reach if Fraction(reach) >= scene.arm[1] else math.nextafter(reach, math.inf)
+    short, long = (float(end) for end in scene.arm)
+    short = short if Fraction(short) <= scene.arm[0] else math.nextafter(short, -math.inf)
+    long = long if Fraction(long) >= scene.arm[1] else math.nextafter(long, math.inf)
     for side in range(len(c.edges)):
         own = chosen[c.side[chosen] == side]
         for part in np.array_split(own, max(1, -(-len(own) // CHUNK))):
@@ -1073,7 +1074,8 @@ def tasks_of(c: Cells, scene: Scene, box: int, chosen: Array, least: float | Non
                 q = np.flatnonzero(array[:, 0] >= 0)
                 rows[q, column] = lower[array[q, 0]]
                 ends = upper[array[q, 1]]
-                rows[q, column + 1] = np.where(ends >= reach, math.inf, ends)  # the arm ends before the cells
+                # where the shortest arm ends before the cells, its end counts
+                rows[q, column + 1] = np.where((ends > short) | (ends >= long), math.inf, ends)
             if len(part):
                 yield Task(box, side, part, rows, least)
 
