@@ -376,13 +376,13 @@ def halved(raw: dict[str, Any], name: str) -> Iterator[dict[str, Any]]:
         yield tree
 
 
-def over_halves(scene: Scene, check: Callable[[Scene], Any]) -> Any:
+def over_halves(scene: Scene, check: Callable[..., str], *more: Any) -> str:
     """Check something that is said of all parameters, by halves where it fails of them together; what fails, or ""."""
     stack, tried = [(scene, 0)], 0
     while stack:
         piece, depth = stack.pop()
         tried += 1
-        bad = check(piece)
+        bad = check(piece, *more)
         if bad:
             parts = piece.halves() if depth < DEPTH and tried + len(stack) < MOST_HALVES else []
             if not parts:
@@ -412,7 +412,7 @@ def read_scene(raw: object, noise: object) -> Scene:
         table(mass, "part.mass", "plate_density", "points")
         require("vertices" in scene["part"] or not mass.get("points"), "points of mass need vertices")
         start, rho2 = read_plate(mass, vertices, unit, length)
-        (ex, ey), along, above = (ONE, ZERO), ZERO, ZERO
+        (ex, ey), along, above, rho, own = (ONE, ZERO), ZERO, ZERO, rho2.sqrt(), -1
     else:
         table(mass, "part.mass", "center radius_of_gyration")
         center = table(mass["center"], "part.mass.center", "side along above")
@@ -420,7 +420,8 @@ def read_scene(raw: object, noise: object) -> Scene:
         require(fits, "part.mass.center.side is not a side")
         along = length(center["along"], "part.mass.center.along")
         above = length(center["above"], "part.mass.center.above")
-        start, (ex, ey), _ = side_frame(vertices, center["side"])
+        own = center["side"]
+        start, (ex, ey), _ = side_frame(vertices, own)
         rho = length(mass["radius_of_gyration"], "part.mass.radius_of_gyration")
         require(bool(rho > 0), "the radius of gyration is not positive")
         rho2 = rho * rho
@@ -444,6 +445,9 @@ def read_scene(raw: object, noise: object) -> Scene:
         with_e, across_e = ex * ux + ey * uy, ux * ey - uy * ex
         a = x * ux + y * uy + along * with_e - above * across_e  # the centre is start + along e + above n
         d = ux * y - uy * x + along * across_e + above * with_e
+        # what stands in the scene is narrower than what is computed, where something is known to a tolerance only
+        a, d = (along, above) if i == own else (a, d)
+        long = length(scene["part"]["sides"][i], "part.sides") if "sides" in scene["part"] else long
         require(bool(a > 0) and bool(a < long) and bool(d > 0), f"the part does not rest on side {i}")
         sides.append(Side(a, d, long, h, rho2, reach_ball, is_exact, is_signed))
     for side, after in zip(sides, sides[1:] + sides[:1], strict=True):
@@ -459,7 +463,7 @@ def read_scene(raw: object, noise: object) -> Scene:
         side.late = (float(side.a.lower()), float(side.d.upper()), float(side.small_d.upper()))
         require(bool(k_lo > side.small_d), "small-angle-2 needs kappa > d")
     ends = reach.lo / unit, reach.hi / unit
-    whole = Scene(sides, k_lo, k_hi, rho2.sqrt(), ends, reach.unit, scene, noise)
+    whole = Scene(sides, k_lo, k_hi, rho, ends, reach.unit, scene, noise)
     if whole.cuts():
         whole.loose = sum(float(ball.rad()) for s in sides for ball in (s.a, s.d, s.h, s.shift, whole.rho))
     return whole
@@ -1768,8 +1772,11 @@ def check_fixed_point(s: Side, k_lo: Arb, k_hi: Arb, edge: float, q: float, said
     return ""
 
 
-def check_below_cells(s: Side, scene: Scene, edge: float, q: float, said: tuple[float, float] | None) -> str:
+def check_below_cells(
+    scene: Scene, side: int, edge: float, q: float, said: tuple[float, float] | None
+) -> str:
     """Check what is said of starts before the first cell: whichever the sign of h asks for; "" or what fails."""
+    s = scene.sides[side]
     if s.h > 0:
         if said is None:
             return "the arm's surface is above the joint, and no fixed point of the jog is given"
@@ -1874,6 +1881,7 @@ def check_tolerance(raw: list[Any], tolerance: object) -> tuple[dict[str, str], 
         own = [quantity(f[key], kinds, key) for f in flat]
         require(len({q.pi for q in own}) == 1, f"{plain(key)}: mixes degrees and radians")
         ranges.append(own)
+        require(key not in names, "tolerance names one quantity twice")
         names.append(key)
         lo, hi = min(q.lo for q in own), max(q.hi for q in own)
         unit = next(u[own[0].unit] for u in UNITS.values() if own[0].unit in u)
@@ -1997,7 +2005,7 @@ def read_goal(section: dict[str, Any], n_sides: int) -> dict[str, Any]:
     return goal
 
 
-def statement_of_goal(goal: dict[str, Any]) -> str:
+def statement_of_goal(goal: dict[str, Any], noisy: bool) -> str:
     """Put a goal in words."""
     start = "every start a_i < x <= arm.length on every side i"
     place = start if goal["anywhere"] else "every start in the attracting cells"
@@ -2008,7 +2016,8 @@ def statement_of_goal(goal: dict[str, Any]) -> str:
         there = f"comes to rest on side {goal['side']} at x >= {plain(goal['text'])}"
         if goal["every"]:
             return f"goal: {place} {there}, after {goal['throws']} throws at most where x is in the cells"
-        return f"goal: {place}, but for starts of total length zero, {there}"
+        those = "others for other throws, " if noisy else ""
+        return f"goal: {place}, but for starts of total length zero, {those}{there}"
     if goal["kind"] == "attracts_all":
         return f"goal: {start} enters one component of attracting cells, connected by its images, and stays in it"
     if goal["kind"] == "flip_order":
@@ -2056,17 +2065,18 @@ def check_everywhere(c: Cells, scene: Scene) -> str:
         if Fraction(float(edges[-1])) < scene.arm[1]:
             return f"side {i}: the cells end before arm.length"
         edge = float(edges[0])
-
-        def thrown_out(half: Scene, i: int = i, edge: float = edge) -> str:
-            s = half.sides[i]
-            gain = -2 * s.h / (half.k_hi - s.small_d)
-            q = float((1 + gain * (1 - 2.0**-20)).lower())
-            return check_near_joint(s, half.k_lo, half.k_hi, edge, q)
-
-        near = over_halves(scene, thrown_out)
+        near = over_halves(scene, check_thrown_out, i, edge)
         if near:
             return f"side {i}, near the joint, x in (a, {float(edges[0])!r}]: {near}"
     return ""
+
+
+def check_thrown_out(scene: Scene, side: int, edge: float) -> str:
+    """Check that starts up to the edge are thrown outward, by whatever factor; "" or what fails."""
+    s = scene.sides[side]
+    gain = -2 * s.h / (scene.k_hi - s.small_d)
+    q = float((1 + gain * (1 - 2.0**-20)).lower())
+    return check_near_joint(s, scene.k_lo, scene.k_hi, edge, q)
 
 
 def check_oriented(c: Cells, scene: Scene, goal: dict[str, Any]) -> str:
@@ -2282,7 +2292,7 @@ def statement_of(name: str, section: dict[str, Any], noisy: bool) -> str:
             f" a factor of at least {min(section['q']):.9g} with every throw"
         )
     if name == "goal":
-        return statement_of_goal(section)
+        return statement_of_goal(section, noisy)
     if name == "expanding":
         least = section["least"]
         entropy = "" if noisy else f"; topological entropy >= ln({least!r}) = {math.log(least):.6g}"
@@ -2321,7 +2331,7 @@ def check_box_claims(
             edge = float(c.edges[i][0])
             said = claims["attracts-all"]["fixed"][i]
             q = claims["attracts-all"]["q"][i]
-            near = over_halves(scene, lambda half: check_below_cells(half.sides[i], half, edge, q, said))
+            near = over_halves(scene, check_below_cells, i, edge, q, said)
             bad = bad or (f"side {i}, near the joint, x in (a, {edge!r}]: {near}" if near else "")
         wide += [] if bad else ["attracts-all"]
         if bad:
@@ -2413,8 +2423,7 @@ def check_certificate(
     crew = Crew(raw, noise, workers, told)
     try:
         for k, (scene, c, b) in enumerate(zip(scenes, cells, boxes, strict=True)):
-            said = b["parameters"]
-            bad = over_halves(scene, lambda half: check_parameters(half, said, f"box {k}"))
+            bad = over_halves(scene, check_parameters, b["parameters"], f"box {k}")
             where = f"box {k}, " if len(boxes) > 1 else ""
             found = [(list(claims), bad)] if bad else check_box_claims(scene, c, k, claims, crew)
             for names, reason in found:
