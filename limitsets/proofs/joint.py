@@ -30,7 +30,7 @@ from limitsets.thrower.side_box import gather_box
 __all__ = ["NearJoint", "near_joint"]
 
 # q - 1 is lowered by this share, so that other arithmetic can confirm it where the parameters are wide.
-SLACK_OF_Q = 2.0**-20
+SLACK_OF_Q = 2.0**-26
 
 
 @dataclass(frozen=True)
