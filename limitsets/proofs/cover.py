@@ -28,6 +28,10 @@ __all__ = ["Cover", "cover"]
 # Share of a side's extent that is left to the argument near the joint.
 NEAREST = 1e-6
 
+# So many times the width of what is known of a_i is left to it at least: nearer than that a jog, whose length goes with
+# x - a, is shorter than a cell, whose width goes with the distance from the least a.
+UNKNOWN = 4.0
+
 # Images are widened by this share of the cell they come from, so that other arithmetic can confirm them.
 SLACK = 1e-3
 
@@ -95,7 +99,8 @@ def cover(box: ParameterBox, cells: int, cuts: Mapping[int, Sequence[float]] | N
     for side, point in enumerate(points):
         if not point.reason:
             foot[side] = anchor[side] = point.hi
-    lo = foot + NEAREST * (end - foot)
+    unknown = np.minimum(UNKNOWN * (box.hi.a - box.lo.a), 0.1 * (end - foot)) if not points else 0.0
+    lo = foot + np.maximum(NEAREST * (end - foot), unknown)
     plain = grid(Domain(lo[:, None], end[:, None], anchor), cells=cells)
     sides = []
     for side, (edges,) in enumerate(plain.edges):

@@ -23,11 +23,14 @@ import limitsets.interval as iv
 from limitsets.jit import proof_kernel
 from limitsets.proofs.cover import Cover
 from limitsets.proofs.fixed_point import leaves
-from limitsets.thrower.flight_box import bracket
+from limitsets.thrower.flight_box import bracket, sure_bracket
 from limitsets.thrower.impact_box import decide_box, displacement_box, strike_box
 from limitsets.thrower.side_box import gather_box
 
 __all__ = ["NearJoint", "near_joint"]
+
+# q - 1 is lowered by this share, so that other arithmetic can confirm it where the parameters are wide.
+SLACK_OF_Q = 2.0**-26
 
 
 @dataclass(frozen=True)
@@ -67,6 +70,8 @@ def _near(lo: Any, hi: Any, side: int, x: float, out: Any) -> None:
     """Root found, jog decided, bracket, -h, room on the arm: positive if proved; q, reach, slope."""
     b = gather_box(lo, hi, side)
     last, good = bracket(b.flight, b, x)
+    if not good:  # so near to the joint its starts may lie far apart, where a is known to a tolerance only
+        last, good = sure_bracket(b.flight, b, x)
     phi = (0.0, last[1])
     starts = (b.a[0], x)
     omega, barrier = strike_box(b.flight, b, starts, phi)
@@ -125,12 +130,13 @@ def near_joint(found: Cover) -> tuple[NearJoint, ...]:
             continue
         out = np.full(8, np.nan)
         _near(found.box.lo, found.box.hi, side, float(edges[0]), out)
-        good = [*(out[:5] > 0.0), out[5] > 1.0]
+        q = 1.0 + (float(out[5]) - 1.0) * (1.0 - SLACK_OF_Q)
+        good = [*(out[:5] > 0.0), q > 1.0]
         reason = "" if all(good) else REASONS[good.index(False)]
         if found.box.landing > 0.0:
             reason = SCATTERED
         rises = bool(out[7] > 0.0)
-        answers.append(NearJoint(float(edges[0]), float(out[5]), float(out[6]), rises, not reason, reason))
+        answers.append(NearJoint(float(edges[0]), q, float(out[6]), rises, not reason, reason))
     return tuple(answers)
 
 

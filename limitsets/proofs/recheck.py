@@ -16,6 +16,7 @@ Exit status: 0 every claim proved, 1 not proved, 2 not a readable certificate, 1
 """
 
 import argparse
+import copy
 import hashlib
 import itertools
 import json
@@ -44,8 +45,9 @@ import numpy as np
 from flint import arb, fmpq
 
 PRECISION = 100  # bits of every ball
-DEPTH = 12  # a cell is halved at most so often in x, and so often in kappa
+DEPTH = 12  # a cell is halved at most so often in x, so often in kappa, and so often in all else that is an interval
 MOST_BOXES = 20_000  # pieces of one cell: a certificate that needs more is refused
+MOST_HALVES = 1_000  # pieces of a tolerance, for one check that is not of a cell
 CHUNK = 2_000  # cells handed to a worker at once
 SMALL = 20_000  # so many cells are done before other processes have started
 FULL_TURN = 6.283185307179586  # a float below 2 pi
@@ -255,7 +257,9 @@ def span(lo: Fraction, hi: Fraction) -> Arb:
 
 
 def quantity(value: object, kinds: str, where: str) -> Quantity:
-    """Read a quantity, `"5.75 in"` or a pair of such, of one of the kinds named."""
+    """Read a quantity, `"5.75 in"` or a pair of such, of one of the kinds named; a half of one is read already."""
+    if isinstance(value, Quantity):  # `halves` put it there: nothing that stands in a file is one
+        return value
     pair = value if isinstance(value, list) else [value, value]
     require(len(pair) == 2, f"{where}: an interval has two ends")
     read = []
@@ -314,6 +318,8 @@ class Side:
     landing: Arb = ZERO  # a part lands within this of where the throw would put it
     over_2m: Arb = ZERO
     floats: tuple[float, float, float] = (0.0, 0.0, 0.0)  # a, d, small_d: for guesses only
+    early: tuple[float, float, float] = (0.0, 0.0, 0.0)  # those of the earliest impact, and of the latest
+    late: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
 
 @dataclass(slots=True)
@@ -326,6 +332,63 @@ class Scene:
     rho: Arb
     arm: tuple[Fraction, Fraction]
     unit: str
+    raw: dict[str, Any] = field(default_factory=dict)  # what it was read from, and the noise
+    noise: object = None
+    loose: float = 0.0  # how wide its sides' enclosures are together, as far as `halves` can narrow them
+    parts: "list[Scene]" = field(default_factory=list)  # its halves, once they are asked for
+
+    def cuts(self) -> list[str]:
+        """Name the quantities of part and arm that are intervals; kappa is halved apart, the arm ends where it ends."""
+        known = [(name, value) for name, value in quantities(self.raw) if name.startswith(("part.", "arm.s"))]
+        halved = [name for name, value in known if isinstance(value, Quantity) and value.lo < value.hi]
+        return halved + [name for name, value in known if isinstance(value, list)]
+
+    def halves(self) -> "list[Scene]":
+        """Return two scenes that hold it together, [] if it is a point: halved in what narrows its enclosures most.
+
+        A quantity is halved, not a_i or d_i: they and the lengths go together.
+        """
+        if self.loose > 0 and not self.parts:
+            pairs = [[read_scene(raw, self.noise) for raw in halved(self.raw, name)] for name in self.cuts()]
+            self.parts = min(pairs, key=lambda pair: sum(half.loose for half in pair), default=[])
+        return self.parts
+
+
+def halved(raw: dict[str, Any], name: str) -> Iterator[dict[str, Any]]:
+    """Cut one quantity of a scene that was read in two halves."""
+    words = re.findall(r"[^.\[\]]+", name)
+
+    def place(tree: Any) -> tuple[Any, Any]:
+        for k, word in enumerate(words):
+            at = word if isinstance(tree, dict) else int({"x": "0", "y": "1"}.get(word, word))
+            if k == len(words) - 1:
+                return tree, at
+            tree = tree[at]
+        raise KeyError(name)
+
+    node, at = place(raw)
+    q = quantity(node[at], "length angle speed acceleration mass density share", name)
+    middle = (q.lo + q.hi) / 2
+    for half in (q._replace(hi=middle), q._replace(lo=middle)):
+        tree = copy.deepcopy(raw)
+        node, at = place(tree)
+        node[at] = half
+        yield tree
+
+
+def over_halves(scene: Scene, check: Callable[..., str], *more: Any) -> str:
+    """Check something that is said of all parameters, by halves where it fails of them together; what fails, or ""."""
+    stack, tried = [(scene, 0)], 0
+    while stack:
+        piece, depth = stack.pop()
+        tried += 1
+        bad = check(piece, *more)
+        if bad:
+            parts = piece.halves() if depth < DEPTH and tried + len(stack) < MOST_HALVES else []
+            if not parts:
+                return bad
+            stack += [(half, depth + 1) for half in parts]
+    return ""
 
 
 def read_scene(raw: object, noise: object) -> Scene:
@@ -349,7 +412,7 @@ def read_scene(raw: object, noise: object) -> Scene:
         table(mass, "part.mass", "plate_density", "points")
         require("vertices" in scene["part"] or not mass.get("points"), "points of mass need vertices")
         start, rho2 = read_plate(mass, vertices, unit, length)
-        (ex, ey), along, above = (ONE, ZERO), ZERO, ZERO
+        (ex, ey), along, above, rho, own = (ONE, ZERO), ZERO, ZERO, rho2.sqrt(), -1
     else:
         table(mass, "part.mass", "center radius_of_gyration")
         center = table(mass["center"], "part.mass.center", "side along above")
@@ -357,7 +420,8 @@ def read_scene(raw: object, noise: object) -> Scene:
         require(fits, "part.mass.center.side is not a side")
         along = length(center["along"], "part.mass.center.along")
         above = length(center["above"], "part.mass.center.above")
-        start, (ex, ey), _ = side_frame(vertices, center["side"])
+        own = center["side"]
+        start, (ex, ey), _ = side_frame(vertices, own)
         rho = length(mass["radius_of_gyration"], "part.mass.radius_of_gyration")
         require(bool(rho > 0), "the radius of gyration is not positive")
         rho2 = rho * rho
@@ -381,6 +445,9 @@ def read_scene(raw: object, noise: object) -> Scene:
         with_e, across_e = ex * ux + ey * uy, ux * ey - uy * ex
         a = x * ux + y * uy + along * with_e - above * across_e  # the centre is start + along e + above n
         d = ux * y - uy * x + along * across_e + above * with_e
+        # what stands in the scene is narrower than what is computed, where something is known to a tolerance only
+        a, d = (along, above) if i == own else (a, d)
+        long = length(scene["part"]["sides"][i], "part.sides") if "sides" in scene["part"] else long
         require(bool(a > 0) and bool(a < long) and bool(d > 0), f"the part does not rest on side {i}")
         sides.append(Side(a, d, long, h, rho2, reach_ball, is_exact, is_signed))
     for side, after in zip(sides, sides[1:] + sides[:1], strict=True):
@@ -392,8 +459,14 @@ def read_scene(raw: object, noise: object) -> Scene:
         side.small_d = side.d if model["flight"] == "small-angle-2" else ZERO
         side.concave = bool(k_lo > side.ell) or not side.exact
         side.floats = (float(side.a.mid()), float(side.d.mid()), float(side.small_d.mid()))
+        side.early = (float(side.a.upper()), float(side.d.lower()), float(side.small_d.lower()))
+        side.late = (float(side.a.lower()), float(side.d.upper()), float(side.small_d.upper()))
         require(bool(k_lo > side.small_d), "small-angle-2 needs kappa > d")
-    return Scene(sides, k_lo, k_hi, rho2.sqrt(), (reach.lo / unit, reach.hi / unit), reach.unit)
+    ends = reach.lo / unit, reach.hi / unit
+    whole = Scene(sides, k_lo, k_hi, rho, ends, reach.unit, scene, noise)
+    if whole.cuts():
+        whole.loose = sum(float(ball.rad()) for s in sides for ball in (s.a, s.d, s.h, s.shift, whole.rho))
+    return whole
 
 
 def read_polygon(part: object, length: Callable[[object, str], Arb]) -> list[tuple[Arb, Arb]]:
@@ -571,7 +644,8 @@ def at_angle(s: Side, p: Arb) -> Angle:
     """Evaluate what depends on the angle alone."""
     if s.exact:
         sin, cos = p.sin_cos()
-        return Angle(p, s.d - s.a * sin - s.d * cos, s.a - s.a * cos + s.d * sin - s.hd * p)
+        back = 1 - cos  # a and d once each: they may be wide
+        return Angle(p, s.d * back - s.a * sin, s.a * back - s.d * (p - sin) - s.h * p)
     return Angle(p, (HALF * s.small_d * p - s.a) * p, -s.h * p)
 
 
@@ -588,7 +662,7 @@ def over_angles(s: Side, phi: Arb, R: Arb, kappa: Arb) -> tuple[int, Arb, Arb]:
         X = s.a * cos - s.d * sin
         fall = R - kappa * phi
         spin = s.rho2 + X * fall + H * s.hd  # M om
-        return decide_exact(s, spin, X, H, kappa), H - s.hd, fall - X
+        return decide_exact(s, spin, X, H, kappa), s.a * sin - s.d * (1 - cos) - s.h, fall - X
     spin = s.rho2 - s.a * R + 2 * s.a * s.a + s.d * s.d + s.d * s.h
     V = kappa * (s.ell - s.d) - 2 * s.a * (R - s.a)
     F = spin * (abs(spin) if s.signed else spin) * s.over_2m - V
@@ -648,10 +722,10 @@ def positive_until(s: Side, x: Arb, kappa: Arb, end: Angle) -> bool:
     return False
 
 
-def guess_root(s: Side, x: float, kappa: float, p: float) -> float:
+def guess_root(floats: tuple[float, float, float], exact: bool, x: float, kappa: float, p: float) -> float:
     """Newton in floats from p; believed by nobody."""
-    a, d, small = s.floats
-    if not s.exact:
+    a, d, small = floats
+    if not exact:
         return 2.0 * (x - a) / (kappa - small)
     for _ in range(12):
         sin, cos = math.sin(p), math.cos(p)
@@ -667,7 +741,7 @@ def guess_root(s: Side, x: float, kappa: float, p: float) -> float:
 
 def root_above(s: Side, x: Arb, kappa: Arb, at: Angle) -> Angle:
     """Find an angle that the impact at x comes before, for this kappa and larger ones: `at` or a proved better one."""
-    p = guess_root(s, float(x.mid()), float(kappa.mid()), float(at.p.mid())) * (1 + 2.0**-40)
+    p = guess_root(s.late, s.exact, float(x.mid()), float(kappa.mid()), float(at.p.mid())) * (1 + 2.0**-40)
     if 0 < p < at.p:
         better = at_angle(s, arb(p))
         if flight(x, kappa, better) < 0:
@@ -677,7 +751,7 @@ def root_above(s: Side, x: Arb, kappa: Arb, at: Angle) -> Angle:
 
 def root_below(s: Side, x: Arb, kappa: Arb, at: Angle, start: Arb) -> Angle:
     """Find an angle that the impact at x comes after, for this kappa and smaller ones: `at` or a proved better one."""
-    p = guess_root(s, float(x.mid()), float(kappa.mid()), float(start.mid())) * (1 - 2.0**-40)
+    p = guess_root(s.early, s.exact, float(x.mid()), float(kappa.mid()), float(start.mid())) * (1 - 2.0**-40)
     if at.p < p < FULL_TURN:
         better = at_angle(s, arb(p))
         if positive_until(s, x, kappa, better):
@@ -828,32 +902,45 @@ def check_ranks(c: Cells, scene: Scene, max_rank: int) -> str:
 # --------------------------------------------------------------------------------------------------------- the cells
 
 
+def check_bracket(s: Side, box: "Box") -> str:
+    """Check a bracket of phi: f rises with x and falls with kappa, so that it holds if it does at two corners."""
+    if not positive_until(s, box.x0, box.k1, box.low):
+        return f"f > 0 up to phi = {float(box.low.p)!r} is not proved at x = {float(box.x0)!r}"
+    if not flight(box.x1, box.k0, box.high) < 0:
+        return f"f < 0 at phi = {float(box.high.p)!r} is not proved at x = {float(box.x1)!r}"
+    return ""
+
+
 def check_cell(
-    s: Side, k_lo: Arb, k_hi: Arb, x: tuple[float, float], phi: tuple[float, float],
+    scene: Scene, side: int, x: tuple[float, float], phi: tuple[float, float],
     targets: tuple[tuple[float, float], tuple[float, float]], least: Arb | None,
 ) -> tuple[Failure | None, int]:  # fmt: skip
     """Prove what the certificate says about one cell; the failure or None, and the number of boxes looked at.
 
     `targets` are the ends of the target cells of a jog and of a flip: (nan, nan) where the branch is excluded, so
-    that nothing lies inside; an upper end inf stands for the arm's length.  f rises with x and falls with kappa, so
-    the bracket of phi holds over the cell if it does at two corners.
+    that nothing lies inside; an upper end inf stands for the arm's length.
     """
-    low, high = at_angle(s, arb(phi[0])), at_angle(s, arb(phi[1]))
-    first = Box(arb(x[0]), arb(x[1]), k_lo, k_hi, low, high, 0, 0)
-    if not positive_until(s, first.x0, k_hi, low):
-        return Failure("image", f"f > 0 up to phi = {phi[0]!r} is not proved at x = {x[0]!r}"), 1
-    if not flight(first.x1, k_lo, high) < 0:
-        return Failure("image", f"f < 0 at phi = {phi[1]!r} is not proved at x = {x[1]!r}"), 1
+    k_lo, k_hi = scene.k_lo, scene.k_hi
+    s = scene.sides[side]
+    first = Box(
+        scene, arb(x[0]), arb(x[1]), k_lo, k_hi, at_angle(s, arb(phi[0])), at_angle(s, arb(phi[1])), 0, 0, 0
+    )
+    bad = check_bracket(s, first)
+    if bad and scene.loose > 0:
+        bad = over_halves(scene, lambda half: check_bracket(half.sides[side], first.of(half, side)))
+    if bad:
+        return Failure("image", bad), 1
     stack, boxes = [first], 0
     while stack:
         box = stack.pop()
         boxes += 1
-        failure = check_box(s, box, targets, least)
+        failure = check_box(box.scene.sides[side], box, targets, least)
         if failure is not None:
-            halves = box.halves()
+            halves = box.halves(side)
             if not halves or boxes + len(stack) > MOST_BOXES:
                 return failure, boxes
             for half in halves:
+                s = half.scene.sides[side]
                 high = root_above(s, half.x1, half.k0, half.high)
                 low = root_below(s, half.x0, half.k1, half.low, high.p)
                 stack.append(half._replace(low=low, high=high))
@@ -861,8 +948,9 @@ def check_cell(
 
 
 class Box(NamedTuple):
-    """A piece of a cell, a piece of kappa, a bracket of the impact angle over both, and how often each was halved."""
+    """A piece of a cell, of kappa and of all else, a bracket of the impact angle over it, how often each was halved."""
 
+    scene: Scene
     x0: Arb
     x1: Arb
     k0: Arb
@@ -871,18 +959,28 @@ class Box(NamedTuple):
     high: Angle
     in_x: int
     in_k: int
+    in_s: int
 
-    def halves(self) -> list["Box"]:
-        """Halve it in what matters more to the angle, x or kappa; [] if it has been halved enough."""
+    def halves(self, side: int) -> list["Box"]:
+        """Halve it in what matters more to the angle, x, kappa or a quantity; [] if it has been halved enough."""
         xm = arb(float((HALF * (self.x0 + self.x1)).mid()))
         km = arb(float((HALF * (self.k0 + self.k1)).mid()))
         by_x = self.in_x < DEPTH and self.x0 < xm and xm < self.x1
         by_k = self.in_k < DEPTH and self.k0 < km and km < self.k1
-        if by_k and not (by_x and HALF * self.high.p * (self.k1 - self.k0) < self.x1 - self.x0):
+        of_x = float(self.x1 - self.x0) if by_x else 0.0
+        of_k = float(HALF * self.high.p * (self.k1 - self.k0)) if by_k else 0.0
+        if self.in_s < DEPTH and self.scene.loose > max(of_x, of_k):
+            return [self.of(half, side) for half in self.scene.halves()]
+        if by_k and of_k >= of_x:
             return [self._replace(k0=km, in_k=self.in_k + 1), self._replace(k1=km, in_k=self.in_k + 1)]
         if by_x:
             return [self._replace(x0=xm, in_x=self.in_x + 1), self._replace(x1=xm, in_x=self.in_x + 1)]
         return []
+
+    def of(self, scene: Scene, side: int) -> "Box":
+        """Make it one of a narrower scene: the bracket stays, what depends on the angle is narrower."""
+        low, high = (at_angle(scene.sides[side], at.p) for at in (self.low, self.high))
+        return self._replace(scene=scene, low=low, high=high, in_s=self.in_s + 1)
 
 
 def check_box(
@@ -895,7 +993,7 @@ def check_box(
     enclosed from a bracket of phi at that end by the mean value theorem; else the mean value theorem over the box.
     Noise of the landing place moves an image, and does not decide.
     """
-    x0, x1, k0, k1, low, high, _, _ = box
+    _, x0, x1, k0, k1, low, high, _, _, _ = box
     phi, R = low.p.union(high.p), x0.union(x1)
     decision, rise, f_slope = over_angles(s, phi, R, k0.union(k1))
     lo, hi = x0 + low.D, x1 + high.D
@@ -951,14 +1049,14 @@ def prepare(raw: list[object], noise: object) -> None:
 def check_task(task: Task) -> tuple[int, Failure | None, int]:
     """Find the first cell of a task that is not proved, and what fails; and count the boxes looked at."""
     if task.box not in SCENES:
+        SCENES.clear()  # with all its halves
         SCENES[task.box] = read_scene(SETUP[0][task.box], SETUP[1])
     scene = SCENES[task.box]
-    s = scene.sides[task.side]
     least = None if task.least is None else arb(task.least)
     total = 0
     for cell, (x0, x1, p0, p1, j0, j1, f0, f1) in zip(task.cells.tolist(), task.rows.tolist(), strict=True):
         targets = ((j0, j1), (f0, f1))
-        failure, boxes = check_cell(s, scene.k_lo, scene.k_hi, (x0, x1), (p0, p1), targets, least)
+        failure, boxes = check_cell(scene, task.side, (x0, x1), (p0, p1), targets, least)
         total += boxes
         if failure is not None:
             return cell, failure, total
@@ -968,8 +1066,9 @@ def check_task(task: Task) -> tuple[int, Failure | None, int]:
 def tasks_of(c: Cells, scene: Scene, box: int, chosen: Array, least: float | None) -> Iterator[Task]:
     """Cut the chosen cells (ascending) into tasks of one side each."""
     lower, upper = c.lower(), c.upper()
-    reach = float(scene.arm[1])
-    reach = reach if Fraction(reach) >= scene.arm[1] else math.nextafter(reach, math.inf)
+    short, long = (float(end) for end in scene.arm)
+    short = short if Fraction(short) <= scene.arm[0] else math.nextafter(short, -math.inf)
+    long = long if Fraction(long) >= scene.arm[1] else math.nextafter(long, math.inf)
     for side in range(len(c.edges)):
         own = chosen[c.side[chosen] == side]
         for part in np.array_split(own, max(1, -(-len(own) // CHUNK))):
@@ -979,7 +1078,8 @@ def tasks_of(c: Cells, scene: Scene, box: int, chosen: Array, least: float | Non
                 q = np.flatnonzero(array[:, 0] >= 0)
                 rows[q, column] = lower[array[q, 0]]
                 ends = upper[array[q, 1]]
-                rows[q, column + 1] = np.where(ends >= reach, math.inf, ends)  # the arm ends before the cells
+                # where the shortest arm ends before the cells, its end counts
+                rows[q, column + 1] = np.where((ends > short) | (ends >= long), math.inf, ends)
             if len(part):
                 yield Task(box, side, part, rows, least)
 
@@ -1186,7 +1286,7 @@ def beside_root(s: Side, x: Arb, kappa: Arb, before: bool) -> Angle:
     a, d, _ = s.floats
     x0, k = float(x), float(kappa)
     right = (x0 + math.sqrt(x0 * x0 + 2 * k * (d + math.hypot(a, d)))) / k  # f < 0 there
-    p = arb(guess_root(s, x0, k, right) if 0 < right < 1e3 else math.nan)
+    p = arb(guess_root(s.floats, s.exact, x0, k, right) if 0 < right < 1e3 else math.nan)
     for _ in range(2):
         f = flight(x, kappa, at_angle(s, p))
         sin, cos = p.sin_cos()
@@ -1612,7 +1712,7 @@ def fixed_angles(s: Side) -> tuple[Ratios, Ratios] | None:
 
 def last_angle(s: Side, x: float, k_lo: Arb) -> Ratios | None:
     """Find an angle p with R(p) > x for all parameters."""
-    guess = guess_root(s, x, float(k_lo), 4 * (x - s.floats[0]) / float(k_lo) + 0.1)
+    guess = guess_root(s.late, s.exact, x, float(k_lo), 4 * (x - s.floats[0]) / float(k_lo) + 0.1)
     for k in range(20):
         p = guess * (1 + 2.0 ** (2 * k - 38))
         if 0 < p < 3:
@@ -1672,8 +1772,11 @@ def check_fixed_point(s: Side, k_lo: Arb, k_hi: Arb, edge: float, q: float, said
     return ""
 
 
-def check_below_cells(s: Side, scene: Scene, edge: float, q: float, said: tuple[float, float] | None) -> str:
+def check_below_cells(
+    scene: Scene, side: int, edge: float, q: float, said: tuple[float, float] | None
+) -> str:
     """Check what is said of starts before the first cell: whichever the sign of h asks for; "" or what fails."""
+    s = scene.sides[side]
     if s.h > 0:
         if said is None:
             return "the arm's surface is above the joint, and no fixed point of the jog is given"
@@ -1778,6 +1881,7 @@ def check_tolerance(raw: list[Any], tolerance: object) -> tuple[dict[str, str], 
         own = [quantity(f[key], kinds, key) for f in flat]
         require(len({q.pi for q in own}) == 1, f"{plain(key)}: mixes degrees and radians")
         ranges.append(own)
+        require(key not in names, "tolerance names one quantity twice")
         names.append(key)
         lo, hi = min(q.lo for q in own), max(q.hi for q in own)
         unit = next(u[own[0].unit] for u in UNITS.values() if own[0].unit in u)
@@ -1901,7 +2005,7 @@ def read_goal(section: dict[str, Any], n_sides: int) -> dict[str, Any]:
     return goal
 
 
-def statement_of_goal(goal: dict[str, Any]) -> str:
+def statement_of_goal(goal: dict[str, Any], noisy: bool) -> str:
     """Put a goal in words."""
     start = "every start a_i < x <= arm.length on every side i"
     place = start if goal["anywhere"] else "every start in the attracting cells"
@@ -1912,7 +2016,8 @@ def statement_of_goal(goal: dict[str, Any]) -> str:
         there = f"comes to rest on side {goal['side']} at x >= {plain(goal['text'])}"
         if goal["every"]:
             return f"goal: {place} {there}, after {goal['throws']} throws at most where x is in the cells"
-        return f"goal: {place}, but for starts of total length zero, {there}"
+        those = "others for other throws, " if noisy else ""
+        return f"goal: {place}, but for starts of total length zero, {those}{there}"
     if goal["kind"] == "attracts_all":
         return f"goal: {start} enters one component of attracting cells, connected by its images, and stays in it"
     if goal["kind"] == "flip_order":
@@ -1956,16 +2061,22 @@ def check_goal(c: Cells, scene: Scene, goal: dict[str, Any]) -> str:
 
 def check_everywhere(c: Cells, scene: Scene) -> str:
     """Check that every start on the arm is in a cell, or near the joint and thrown outward; "" or what fails."""
-    for i, s in enumerate(scene.sides):
-        edges = c.edges[i]
+    for i, edges in enumerate(c.edges):
         if Fraction(float(edges[-1])) < scene.arm[1]:
             return f"side {i}: the cells end before arm.length"
-        gain = -2 * s.h / (scene.k_hi - s.small_d)
-        q = float((1 + gain * (1 - 2.0**-30)).lower())
-        near = check_near_joint(s, scene.k_lo, scene.k_hi, float(edges[0]), q)
+        edge = float(edges[0])
+        near = over_halves(scene, check_thrown_out, i, edge)
         if near:
             return f"side {i}, near the joint, x in (a, {float(edges[0])!r}]: {near}"
     return ""
+
+
+def check_thrown_out(scene: Scene, side: int, edge: float) -> str:
+    """Check that starts up to the edge are thrown outward, by whatever factor; "" or what fails."""
+    s = scene.sides[side]
+    gain = -2 * s.h / (scene.k_hi - s.small_d)
+    q = float((1 + gain * (1 - 2.0**-20)).lower())
+    return check_near_joint(s, scene.k_lo, scene.k_hi, edge, q)
 
 
 def check_oriented(c: Cells, scene: Scene, goal: dict[str, Any]) -> str:
@@ -1985,8 +2096,9 @@ def check_oriented(c: Cells, scene: Scene, goal: dict[str, Any]) -> str:
         bad = first_bad(c, [(good, f"a {what} may end beyond x = {float(beyond)!r} on another side")])
         if bad:
             return bad
-    for i, s in enumerate(scene.sides):
-        if i != goal["side"] and not near_landing(s, scene.k_lo, scene.k_hi, float(c.edges[i][0])) <= x:
+    for i, edges in enumerate(c.edges):
+        edge = float(edges[0])
+        if i != goal["side"] and not near_landing(scene.sides[i], scene.k_lo, scene.k_hi, edge) <= x:
             return f"side {i}, near the joint: a throw may end beyond x = {float(beyond)!r}"
     return ""
 
@@ -2180,7 +2292,7 @@ def statement_of(name: str, section: dict[str, Any], noisy: bool) -> str:
             f" a factor of at least {min(section['q']):.9g} with every throw"
         )
     if name == "goal":
-        return statement_of_goal(section)
+        return statement_of_goal(section, noisy)
     if name == "expanding":
         least = section["least"]
         entropy = "" if noisy else f"; topological entropy >= ln({least!r}) = {math.log(least):.6g}"
@@ -2215,10 +2327,11 @@ def check_box_claims(
             yield ["goal"], bad
     if "attracts-all" in claims:
         bad = check_ranks(c, scene, claims["attracts-all"]["max_rank"])
-        for i, s in enumerate(scene.sides):
+        for i in range(len(scene.sides)):
             edge = float(c.edges[i][0])
             said = claims["attracts-all"]["fixed"][i]
-            near = check_below_cells(s, scene, edge, claims["attracts-all"]["q"][i], said)
+            q = claims["attracts-all"]["q"][i]
+            near = over_halves(scene, check_below_cells, i, edge, q, said)
             bad = bad or (f"side {i}, near the joint, x in (a, {edge!r}]: {near}" if near else "")
         wide += [] if bad else ["attracts-all"]
         if bad:
@@ -2310,12 +2423,13 @@ def check_certificate(
     crew = Crew(raw, noise, workers, told)
     try:
         for k, (scene, c, b) in enumerate(zip(scenes, cells, boxes, strict=True)):
-            bad = check_parameters(scene, b["parameters"], f"box {k}")
+            bad = over_halves(scene, check_parameters, b["parameters"], f"box {k}")
             where = f"box {k}, " if len(boxes) > 1 else ""
             found = [(list(claims), bad)] if bad else check_box_claims(scene, c, k, claims, crew)
             for names, reason in found:
                 for name in names:
                     failed.setdefault(name, where + reason)
+            scene.parts.clear()  # room
             if len(failed) == len(claims):
                 break
     finally:

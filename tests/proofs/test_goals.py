@@ -267,6 +267,18 @@ def test_an_attracting_orbit_keeps_almost_every_orbit_from_getting_there(tmp_pat
         assert all(state["between"][1] < fixed + 0.0005 for state in states)
 
 
+def test_a_start_on_its_way_to_the_limit_set_refutes_nothing():
+    """All that stays is the fixed point, and it lies below x: cells around it reach beyond, and parts do once."""
+    scene = part_of(ONE_FIXED, {"attracts_all": True})
+    fixed = float(ls.orbit(scene.map, 24.1, 1, 5000).x[-1])
+    assert float(reference.throw(facts_of(scene), 1, fixed).x) == pytest.approx(fixed, abs=1e-9)
+    for more, want in ((1e-6, "undecided"), (1e-2, "proved")):
+        goal = {"oriented_beyond": {"x": f"{fixed + more!r} in", "side": 2}}
+        assert asked(part_of(ONE_FIXED, goal))[1].verdict == want
+    goal = {"oriented_beyond": {"x": f"{fixed - 1e-4!r} in", "side": 2}}
+    assert asked(part_of(ONE_FIXED, goal))[1].verdict == "refuted"
+
+
 # ---------------------------------------------------------------- with a tolerance, and where nothing is proved
 
 

@@ -214,3 +214,25 @@ def test_near_the_joint_nothing_holds_with_scattered_landings():
             missing = checker.check_near_joint(side, scene.k_lo, scene.k_hi, edge, 1.0157)
             assert (missing == "") == proved
             assert proved or "x <= a" in missing
+
+
+# ---------------------------------------------------------------- arms of a tolerance
+
+
+def test_what_lands_on_a_longer_arm_is_off_a_shorter_one(good, tmp_path):
+    """Designed, from side 2 just below x = 20, a jog lands beyond x = 23.3 (docs/model.md): not on an arm of 22 in."""
+    f = good.copy()
+    f.header["boxes"][0]["scene"]["arm"]["length"] = ["22 in", "28 in"]
+    f.header["boxes"][0]["parameters"]["arm_length"] = [(21.999).hex(), (28.001).hex()]
+    f.header["tolerance"] = {"arm.length": "3 in"}
+    report = verdict(f, tmp_path)
+    assert report.verdict == "failed"
+    assert {state for claim, state, _ in report.claims if claim in ("attracts-all", "trapping")} == {"failed"}
+    # on arms from 24 in on everything stays
+    f.header["boxes"][0]["scene"]["arm"]["length"] = ["24 in", "28 in"]
+    f.header["boxes"][0]["parameters"]["arm_length"] = [(23.999).hex(), (28.001).hex()]
+    f.header["tolerance"] = {"arm.length": "2 in"}
+    invariant = [c for c in f.header["claims"] if c["claim"] in ("invariant", "trapping")]
+    f.header["claims"] = invariant
+    report = verdict(f, tmp_path)
+    assert (report.verdict, report.reason) == ("proved", "")

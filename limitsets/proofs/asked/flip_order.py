@@ -15,7 +15,7 @@ from limitsets.goals import FlipOrder
 from limitsets.maps import orbit
 from limitsets.proofs.asked.cycling import cycle_that
 from limitsets.proofs.asked.kind import Answer, Kind, common, peeled, place, undecided
-from limitsets.proofs.asked.search import Choice, Path, State, middle, replayed
+from limitsets.proofs.asked.search import Choice, Path, State, replayed, settled
 from limitsets.proofs.attraction import Attraction
 from limitsets.scene import Scene
 
@@ -62,7 +62,7 @@ def _against(found: Attraction, order: tuple[int, ...]) -> tuple[State, ...]:
     """Find an orbit in the attracting cells with a flip that the order has not, and prove it."""
     box = found.cover.box
     choice = Choice(0.5 * (box.lo.kappa + box.hi.kappa), 0.0)
-    start, on = middle(found, found.cells.numbers())
+    start, on = settled(found)
     path = orbit(box.lo._replace(kappa=choice.kappa), start, on, THROWS)
     allowed = set(zip(order, (*order[1:], order[0]), strict=True))
     pairs = list(zip(path.side[:-1].tolist(), path.side[1:].tolist(), strict=True))

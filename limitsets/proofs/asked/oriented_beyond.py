@@ -37,7 +37,8 @@ def _ask(found: Attraction, scene: Scene, goal: OrientedBeyond) -> Answer:
     if goal.from_anywhere:
         reason = _thrown_there(found, goal, bad)
         orbit = one_throw(found, wrong) if reason else ()
-        reason = reason or missing
+        # above the joint no cells are near enough: say that, not that a throw from there may land anywhere
+        reason = missing if found.cover.points and not orbit else reason or missing
     else:
         bad &= found.component >= 0
         reason = (

@@ -31,6 +31,7 @@ __all__ = [
     "long_orbit",
     "middle",
     "replayed",
+    "settled",
     "throws",
 ]
 
@@ -45,6 +46,9 @@ MOST_THROWS = 2000
 
 # Without a choice: throws of the orbit that is searched, and how many of the last are shown and replayed.
 SEARCHED, SHOWN = 200_000, 20
+
+# Throws that bring an orbit from the attracting cells to the limit set, before a violation counts.
+SETTLING = 20_000
 
 # Violations by less than this, relative to x, may be rounding.
 MORE_THAN_ROUNDING = 1.0 - 1e-9
@@ -177,10 +181,21 @@ def middle(found: Attraction, cells: NDArray[np.int64]) -> tuple[float, int]:
     return 0.5 * float(lo[0, 0] + hi[0, 0]), side
 
 
+def settled(found: Attraction) -> tuple[float, int]:
+    """Follow an orbit from the attracting cells until it is as near to the limit set as floats come, and its end.
+
+    Cells surround the limit set: what starts in one of them may violate a goal once, on its way, and never again.
+    """
+    start, on = middle(found, found.cells.numbers())
+    box = found.cover.box
+    path = orbit(box.lo._replace(kappa=0.5 * (box.lo.kappa + box.hi.kappa)), start, on, SETTLING)
+    return float(path.x[-1]), int(path.side[-1])
+
+
 def _search(found: Attraction, wrong: Wrong) -> Path | None:
     """Breadth first from an attracting cell, one state per cell, until a state violates the goal."""
     grid: Grid = found.cover.grid
-    start, on = middle(found, found.cells.numbers())
+    start, on = settled(found)
     x, side = np.array([start]), np.array([on])
     seen = np.zeros(grid.n_cells, dtype=bool)
     reached, options = Reached.of(x, side), choices(found.cover.box)
@@ -216,11 +231,11 @@ def long_orbit(
     wrong : callable
         From places and sides to whether each violates the goal.
     cells : ndarray of int64, optional
-        Where it begins; default, the attracting cells.
+        Where it begins; default, where an orbit from the attracting cells settles.
     throws : int
         Length at most.
     """
-    start, on = middle(found, found.cells.numbers() if cells is None else cells)
+    start, on = settled(found) if cells is None else middle(found, cells)
     (choice,) = {Choice(0.5 * (found.cover.box.lo.kappa + found.cover.box.hi.kappa), 0.0)}
     path = orbit(found.cover.box.lo._replace(kappa=choice.kappa), start, on, throws)
     bad = np.flatnonzero(wrong(path.x * MORE_THAN_ROUNDING, path.side))
