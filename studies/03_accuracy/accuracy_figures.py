@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -27,7 +28,7 @@ LOOKS = [
 ]
 TEXT, SMALL = 12, 10.5
 # Below this, in doubles, an error is what rounding leaves and no exponent is fitted.
-ROUNDING = 1e-8
+ROUNDING = 1e-7
 # Fixed costs hide the exponent in time: points within this factor of the fastest one are not fitted.
 FIXED = 3.0
 
@@ -45,8 +46,14 @@ def label_of(points: list[Point], what: str | None) -> str:
     return label if late is None else f"{label}, t$^{{{late:.2f}}}$"
 
 
+def _decades(values: list[float]) -> tuple[float, float]:
+    """Limits at whole powers of ten, and a little beyond: an axis with one label says nothing."""
+    low, high = math.floor(math.log10(0.9 * min(values))), math.ceil(math.log10(1.1 * max(values)))
+    return 0.8 * 10.0**low, 1.25 * 10.0**high
+
+
 def _draw(axes: Any, points: list[Point], looks: dict[str, tuple[str, str]]) -> None:
-    for name, some in by_method(points).items():
+    for k, (name, some) in enumerate(by_method(points).items()):
         colour, marker = looks[name]
         x, y = [point.seconds for point in some], [max(point.error, 1e-300) for point in some]
         axes.plot(
@@ -54,12 +61,14 @@ def _draw(axes: Any, points: list[Point], looks: dict[str, tuple[str, str]]) -> 
             y,
             color=colour,
             marker=marker,
-            markersize=7,
+            markersize=10 if k == 0 else 6.5,  # the second may lie on the first
             linewidth=1.4,
             markeredgecolor="white",
             markeredgewidth=0.5,
         )
     axes.set(xscale="log", yscale="log")
+    axes.set_xlim(*_decades([point.seconds for point in points]))
+    axes.set_ylim(*_decades([point.error for point in points]))
     axes.grid(alpha=0.25, which="major")
     axes.tick_params(labelsize=SMALL)
     axes.xaxis.set_minor_locator(LogLocator(subs=(2, 5), numticks=20))
@@ -92,7 +101,7 @@ def throw_figure(throws: list[Point], critical: list[Point], ratios: Any, unit: 
     two.set_ylabel(f"largest error of a critical point $r_i$ [{unit}]", fontsize=TEXT)
     two.set_title("Critical points", loc="left", fontsize=TEXT + 1)
     low, middle, high = np.quantile(ratios, (0.05, 0.5, 0.95))
-    three.hist(ratios, bins=np.linspace(0.0, 1.4, 57), color="#9DC3DC", edgecolor="white", linewidth=0.4)
+    three.hist(ratios, bins=np.linspace(0.2, 1.2, 51), color="#9DC3DC", edgecolor="white", linewidth=0.4)
     three.axvspan(low, high, color="#F2C14E", alpha=0.25, zorder=0)
     three.axvline(middle, color="#222222")
     top = three.get_ylim()[1]
