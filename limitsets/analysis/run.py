@@ -10,9 +10,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from limitsets.analysis.accuracy import CELLS as BY_CELLS
-from limitsets.analysis.accuracy import Accuracy, Plan, left_to_cells, plan_for, require_error, verified
+from limitsets.analysis.accuracy import Accuracy, Plan, left_to_cells, plan_for, require_error
 from limitsets.analysis.asked import Answered, answer
 from limitsets.analysis.flags import other_vertex_first
+from limitsets.analysis.verifying import verified
 from limitsets.errors import AnswerError
 
 if TYPE_CHECKING:

@@ -3,11 +3,13 @@
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import limitsets as ls
 from limitsets.analysis import plan_for
-from limitsets.analysis.accuracy import _distance, _Visited
+from limitsets.analysis.accuracy import _distance
+from limitsets.analysis.verifying import _Visited
 from limitsets.errors import AnswerError
 
 HERE = Path(__file__).parent
@@ -98,8 +100,6 @@ def test_distance_of_unions():
 
 
 def test_a_hole_counts_by_half():
-    import numpy as np
-
     seen = _Visited(0, 0.0, 10.0, 0.01)
     seen.add(np.concatenate([np.arange(0.0, 4.0, 0.005), np.arange(6.0, 10.0, 0.005)]))
     assert seen.gap() == pytest.approx(1.0, abs=0.03)
