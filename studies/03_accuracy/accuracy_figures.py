@@ -22,11 +22,13 @@ LOOKS = [
     ("#222222", "v"),
     ("#56B4E9", "P"),
     ("#B58900", "X"),
-    ("#7F3C8D", "*"),
+    ("#7F3C8D", "h"),
     ("#888888", "<"),
     ("#4C6A00", ">"),
 ]
 TEXT, SMALL = 12, 10.5
+# The two small-angle flights are alike: the first shows behind the second.
+BEHIND = "small angle (the paper)"
 # Below this, in doubles, an error is what rounding leaves and no exponent is fitted.
 ROUNDING = 1e-7
 # Fixed costs hide the exponent in time: points within this factor of the fastest one are not fitted.
@@ -49,11 +51,12 @@ def label_of(points: list[Point], what: str | None) -> str:
 def _decades(values: list[float]) -> tuple[float, float]:
     """Limits at whole powers of ten, and a little beyond: an axis with one label says nothing."""
     low, high = math.floor(math.log10(0.9 * min(values))), math.ceil(math.log10(1.1 * max(values)))
-    return 0.8 * 10.0**low, 1.25 * 10.0**high
+    edge = 0.03 * (high - low)
+    return 10.0 ** (low - edge), 10.0 ** (high + edge)
 
 
 def _draw(axes: Any, points: list[Point], looks: dict[str, tuple[str, str]]) -> None:
-    for k, (name, some) in enumerate(by_method(points).items()):
+    for name, some in by_method(points).items():
         colour, marker = looks[name]
         x, y = [point.seconds for point in some], [max(point.error, 1e-300) for point in some]
         axes.plot(
@@ -61,7 +64,7 @@ def _draw(axes: Any, points: list[Point], looks: dict[str, tuple[str, str]]) -> 
             y,
             color=colour,
             marker=marker,
-            markersize=10 if k == 0 else 6.5,  # the second may lie on the first
+            markersize=10 if name == BEHIND else 6.5,
             linewidth=1.4,
             markeredgecolor="white",
             markeredgewidth=0.5,

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from accuracy_ends import BORDERS, CRITICAL, ORBIT, PROVED, reference, set_errors
+from accuracy_ends import BORDERS, CENTRES, CRITICAL, ORBIT, PROVED, reference, set_errors
 from accuracy_figures import ROUNDING, long_run_figure, set_figure, throw_figure
 from accuracy_long_run import (
     CELLS,
@@ -105,8 +105,8 @@ def main(seed: int = 0, out: Path = HERE, quick: bool = False) -> dict[str, Any]
 def _duration(seconds: float) -> str:
     for unit, size in (("s", 1.0), ("ms", 1e-3), ("us", 1e-6)):
         if seconds >= size:
-            return f"{seconds / size:.2g} {unit}"
-    return f"{seconds / 1e-9:.2g} ns"
+            return f"{float(f'{seconds / size:.2g}'):g} {unit}"
+    return f"{float(f'{seconds / 1e-9:.2g}'):g} ns"
 
 
 def table(numbers: dict[str, Any]) -> str:
@@ -119,12 +119,13 @@ def table(numbers: dict[str, Any]) -> str:
     for name, points in rows.items():
         best = min(points, key=lambda point: (point["error"], point["seconds"]))
         words = {
-            BORDERS: "a power of 1/rounds: geometrically",
+            BORDERS: "0.2^rounds or faster",
             CRITICAL: "rounding alone",
             PROVED: "rounding alone",
         }
         count = "throws" if name == ORBIT else "cells"
         falls = f"{count}^{fitted[name]:.2f}" if name in fitted else words.get(name, "")
+        falls = "no law" if name == CENTRES else falls
         lines.append(f"| {name} | {falls} | {best['error']:.1e} | {_duration(best['seconds'])} |")
     return "\n".join(lines)
 
