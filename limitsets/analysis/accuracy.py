@@ -175,7 +175,7 @@ class _Trial:
     limits: Sequence[LimitSet]
 
 
-def _trial(scene: Scene, cells: int) -> _Trial:
+def _trial(scene: Scene, cells: int, throws: int) -> _Trial:
     from limitsets.cells import grid
     from limitsets.graph import transitions
     from limitsets.sets import attractors, limit_set
@@ -184,7 +184,7 @@ def _trial(scene: Scene, cells: int) -> _Trial:
     graph = transitions(scene.map, grid(scene.domain, cells=cells))
     graph.survey()
     stops.append(time.perf_counter())
-    found = attractors(graph)
+    found = attractors(graph, throws)
     stops.append(time.perf_counter())
     limits = [limit_set(graph, each) for each in found]
     stops.append(time.perf_counter())
@@ -249,7 +249,7 @@ def _by_end_points(fine: _Trial) -> Choice:
     return Choice(END_POINTS, FEWEST, rounding if sure else math.inf, fine.graph + fine.orbits + fine.ends)
 
 
-def plan_for(scene: Scene, error: float) -> Plan:
+def plan_for(scene: Scene, error: float, throws: int = 200_000) -> Plan:
     """Pick the cheapest way to the ends of a scene's limit sets, from a short trial on this machine.
 
     Parameters
@@ -258,6 +258,8 @@ def plan_for(scene: Scene, error: float) -> Plan:
         The scene.
     error : float
         Largest error of an end that is asked for [scene's unit].
+    throws : int
+        Length of the orbit on which jogs are counted: part of what is timed.
 
     Returns
     -------
@@ -280,8 +282,8 @@ def plan_for(scene: Scene, error: float) -> Plan:
     'end points'
     """
     asked = require_error(error)
-    _trial(scene, COARSE)  # compiles
-    coarse, fine = _trial(scene, COARSE), _trial(scene, FINE)
+    coarse = _trial(scene, COARSE, 1)  # first, and untimed: it may have to compile
+    fine = _trial(scene, FINE, throws)
     ways = [_by_cells(scene, coarse, fine, asked), _by_end_points(fine)]
     good = sorted((way for way in ways if way.error <= asked), key=lambda way: way.seconds)
     ranked = good + sorted((way for way in ways if way not in good), key=lambda way: way.error)

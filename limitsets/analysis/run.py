@@ -194,7 +194,7 @@ def analyse(
     plan = None
     if asked_error is not None:
         with steps.step("plan"):
-            plan = plan_for(chosen, asked_error)
+            plan = plan_for(chosen, asked_error, throws)
         if announce is not None:
             announce(plan)
     count = plan.chosen.cells if plan is not None else CELLS if cells is None else cells
