@@ -4,9 +4,21 @@ The answers themselves are made in `limitsets.sets` and below; here they are ask
 scene's goal and written as JSON.
 """
 
+from limitsets.analysis.accuracy import Accuracy, Plan, plan_for
 from limitsets.analysis.asked import Answered
 from limitsets.analysis.flags import other_vertex_first, overlap
 from limitsets.analysis.run import Analysis, analyse
 from limitsets.analysis.words import scene_of, to_json
 
-__all__ = ["Analysis", "Answered", "analyse", "other_vertex_first", "overlap", "scene_of", "to_json"]
+__all__ = [
+    "Accuracy",
+    "Analysis",
+    "Answered",
+    "Plan",
+    "analyse",
+    "other_vertex_first",
+    "overlap",
+    "plan_for",
+    "scene_of",
+    "to_json",
+]

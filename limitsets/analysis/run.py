@@ -9,8 +9,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from limitsets.analysis.accuracy import CELLS as BY_CELLS
+from limitsets.analysis.accuracy import Accuracy, Plan, left_to_cells, limit_of, plan_for, require_error
 from limitsets.analysis.asked import Answered, answer
 from limitsets.analysis.flags import other_vertex_first
+from limitsets.analysis.verifying import verified
 from limitsets.errors import AnswerError
 
 if TYPE_CHECKING:
@@ -66,6 +69,8 @@ class Analysis:
         Recurrent cells that vanish on refinement.
     timings : dict of str to float
         Per step, in seconds.
+    accuracy : Accuracy or None
+        What was done for an error asked for, and what was reached.
     """
 
     scene: Scene
@@ -82,6 +87,7 @@ class Analysis:
     other_vertex_first: Extents
     spurious: tuple[CellSet, ...]
     timings: dict[str, float]
+    accuracy: Accuracy | None = None
 
     @property
     def second_pass(self) -> float:
@@ -123,24 +129,15 @@ class _Steps:
         self.timings[name] = time.perf_counter() - begin
 
 
-def _limit_set(graph: TransitionGraph, attractor: Attractor) -> LimitSet:
-    """Its end points; the cells where the map's branches cannot be followed one by one."""
-    from limitsets.maps import kind_of
-    from limitsets.sets import LimitSet, limit_set
-
-    if kind_of(graph.map).has_image_on:
-        return limit_set(graph, attractor)
-    advice = "with effects on a throw has more branches than this version follows"
-    return LimitSet(attractor.extents, (), 0, False, False, advice)
-
-
 def analyse(
     scene: str | Path | Mapping[str, Any] | Scene,
-    cells: int = CELLS,
+    cells: int | None = None,
     *,
+    error: float | None = None,
     throws: int = 200_000,
     cycles: int = 0,
     progress: Progress | None = None,
+    announce: Callable[[Plan], None] | None = None,
 ) -> Analysis:
     """Find where the throws of a scene lead.
 
@@ -148,14 +145,19 @@ def analyse(
     ----------
     scene : str, Path, mapping or Scene
         A scene, or what `limitsets.load` reads.
-    cells : int
-        Cells per side; they shrink towards the inner end of each side.
+    cells : int, optional
+        Cells per side, 4096 by default; they shrink towards the inner end of each side.
+    error : float, optional
+        Instead of `cells`: the largest error of the limit sets' ends [scene's unit].  The cheapest method that meets
+        it is picked, and the error reached is verified (`Analysis.accuracy`); one that cannot be met is told there.
     throws : int
         Length of the orbit on which jogs, flips and the Lyapunov exponent are counted.
     cycles : int
         Look for all periodic orbits up to this period in each attractor; 0 looks for none.
     progress : callable, optional
         Called as ``progress(step, done, of)`` before each step.
+    announce : callable, optional
+        Called with the `Plan` for `error` before the computation starts.
 
     Returns
     -------
@@ -170,7 +172,7 @@ def analyse(
     GridError
         For a number of cells that cannot be.
     AnswerError
-        For a number of throws or a period that cannot be.
+        For a number of throws, a period or an error that cannot be, or both cells and an error.
 
     Examples
     --------
@@ -189,18 +191,29 @@ def analyse(
 
     if cycles < 0:
         raise AnswerError("the longest period", cycles, "an integer from 0", "pass cycles=0 for none")
-    steps = _Steps(9 + (cycles > 0), progress)
+    if cells is not None and error is not None:
+        raise AnswerError("the cells", cells, "none beside an error", "give cells or error, not both")
+    asked_error = None if error is None else require_error(error)
+    steps = _Steps(9 + (cycles > 0) + 2 * (asked_error is not None), progress)
     with steps.step("scene"):
         choice = choose(scene if isinstance(scene, Scene) else load(scene))
         chosen = choice.scene
+    plan = None
+    if asked_error is not None:
+        with steps.step("plan"):
+            plan = plan_for(chosen, asked_error, throws)
+        if announce is not None:
+            announce(plan)
+    count = plan.chosen.cells if plan is not None else CELLS if cells is None else cells
     with steps.step("transitions"):
-        graph = transitions(chosen.map, grid(chosen.domain, cells=cells))
+        graph = transitions(chosen.map, grid(chosen.domain, cells=count))
     with steps.step("attractors"):
         found = attractors(graph, throws=throws)
     with steps.step("basins"):
         shares = basins(graph, found)
     with steps.step("limit sets"):
-        limits = tuple(_limit_set(graph, attractor) for attractor in found)
+        skip = plan is not None and plan.chosen.method == BY_CELLS
+        limits = tuple(left_to_cells() if skip else limit_of(graph, each) for each in found)
     with steps.step("critical points"):
         critical = critical_points(chosen.map, chosen.domain)
     orbits: tuple[Cycle, ...] = ()
@@ -218,6 +231,11 @@ def analyse(
         asked = None if chosen.goal is None else answer(chosen.goal, graph, found, shares, extents)
     with steps.step("assumptions"):
         flags = other_vertex_first(chosen)
+    accuracy = None
+    if plan is not None:
+        with steps.step("accuracy"):
+            took = sum(steps.timings[step] for step in ("transitions", "attractors", "limit sets"))
+            accuracy = verified(chosen, plan, found, limits, took)
     return Analysis(
         chosen,
         choice,
@@ -233,4 +251,5 @@ def analyse(
         flags,
         false_sets,
         steps.timings,
+        accuracy,
     )

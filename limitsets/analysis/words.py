@@ -82,6 +82,7 @@ def to_json(analysis: Analysis) -> dict[str, Any]:
         "spurious": [
             {"cells": len(cells), "extents": _extents(cells.extents())} for cells in analysis.spurious
         ],
+        "accuracy": None if analysis.accuracy is None else analysis.accuracy.to_json(),
         "second_pass": _number(analysis.second_pass),
         "timings": {step: round(seconds, 6) for step, seconds in analysis.timings.items()},
     }

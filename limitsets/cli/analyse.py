@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json as json_words
+import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -11,7 +12,7 @@ import typer
 from limitsets.cli.output import Json, Scene, progress, table
 
 if TYPE_CHECKING:
-    from limitsets.analysis import Analysis
+    from limitsets.analysis import Analysis, Plan
 
 __all__ = ["analyse"]
 
@@ -21,8 +22,18 @@ MOST_CELLS = 10_000_000
 def analyse(
     scene: Scene,
     cells: Annotated[
-        int, typer.Option("--cells", min=1, max=MOST_CELLS, metavar="N", help="Cells per side.")
-    ] = 4096,
+        int | None,
+        typer.Option("--cells", min=1, max=MOST_CELLS, metavar="N", help="Cells per side, 4096 by default."),
+    ] = None,
+    error: Annotated[
+        float | None,
+        typer.Option(
+            "--error",
+            metavar="X",
+            help="Instead of cells: largest error of the limit sets' ends, in the scene's unit of length. "
+            "What is picked for it, and what it will cost, is told before it starts.",
+        ),
+    ] = None,
     out: Annotated[
         Path | None,
         typer.Option("--out", "-o", metavar="DIR", help="Folder of the report, ./NAME-analysis by default."),
@@ -40,13 +51,17 @@ def analyse(
         require_place(folder)
         from limitsets.analysis import analyse as run
 
-        analysis = run(chosen, cells, progress=tell)
+        analysis = run(chosen, cells, error=error, progress=tell, announce=_announce)
         files = write(analysis, folder, progress=tell)
     if json:
         print(json_words.dumps(analysis.to_json(), indent=2, allow_nan=False))
     else:
         _text(analysis)
         typer.echo(f"report: {files[0]}")
+
+
+def _announce(plan: Plan) -> None:
+    print(f"limitsets: {plan}", file=sys.stderr, flush=True)
 
 
 def _text(analysis: Analysis) -> None:
@@ -65,3 +80,8 @@ def _text(analysis: Analysis) -> None:
     if analysis.goal is not None:
         verdict = {True: "holds", False: "does not hold", None: "not decided"}[analysis.goal.holds]
         typer.echo(f"goal {analysis.goal.goal.kind}: {verdict} ({analysis.goal.how}, not proved)")
+    found = analysis.accuracy
+    if found is not None and found.reached is not None:
+        typer.echo(f"error of the ends: {found.reached:.2g} {unit} ({found.how})")
+    if found is not None and not found.met:
+        typer.echo(f"the error of {found.plan.asked:g} {unit} was not met: {found.advice}")

@@ -10,7 +10,7 @@ from limitsets.analysis import overlap
 from limitsets.report.tables import intervals, number, percent, table
 
 if TYPE_CHECKING:
-    from limitsets.analysis import Analysis
+    from limitsets.analysis import Accuracy, Analysis
     from limitsets.scene import Scene
 
 __all__ = ["everything", "figure_line", "scene_of", "steps", "trust"]
@@ -45,6 +45,8 @@ def trust(analysis: Analysis) -> str:
             )
         ),
     ]
+    if analysis.accuracy is not None:
+        lines.append(_accuracy(analysis.accuracy))
     if analysis.spurious:
         lines.append(
             f"**Cells too coarse:** {len(analysis.spurious)} recurrent sets vanish when cells are cut finer. "
@@ -109,6 +111,24 @@ def _assumed(scene: Scene) -> str:
     ]
     words = "; ".join(text for lifted, text in kept if not lifted)
     return f"**Assumed:** {words}. `limitsets audit` says which of this the scene breaks."
+
+
+HOW = {
+    "proved": "every end lies between two proved numbers, and this is the farther of them",
+    "rounding": "an estimate, from the slopes and the rounding of each step",
+    "orbit": "how far a point of the cells can be from the throws of a long orbit",
+}
+
+
+def _accuracy(found: Accuracy) -> str:
+    """Say what error of the ends was asked for, how it was gone about, and what was reached."""
+    unit = found.plan.unit
+    lines = [f"**Accuracy of the ends:** {found.plan}. It took {found.seconds:.2g} s."]
+    if found.reached is not None:
+        lines.append(f"Error reached: {found.reached:.2g} {unit} ({HOW[found.how]}).")
+    if not found.met:
+        lines.append(f"**The error asked for was not met**: {found.advice}.")
+    return " ".join(lines)
 
 
 def scene_of(scene: Scene) -> str:

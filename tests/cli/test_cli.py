@@ -49,7 +49,10 @@ BAD = [
     ["analyse", "paper-designed", "--cells", "0"],
     ["analyse", "paper-designed", "--cells", "many"],
     ["analyse", "paper-designed", "--cells", "99999999999"],
-    ["analyse", "paper-designed", "--error", "1e-6"],
+    ["analyse", "paper-designed", "--error", "0"],
+    ["analyse", "paper-designed", "--error", "nan"],
+    ["analyse", "paper-designed", "--error", "fine"],
+    ["analyse", "paper-designed", "--error", "1e-6", "--cells", "64"],
     ["analyse", "paper-designed", "--cells", "64", "--out", "file"],
     ["analyse", "paper-designed", "--cells", "64", "--out", "file/below"],
     ["throw", "paper-designed", "--x", "8"],
@@ -205,6 +208,31 @@ def test_analyse_in_words(capfd):
     assert "18.995 to 19.976, 20.434 to 21.554" in out
     assert "goal oriented_beyond: does not hold (sampled, not proved)" in out
     assert f"report: {Path('here') / 'report.md'}" in out
+
+
+def test_analyse_to_an_error(capfd):
+    code, out, err = run(capfd, "analyse", "paper-designed", "--error", "1e-6", "--json")
+    assert code == 0
+    told = [
+        line for line in err.splitlines() if line.startswith("limitsets: error 1e-06 in asked: end points")
+    ]
+    assert len(told) == 1
+    found = json.loads(out)
+    assert found["accuracy"]["met"] is True
+    assert found["accuracy"]["how"] == "proved"
+    (lo, hi) = found["attractors"][0]["extents"]["2"][0]
+    assert max(abs(lo - 8.9140259080455), abs(hi - 23.383151921158)) < found["accuracy"]["asked"]
+    report = Path("paper-designed-analysis/report.md").read_text()
+    assert "Error reached" in report
+    assert "was not met" not in report
+
+
+def test_an_error_that_cannot_be_met_is_told_before_and_after(capfd):
+    code, out, err = run(capfd, "analyse", "paper-designed", "--error", "1e-15")
+    assert code == 0
+    assert "error 1e-15 in asked cannot be met; the best there is: end points" in err
+    assert "the error of 1e-15 in was not met: rounding leaves about" in out
+    assert "**The error asked for was not met**" in Path("paper-designed-analysis/report.md").read_text()
 
 
 @pytest.mark.parametrize("kind", ["limit-set", "map", "basins", "morse", "flight"])

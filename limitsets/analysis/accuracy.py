@@ -1,0 +1,310 @@
+"""The cheapest way to the ends of the limit sets for an error asked for: what is planned before.
+
+`limitsets.analysis.verifying` says what was reached.
+
+Two methods give the extents of an attractor.  Borders of attracting cells are off by about the width of a cell, times
+what the throws after a critical point do to it: halving the error doubles the cells and the time.  Images of critical
+points (`limitsets.sets.limit_set`) are off by rounding alone, once cells have shown where the attractor is.
+Source of the exponents: studies/03_accuracy.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from limitsets.errors import AnswerError
+
+if TYPE_CHECKING:
+    from limitsets.graph import TransitionGraph
+    from limitsets.scene import Scene
+    from limitsets.sets import Attractor, LimitSet
+
+__all__ = ["Accuracy", "Choice", "Plan", "left_to_cells", "limit_of", "plan_for", "require_error"]
+
+Extents = dict[int, list[tuple[float, float]]]
+
+CELLS, END_POINTS = "cells", "end points"
+
+# Error of the ends against cells per side, and seconds of the graph against cells: what the study fits, rounded.
+EXPONENT_OF_ERROR, EXPONENT_OF_SECONDS = 1.0, 1.1
+# Errors of single grids scatter around the fit by less than this factor.
+SCATTER = 2.5
+# Fewer cells than these show sets that are not there (`limitsets.analysis.run`), more are not tried.
+FEWEST, MOST = 4096, 2**20
+# Cells per side of the two trials, and those at which this machine's speed is measured, the best of so many times.
+COARSE, FINE = 1024, 4096
+MANY, TIMES = 32768, 2
+
+
+@dataclass(frozen=True)
+class Choice:
+    """One way to the ends, and what it is expected to give and to cost.
+
+    Attributes
+    ----------
+    method : str
+        "cells" or "end points".
+    cells : int
+        Cells per side.
+    error : float
+        Expected error of the ends [scene's unit].
+    seconds : float
+        Expected time of the steps that lead to the ends: transitions, attractors, limit sets.
+    """
+
+    method: str
+    cells: int
+    error: float
+    seconds: float
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What was picked for an error asked for; as text, one sentence.
+
+    Attributes
+    ----------
+    asked : float
+        The error asked for [unit].
+    unit : str
+        The scene's unit.
+    chosen : Choice
+        The cheapest way that is expected to meet it; the most accurate one where none is.
+    other : Choice or None
+        The next best.
+    expected : bool
+        Whether `chosen` is expected to meet it.
+    """
+
+    asked: float
+    unit: str
+    chosen: Choice
+    other: Choice | None
+    expected: bool
+
+    def __str__(self) -> str:
+        words = {CELLS: "borders of cells", END_POINTS: "end points by critical orbits"}
+
+        def told(way: Choice) -> str:
+            return (
+                f"{words[way.method]}, {way.cells} cells a side, error about {way.error:.1g} {self.unit}, "
+                f"about {way.seconds:.2g} s"
+            )
+
+        so = "asked:" if self.expected else "asked cannot be met; the best there is:"
+        text = f"error {self.asked:g} {self.unit} {so} {told(self.chosen)}"
+        return text if self.other is None else f"{text} (instead of {told(self.other)})"
+
+
+@dataclass(frozen=True)
+class Accuracy:
+    """What was asked of the ends, how it was gone about, and what was reached.
+
+    Attributes
+    ----------
+    plan : Plan
+        What was picked before.
+    seconds : float
+        What the planned steps took.
+    reached : float or None
+        Largest error of an end, as verified [scene's unit]; None where there are no ends.
+    how : str
+        "proved": between two proved numbers; "rounding": estimated from slopes and rounding of each step; "orbit":
+        how far a point of the cells may be from a long orbit, given that sampled cells hold all of it; "nothing
+        stays".
+    advice : str or None
+        Why the error was not met, and what to do.
+    proved : float or None
+        Error of the end points that is proved, where they were the method and a proof was found [scene's unit].
+    """
+
+    plan: Plan
+    seconds: float
+    reached: float | None
+    how: str
+    advice: str | None
+    proved: float | None = None
+
+    @property
+    def met(self) -> bool:
+        """Whether the error reached is the one asked for, or less."""
+        return self.reached is not None and self.reached <= self.plan.asked
+
+    def to_json(self) -> dict[str, Any]:
+        """Give it as a table for JSON."""
+        chosen = self.plan.chosen
+        return {
+            "asked": self.plan.asked,
+            "method": chosen.method,
+            "cells": chosen.cells,
+            "estimated_error": chosen.error if math.isfinite(chosen.error) else None,
+            "estimated_seconds": round(chosen.seconds, 6),
+            "seconds": round(self.seconds, 6),
+            "reached": self.reached if self.reached is None or math.isfinite(self.reached) else None,
+            "how": self.how,
+            "proved": self.proved,
+            "met": self.met,
+            "advice": self.advice,
+        }
+
+
+def require_error(error: float) -> float:
+    """Refuse an error that nobody can ask for."""
+    if not (isinstance(error, int | float) and math.isfinite(error) and error > 0):
+        raise AnswerError("the error", error, "a number > 0, in the scene's unit", "pass error=1e-6")
+    return float(error)
+
+
+# ---------------------------------------------------------------- before
+
+
+@dataclass(frozen=True)
+class _Trial:
+    """One run of the steps, and the seconds of each."""
+
+    graph: float
+    orbits: float
+    ends: float
+    attractors: Sequence[Attractor]
+    limits: Sequence[LimitSet]
+
+
+def _trial(scene: Scene, cells: int, throws: int) -> _Trial:
+    from limitsets.cells import grid
+    from limitsets.graph import transitions
+    from limitsets.sets import attractors
+
+    stops = [time.perf_counter()]
+    graph = transitions(scene.map, grid(scene.domain, cells=cells))
+    graph.survey()
+    stops.append(time.perf_counter())
+    found = attractors(graph, throws)
+    stops.append(time.perf_counter())
+    limits = [limit_of(graph, each) for each in found]
+    stops.append(time.perf_counter())
+    graph_took, orbits, ends = np.diff(stops).tolist()
+    return _Trial(graph_took, orbits, ends, found, limits)
+
+
+def _seconds_of_graph(scene: Scene, cells: int) -> float:
+    """Time of a graph of so many cells a side, from that of one that takes a few hundredths of a second."""
+    from limitsets.cells import grid
+    from limitsets.graph import transitions
+
+    best = math.inf
+    for _ in range(TIMES):
+        begin = time.perf_counter()
+        transitions(scene.map, grid(scene.domain, cells=MANY)).survey()
+        best = min(best, time.perf_counter() - begin)
+    return float(best * (cells / MANY) ** EXPONENT_OF_SECONDS)
+
+
+def _distance(extents: Extents, exact: Extents) -> float:
+    """Hausdorff distance between unions of intervals per side; infinite where a side has but one of them."""
+    if set(extents) != set(exact):
+        return math.inf
+    return max(
+        (_one_way(a[side], b[side]) for a, b in ((extents, exact), (exact, extents)) for side in a),
+        default=0.0,
+    )
+
+
+def _one_way(some: Sequence[tuple[float, float]], others: Sequence[tuple[float, float]]) -> float:
+    """Largest distance of a point of `some` from `others`: it is at an end, or in the middle of a gap."""
+    gaps = [(a[1] + b[0]) / 2 for a, b in pairwise(others)]
+    points = [x for lo, hi in some for x in (lo, hi, *(gap for gap in gaps if lo < gap < hi))]
+    return max(min(max(lo - x, x - hi, 0.0) for lo, hi in others) for x in points)
+
+
+def _by_cells(scene: Scene, coarse: _Trial, fine: _Trial, asked: float) -> Choice:
+    """Cells alone: the error of the fine trial is known from its end points, or from what the coarse one had more."""
+    exact = [
+        limit.extents if limit.converged else each.extents
+        for limit, each in zip(fine.limits, fine.attractors, strict=True)
+    ]
+    known = all(limit.converged for limit in fine.limits)
+    measured, at = (fine, FINE) if known else (coarse, COARSE)
+    if len(measured.attractors) != len(exact):
+        error = math.inf
+    else:
+        error = max(
+            (_distance(each.extents, ends) for each, ends in zip(measured.attractors, exact, strict=True)),
+            default=0.0,
+        )
+    needed = at * (SCATTER * error / asked) ** (1.0 / EXPONENT_OF_ERROR)
+    cells = int(2.0 ** math.ceil(math.log2(min(max(needed, FEWEST), MOST))))
+    left = error * SCATTER * (at / cells) ** EXPONENT_OF_ERROR
+    return Choice(CELLS, cells, left, fine.orbits + max(fine.graph, _seconds_of_graph(scene, cells)))
+
+
+def _by_end_points(fine: _Trial) -> Choice:
+    rounding = max((end.error for limit in fine.limits for end in limit.ends), default=0.0)
+    sure = all(limit.converged and all(end.origin.branches for end in limit.ends) for limit in fine.limits)
+    return Choice(END_POINTS, FEWEST, rounding if sure else math.inf, fine.graph + fine.orbits + fine.ends)
+
+
+def plan_for(scene: Scene, error: float, throws: int = 200_000) -> Plan:
+    """Pick the cheapest way to the ends of a scene's limit sets, from a short trial on this machine.
+
+    Parameters
+    ----------
+    scene : Scene
+        The scene.
+    error : float
+        Largest error of an end that is asked for [scene's unit].
+    throws : int
+        Length of the orbit on which jogs are counted: part of what is timed.
+
+    Returns
+    -------
+    Plan
+
+    Raises
+    ------
+    AnswerError
+        For an error that is not a positive number.
+
+    Notes
+    -----
+    The trial takes a few tenths of a second, and loads or compiles what is needed, which the estimates leave out.
+
+    Examples
+    --------
+    >>> import limitsets as ls
+    >>> from limitsets.analysis import plan_for
+    >>> plan_for(ls.load("paper-designed"), 1e-6).chosen.method
+    'end points'
+    """
+    asked = require_error(error)
+    coarse = _trial(scene, COARSE, 1)  # first, and untimed: it may have to compile
+    fine = _trial(scene, FINE, throws)
+    ways = [_by_cells(scene, coarse, fine, asked), _by_end_points(fine)]
+    good = sorted((way for way in ways if way.error <= asked), key=lambda way: way.seconds)
+    ranked = good + sorted((way for way in ways if way not in good), key=lambda way: way.error)
+    other = ranked[1] if math.isfinite(ranked[1].error) else None
+    return Plan(asked, scene.unit, ranked[0], other, bool(good))
+
+
+def left_to_cells() -> LimitSet:
+    """Say that end points were not looked for, because the borders of cells meet the error."""
+    from limitsets.sets import LimitSet
+
+    return LimitSet({}, (), 0, False, False, "end points were not looked for: cells meet the error asked for")
+
+
+def limit_of(graph: TransitionGraph, attractor: Attractor) -> LimitSet:
+    """Its end points; the cells where the map's branches cannot be followed one by one."""
+    from limitsets.maps import kind_of
+    from limitsets.sets import LimitSet, limit_set
+
+    if kind_of(graph.map).has_image_on:
+        return limit_set(graph, attractor)
+    advice = "with effects on a throw has more branches than this version follows"
+    return LimitSet(attractor.extents, (), 0, False, False, advice)
