@@ -1,4 +1,4 @@
-"""What accuracy costs in time: error against seconds for one throw, the limit set, basins, densities and exponents.
+"""What accuracy costs in time: for one throw, the limit set, basins, densities, exponents, and each effect.
 
 Run it as ``python studies/03_accuracy/study.py [--seed 0] [--quick] [--out FOLDER]``; errors do not depend on the
 machine, seconds do.
@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from accuracy_effects import SCENES, effect_costs, effects_figure
 from accuracy_ends import BORDERS, CENTRES, CRITICAL, ORBIT, PROVED, reference, set_errors
 from accuracy_figures import ROUNDING, long_run_figure, set_figure, throw_figure
 from accuracy_long_run import (
@@ -76,11 +77,13 @@ def main(seed: int = 0, out: Path = HERE, quick: bool = False) -> dict[str, Any]
         "Lyapunov exponent of the logistic map, r = 4": ("error per step", lyapunov_errors(seed, quick)),
         f"Lyapunov exponent of {SCENE}": ("error per throw", growth),
     }
+    effects = {name: effect_costs(name, quick) for name in SCENES}
     out.mkdir(parents=True, exist_ok=True)
     sizes = {**SIZES, **{name: "n" for name in by_method(sets) if name.startswith(("cells", "the same"))}}
     throw_figure(throws, critical, ratios, scene.unit).savefig(out / "one-throw.png", dpi=90)
     set_figure(sets, scene.unit, sizes).savefig(out / "limit-set.png", dpi=90)
     long_run_figure(panels, sizes).savefig(out / "long-run.png", dpi=90)
+    effects_figure(effects, scene.unit).savefig(out / "effects.png", dpi=90)
     low, middle, high = np.quantile(ratios, (0.05, 0.5, 0.95)).tolist()
     return {
         "reference": {str(side): [[float(a), float(b)] for a, b in parts] for side, parts in exact.items()},
@@ -90,6 +93,7 @@ def main(seed: int = 0, out: Path = HERE, quick: bool = False) -> dict[str, Any]
         "limit_set": {"exponents": _fits(sets, (BORDERS, CRITICAL, PROVED)), "least": _least(sets)},
         "long_run": {title: _fits(points) for title, (_, points) in panels.items()},
         "lyapunov": known,
+        "effects": {name: {row.name: row._asdict() for row in rows} for name, rows in effects.items()},
         "points": {
             name: [point._asdict() for point in points]
             for name, points in {
