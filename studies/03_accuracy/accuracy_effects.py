@@ -100,9 +100,8 @@ def effect_costs(scene: str, quick: bool = False) -> list[Cost]:
 def effects_figure(panels: Mapping[str, list[Cost]], unit: str = "in") -> Figure:
     """Error of leaving an effect out against what it costs to have it, a panel for each scene."""
     figure = Figure(figsize=(5.2 * len(panels), 5.2), layout="constrained")
-    for axes, (title, rows) in zip(
-        np.atleast_1d(figure.subplots(1, len(panels), sharey=True)), panels.items()
-    ):
+    columns = np.atleast_1d(figure.subplots(1, len(panels), sharey=True))
+    for axes, (title, rows) in zip(columns, panels.items(), strict=True):
         for k, row in enumerate(rows):
             low, high = max(row.typical, NOTHING), max(row.worst, NOTHING)
             axes.plot([row.ratio] * 2, [low, high], color=f"C{k}", marker="_", linewidth=2)
