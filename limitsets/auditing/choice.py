@@ -44,8 +44,8 @@ class Choice:
         }
 
 
-def _hindrance(scene: Scene, finding: Finding) -> str:
-    """Why an effect that is called for, or may be, cannot be switched on; empty if it can."""
+def _hindrance(scene: Scene, finding: Finding, others: tuple[str, ...]) -> str:
+    """Why an effect that is called for, or may be, cannot be switched on beside others; empty if it can."""
     from limitsets.thrower.effects import BUILT
 
     effect = finding.effect
@@ -62,7 +62,10 @@ def _hindrance(scene: Scene, finding: Finding) -> str:
     if scene.flight != "exact":
         return 'called for, but it needs flight = "exact"'
     missing = [fact for fact in BUILT[effect].needs if getattr(scene.world, fact) is None]
-    return f"called for, but {' and '.join(f'world.{fact}' for fact in missing)} missing" if missing else ""
+    if missing:
+        return f"called for, but {' and '.join(f'world.{fact}' for fact in missing)} missing"
+    barred = [other for other in others if other in BUILT[effect].excludes or effect in BUILT[other].excludes]
+    return f"called for, but it cannot be simulated together with {' and '.join(barred)}" if barred else ""
 
 
 def _with(scene: Scene, effects: tuple[str, ...]) -> Scene:
@@ -79,8 +82,9 @@ def _with(scene: Scene, effects: tuple[str, ...]) -> Scene:
 def choose(scene: Scene) -> Choice:
     """Resolve `auto`.
 
-    An effect is switched on where the audit finds it called for on the limit set and its facts are given.  With it the
-    limit set is another, which may call for more: the audit is repeated until it asks for nothing new.
+    An effect is switched on where the audit finds it called for on the limit set and its facts are given; of two that
+    exclude each other, the one that is on already, or stands first in the audit.  With it the limit set is another,
+    which may call for more: the audit is repeated until it asks for nothing new.
 
     Parameters
     ----------
@@ -108,7 +112,7 @@ def choose(scene: Scene) -> Choice:
         for finding in audit(now).on("limit-set"):
             if finding.called_for is False or finding.simulated or finding.effect in wanted:
                 continue
-            reason = _hindrance(now, finding)
+            reason = _hindrance(now, finding, (*now.effects.on(), *wanted))
             if reason:
                 left[finding.effect] = left.get(finding.effect) or reason
             else:

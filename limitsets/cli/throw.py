@@ -67,6 +67,12 @@ def throw(
         table(["throw", f"x [{unit}]", "side", "status", "turned by", f"displacement [{unit}]", "flag"], rows)
 
     answer(records, json, out, text)
+    if chosen.effects.auto:
+        typer.echo(
+            "limitsets: auto in [effects] is resolved by limitsets analyse; thrown with: "
+            + (", ".join(chosen.effects.on()) or "no effects"),
+            err=True,
+        )
     if path.stopped == "stalled":
         typer.echo(
             "limitsets: stalled: the displacement is too small to change x any more; no fixed point", err=True
@@ -87,6 +93,7 @@ def _records(path: Trace) -> list[dict[str, Any]]:
             "status": codes.NAMES[int(path.code[k])],
             "phi": _number(path.phi[k]),
             "displacement": _number(path.displacement[k]),
+            "sides_turned": int(path.turned[k]),
             "other_vertex_first": bool(path.other_vertex_first[k]),
         }
         for k in range(path.code.size)

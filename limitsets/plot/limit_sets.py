@@ -75,6 +75,7 @@ def limit_set(scene: Scene, found: Any, *, axes: Axes | None = None) -> Figure:
     marked = _critical(axes, scene)
     _goal(axes, scene)
     _frame(axes, scene, sets, marked)
+    style.keep_apart(axes, 0.1)
     axes.set_title(
         f"Limit set of {scene.name}: where the part comes to rest", fontsize=style.TEXT + 1.5, loc="left"
     )
@@ -194,6 +195,7 @@ def _critical(axes: Axes, scene: Scene) -> list[float]:
                 fontsize=style.SMALL,
                 zorder=7,
                 bbox={"boxstyle": "square,pad=0.1", "fc": "white", "ec": "none", "alpha": 0.85},
+                gid="name",
             )
             marked.append(point.x)
     return marked

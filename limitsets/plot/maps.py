@@ -77,6 +77,7 @@ def map(scene: Scene, found: Any = None) -> Figure:  # noqa: A001 - ls.plot.map 
     for axes in panels[count:]:
         axes.set_axis_off()
     for k, axes in enumerate(panels[:count]):
+        style.keep_apart(axes, 0.13)
         axes.xaxis.set_tick_params(labelbottom=k + columns >= count)
         if k + columns >= count:
             axes.set_xlabel(f"x before the throw [{scene.unit}]")
@@ -173,6 +174,7 @@ def _frame(axes: Axes, scene: Scene, side: int, critical: list[float]) -> None:
             ha="right",
             va="top",
             fontsize=style.TEXT,
+            gid="name",
         )
 
 

@@ -123,6 +123,26 @@ def title(figure: Figure, text: str) -> None:
     figure.suptitle(text, fontsize=TEXT + 1.5)
 
 
+def keep_apart(axes: Axes, share: float) -> None:
+    """Take away names of critical points that would run into the name before: each is left of its point.
+
+    Parameters
+    ----------
+    axes : Axes
+        With its limits set; the names have the gid "name", and those of one row stand together, from left to right.
+    share : float
+        Room that a name takes, of the width of the axes.
+    """
+    lo, hi = axes.get_xlim()
+    row, last = None, lo
+    for text in [each for each in axes.texts if each.get_gid() == "name"]:
+        x, y = text.xy  # type: ignore[attr-defined]  # of an annotation
+        if y == row and x - last < share * (hi - lo):
+            text.remove()
+        else:
+            row, last = y, x
+
+
 def interval_text(parts: Sequence[tuple[float, float]], most: int = 2) -> str:
     """Intervals as text, one per line."""
     lines = [f"{lo:.2f} to {hi:.2f}" for lo, hi in parts[:most]]

@@ -90,6 +90,11 @@ def _effects(analysis: Analysis) -> list[str]:
             choice.switched_on
         )
         lines.append(f"**Simulated** beyond the minimal model: {', '.join(names)}.{asked}")
+    if analysis.scene.effects.spread:
+        lines.append(
+            "**Only orbits scatter.** Cells, and with them the limit set, basins and critical points, are those of "
+            "throws without scatter; the numbers of jogs and flips are from an orbit with it, which may leave them."
+        )
     if choice.left_out:
         reasons = "; ".join(f"{effect}: {reason}" for effect, reason in choice.left_out.items())
         lines.append(f"**Not simulated**, though it may be called for: {reasons}.")

@@ -99,7 +99,11 @@ def resolve_effects(table: EffectsTable, world: World, flight: str, resolver: Re
             if other in effects.on():
                 allowed = f"{effect} or {other}"
                 raise resolver.refusal(
-                    key, "the effects", f"{effect} and {other}", allowed, "they cannot be simulated together"
+                    key,
+                    "this pair of effects",
+                    f"{effect} and {other}",
+                    allowed,
+                    "they cannot be simulated together",
                 )
         for fact in BUILT[effect].needs:
             if getattr(world, fact) is None:

@@ -348,6 +348,15 @@ def test_auto_says_that_effects_need_the_exact_flight():
     assert chosen.left_out["roll"] == 'called for, but it needs flight = "exact"'
 
 
+def test_auto_leaves_out_what_cannot_be_simulated_beside_what_is_on():
+    # without restitution the bounce changes nothing, and the stroke is called for as in the minimal model
+    world = {"stroke": "6 deg", "restitution": 0.0, "bounce_threshold": "0.01 in"}
+    assert "drive" in choose(told("paper-initial", world, auto=True)).switched_on
+    chosen = choose(told("paper-initial", world, auto=True, bounce=True))
+    assert "drive" not in chosen.switched_on
+    assert chosen.left_out["drive"] == "called for, but it cannot be simulated together with bounce"
+
+
 def test_without_auto_nothing_changes():
     scene = ls.load("paper-initial")
     assert choose(scene).scene is scene

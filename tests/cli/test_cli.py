@@ -138,7 +138,7 @@ def test_throw(capfd):
     assert (code, err) == (0, "")
     record = json.loads(out)
     assert [each["x"] for each in record] == pytest.approx([8.262013, 8.557124, 8.891802], abs=1e-6)
-    words = {"x", "side", "status", "phi", "displacement", "other_vertex_first"}
+    words = {"x", "side", "status", "phi", "displacement", "sides_turned", "other_vertex_first"}
     assert all(set(each) == words for each in record)
     assert record[0]["phi"] == pytest.approx(0.311437, abs=1e-6)
     assert [each["status"] for each in record] == ["jog"] * 3
@@ -155,7 +155,8 @@ def test_throw_ends_at_the_first_exit(capfd):
     _, out, _ = run(capfd, "throw", "paper-designed", "--x", "-3", "--side", "2", "--count", "9", "--json")
     (record,) = json.loads(out)
     assert record == {
-        "x": -3.0, "side": 2, "status": "outside-model", "phi": None, "displacement": None, "other_vertex_first": False
+        "x": -3.0, "side": 2, "status": "outside-model", "phi": None, "displacement": None, "sides_turned": 0,
+        "other_vertex_first": False
     }  # fmt: skip
     scene = ls.load("paper-designed").with_values({"arm.surface_height": -3.0})
     ls.dump(scene, "high.toml")
@@ -351,3 +352,13 @@ def test_ctrl_c_leaves_the_old_files_whole(tmp_path):
         "report.md": "old",
         "map.png": "old",
     }
+
+
+def test_throw_tells_sides_turned_and_that_auto_is_not_resolved(capfd):
+    # beyond r_2 = 20 a part flips, from side 2 onto side 0
+    scene = ls.load("paper-initial").as_dict() | {"name": "asks", "effects": {"auto": True}}
+    ls.dump(ls.load(scene), "asks.toml")
+    _, out, err = run(capfd, "throw", "asks.toml", "--x", "22", "--side", "2", "--json")
+    assert "auto in [effects] is resolved by limitsets analyse; thrown with: no effects" in err
+    (record,) = json.loads(out)
+    assert (record["status"], record["sides_turned"], record["side"]) == ("flip", 1, 0)

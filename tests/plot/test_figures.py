@@ -11,11 +11,12 @@ import numpy as np
 import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import to_rgb
+from matplotlib.figure import Figure
 
 import limitsets as ls
 from limitsets import plot
 from limitsets.errors import AnswerError, MapError
-from limitsets.plot.style import SETS, extents_of, stretch
+from limitsets.plot.style import SETS, extents_of, keep_apart, stretch
 from limitsets.thrower import fly
 
 SCENES = Path(__file__).parents[1] / "analysis"
@@ -344,3 +345,13 @@ def test_pyplot_is_never_imported():
         [sys.executable, "-W", "error", "-c", code], capture_output=True, text=True, check=True
     )
     assert done.stdout.split() == ["False"]
+
+
+def test_names_of_critical_points_that_would_run_into_each_other_are_taken_away():
+    axes = Figure().subplots()
+    axes.set_xlim(0.0, 10.0)
+    for x, y in [(2.0, 0.0), (2.5, 0.0), (3.1, 0.0), (3.2, 1.0), (9.0, 1.0)]:
+        axes.annotate(f"{x}", (x, y), gid="name")
+    axes.annotate("other", (2.1, 0.0))
+    keep_apart(axes, 0.1)
+    assert [text.get_text() for text in axes.texts] == ["2.0", "3.1", "3.2", "9.0", "other"]

@@ -10,6 +10,7 @@ import pytest
 
 from limitsets.errors import GeometryError, SceneError
 from limitsets.scene import dump, load
+from limitsets.thrower.effects import Effect
 
 GONE = object()
 BOTH = {"sides": ["3 in", "4 in", "5 in"], "vertices": [["0 in", "0 in"], ["1 in", "0 in"], ["0 in", "1 in"]]}
@@ -155,6 +156,11 @@ TABLE: list[tuple[dict[str, Any], str, str]] = [
     ({"effects/bounce": True, "world/bounce_threshold": GONE}, "effects.bounce", "world.bounce_threshold"),
     ({"effects/drive": True, "world/stroke": GONE}, "effects.drive", "world.stroke"),
     ({"effects/spread": "bounded", "world/scatter": {}}, "effects.spread", "world.scatter"),
+    ({"effects/drive": True, "effects/slip": True}, "effects.drive", "drive or slip"),
+    ({"effects/drive": True, "effects/pivot": True}, "effects.drive", "drive or pivot"),
+    ({"effects/drive": True, "effects/bounce": True}, "effects.drive", "drive or bounce"),
+    ({"effects/roll": True, "model/flight": "small-angle"}, "effects.roll", "the exact one"),
+    ({"effects/spread": "gaussian", "model/flight": "small-angle-2"}, "effects.spread", "the exact one"),
     ({"tolerance": {"throw.sped": "1 %"}}, 'tolerance."throw.sped"', "did you mean 'throw.speed'"),
     ({"tolerance": {"part.sides[3]": "1 %"}}, 'tolerance."part.sides[3]"', "does not give it"),
     ({"tolerance": {"throw.speed": "1 in"}}, 'tolerance."throw.speed"', "dimension is wrong"),
@@ -180,12 +186,13 @@ def test_refuses(changes: dict[str, Any], key: str, words: str, whole: dict[str,
 def test_effects_that_are_not_built_are_refused(
     effect: str, whole: dict[str, Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("limitsets.thrower.effects.BUILT", ("spread",))
+    row = Effect((), lambda world, how: None)
+    monkeypatch.setattr("limitsets.thrower.effects.BUILT", {"spread": row})
     whole["effects"][effect] = True
     with pytest.raises(SceneError, match=f"{effect}.*this version can simulate: spread") as caught:
         load(whole)
     assert caught.value.key == f"effects.{effect}"
-    monkeypatch.setattr("limitsets.thrower.effects.BUILT", (effect,))
+    monkeypatch.setattr("limitsets.thrower.effects.BUILT", {effect: row})
     assert load(whole).effects.on() == (effect,)
 
 

@@ -9,6 +9,7 @@ from limitsets.jit import kernel
 from limitsets.maps import advance, codes, images, orbit
 from limitsets.maps.counting_random import normal_pair, philox, uniform_pair
 from limitsets.scene import Scene
+from limitsets.thrower import trace
 
 DESIGNED = ls.load("paper-designed")
 
@@ -111,3 +112,15 @@ def test_a_scatter_in_degrees_per_second_is_one_in_percent() -> None:
     del tree["gravity"]
     with pytest.raises(ls.errors.SceneError, match="gravity"):
         _ = ls.load(tree).map
+
+
+@pytest.mark.parametrize("word", ["bounded", "gaussian"])
+def test_what_is_told_of_a_throw_is_that_of_the_throw_made(word: str) -> None:
+    """On a side R' = R + displacement; a throw by w' turns the part by another angle than one by w."""
+    scattered = trace(scene(word, "1 %", "0.05 in").map, 12.0, 2, 200)
+    same = scattered.code == codes.JOG
+    assert same.sum() > 50
+    moved = np.diff(scattered.x)[same]
+    assert np.allclose(scattered.displacement[same], moved, rtol=0, atol=1e-13)
+    bare = trace(DESIGNED.map, 12.0, 2, 1)
+    assert 1e-6 < abs(scattered.phi[0] - bare.phi[0]) < 0.05 * bare.phi[0]
