@@ -36,8 +36,8 @@ class Comparison:
         Vertex that met the arm first in the engine.
     left : ndarray of int, shape (n,)
         Left bottom vertex before the throw, the one that the minimal model lets land.
-    residual, reverses : ndarray
-        Of unilateral contact: how far the engine is from Coulomb's law, and where that and Routh's differ (`Landing`).
+    residual, reverses, rocks : ndarray
+        What was seen of unilateral contact (`Landing`).
     """
 
     x: NDArray[np.float64]
@@ -52,6 +52,7 @@ class Comparison:
     left: NDArray[np.int64]
     residual: NDArray[np.float64]
     reverses: NDArray[np.bool_]
+    rocks: NDArray[np.bool_]
 
     @property
     def agree(self) -> NDArray[np.bool_]:
@@ -133,6 +134,7 @@ def compare(
         left=-sides % len(scene.sides),
         residual=np.array([landing.residual for landing in landings]),
         reverses=np.array([landing.reverses for landing in landings], dtype=np.bool_),
+        rocks=np.array([landing.rocks for landing in landings], dtype=np.bool_),
     )
 
 

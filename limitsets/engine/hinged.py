@@ -65,31 +65,31 @@ def _turn_about(stage: Stage, place: tuple[float, ...], rate: float) -> None:
     stage.body.angular_velocity, stage.body.velocity = rate, (-rate * up, rate * across)
 
 
-def _stick(stage: Stage, vertex: int) -> float:
-    """Let a joint stop a vertex: the normal impulse it took."""
-    pymunk, body = pymunk_module(), stage.body
+def _stick(stage: Stage, vertex: int, lift: float = 0.0) -> float:
+    """Let a joint give a vertex a velocity straight up, or stop it: the normal impulse that takes."""
+    pymunk, space, body = pymunk_module(), stage.space, stage.body
     before = body.velocity.y
-    catch = pymunk.PivotJoint(stage.space.static_body, body, tuple(body.local_to_world(stage.corners[vertex])))
-    catch.error_bias = 1.0
+    place = tuple(body.local_to_world(stage.corners[vertex]))
+    carrier = pymunk.Body(body_type=pymunk.Body.KINEMATIC)
+    carrier.position, carrier.velocity = place, (0.0, lift)
+    catch = pymunk.PivotJoint(carrier, body, place)
+    catch.error_bias = 1.0  # nothing to correct yet
+    space.add(carrier)
     stage.strike(catch)
+    space.remove(carrier)
     return float(body.velocity.y - before)
 
 
 def _bounce(stage: Stage, vertex: int, impulse: float, threshold: float) -> bool:
     """Give back a normal impulse to a vertex that does not slip; False, and nothing, if it would hardly rise."""
-    pymunk, body = pymunk_module(), stage.body
+    body = stage.body
     stuck = body.velocity, body.angular_velocity
-    place = tuple(body.local_to_world(stage.corners[vertex]))
-    body.apply_impulse_at_world_point((0.0, max(impulse, 0.0)), place)
-    ends = [(place[0], place[1] + reach) for reach in (-1.0, 1.0)]
-    groove = pymunk.GrooveJoint(stage.space.static_body, body, *ends, stage.corners[vertex])
-    groove.error_bias = 1.0
-    stage.strike(groove)  # it takes what velocity along the arm the impulse has given
-    lift = float(body.velocity_at_world_point(place).y)
-    if lift > 0.0 and lift * lift > 2.0 * stage.kappa * threshold:
-        return True
+    lift = impulse / _stick(stage, vertex, 1.0)  # what the joint takes grows with the lift in proportion
     body.velocity, body.angular_velocity = stuck
-    return False
+    if lift <= 0.0 or lift * lift <= 2.0 * stage.kappa * threshold:
+        return False
+    _stick(stage, vertex, lift)
+    return True
 
 
 def _lands(stage: Stage) -> int:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from limitsets.engine.stage import Stage, pymunk_module
@@ -10,7 +11,7 @@ from limitsets.engine.stage import Stage, pymunk_module
 if TYPE_CHECKING:
     from limitsets.scene import Scene
 
-__all__ = ["IDLE", "settle", "slides_back"]
+__all__ = ["IDLE", "Seen", "settle"]
 
 # For this long [rad] the part has to be idle, by the engine's own measure, before it is taken to rest.
 IDLE = 0.5
@@ -22,19 +23,33 @@ OVERLAP = 1e-4
 TAKEN_BACK = 0.2
 # Two contacts with friction on one body; more change nothing.
 ITERATIONS = 40
+# A change of velocity in one step beyond this share of a fall by the part's size is an impact.
+SUDDEN = 0.02
+# Vertices lower than this fraction of the part's size touch the arm.
+TOUCHING = 1e-3
 
 
-def slides_back(stage: Stage, vertex: int, friction: float) -> bool:
-    """Whether Routh's path stops the sliding of a vertex that strikes now and then sets it sliding the other way.
+@dataclass
+class Seen:
+    """What is noticed on the way to rest; see `Landing` for what it means."""
+
+    residual: float = 0.0
+    reverses: bool = False
+    rocks: bool = False
+
+
+def slides_back(stage: Stage, velocity: Any, rate: float, friction: float) -> bool:
+    """Whether Routh's path stops the sliding of the vertex that strikes now and then sets it sliding the other way.
 
     Signorini's and Coulomb's laws for the whole impulse, which the engine solves, have friction against the last
     sliding alone.  Notation of docs/model.md: A, B, C say what an impulse at the vertex does to its velocity.
     """
-    body, place = stage.body, stage.body.local_to_world(stage.corners[vertex])
-    right, high = body.position.x - place.x, body.position.y - place.y
-    rho2 = float(body.moment)
+    body = stage.body
+    arms = [body.position - body.local_to_world(corner) for corner in stage.corners]
+    low = max(arm.y for arm in arms) - TOUCHING * stage.size
+    off, right, high = min((velocity.y - rate * arm.x, arm.x, arm.y) for arm in arms if arm.y > low)
+    along, rho2 = velocity.x + rate * high, float(body.moment)
     a, b, c = 1.0 + high * high / rho2, -right * high / rho2, 1.0 + right * right / rho2
-    along, off = body.velocity_at_world_point(place)
     push = (b * along / a - off) / (c - b * b / a)
     if push > 0.0 and abs(along + b * push) <= friction * a * push:  # friction can hold the vertex
         return False
@@ -44,8 +59,8 @@ def slides_back(stage: Stage, vertex: int, friction: float) -> bool:
 
 def settle(
     stage: Stage, scene: Scene, friction: float, restitution: float, step: float, patience: float
-) -> tuple[float, int, float]:
-    """Let the engine's contact bring the part to rest: time, side (-1 where patience ends first) and residual."""
+) -> tuple[float, int, Seen]:
+    """Let the engine's contact bring the part to rest: time, side (-1 where patience ends first), and what was seen."""
     pymunk, space, body, size = pymunk_module(), stage.space, stage.body, stage.size
     far = 4.0 * (scene.arm_length + size)
     # As thick as the part is long: it never comes out on the other side.
@@ -56,25 +71,33 @@ def settle(
     space.iterations = ITERATIONS
     space.collision_slop = OVERLAP * size
     space.collision_bias = (1.0 - TAKEN_BACK) ** (1.0 / step)
-    short = [0.0]
-    space.on_collision(post_solve=lambda arbiter, _space, _data: _watch(arbiter, body, friction, short))
+    seen, sudden = Seen(), SUDDEN * math.sqrt(stage.kappa * size)
+    space.on_collision(post_solve=lambda arbiter, _space, _data: _watch(arbiter, body, friction, seen))
+    seen.reverses = slides_back(stage, body.velocity, body.angular_velocity, friction)
     stage.strike(arm)  # where the vertex is: a whole step would first move it through the arm
     space.add(arm)
     space.sleep_time_threshold = IDLE
 
     time = 0.0
     while time <= patience and not body.is_sleeping:
-        space.step(step)
+        velocity, rate = body.velocity, body.angular_velocity
+        space.step(step)  # it moves the part first
         time += step
+        if (body.velocity - velocity).length + stage.size * abs(body.angular_velocity - rate) > sudden:
+            seen.reverses |= slides_back(stage, velocity, rate, friction)
+            flat = min(abs(math.remainder(body.angle - flat, math.tau)) for flat in stage.flat) < LEANING
+            seen.rocks |= flat and body.angular_velocity * rate > 0.0 and stage.size * abs(body.angular_velocity) > sudden
     off = [abs(math.remainder(body.angle - flat, math.tau)) for flat in stage.flat]
     side = off.index(min(off))
     at_rest = body.is_sleeping and off[side] < LEANING
-    return time, side if at_rest else -1, short[0] / (stage.kappa * size)
+    seen.residual /= stage.kappa * size
+    return time, side if at_rest else -1, seen
 
 
-def _watch(arbiter: Any, body: Any, friction: float, short: list[float]) -> None:
-    """Add the energy that a contact which slides should have lost and has not."""
-    points = arbiter.contact_point_set.points
-    along = sum(body.velocity_at_world_point(point.point_a).x for point in points) / len(points)
+def _watch(arbiter: Any, body: Any, friction: float, seen: Seen) -> None:
+    """Add the energy that a sliding contact should have lost and has not, and what moves it on into the arm."""
+    velocities = [body.velocity_at_world_point(point.point_a) for point in arbiter.contact_point_set.points]
+    along = sum(velocity.x for velocity in velocities) / len(velocities)
+    into = min(min(velocity.y for velocity in velocities), 0.0)
     drag, push = arbiter.total_impulse
-    short[0] += abs(along) * abs(friction * abs(push) - abs(drag))
+    seen.residual += abs(along) * abs(friction * abs(push) - abs(drag)) + 0.5 * into * into

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from limitsets.engine.flying import fly
 from limitsets.engine.hinged import turn_and_roll, turn_on_hinge
-from limitsets.engine.settling import settle, slides_back
+from limitsets.engine.settling import Seen, settle
 from limitsets.engine.stage import set_up
 from limitsets.engine.stroke import accelerate
 from limitsets.errors import AnswerError, MapError
@@ -41,8 +41,10 @@ class Landing:
         Unilateral contact: energy by which the engine's contact fell short of Coulomb's law, as a fraction of what
         lifts the part by its own size.  Its solver does not converge where friction presses a sliding vertex hard.
     reverses : bool
-        Unilateral contact: within the first impact the vertex would slide one way and then, driven by the impact
-        itself, the other.  Routh's law follows both; a law for the whole impulse knows the second alone.
+        Unilateral contact: within an impact the vertex would slide one way and then, driven by the impact itself,
+        the other.  Routh's law follows both; a law for the whole impulse, as the engine's, knows the second alone.
+    rocks : bool
+        Unilateral contact: after a face had come down the part rose again over its other end.
     """
 
     x: float
@@ -53,6 +55,7 @@ class Landing:
     time: float
     residual: float = 0.0
     reverses: bool = False
+    rocks: bool = False
 
 
 def throw(
@@ -135,16 +138,16 @@ def throw(
         return Landing(x, side, "no flight", -1, math.nan, 0.0)
     if flown > patience:
         return Landing(stage.body.position.x, -1, "unfinished", -1, math.nan, flown)
-    struck, left, residual, reverses = stage.lowest(), patience - flown, 0.0, False
+    struck, left, seen = stage.lowest(), patience - flown, Seen()
     if contact == "unilateral":
-        reverses = slides_back(stage, struck, mu)
-        turned, on, residual = settle(stage, scene, mu, e, step, left)
+        turned, on, seen = settle(stage, scene, mu, e, step, left)
     elif rolls or e > 0.0:
         turned, on = turn_and_roll(stage, struck, rolls, (e, threshold), step, left)
     else:
         turned, on = turn_on_hinge(stage, struck, step, left)
     status = "rest" if on >= 0 else "unfinished"
-    return Landing(stage.body.position.x, on, status, struck, flown, flown + turned, residual, reverses)
+    end, time = stage.body.position.x, flown + turned
+    return Landing(end, on, status, struck, flown, time, seen.residual, seen.reverses, seen.rocks)
 
 
 def _check(
