@@ -53,3 +53,4 @@ def accelerate(stage: Stage, stroke: float, friction: float, step: float) -> Non
         space.step(time)
     space.step(INSTANT)
     space.remove(arm, surface)
+    body.position += (0.0, -stage.gap())  # what the contact overlaps
