@@ -129,5 +129,3 @@ def turn_and_roll(
         left, right = -face % len(stage.flat), (1 - face) % len(stage.flat)
         vertex = right if vertex == left else left
     return time, -1
-
-

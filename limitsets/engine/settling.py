@@ -25,6 +25,8 @@ TAKEN_BACK = 0.2
 ITERATIONS = 40
 # A change of velocity in one step beyond this share of a fall by the part's size is an impact.
 SUDDEN = 0.02
+# Of a part of mass 1 with less energy than this nothing is worth watching [scene's unit squared].
+STILL = 1e-9
 # Vertices lower than this fraction of the part's size touch the arm.
 TOUCHING = 1e-3
 
@@ -86,7 +88,11 @@ def settle(
         if (body.velocity - velocity).length + stage.size * abs(body.angular_velocity - rate) > sudden:
             seen.reverses |= slides_back(stage, velocity, rate, friction)
             flat = min(abs(math.remainder(body.angle - flat, math.tau)) for flat in stage.flat) < LEANING
-            seen.rocks |= flat and body.angular_velocity * rate > 0.0 and stage.size * abs(body.angular_velocity) > sudden
+            seen.rocks |= (
+                flat
+                and body.angular_velocity * rate > 0.0
+                and stage.size * abs(body.angular_velocity) > sudden
+            )
     off = [abs(math.remainder(body.angle - flat, math.tau)) for flat in stage.flat]
     side = off.index(min(off))
     at_rest = body.is_sleeping and off[side] < LEANING
@@ -96,6 +102,8 @@ def settle(
 
 def _watch(arbiter: Any, body: Any, friction: float, seen: Seen) -> None:
     """Add the energy that a sliding contact should have lost and has not, and what moves it on into the arm."""
+    if body.kinetic_energy < STILL:  # most steps of a throw are those of a part that lies
+        return
     velocities = [body.velocity_at_world_point(point.point_a) for point in arbiter.contact_point_set.points]
     along = sum(velocity.x for velocity in velocities) / len(velocities)
     into = min(min(velocity.y for velocity in velocities), 0.0)

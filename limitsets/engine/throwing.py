@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
 __all__ = ["Landing", "throw"]
 
+
 @dataclass(frozen=True)
 class Landing:
     """Where one throw ended in the engine.
@@ -129,6 +130,7 @@ def throw(
     >>> landing.side, round(landing.x, 3)
     (2, 16.754)
     """
+    _check_asked(contact, friction, threshold, rolls, stroke)
     mu, e = _check(scene, side, contact, friction, restitution, step)
     stage = set_up(scene, x, side)
     if stroke > 0.0:
@@ -148,6 +150,25 @@ def throw(
     status = "rest" if on >= 0 else "unfinished"
     end, time = stage.body.position.x, flown + turned
     return Landing(end, on, status, struck, flown, time, seen.residual, seen.reverses, seen.rocks)
+
+
+def _check_asked(contact: str, friction: float | None, threshold: float, rolls: bool, stroke: float) -> None:
+    """Refuse words that say nothing of this contact."""
+    if contact == "hinge" and friction is not None and stroke == 0.0:
+        raise AnswerError(
+            "the contact", contact, "'unilateral' with a friction", "a hinge has none: leave it out"
+        )
+    if contact != "hinge" and (rolls or threshold):
+        raise AnswerError(
+            "the contact",
+            contact,
+            "'hinge' with rolls or a threshold",
+            "the engine's own contact rolls anyway",
+        )
+    if not (0.0 <= stroke < 0.5 * math.pi and 0.0 <= threshold < math.inf):
+        raise AnswerError(
+            "the stroke and the threshold", (stroke, threshold), "0 to pi/2 rad; from 0", "pass stroke=0.2"
+        )
 
 
 def _check(
