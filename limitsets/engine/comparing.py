@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -36,6 +36,8 @@ class Comparison:
         Vertex that met the arm first in the engine.
     left : ndarray of int, shape (n,)
         Left bottom vertex before the throw, the one that the minimal model lets land.
+    residual, reverses, rocks : ndarray
+        What was seen of unilateral contact (`Landing`).
     """
 
     x: NDArray[np.float64]
@@ -48,6 +50,9 @@ class Comparison:
     status: NDArray[np.str_]
     struck: NDArray[np.int64]
     left: NDArray[np.int64]
+    residual: NDArray[np.float64]
+    reverses: NDArray[np.bool_]
+    rocks: NDArray[np.bool_]
 
     @property
     def agree(self) -> NDArray[np.bool_]:
@@ -72,12 +77,7 @@ def compare(
     scene: Scene,
     x: ArrayLike,
     side: ArrayLike,
-    *,
-    contact: str = "hinge",
-    friction: float | None = None,
-    restitution: float | None = None,
-    step: float = 1e-3,
-    patience: float = 60.0,
+    **how: Any,
 ) -> Comparison:
     """Throw parts by the scene's map, with the effects it has, and in the engine.
 
@@ -89,8 +89,8 @@ def compare(
         Where the parts rest before the throw [scene's unit].
     side : int or array_like, shape (n,)
         On which side.
-    contact, friction, restitution, step, patience
-        What happens in the engine after the first contact: see `throw`.
+    **how
+        How it goes in the engine, as keywords of `throw`: contact, friction, restitution, ...
 
     Returns
     -------
@@ -118,17 +118,7 @@ def compare(
         )
     sides = np.broadcast_to(sides, starts.shape).copy()
     landings = [
-        throw(
-            scene,
-            start,
-            on,
-            contact=contact,
-            friction=friction,
-            restitution=restitution,
-            step=step,
-            patience=patience,
-        )
-        for start, on in zip(starts.tolist(), sides.tolist(), strict=True)
+        throw(scene, start, on, **how) for start, on in zip(starts.tolist(), sides.tolist(), strict=True)
     ]
     x_map, side_map, code_map = _by_map(scene, starts, sides)
     return Comparison(
@@ -142,6 +132,9 @@ def compare(
         status=np.array([landing.status for landing in landings], dtype=np.str_),
         struck=np.array([landing.struck for landing in landings], dtype=np.int64),
         left=-sides % len(scene.sides),
+        residual=np.array([landing.residual for landing in landings]),
+        reverses=np.array([landing.reverses for landing in landings], dtype=np.bool_),
+        rocks=np.array([landing.rocks for landing in landings], dtype=np.bool_),
     )
 
 

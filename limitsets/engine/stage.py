@@ -64,6 +64,8 @@ class Stage:
         The body's angle when it rests on each side [rad].
     height, kappa : float
         Of the arm's surface over the joint, and gravity [scene's unit].
+    size : float
+        Length of the longest side [scene's unit].
     """
 
     space: Space
@@ -73,11 +75,12 @@ class Stage:
     flat: tuple[float, ...]
     height: float
     kappa: float
+    size: float
 
     def kick(self, time: float) -> None:
         """Give the velocity that gravity adds in `time`, which may be negative."""
-        across, up = self.body.velocity
-        self.body.velocity = (across, up - self.kappa * time)
+        (across, up), (along, down) = self.body.velocity, self.space.gravity
+        self.body.velocity = (across + along * time, up + down * time)
 
     def drift(self, time: float) -> None:
         """Fly freely, from the velocity at the start of the step to that at its end."""
@@ -133,4 +136,5 @@ def set_up(scene: Scene, x: float, side: int) -> Stage:
     space = pymunk.Space()
     space.gravity = (0.0, -scene.kappa)
     space.add(body, part)
-    return Stage(space, body, part, corners, tuple(flat), height, scene.kappa)
+    size = float(scene.sides.length.max())
+    return Stage(space, body, part, corners, tuple(flat), height, scene.kappa, size)

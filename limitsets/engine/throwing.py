@@ -6,28 +6,17 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from limitsets.engine.stage import Stage, pymunk_module, set_up
+from limitsets.engine.flying import fly
+from limitsets.engine.hinged import turn_and_roll, turn_on_hinge
+from limitsets.engine.settling import Seen, settle
+from limitsets.engine.stage import set_up
+from limitsets.engine.stroke import accelerate
 from limitsets.errors import AnswerError, MapError
 
 if TYPE_CHECKING:
     from limitsets.scene import Scene
 
 __all__ = ["Landing", "throw"]
-
-# A flight is exact whatever the step; between steps of this size [rad] a vertex must not touch and rise again.
-FLIGHT_STEP = 2.0**-7
-# Shorter flights than this [rad] are lost in the rounding of heights.
-SHORTEST = 1e-9
-# For this long [rad] the part has to be idle, by the engine's own measure, before it is taken to rest.
-IDLE = 0.5
-# Farther from flat than this [rad] an idle part leans or stands on a vertex.
-LEANING = 0.02
-# What contacts may overlap for good, as a fraction of the part's size: without any they would come and go.
-OVERLAP = 1e-4
-# Of the overlap beyond that so much is taken back in each step, without adding to the velocity.
-TAKEN_BACK = 0.2
-# Two contacts with friction on one body; more change nothing.
-ITERATIONS = 40
 
 
 @dataclass(frozen=True)
@@ -49,6 +38,14 @@ class Landing:
         By how much the part had turned then [rad]; nan where it did not.
     time : float
         From release to rest, times the angular speed of the throw [rad].
+    residual : float
+        Unilateral contact: energy by which the engine's contact fell short of Coulomb's law, as a fraction of what
+        lifts the part by its own size.  Its solver does not converge where friction presses a sliding vertex hard.
+    reverses : bool
+        Unilateral contact: within an impact the vertex would slide one way and then, driven by the impact itself,
+        the other.  Routh's law follows both; a law for the whole impulse, as the engine's, knows the second alone.
+    rocks : bool
+        Unilateral contact: after a face had come down the part rose again over its other end.
     """
 
     x: float
@@ -57,6 +54,9 @@ class Landing:
     struck: int
     phi: float
     time: float
+    residual: float = 0.0
+    reverses: bool = False
+    rocks: bool = False
 
 
 def throw(
@@ -67,6 +67,9 @@ def throw(
     contact: str = "hinge",
     friction: float | None = None,
     restitution: float | None = None,
+    threshold: float = 0.0,
+    rolls: bool = False,
+    stroke: float = 0.0,
     step: float = 1e-3,
     patience: float = 60.0,
 ) -> Landing:
@@ -88,6 +91,14 @@ def throw(
         model.  ``"unilateral"``: the engine's own contact, which pushes, slips and bounces, until the part lies still.
     friction, restitution : float, optional
         Of the unilateral contact; from the scene's world where not given here.  Without a restitution it is plastic.
+        With a hinge, friction is that of the stroke, and a restitution throws the struck vertex off again: Poisson's
+        law, a joint keeping the vertex from sliding.
+    threshold : float
+        With a hinge: height below which a bounce is none [scene's unit].
+    rolls : bool
+        With a hinge: whether the part may roll on over the other end of the face that came down.
+    stroke : float
+        Angle over which the arm is turned, with constant acceleration, before it stops [rad]; 0 for an impulse.
     step : float
         The engine's step after the first contact, times the angular speed of the throw [rad].
     patience : float
@@ -119,45 +130,64 @@ def throw(
     >>> landing.side, round(landing.x, 3)
     (2, 16.754)
     """
+    _check_asked(contact, friction, threshold, rolls, stroke)
     mu, e = _check(scene, side, contact, friction, restitution, step)
     stage = set_up(scene, x, side)
-    flown = _fly(stage, patience)
+    if stroke > 0.0:
+        accelerate(stage, stroke, mu, step)
+    flown = fly(stage, patience)
     if flown <= 0.0:
         return Landing(x, side, "no flight", -1, math.nan, 0.0)
     if flown > patience:
         return Landing(stage.body.position.x, -1, "unfinished", -1, math.nan, flown)
-    struck = stage.lowest()
-    if contact == "hinge":
-        turned, on = _turn_on_hinge(stage, struck, step, patience - flown)
+    struck, left, seen = stage.lowest(), patience - flown, Seen()
+    if contact == "unilateral":
+        turned, on, seen = settle(stage, scene, mu, e, step, left)
+    elif rolls or e > 0.0:
+        turned, on = turn_and_roll(stage, struck, rolls, (e, threshold), step, left)
     else:
-        turned, on = _settle(stage, scene, mu, e, step, patience - flown)
+        turned, on = turn_on_hinge(stage, struck, step, left)
     status = "rest" if on >= 0 else "unfinished"
-    return Landing(stage.body.position.x, on, status, struck, flown, flown + turned)
+    end, time = stage.body.position.x, flown + turned
+    return Landing(end, on, status, struck, flown, time, seen.residual, seen.reverses, seen.rocks)
+
+
+def _check_asked(contact: str, friction: float | None, threshold: float, rolls: bool, stroke: float) -> None:
+    """Refuse words that say nothing of this contact."""
+    if contact == "hinge" and friction is not None and stroke == 0.0:
+        raise AnswerError(
+            "the contact", contact, "'unilateral' with a friction", "a hinge has none: leave it out"
+        )
+    if contact != "hinge" and (rolls or threshold):
+        raise AnswerError(
+            "the contact",
+            contact,
+            "'hinge' with rolls or a threshold",
+            "the engine's own contact rolls anyway",
+        )
+    if not (0.0 <= stroke < 0.5 * math.pi and 0.0 <= threshold < math.inf):
+        raise AnswerError(
+            "the stroke and the threshold", (stroke, threshold), "0 to pi/2 rad; from 0", "pass stroke=0.2"
+        )
 
 
 def _check(
     scene: Scene, side: int, contact: str, friction: float | None, restitution: float | None, step: float
 ) -> tuple[float, float]:
-    """Friction and restitution of the contact, both 0 for a hinge."""
+    """Friction and restitution of the contact; of a hinge only what is asked for."""
     if not 0 <= side < len(scene.sides):
         raise MapError(
             "the side", side, f"an integer from 0 to {len(scene.sides) - 1}", "name a side of the part"
         )
     if not 0.0 < step <= 0.1:
         raise AnswerError("the engine's step", step, "above 0 and at most 0.1 rad", "pass step=1e-3")
-    if contact == "hinge":
-        if friction is not None or restitution is not None:
-            raise AnswerError(
-                "the contact",
-                contact,
-                "'unilateral' with a friction or a restitution",
-                "a hinge has neither: leave them out",
-            )
-        return 0.0, 0.0
-    if contact != "unilateral":
+    if contact not in ("hinge", "unilateral"):
         raise AnswerError("the contact", contact, "'hinge' or 'unilateral'", "choose one")
+    held = contact == "hinge"
     mu = scene.world.friction if friction is None else friction
-    e = scene.world.restitution if restitution is None else restitution
+    e = scene.world.restitution if restitution is None and not held else restitution
+    if mu is None and held:
+        mu = 0.0
     if mu is None or not 0.0 <= mu < math.inf:
         raise AnswerError(
             "the friction", mu, "a number from 0", "pass friction=0.5, or give world.friction in the scene"
@@ -165,95 +195,3 @@ def _check(
     if e is not None and not 0.0 <= e <= 1.0:
         raise AnswerError("the restitution", e, "0 to 1", "pass restitution=0 for a plastic contact")
     return mu, e or 0.0
-
-
-def _fly(stage: Stage, patience: float) -> float:
-    """Fly until the part's lowest point is on the arm; the time, 0 where it never leaves the arm."""
-    from scipy.optimize import brentq
-
-    before, length = stage.state(), FLIGHT_STEP
-    stage.drift(length)
-    while stage.gap() <= 0.0:  # a short flight: first find a moment in the air
-        length *= 0.5
-        if length < SHORTEST:
-            return 0.0
-        stage.restore(before)
-        stage.drift(length)
-    flown = length
-    before = stage.state()
-    stage.drift(FLIGHT_STEP)
-    while stage.gap() > 0.0:
-        flown += FLIGHT_STEP
-        if flown > patience:
-            return flown
-        before = stage.state()
-        stage.drift(FLIGHT_STEP)
-
-    def gap_after(time: float) -> float:
-        stage.restore(before)
-        stage.drift(time)  # the engine takes a step of 0 as none
-        return stage.gap()
-
-    time = float(brentq(gap_after, 0.0, FLIGHT_STEP, xtol=1e-14))
-    gap_after(time)
-    return flown + time
-
-
-def _turn_on_hinge(stage: Stage, struck: int, step: float, patience: float) -> tuple[float, int]:
-    """Hold the struck vertex until a face lies on the arm: time and side, -1 where patience ends first."""
-    pymunk, space, body = pymunk_module(), stage.space, stage.body
-    count = len(stage.flat)
-    clockwise, counter = -struck % count, (1 - struck) % count
-    # The angles between which no face is down; a face may already lie there, to rounding.
-    leaning = (body.angle - stage.flat[clockwise] + LEANING) % math.tau - LEANING
-    low = body.angle - leaning
-    high = low + (stage.flat[counter] - stage.flat[clockwise]) % math.tau
-
-    place = tuple(body.local_to_world(stage.corners[struck]))
-    catch, joint = (pymunk.PivotJoint(space.static_body, body, place) for _ in range(2))
-    catch.error_bias = 1.0  # nothing to correct yet, and rounding is not to be divided by an instant
-    joint.error_bias = 0.0  # all of the drift is corrected in the next step
-    stage.kick(0.5 * step)  # as in `drift`: the velocity of the middle of each step, here within the joint
-    stage.strike(catch)
-    space.add(joint)
-
-    time = 0.0
-    while time <= patience:
-        angle, rate = body.angle, body.angular_velocity
-        if low < angle + rate * step < high:
-            space.step(step)
-            time += step
-            continue
-        target, side = (low, clockwise) if rate < 0.0 else (high, counter)
-        last = max((target - angle) / rate, 0.0) if rate else 0.0
-        space.step(last)  # a step turns by rate times its length
-        return time + last, side
-    return time, -1
-
-
-def _settle(
-    stage: Stage, scene: Scene, friction: float, restitution: float, step: float, patience: float
-) -> tuple[float, int]:
-    """Let the engine's contact bring the part to rest: time and side, -1 where it does not within patience."""
-    pymunk, space, body = pymunk_module(), stage.space, stage.body
-    size = float(scene.sides.length.max())
-    far = 4.0 * (scene.arm_length + size)
-    # As thick as the part is long: it never comes out on the other side.
-    low = stage.height - size
-    arm = pymunk.Segment(space.static_body, (-far, low), (far, low), size)
-    arm.friction = arm.elasticity = 1.0  # the engine takes products
-    stage.part.friction, stage.part.elasticity = friction, restitution
-    space.iterations = ITERATIONS
-    space.collision_slop = OVERLAP * size
-    space.collision_bias = (1.0 - TAKEN_BACK) ** (1.0 / step)
-    stage.strike(arm)  # where the vertex is: a whole step would first move it through the arm
-    space.add(arm)
-    space.sleep_time_threshold = IDLE
-
-    time = 0.0
-    while time <= patience and not body.is_sleeping:
-        space.step(step)
-        time += step
-    off = [abs(math.remainder(body.angle - flat, math.tau)) for flat in stage.flat]
-    side = off.index(min(off))
-    return time, side if body.is_sleeping and off[side] < LEANING else -1

@@ -13,8 +13,8 @@ import pytest
 
 import limitsets as ls
 from limitsets.engine import compare, throw
+from limitsets.engine.settling import IDLE, settle
 from limitsets.engine.stage import set_up
-from limitsets.engine.throwing import IDLE, _settle
 from limitsets.errors import AnswerError, MapError
 
 pytest.importorskip("pymunk")
@@ -99,7 +99,7 @@ def test_a_vertical_bounce_ends_after_its_zeno_time(restitution):
     stage = set_up(DESIGNED, 10.0, 2)
     speed, step = 6.0, 2e-4
     stage.body.velocity, stage.body.angular_velocity = (0.0, -speed), 0.0
-    time, side = _settle(stage, DESIGNED, 1.0, restitution, step, 60.0)
+    time, side, _ = settle(stage, DESIGNED, 1.0, restitution, step, 60.0)
     ends = 2 * speed * restitution / (DESIGNED.kappa * (1 - restitution))
     assert side == 2
     assert time - IDLE == pytest.approx(ends, abs=0.01)
@@ -141,7 +141,10 @@ def test_a_missing_engine_is_named_with_its_remedy(monkeypatch):
     ("words", "said"),
     [
         ({"contact": "glue"}, "'hinge' or 'unilateral'"),
-        ({"friction": 0.5}, "a hinge has neither"),
+        ({"friction": 0.5}, "a hinge has none"),
+        ({"contact": "unilateral", "friction": 0.5, "rolls": True}, "rolls anyway"),
+        ({"stroke": 1.6}, "0 to pi/2"),
+        ({"threshold": -1.0}, "from 0"),
         ({"contact": "unilateral"}, "the friction is None"),
         ({"contact": "unilateral", "friction": -1.0}, "a number from 0"),
         ({"contact": "unilateral", "friction": math.inf}, "a number from 0"),

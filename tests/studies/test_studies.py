@@ -2,6 +2,7 @@
 
 import importlib.util
 import json
+import sys
 from pathlib import Path
 
 import pytest
@@ -9,9 +10,10 @@ import pytest
 STUDIES = Path(__file__).resolve().parents[2] / "studies"
 
 
-def load_study(name):
-    spec = importlib.util.spec_from_file_location(f"study_{name}", STUDIES / name / "study.py")
+def load_study(name, file="study"):
+    spec = importlib.util.spec_from_file_location(f"{file}_{name}", STUDIES / name / f"{file}.py")
     module = importlib.util.module_from_spec(spec)
+    sys.modules[spec.name] = module  # dataclasses look their module up
     spec.loader.exec_module(module)
     return module
 
@@ -111,3 +113,46 @@ def test_unilateral_contact_in_the_engine(physics_engine):
     text = (STUDIES / "02_physics_engine" / "README.md").read_text(encoding="utf-8")
     places = study.table(numbers).split("\n\n", 1)[1]  # what does not depend on the starts drawn
     assert set(places.splitlines()) <= set(text.splitlines())
+
+
+@pytest.fixture(scope="module")
+def effects_in_engine(tmp_path_factory):
+    pytest.importorskip("pymunk")
+    study = load_study("02_physics_engine", "effects")
+    out = tmp_path_factory.mktemp("effects")
+    return study, study.main(seed=3, out=out, throws=60), out
+
+
+def test_the_engine_agrees_with_the_effects(effects_in_engine):
+    study, numbers, out = effects_in_engine
+    assert (out / "effects.png").stat().st_size > 20_000
+    most = {
+        "hinge": 0.5 * 9.0**2 * 4.4 * 1e-6,
+        "drive": 5e-3,
+        "contact": 0.04,
+    }  # by the order of each, as above
+    for name, case in study.CASES.items():
+        found, kind = numbers[name], name.split(",")[0]
+        assert found["throws"] == max(int(60 * case.share), 1)
+        assert found["same_law"] + sum(found["aside"].values()) == found["throws"]
+        if name.endswith("0.5, bounce"):  # Newton's restitution against Poisson's
+            continue
+        assert found["sides_that_differ"] == [], name
+        assert found["same_side"] == found["same_law"] > 0, name
+        assert found["error"]["worst"] < most.get(kind, most["hinge"]), name
+
+
+def test_the_engine_nears_the_effects_as_its_order_says(effects_in_engine):
+    _, numbers, _ = effects_in_engine
+    expected = json.loads((STUDIES / "02_physics_engine" / "expected.json").read_text(encoding="utf-8"))
+    for name, order in expected["effects"]["order"].items():
+        assert numbers["convergence"][name]["order"] == pytest.approx(order, abs=0.3), name
+
+
+def test_throws_are_set_aside_where_the_laws_part(effects_in_engine):
+    _, numbers, _ = effects_in_engine
+    for name, found in numbers.items():
+        if name.startswith("contact, friction 5"):
+            assert found["aside"]["solver"] > 10
+        if name in ("landing", "landing, roll", "landing, roll, bounce", "drive, landing"):
+            assert found["same_law"] == 60

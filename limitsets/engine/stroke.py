@@ -1,0 +1,56 @@
+"""The throw by a stroke in the engine: an arm that turns with constant angular acceleration, and stops."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from limitsets.engine.stage import INSTANT, Stage, pymunk_module
+
+__all__ = ["accelerate"]
+
+# Steps of a stroke to one of the way to rest; contact is of first order in them.
+FINER = 0.5
+# Overlap of part and arm, as a fraction of the part's size.
+OVERLAP = 1e-5
+
+
+def accelerate(stage: Stage, stroke: float, friction: float, step: float) -> None:
+    """Turn the arm under the part until it is level, at rate 1 then, and take it away: it has stopped.
+
+    All is seen by the arm as it stops; gravity leans towards the joint.
+    """
+    pymunk, space, body, part = pymunk_module(), stage.space, stage.body, stage.part
+    sine, cosine = math.sin(stroke), math.cos(stroke)
+    space.gravity = (-stage.kappa * sine, -stage.kappa * cosine)
+    across, up = body.position.x, body.position.y - 0.5 * OVERLAP * stage.size
+    body.position = (across * cosine + up * sine, up * cosine - across * sine)
+    body.angle -= stroke
+
+    steps = math.ceil(2.0 * stroke / (FINER * step))
+    time = 2.0 * stroke / steps
+    gain = time / (2.0 * stroke)
+    arm = pymunk.Body(body_type=pymunk.Body.KINEMATIC)
+    arm.angle, arm.angular_velocity = -stroke, 0.5 * gain
+    far, low = 4.0 * (across + stage.size), stage.height - stage.size
+    surface = pymunk.Segment(arm, (-far, low), (far, low), stage.size)
+    surface.friction, part.friction = 1.0, friction
+    gains = [gain] * (steps - 1) + [0.5 * gain]  # each step moves by the velocity of its middle
+
+    def turn_faster(arm: Any, _gravity: Any, _damping: float, _time: float) -> None:
+        if gains:
+            arm.angular_velocity += gains.pop()
+
+    space.collision_slop = OVERLAP * stage.size
+    space.collision_bias = 0.8 ** (1.0 / time)
+    space.iterations = 40
+    body.angular_velocity = 0.5 * gain
+    body.velocity = (-0.5 * gain * body.position.y, 0.5 * gain * body.position.x)
+    space.add(arm, surface)
+    gains.reverse()
+    arm.velocity_func = turn_faster
+    for _ in range(steps):
+        space.step(time)
+    space.step(INSTANT)
+    space.remove(arm, surface)
+    body.position += (0.0, -stage.gap())  # what the contact overlaps
