@@ -48,7 +48,7 @@ def slides_back(stage: Stage, velocity: Any, rate: float, friction: float) -> bo
     """
     body = stage.body
     arms = [body.position - body.local_to_world(corner) for corner in stage.corners]
-    low = max(arm.y for arm in arms) - TOUCHING * stage.size
+    low = min(body.position.y - stage.height, max(arm.y for arm in arms)) - TOUCHING * stage.size
     off, right, high = min((velocity.y - rate * arm.x, arm.x, arm.y) for arm in arms if arm.y > low)
     along, rho2 = velocity.x + rate * high, float(body.moment)
     a, b, c = 1.0 + high * high / rho2, -right * high / rho2, 1.0 + right * right / rho2

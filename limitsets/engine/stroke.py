@@ -11,8 +11,8 @@ __all__ = ["accelerate"]
 
 # Steps of a stroke to one of the way to rest; contact is of first order in them.
 FINER = 0.5
-# Overlap of part and arm, as a fraction of the part's size.
-OVERLAP = 1e-5
+# Overlap of part and arm, as a fraction of the part's size: more than the steps' straight ways lift the part.
+OVERLAP = 1e-4
 
 
 def accelerate(stage: Stage, stroke: float, friction: float, step: float) -> None:
