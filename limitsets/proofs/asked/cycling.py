@@ -20,7 +20,7 @@ __all__ = ["cycle_that"]
 def cycle_that(
     found: Attraction, scene: Scene, refutes: Callable[[ProvedCycle], bool], longest: int = PERIODS[0]
 ) -> tuple[State, ...]:
-    """Find a periodic orbit in the attracting cells that refutes a goal, and prove it; empty if none is found.
+    """Find a periodic orbit in the attracting cells that refutes a goal, and prove it; empty if none is found, or with effects.
 
     Parameters
     ----------
@@ -38,6 +38,8 @@ def cycle_that(
     tuple of State
         The orbit, its first point again at the end.
     """
+    if found.cover.box.effects:
+        return ()
     box = parameter_box(scene, tree=found.cover.box.scene)
     quiet = replace(found, cover=replace(found.cover, box=box))
     scattered = found.cover.box.landing > 0.0
