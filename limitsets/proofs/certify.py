@@ -163,10 +163,11 @@ class Proof:
 
 def _attracts_all(found: Attraction, scene: Scene) -> Claim:
     if not found.proved:
-        if found.cover.box.landing > 0.0 and not found.cover.points:
+        noisy, may = found.cover.box.landing > 0.0, found.cover.graph.ranges.exits.any()
+        if (noisy or (found.cover.box.effects and may)) and not found.cover.points:
             orbit = leaving(found)
             verdict = "refuted" if orbit else "undecided"
-            return Claim("attracts-all", verdict, found.reason, {}, orbit, final=True)
+            return Claim("attracts-all", verdict, found.reason, {}, orbit, final=noisy or bool(orbit))
         return _not_attracted(found, scene)
     joint: dict[str, dict[str, Any]] = {}
     for side, near in enumerate(found.joint):
@@ -240,7 +241,9 @@ def _require_one_scene(claim: str, found: Attraction, scene: Scene) -> None:
 
 
 def _of_effects(claim: str) -> Claim:
-    reason = f"{claim.replace('-', ' ')} with effects beyond the minimal model cannot be proved in this version"
+    reason = (
+        f"{claim.replace('-', ' ')} with effects beyond the minimal model cannot be proved in this version"
+    )
     return Claim(claim, "undecided", reason, {}, final=True)
 
 

@@ -13,8 +13,8 @@ import limitsets.interval as iv
 from limitsets.interval.arithmetic import Interval
 from limitsets.jit import proof_kernel
 from limitsets.maps.contract import fallback_box, image_box
-from limitsets.thrower.effects.landing_box import landed
-from limitsets.thrower.effects.roll_box import rested
+from limitsets.thrower.arrival_box import landed
+from limitsets.thrower.roll_box import rested
 from limitsets.thrower.motion import FullThrow
 from limitsets.thrower.motion_box import NOTHING, FullSideBox, Ways, gather_full_box, no_way
 from limitsets.thrower.throw_box import sure_throw_box, throw_box

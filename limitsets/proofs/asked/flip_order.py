@@ -45,7 +45,9 @@ def _ask(found: Attraction, scene: Scene, goal: FlipOrder) -> Answer:
     if goal.from_anywhere and found.missing:
         return undecided(found.missing, final=found.cover.box.landing > 0.0)
     if any((ends[inside, 0] >= 0).any() for ends in _rolls(found)):
-        return undecided("parts may roll on to other sides than the next, in this version no order is proved then")
+        return undecided(
+            "parts may roll on to other sides than the next, in this version no order is proved then"
+        )
     visits, left = peeled(found, inside, np.zeros_like(inside), (0,))
     if left.size:
         stays = cycle_that(found, scene, lambda cycle: not cycle.branches.any())

@@ -112,9 +112,7 @@ def peeled(
         Cells from which it is not proved.
     """
     ends = (
-        everywhere(found.cover)
-        if branches is None
-        else [targets(found.cover, branch) for branch in branches]
+        everywhere(found.cover) if branches is None else [targets(found.cover, branch) for branch in branches]
     )
     done = cells & wanted
     left = np.flatnonzero(cells & ~done & (found.cover.graph.ranges.exits == 0))

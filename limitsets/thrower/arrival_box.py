@@ -1,4 +1,4 @@
-"""The box twin of `landing.py` and `pivot.py`: which vertices may land first, and the sides that come down then.
+"""The box twin of `effects/landing.py` and `effects/pivot.py`: which vertices may land first, and the sides that come down then.
 
 As long as the bracket of the left vertex's own landing stays at or below the exterior angle there nothing changes.  A
 start still in the air at that angle has the next vertex at the same height, which is a concave function of the angle

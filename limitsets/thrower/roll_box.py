@@ -1,4 +1,4 @@
-"""The box twin of `roll.py`: whether the part rests on a side that came down, or goes on over one of its ends.
+"""The box twin of `effects/roll.py`: whether the part rests on a side that came down, or goes on over one of its ends.
 
 Only energies matter.  Coming down on side k about one end with kinetic energy E, of which the strike of the other end
 leaves E' = E [rho^2 + d^2 - a (L - a)]^2 / (M M') or nothing, the part rests where E' lifts it over neither end; over
