@@ -345,7 +345,8 @@ def certify(
     Raises
     ------
     AnswerError
-        For a word that is no claim, an effect of which nothing can be proved, noise that cannot be enclosed, or a thread that does not round to nearest.
+        For a word that is no claim, an effect of which nothing can be proved, noise that cannot be enclosed, or a
+        thread that does not round to nearest.
 
     Examples
     --------

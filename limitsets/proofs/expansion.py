@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from limitsets.cells import CellSet
 from limitsets.jit import proof_kernel
 from limitsets.proofs.cover import Cover
+from limitsets.thrower.motion import FullThrow
 from limitsets.thrower.side_box import gather_box
 from limitsets.thrower.throw_box import NOTHING, throw_box
 
@@ -70,8 +71,9 @@ def _pieces(found: Cover, cells: CellSet) -> Iterator[tuple[int, Any, Any, Any, 
         out = np.empty(k.size * PIECES)
         lo, hi = np.ascontiguousarray(cuts[:, :-1].ravel()), np.ascontiguousarray(cuts[:, 1:].ravel())
         _slopes(*found.box.bare, side, lo, hi, out)
-        if found.box.effects and found.box.lo.landing is not None:
+        lowest = found.box.lo
+        if isinstance(lowest, FullThrow) and lowest.landing is not None:
             # where another vertex may land the displacement is another function
-            late = ~(found.images[side].witness[1, k] <= found.box.lo.corner[side])
+            late = ~(found.images[side].witness[1, k] <= lowest.bare.corner[side])
             out.reshape(k.size, PIECES)[late] = -1.0
         yield side, k, lo, hi, out

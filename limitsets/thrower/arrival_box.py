@@ -1,4 +1,4 @@
-"""The box twin of `effects/landing.py` and `effects/pivot.py`: which vertices may land first, and the sides that come down then.
+"""The box twin of `effects/landing.py` and `effects/pivot.py`: what may land first, and the sides that come down then.
 
 As long as the bracket of the left vertex's own landing stays at or below the exterior angle there nothing changes.  A
 start still in the air at that angle has the next vertex at the same height, which is a concave function of the angle
@@ -13,7 +13,7 @@ from typing import Any
 
 import limitsets.interval as iv
 from limitsets.interval.arithmetic import Interval
-from limitsets.jit import proof_kernel
+from limitsets.jit import generic, proof_kernel
 from limitsets.thrower.impact_box import decide_box
 from limitsets.thrower.motion_box import NOTHING, FullSideBox, box_of, corner_box, vertex_box, wait
 from limitsets.thrower.turn_box import exact_turn, turn_box, turn_point
@@ -126,12 +126,19 @@ def _place_of_cell(
     return max(whole[0], least) if rising else whole[0], min(whole[1], most) if rising else whole[1]
 
 
-@proof_kernel
 def came_down(part: FullSideBox, k: int, x: Interval, phi: Interval, place: Interval, count: int) -> int:
     """Strike with vertex k and turn about it: the sides the part may come down on wait; how many then do.
 
     `place`: of the centre of mass, if the part fell back on side k.
     """
+
+
+# Not inlined, for it is called in three places: it would be most of the compile time.
+came_down = generic(came_down, proof=True, inlined=False)
+
+
+@proof_kernel
+def _came_down(part: FullSideBox, k: int, x: Interval, phi: Interval, place: Interval, count: int) -> int:
     b, after = box_of(part, k), box_of(part, k + 1)
     right, above = _x_and_h(part, k, phi[0], phi[1])
     turning = iv.mul(right, iv.sub(x, iv.mul(b.kappa, phi)))
@@ -153,6 +160,9 @@ def came_down(part: FullSideBox, k: int, x: Interval, phi: Interval, place: Inte
         energy = iv.add(kinetic, iv.mul(b.kappa, iv.sub(above, after.d)))
         count = wait(part, count, k + 1, False, False, energy, iv.sub(place, b.shift))
     return count
+
+
+came_down.on(FullSideBox, _came_down)  # type: ignore[attr-defined]  # generic functions carry `on`
 
 
 @proof_kernel

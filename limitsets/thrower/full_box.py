@@ -11,12 +11,12 @@ from typing import Any
 
 import limitsets.interval as iv
 from limitsets.interval.arithmetic import Interval
-from limitsets.jit import proof_kernel
+from limitsets.jit import generic, proof_kernel
 from limitsets.maps.contract import fallback_box, image_box
 from limitsets.thrower.arrival_box import landed
-from limitsets.thrower.roll_box import rested
 from limitsets.thrower.motion import FullThrow
 from limitsets.thrower.motion_box import NOTHING, FullSideBox, Ways, gather_full_box, no_way
+from limitsets.thrower.roll_box import rested
 from limitsets.thrower.throw_box import sure_throw_box, throw_box
 
 __all__ = ["full_fallback_box", "full_image_box", "full_ways", "gather_full_pair"]
@@ -49,13 +49,23 @@ def known(part: FullSideBox) -> bool:
     return held & _bounded(part.spread)
 
 
-@proof_kernel
 def full_ways(part: FullSideBox, x: Interval, state: int, phi: Interval, jog: Interval) -> Ways:
     """Places of rest of every start in x, from what the minimal model proves of their landings."""
+
+
+# Not inlined: images, replays and the argument near the joint would each compile it anew.
+full_ways = generic(full_ways, proof=True, inlined=False)
+
+
+@proof_kernel
+def _full_ways(part: FullSideBox, x: Interval, state: int, phi: Interval, jog: Interval) -> Ways:
     ways = no_way()
     if (state == NOTHING) | (not known(part)):
         return Ways(NOTHING, ways.first, ways.second)
     return rested(part.roll, part, landed(part.landing, part, x, phi, jog))
+
+
+full_ways.on(FullSideBox, _full_ways)  # type: ignore[attr-defined]  # generic functions carry `on`
 
 
 @proof_kernel

@@ -20,7 +20,7 @@ __all__ = ["cycle_that"]
 def cycle_that(
     found: Attraction, scene: Scene, refutes: Callable[[ProvedCycle], bool], longest: int = PERIODS[0]
 ) -> tuple[State, ...]:
-    """Find a periodic orbit in the attracting cells that refutes a goal, and prove it; empty if none is found, or with effects.
+    """Find a periodic orbit in the attracting cells that refutes a goal, and prove it; empty if none is found.
 
     Parameters
     ----------
