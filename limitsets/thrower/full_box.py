@@ -23,11 +23,6 @@ __all__ = ["full_fallback_box", "full_image_box", "full_ways", "gather_full_pair
 
 
 @proof_kernel
-def _absent(effect: Any) -> bool:
-    return effect is None
-
-
-@proof_kernel
 def _bounded(spread: Any) -> bool:
     if spread is None:
         return True
@@ -43,10 +38,32 @@ def _scattered(spread: Any, x: Interval) -> Interval:
 
 
 @proof_kernel
-def known(part: FullSideBox) -> bool:
-    """Whether all effects that are simulated can be enclosed: the others are never typed here."""
-    held = _absent(part.pivot) & _absent(part.slip) & _absent(part.bounce) & _absent(part.drive)
-    return held & _bounded(part.spread)
+def _none() -> Ways:
+    ways = no_way()
+    return Ways(NOTHING, ways.first, ways.second)
+
+
+@proof_kernel
+def _followed(
+    pivot: Any,
+    slip: Any,
+    bounce: Any,
+    drive: Any,
+    part: FullSideBox,
+    x: Interval,
+    phi: Interval,
+    jog: Interval,
+) -> Ways:
+    """Places of rest; with an effect that has no box twin what follows is never typed."""
+    if pivot is not None:
+        return _none()
+    if slip is not None:
+        return _none()
+    if bounce is not None:
+        return _none()
+    if drive is not None:
+        return _none()
+    return rested(part.roll, part, landed(part.landing, part, x, phi, jog))
 
 
 def full_ways(part: FullSideBox, x: Interval, state: int, phi: Interval, jog: Interval) -> Ways:
@@ -59,10 +76,9 @@ full_ways = generic(full_ways, proof=True, inlined=False)
 
 @proof_kernel
 def _full_ways(part: FullSideBox, x: Interval, state: int, phi: Interval, jog: Interval) -> Ways:
-    ways = no_way()
-    if (state == NOTHING) | (not known(part)):
-        return Ways(NOTHING, ways.first, ways.second)
-    return rested(part.roll, part, landed(part.landing, part, x, phi, jog))
+    if (state == NOTHING) | (not _bounded(part.spread)):
+        return _none()
+    return _followed(part.pivot, part.slip, part.bounce, part.drive, part, x, phi, jog)
 
 
 full_ways.on(FullSideBox, _full_ways)  # type: ignore[attr-defined]  # generic functions carry `on`
