@@ -300,9 +300,8 @@ def parameter_box(
         for end in (0, 1)
     )
     if full is not None:
-        ends_p, ends_q = _columns(p), _columns(q)
         lo, hi = (
-            full._replace(bare=bare, outline=Outline(ends_p[end].copy(), ends_q[end].copy()))
+            full._replace(bare=bare, outline=Outline(_columns(p)[end].copy(), _columns(q)[end].copy()))
             for end, bare in ((0, lo), (1, hi))
         )
     return ParameterBox(lo, hi, text, dict(noise or {}), landing)

@@ -5,11 +5,13 @@ next one's; on that of paper-designed no effect is ever called for (docs/model.m
 those of plane geometry at 50 digits; counterexamples are thrown again by the point map.
 """
 
+from fractions import Fraction
 from itertools import pairwise
 
 import numpy as np
 import pytest
 from mpmath import mp
+from typer.testing import CliRunner
 
 import limitsets as ls
 from limitsets.errors import AnswerError
@@ -17,6 +19,7 @@ from limitsets.maps import images
 from limitsets.proofs.attraction import attraction
 from limitsets.proofs.cover import cover
 from limitsets.proofs.parameters import parameter_box
+from limitsets.proofs.rational import Span, angle
 
 BOTH = {"landing": True, "roll": True}
 SCATTER = {"speed": "0.3 %", "landing": "0.02 in"}
@@ -158,3 +161,30 @@ def test_near_the_joint_what_rolls_has_to_come_to_the_cells(initial):
         got = images(tall.map, [a + share * (near[1].x - a)], 1)
         assert (got.code[0], got.side[0]) == (2, 0)
         assert got.x[0] <= near[1].reach < got.x[0] + 1e-4
+
+
+def test_the_angle_of_a_box_of_vectors_holds_that_of_every_vector():
+    random = np.random.default_rng(4)
+    mp.dps = 50
+    for _ in range(40):
+        x, y = Fraction(float(random.normal())), Fraction(float(abs(random.normal())) + 1e-9)
+        width = Fraction(float(random.choice([0.0, 1e-3]))) * y
+        found = angle(Span(y, y + width), Span(x, x + width))
+        for u in (x, x + width):
+            for v in (y, y + width):
+                exact = mp.atan2(mp.mpf(v.numerator) / v.denominator, mp.mpf(u.numerator) / u.denominator)
+                lo, hi = (mp.mpf(end.numerator) / end.denominator for end in (found.lo, found.hi))
+                assert lo <= exact <= hi
+        assert float(found.hi - found.lo) < (2e-3 if width else 1e-13)
+
+
+def test_the_command_tells_the_proof_and_writes_no_certificate(tmp_path):
+    from limitsets.cli.app import app
+
+    file, out = tmp_path / "rolls.toml", tmp_path / "rolls.proof.zip"
+    ls.scene.dump(scene("paper-designed", BOTH), file)
+    told = CliRunner().invoke(app, ["certify", str(file), "--out", str(out)])
+    assert told.exit_code == 0
+    assert "with the effects landing, roll" in told.stdout
+    assert "no certificate is written" in told.stdout
+    assert not out.exists()
