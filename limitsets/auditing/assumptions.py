@@ -99,7 +99,7 @@ def _enough(scene: Scene, _: ParameterBox) -> Terms:
 
 def _corner(scene: Scene, box: ParameterBox) -> Terms:
     corners = scene.sides.corner
-    known = [corner_bounds(box.lo, box.hi, side, float(corner)) for side, corner in enumerate(corners)]
+    known = [corner_bounds(*box.bare, side, float(corner)) for side, corner in enumerate(corners)]
     return Terms(np.array([below for below, _ in known]))
 
 

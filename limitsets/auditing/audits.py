@@ -250,7 +250,8 @@ def audit(scene: str | Path | Mapping[str, Any] | Scene) -> Audit:
     from limitsets.scene import Scene, load
 
     chosen = scene if isinstance(scene, Scene) else load(scene)
-    box = parameter_box(chosen)
+    # what the minimal model assumes is asked of its throws, whichever effects are on
+    box = parameter_box(load({**chosen.as_dict(), "effects": {}}))
     rows = [Row(about, about.terms(chosen, box)) for about in ASSUMPTIONS]
     asked = places(chosen, box)
     findings = [

@@ -65,7 +65,7 @@ class Row:
 
 def ask(box: ParameterBox, side: int, x: Array) -> Array:
     """Enclose everything at single throws."""
-    return assumed(box.lo, box.hi, side, x, x)
+    return assumed(*box.bare, side, x, x)
 
 
 def all_kept(box: ParameterBox, cells: Cells, rows: list[Row]) -> list[bool]:
@@ -74,7 +74,7 @@ def all_kept(box: ParameterBox, cells: Cells, rows: list[Row]) -> list[bool]:
     for side, (lo, hi) in cells.items() if rows else ():
         needed = np.tile(open_rows, (lo.size, 1))
         for halving in range(HALVINGS + 1):
-            found = assumed(box.lo, box.hi, side, lo, hi)
+            found = assumed(*box.bare, side, lo, hi)
             kept = np.stack([row.kept(found, side) for row in rows], axis=1)
             needed &= ~kept & open_rows
             again = needed.any(axis=1)

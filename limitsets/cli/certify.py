@@ -53,7 +53,7 @@ def certify(
 
         with saved(file) as draft:
             proof = run(chosen, claim or None, noise=varying, tolerance=fixed, progress=tell)
-            written = any(each.verdict == "proved" for each in proof.claims)
+            written = any(each.verdict == "proved" for each in proof.claims) and not proof.effects
             if written:
                 proof.save(draft)
     if json:
@@ -83,6 +83,8 @@ def _text(proof: Proof, file: Path | None) -> None:
     for name, text in proof.noise.items():
         value = "the model's place" if name == "landing.x" else "its value"
         typer.echo(f"for every sequence of throws, {name} within {text} of {value}, anew at every throw")
+    if proof.effects:
+        typer.echo(f"with the effects {', '.join(proof.effects)}")
     for claim in proof.claims:
         typer.echo(f"\n{claim.claim}: {claim.verdict.upper()}")
         for line in _words(proof, claim):
@@ -90,7 +92,9 @@ def _text(proof: Proof, file: Path | None) -> None:
         if claim.counterexample:
             _orbit(proof, claim)
     typer.echo("")
-    if file is None:
+    if proof.effects and any(each.verdict == "proved" for each in proof.claims):
+        typer.echo("no certificate is written: nothing rechecks maps with effects")
+    elif file is None:
         typer.echo("nothing is proved: no certificate is written")
     else:
         left = "" if proof.proved else ", of what is proved only"

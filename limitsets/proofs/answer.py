@@ -45,6 +45,7 @@ def _claim(proof: Proof, claim: Claim) -> dict[str, Any]:
         "reason": claim.reason or None,
         "counterexample": [_state(proof, claim, state) for state in claim.counterexample] or None,
         "parameters": dict(values(proof)),
+        "effects": list(proof.effects) or None,
         "noise": proof.noise or None,
         "tolerance": proof.tolerance or None,
         "max_throws": max_throws(proof) if proved and claim.claim == "attracts-all" else None,

@@ -24,7 +24,7 @@ from limitsets.proofs.attraction import Attraction
 from limitsets.proofs.cover import Cover
 from limitsets.thrower import Energy, Exact, Signed, SmallAngle, SmallAngle2
 
-__all__ = ["FORMAT", "VERSION", "arrays_of", "targets", "write"]
+__all__ = ["FORMAT", "VERSION", "arrays_of", "everywhere", "targets", "write"]
 
 FORMAT, VERSION = "limitsets-proof", 1
 
@@ -45,13 +45,23 @@ FORMULAS = [
 ]
 
 
-def targets(found: Cover, branch: int) -> NDArray[np.int32]:
-    """First and last target cell of one branch, -1 -1 where it is impossible."""
+def everywhere(found: Cover) -> list[NDArray[np.int32]]:
+    """First and last target cells, as `targets`, of every branch and every number of sides that it turns."""
+    sides = found.grid.sides
+    keys = {((to - side) % sides, of) for side, images in enumerate(found.images) for to, of in images.hulls}
+    return [targets(found, branch, turned) for turned, branch in sorted(keys)]
+
+
+def targets(found: Cover, branch: int, turned: int | None = None) -> NDArray[np.int32]:
+    """First and last target cell of one branch, -1 -1 where it is impossible.
+
+    A branch that leads to several sides is asked for with the number of sides it turns.
+    """
     grid = found.grid
     out = np.full((grid.n_cells, 2), -1, dtype=np.int32)
     for side, images in enumerate(found.images):
         for (to, of_branch), (lo, hi) in images.hulls.items():
-            if of_branch != branch:
+            if of_branch != branch or (turned is not None and (to - side) % grid.sides != turned):
                 continue
             edges = grid.edges[to][0]
             some = lo <= hi
@@ -144,7 +154,9 @@ def write(
     for number, proof in enumerate(proofs):
         arrays |= arrays_of(proof, f"{number}.")
         found = proof.cover
-        boxes.append({"scene": found.box.scene, "parameters": _parameters(found), "prefix": f"{number}."})
+        # what is left of the effects here is noise, which the header has
+        scene = {word: table for word, table in found.box.scene.items() if word != "effects"}
+        boxes.append({"scene": scene, "parameters": _parameters(found), "prefix": f"{number}."})
     first = proofs[0].cover.box.lo
     header = {
         "format": FORMAT,

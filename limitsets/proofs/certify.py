@@ -21,6 +21,7 @@ from limitsets.proofs.end_points import proved_ends
 from limitsets.proofs.expansion import least_slope
 from limitsets.proofs.orbits import proved_cycles
 from limitsets.proofs.parameters import ParameterBox, parameter_box
+from limitsets.proofs.simulated import joined, scattered
 from limitsets.proofs.tolerance import Piece, whole
 from limitsets.proofs.trapping import trapping
 from limitsets.scene import Scene, load
@@ -104,6 +105,11 @@ class Proof:
         """Both ends of each quantity that is fixed but unknown, as text."""
         return whole(self.scene, self.tolerance).texts() if self.tolerance else {}
 
+    @property
+    def effects(self) -> tuple[str, ...]:
+        """The effects of the scene that the proof is about, but for a spread, which is noise."""
+        return tuple(name for name in self.scene.effects.on() if name != "spread")
+
     def to_json(self) -> list[dict[str, Any]]:
         """Give it as plain tables for JSON, one per claim (`limitsets.proofs.answer`)."""
         from limitsets.proofs.answer import to_json
@@ -121,8 +127,15 @@ class Proof:
         Raises
         ------
         AnswerError
-            Nothing is proved.
+            Nothing is proved, or it is proved of a map that no recheck knows.
         """
+        if self.effects:
+            raise AnswerError(
+                "the certificate",
+                f"with the effects {', '.join(self.effects)}",
+                "the minimal model, and noise",
+                "nothing rechecks other maps; the proof stands in .claims and .to_json()",
+            )
         good = [
             {"claim": claim.claim, "section": claim.section}
             for claim in self.claims
@@ -150,10 +163,11 @@ class Proof:
 
 def _attracts_all(found: Attraction, scene: Scene) -> Claim:
     if not found.proved:
-        if found.cover.box.landing > 0.0 and not found.cover.points:
+        noisy, may = found.cover.box.landing > 0.0, found.cover.graph.ranges.exits.any()
+        if (noisy or (found.cover.box.effects and may)) and not found.cover.points:
             orbit = leaving(found)
             verdict = "refuted" if orbit else "undecided"
-            return Claim("attracts-all", verdict, found.reason, {}, orbit, final=True)
+            return Claim("attracts-all", verdict, found.reason, {}, orbit, final=noisy or bool(orbit))
         return _not_attracted(found, scene)
     joint: dict[str, dict[str, Any]] = {}
     for side, near in enumerate(found.joint):
@@ -226,8 +240,17 @@ def _require_one_scene(claim: str, found: Attraction, scene: Scene) -> None:
         raise AnswerError("the claim", claim, "a claim about one scene", "ask for it without a tolerance")
 
 
+def _of_effects(claim: str) -> Claim:
+    reason = (
+        f"{claim.replace('-', ' ')} with effects beyond the minimal model cannot be proved in this version"
+    )
+    return Claim(claim, "undecided", reason, {}, final=True)
+
+
 def _end_points(found: Attraction, scene: Scene) -> Claim:
     _require_one_scene("end-points", found, scene)
+    if found.cover.box.effects:
+        return _of_effects("end-points")
     if found.cover.box.landing > 0.0:
         reason = "end points with noise of landing.x cannot be proved in this version"
         return Claim("end-points", "undecided", reason, {}, final=True)
@@ -239,6 +262,8 @@ def _end_points(found: Attraction, scene: Scene) -> Claim:
 
 def _cycles(found: Attraction, scene: Scene) -> Claim:
     _require_one_scene("cycles", found, scene)
+    if found.cover.box.effects:
+        return _of_effects("cycles")
     orbits = proved_cycles(found)
     if not orbits.cycles:
         reason = orbits.missing[0] if orbits.missing else f"none is found of period up to {orbits.up_to}"
@@ -316,7 +341,7 @@ def certify(
         exist, and attract or repel) and "goal".  Default: attracts-all, and the goal if there is one.
     noise : mapping of str to str, optional
         ``{"throw.speed": "0.3 %"}``: what may differ at every throw; the claims are then proved for every sequence of
-        throws.
+        throws.  A scene whose effects have spread = "bounded" adds its scatter.
     tolerance : mapping of str to str, optional
         ``{"throw.speed": "0.7 %"}``: what is fixed but unknown; the claims are then proved for every such value.
     progress : callable, optional
@@ -330,7 +355,8 @@ def certify(
     Raises
     ------
     AnswerError
-        For a word that is no claim, noise that cannot be enclosed, or a thread that does not round to nearest.
+        For a word that is no claim, an effect of which nothing can be proved, noise that cannot be enclosed, or a
+        thread that does not round to nearest.
 
     Examples
     --------
@@ -342,7 +368,8 @@ def certify(
     asked = scene if isinstance(scene, Scene) else load(scene)
     _require_minimal(asked)
     wanted = _chosen(asked, claims)
-    noise, tolerance = _deviations(asked, noise), _deviations(asked, tolerance)
+    noise = joined(_deviations(asked, noise), _deviations(asked, scattered(asked)))
+    tolerance = _deviations(asked, tolerance)
     begin = time.perf_counter()
     if tolerance:
         found, answers = _pieces(asked, wanted, whole(asked, tolerance), noise, progress)

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from limitsets.cells import CellSet
 from limitsets.jit import proof_kernel
 from limitsets.proofs.cover import Cover
+from limitsets.thrower.motion import FullThrow
 from limitsets.thrower.side_box import gather_box
 from limitsets.thrower.throw_box import NOTHING, throw_box
 
@@ -33,7 +34,7 @@ def _slopes(lo_map: Any, hi_map: Any, side: int, lo: Any, hi: Any, out: Any) -> 
 
 
 def least_slope(found: Cover, cells: CellSet) -> tuple[float, str]:
-    """Lower bound of the slope on the given cells (the same for a jog and a flip), and where it is met.
+    """Lower bound of the slope on the given cells (the same for a jog, a flip and a roll), and where it is met.
 
     Returns
     -------
@@ -69,5 +70,10 @@ def _pieces(found: Cover, cells: CellSet) -> Iterator[tuple[int, Any, Any, Any, 
         cuts[:, -1] = edges[k + 1]
         out = np.empty(k.size * PIECES)
         lo, hi = np.ascontiguousarray(cuts[:, :-1].ravel()), np.ascontiguousarray(cuts[:, 1:].ravel())
-        _slopes(found.box.lo, found.box.hi, side, lo, hi, out)
+        _slopes(*found.box.bare, side, lo, hi, out)
+        lowest = found.box.lo
+        if isinstance(lowest, FullThrow) and lowest.landing is not None:
+            # where another vertex may land the displacement is another function
+            late = ~(found.images[side].witness[1, k] <= lowest.bare.corner[side])
+            out.reshape(k.size, PIECES)[late] = -1.0
         yield side, k, lo, hi, out

@@ -228,6 +228,10 @@ def _fixed_point(box: ParameterBox, side: int) -> FixedPoint:
     def none(reason: str) -> FixedPoint:
         return FixedPoint(np.nan, np.nan, np.nan, np.nan, reason)
 
+    if box.effects:
+        return none(
+            "with effects beyond the minimal model nothing is proved where the surface is above the joint"
+        )
     if not isinstance(box.lo.flight, Exact):
         return none("with this flight every jog goes inward where the arm's surface is above the joint")
     out = np.full(6, np.nan)

@@ -7,6 +7,8 @@ w = phi - sin phi, and
     a v - d w >= phi^2 (a/2 - a phi^2/24 - d phi/6) >= 0      where the bracket is proved positive,
 
 so R' - a >= q r with q = 1 + 2 |h| / kappa > 1: the orbit leaves the interval after ln(delta/r) / ln q throws at most.
+With effects the left vertex has to land first, phi at most the exterior angle there, and what rolls on has to come to
+rest in the cells: every start then either rests as above, or is in the cells at once.
 The small-angle flights have phi >= 2 r / kappa and no v and w in the displacement, so the same q serves.
 For h > 0 see `fixed_point.py`.
 Source: docs/model.md, "Conventions": near a_i.
@@ -24,7 +26,9 @@ from limitsets.jit import proof_kernel
 from limitsets.proofs.cover import Cover
 from limitsets.proofs.fixed_point import leaves
 from limitsets.thrower.flight_box import bracket, sure_bracket
+from limitsets.thrower.full_box import full_ways
 from limitsets.thrower.impact_box import decide_box, displacement_box, strike_box
+from limitsets.thrower.motion_box import gather_full_box
 from limitsets.thrower.side_box import gather_box
 
 __all__ = ["NearJoint", "near_joint"]
@@ -54,6 +58,8 @@ class NearJoint:
         What is missing, empty if nothing.
     fixed_point : (float, float) or None
         With the arm's surface above the joint: R* lies between them.
+    rolls : bool
+        Whether a throw from (a_i, x] may roll on to another side.
     """
 
     x: float
@@ -63,6 +69,7 @@ class NearJoint:
     proved: bool
     reason: str
     fixed_point: tuple[float, float] | None = None
+    rolls: bool = False
 
 
 @proof_kernel(entry=True)
@@ -90,6 +97,25 @@ def _near(lo: Any, hi: Any, side: int, x: float, out: Any) -> None:
     out[5] = iv.add((1.0, 1.0), gain)[0]
     out[6] = reached
     out[7] = rise[0]
+
+
+@proof_kernel(entry=True)
+def _near_ways(lo: Any, hi: Any, side: int, x: float, corner: Any, turned: Any, place: Any) -> int:
+    """Places of rest with effects, of starts up to x, their sides turned and bounds; how many, -1 if not known.
+
+    `corner`: by how much the exterior angle at the left vertex exceeds the angle of impact.
+    """
+    part = gather_full_box(lo, hi, side, (lo.bare.kappa, hi.bare.kappa))
+    b = part.own
+    last, good = bracket(b.flight, b, x)
+    phi, starts = (0.0, last[1]), (b.a[0], x)
+    shift, _ = displacement_box(b.flight, b, phi)
+    corner[0] = iv.sub((lo.bare.corner[side], lo.bare.corner[side]), (last[1], last[1]))[0]
+    ways = full_ways(part, starts, 0 if good else -1, phi, iv.add(starts, shift))
+    turned[0], turned[1] = ways.first.turned, ways.second.turned
+    place[0, 0], place[0, 1] = ways.first.lo, ways.first.hi
+    place[1, 0], place[1, 1] = ways.second.lo, ways.second.hi
+    return ways.number
 
 
 REASONS = (
@@ -129,15 +155,40 @@ def near_joint(found: Cover) -> tuple[NearJoint, ...]:
             answers.append(_beyond(found, side, float(edges[0])))
             continue
         out = np.full(8, np.nan)
-        _near(found.box.lo, found.box.hi, side, float(edges[0]), out)
+        _near(*found.box.bare, side, float(edges[0]), out)
         q = 1.0 + (float(out[5]) - 1.0) * (1.0 - SLACK_OF_Q)
         good = [*(out[:5] > 0.0), q > 1.0]
         reason = "" if all(good) else REASONS[good.index(False)]
         if found.box.landing > 0.0:
             reason = SCATTERED
-        rises = bool(out[7] > 0.0)
-        answers.append(NearJoint(float(edges[0]), q, float(out[6]), rises, not reason, reason))
+        rises, x, reach = bool(out[7] > 0.0), float(edges[0]), float(out[6])
+        rolls = False
+        if found.box.effects and not reason:
+            reach, rolls, reason = _rolled(found, side, x, reach)
+        answers.append(NearJoint(x, q, reach, rises, not reason, reason, rolls=rolls))
     return tuple(answers)
+
+
+def _rolled(found: Cover, side: int, x: float, reach: float) -> tuple[float, bool, str]:
+    """Prove that what is thrown from (a_i, x] rests as in the minimal model, or rolls into the cells.
+
+    Returns the farthest place of all, whether anything may roll to another side, and what is missing.
+    """
+    corner, turned, place = np.full(1, np.nan), np.zeros(2, np.int64), np.full((2, 2), np.nan)
+    count = _near_ways(found.box.lo, found.box.hi, side, x, corner, turned, place)
+    if not corner[0] >= 0.0:
+        return reach, True, "another vertex than the left one may land first"
+    if count < 1:
+        return reach, True, "where the part rolls to is not enclosed"
+    sides, end = found.grid.sides, found.box.bare[0].arm_length
+    rolls = [k for k in range(count) if turned[k] != 0]
+    for k in rolls:
+        lo, hi = place[k]
+        edges = found.grid.edges[(side + int(turned[k])) % sides][0]
+        if not (lo >= edges[0] and hi <= edges[-1] and hi <= end):
+            return reach, True, "the part may roll to where it is not on the arm, or near to the joint again"
+        reach = max(reach, float(hi))
+    return reach, bool(rolls), ""
 
 
 def _beyond(found: Cover, side: int, x: float) -> NearJoint:

@@ -15,12 +15,15 @@ from typing import Any
 import numpy as np
 
 from limitsets.errors import AnswerError
-from limitsets.geometry import OnSide, mass_of, rest_of, triangle_of
-from limitsets.proofs.rational import Span, pi, sine, square_root
+from limitsets.geometry import OnSide, mass_of, rest_of, side_ends, triangle_of
+from limitsets.geometry.polygon import above_side
+from limitsets.proofs.rational import Span, angle, pi, sine, square_root
+from limitsets.proofs.simulated import simulated
 from limitsets.scene import Scene
 from limitsets.scene.quantities import find
 from limitsets.scene.units import exact_factor, parse
 from limitsets.thrower import Throw
+from limitsets.thrower.motion import FullThrow, Outline
 
 __all__ = ["VARYING", "ParameterBox", "parameter_box"]
 
@@ -36,8 +39,8 @@ class ParameterBox:
 
     Attributes
     ----------
-    lo, hi : Throw
-        Its corners, as kernels take them.
+    lo, hi : Throw or FullThrow
+        Its corners, as kernels take them; with effects where they are more than noise.
     scene : dict
         The scene as written; a quantity with a tolerance is a pair of texts.
     noise : dict of str to str
@@ -46,11 +49,27 @@ class ParameterBox:
         A part lands within this of where the throw would put it; in the scene's unit, 0 without such noise.
     """
 
-    lo: Throw
-    hi: Throw
+    lo: Throw | FullThrow
+    hi: Throw | FullThrow
     scene: dict[str, Any]
     noise: dict[str, str]
     landing: float = 0.0
+
+    @property
+    def bare(self) -> tuple[Throw, Throw]:
+        """The corners of the minimal model's parameters."""
+        lo, hi = (each.bare if isinstance(each, FullThrow) else each for each in (self.lo, self.hi))
+        return lo, hi
+
+    @property
+    def effects(self) -> bool:
+        """Whether more than the minimal model is thrown."""
+        return isinstance(self.lo, FullThrow)
+
+    def at_kappa(self, kappa: float) -> Throw | FullThrow:
+        """Return one map of the box, thrown with a kappa."""
+        bare = self.bare[0]._replace(kappa=kappa)
+        return self.lo._replace(bare=bare) if isinstance(self.lo, FullThrow) else bare
 
 
 def _at(tree: Mapping[str, Any], name: str) -> Any:
@@ -149,8 +168,8 @@ class _Reader:
         flat, steep = sine(least * (1 - share) - more), sine(least * (1 + share) + more)
         return Span((flat / sine(least)).lo, (steep / sine(least)).hi)
 
-    def body(self) -> tuple[list[tuple[Any, ...]], Span]:
-        """Return (a, d, length) of every side, and the radius of gyration."""
+    def shape(self) -> tuple[list[Any], Any, list[Span] | None, Span]:
+        """Return the vertices, the centre of mass, the sides' lengths where they are given, the radius of gyration."""
         part = self.tree["part"]
         lengths = None
         vertices: list[Any]
@@ -175,9 +194,26 @@ class _Reader:
             density = self.one(mass["plate_density"], "mass per area")
             found: Any = mass_of(vertices, density, points, square_root)
             centre, radius = found.centre, found.radius_of_gyration
+        return vertices, centre, lengths, radius
+
+    def body(self) -> tuple[list[tuple[Any, ...]], Span]:
+        """Return (a, d, length) of every side, and the radius of gyration."""
+        vertices, centre, lengths, radius = self.shape()
         corner = Span.of(0, 4)  # of no use to a proof about the minimal map
         sides = rest_of(vertices, centre, lengths, square_root, lambda _y, _x: corner)
         return [side[:3] for side in sides], radius
+
+    def outline(self) -> tuple[list[Span], list[list[Span]], list[list[Span]]]:
+        """Return the exterior angles, and where the vertices are: p and q of `thrower.motion.Outline`."""
+        vertices, centre, lengths, _ = self.shape()
+        sides = rest_of(vertices, centre, lengths, square_root, angle)
+        ends = [side_ends(len(vertices), side) for side in range(len(vertices))]
+        p, q = [], []
+        for (left, right), side in zip(ends, sides, strict=True):
+            at = [above_side(vertices[left], vertices[right], vertices[k], square_root) for k, _ in ends]
+            p.append([along - side[0] for along, _, _ in at])
+            q.append([above - side[1] for _, above, _ in at])
+        return [side[4] for side in sides], p, q
 
 
 def _require_rest(sides: Sequence[tuple[Any, ...]], kappa: Span, radius: Span) -> None:
@@ -189,6 +225,14 @@ def _require_rest(sides: Sequence[tuple[Any, ...]], kappa: Span, radius: Span) -
             )
     if not (kappa.lo > 0 and radius.lo > 0):
         raise AnswerError("kappa or the radius of gyration", float(kappa), "above 0 throughout", NARROWER)
+
+
+def _columns(spans: Sequence[Any]) -> Any:
+    """Doubles around spans, or rows of them: the lower ends, the upper ends."""
+    pairs = np.array(
+        [[each.outward() for each in row] if isinstance(row, list) else row.outward() for row in spans]
+    )
+    return np.moveaxis(pairs, -1, 0)
 
 
 def parameter_box(
@@ -240,17 +284,24 @@ def parameter_box(
     scalars = [kappa, reader.span("arm.surface_height"), reader.span("arm.length"), radius]
     ends = [span.outward() for span in scalars]
     columns = [np.array([side[k].outward() for side in sides]) for k in range(3)]
-    corner = np.full(len(sides), np.nan)
+    full = simulated(scene)
+    angles, p, q = reader.outline() if full is not None else ([], [], [])
+    corner = _columns(angles) if angles else np.full((2, len(sides)), np.nan)
     model: Any = Throw
-    flight, flip = scene.map.flight, scene.map.flip
+    flight, flip = scene.bare_map.flight, scene.bare_map.flip
     lo, hi = (
         model(
             flight,
             flip,
             *(pair[end] for pair in ends),
             *(np.ascontiguousarray(c[:, end]) for c in columns),
-            corner,
+            np.ascontiguousarray(corner[end]),
         )
         for end in (0, 1)
     )
+    if full is not None:
+        lo, hi = (
+            full._replace(bare=bare, outline=Outline(_columns(p)[end].copy(), _columns(q)[end].copy()))
+            for end, bare in ((0, lo), (1, hi))
+        )
     return ParameterBox(lo, hi, text, dict(noise or {}), landing)

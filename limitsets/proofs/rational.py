@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from math import isqrt
 
-__all__ = ["Span", "pi", "sine", "square_root"]
+__all__ = ["Span", "angle", "pi", "sine", "square_root"]
 
 BITS = 200
 
@@ -126,3 +126,41 @@ def sine(x: Span) -> Span:
         return total - last, total + last
 
     return _short(bounds(x.lo)[0], min(bounds(x.hi)[1], Fraction(1)))
+
+
+def _turned(angle: Fraction) -> tuple[Span, Span]:
+    """Sine and cosine of an angle in [0, pi]: by its half."""
+    s = sine(Span.of(angle / 2))
+    c = square_root(1 - s * s)
+    return 2 * (s * c), 1 - 2 * (s * s)
+
+
+def _angle(y: Fraction, x: Fraction) -> tuple[Fraction, Fraction]:
+    """Bounds of the angle of one vector with y > 0: libm proposes, signs decide."""
+    guess, step = Fraction(math.atan2(float(y), float(x))), Fraction(1, 1 << 50)
+    lo, hi, top = guess - step, guess + step, pi().lo
+
+    def across(angle: Fraction) -> Span:
+        s, c = _turned(angle)
+        return Span.of(y) * c - Span.of(x) * s
+
+    while lo > 0 and not across(lo).lo > 0:
+        step, lo = 2 * step, lo - step
+    while hi < top and not across(hi).hi < 0:
+        step, hi = 2 * step, hi + step
+    return max(lo, Fraction(0)), min(hi, pi().hi)
+
+
+def angle(y: Span, x: Span) -> Span:
+    """Angle of the vectors with y > 0 in a box, in (0, pi).
+
+    Raises
+    ------
+    ZeroDivisionError
+        y may be 0.
+    """
+    if not y.lo > 0:
+        raise ZeroDivisionError
+    # along each border of the box it is monotone
+    ends = [_angle(b, a) for b in {y.lo, y.hi} for a in {x.lo, x.hi}]
+    return Span(min(lo for lo, _ in ends), max(hi for _, hi in ends))

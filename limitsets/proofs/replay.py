@@ -11,8 +11,10 @@ import limitsets.interval as iv
 from limitsets.jit import proof_kernel
 from limitsets.maps import codes
 from limitsets.proofs.parameters import ParameterBox
+from limitsets.thrower.full_box import full_ways
+from limitsets.thrower.motion_box import gather_full_box
 from limitsets.thrower.side_box import gather_box, with_kappa
-from limitsets.thrower.throw_box import throw_box
+from limitsets.thrower.throw_box import sure_throw_box, throw_box
 
 __all__ = ["replay"]
 
@@ -31,6 +33,20 @@ def _replay(lo_map: Any, hi_map: Any, kappa: Any, landing: Any, lo: Any, hi: Any
         else:
             return k
         lo[k + 1], hi[k + 1] = iv.add((lo[k + 1], hi[k + 1]), (landing[k], landing[k]))
+    return int(lo.size - 1)
+
+
+@proof_kernel(entry=True)
+def _replay_full(lo_map: Any, hi_map: Any, kappa: Any, landing: Any, lo: Any, hi: Any, side: Any) -> int:
+    """As `_replay`, with effects."""
+    for k in range(lo.size - 1):
+        part = gather_full_box(lo_map, hi_map, side[k], (kappa[0, k], kappa[1, k]))
+        state, jog, phi, _, _ = sure_throw_box(part.own, lo[k], hi[k])
+        ways = full_ways(part, (lo[k], hi[k]), state, phi, jog)
+        if ways.number != 1:
+            return k
+        lo[k + 1], hi[k + 1] = iv.add((ways.first.lo, ways.first.hi), (landing[k], landing[k]))
+        side[k + 1] = (side[k] + ways.first.turned) % lo_map.bare.a.size
     return int(lo.size - 1)
 
 
@@ -62,5 +78,6 @@ def replay(
     throws = kappa.shape[1]
     lo, hi, sides = np.empty(throws + 1), np.empty(throws + 1), np.empty(throws + 1, np.int64)
     lo[0], hi[0], sides[0] = x, x, side
-    made = _replay(box.lo, box.hi, np.ascontiguousarray(kappa), landing, lo, hi, sides)
+    follow = _replay_full if box.effects else _replay
+    made = follow(box.lo, box.hi, np.ascontiguousarray(kappa), landing, lo, hi, sides)
     return lo[: made + 1], hi[: made + 1], sides[: made + 1]

@@ -20,6 +20,7 @@ from limitsets.thrower.effects.roll import next_arrival
 from limitsets.thrower.effects.slip import slid_on
 from limitsets.thrower.effects.spread import moved_by, spread_over
 from limitsets.thrower.free_flight import fly_on
+from limitsets.thrower.full_box import full_fallback_box, full_image_box, gather_full_pair
 from limitsets.thrower.motion import LOST, OFF, FullSide, FullThrow, side_number
 from limitsets.thrower.params import gather
 from limitsets.thrower.throw import EXITS
@@ -137,7 +138,10 @@ BRANCHES = ("jog", "flip", "roll")
 register(
     FullThrow,
     image=_image,
+    image_box=full_image_box,
+    fallback_box=full_fallback_box,
     on_side=gather_full,
+    on_side_box=gather_full_pair,
     displacement=_displacement,
     scattered=_scattered,
     branches=BRANCHES,

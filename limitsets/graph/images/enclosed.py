@@ -7,6 +7,7 @@ it is possible.  A cell of which nothing can be proved may go everywhere: whatev
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any, TypeAlias
@@ -34,23 +35,38 @@ PIECES_OF_X = {1: 4, 2: 4, 3: 2}
 PIECES_OF_PARAMETER = {1: 256, 2: 16, 3: 8}
 
 
-def _least_known(lo_map: Any, hi_map: Any) -> str | None:
-    """Name of the scalar parameter of largest relative width, None where all are known to some ulp."""
+def _numbers(lo_map: Any, hi_map: Any) -> Iterator[tuple[tuple[str, ...], float, float]]:
+    """Scalar parameters by the names on the way to them, and both corners' values."""
+    for name, low, high in zip(lo_map._fields, lo_map, hi_map, strict=True):
+        if isinstance(low, float):
+            yield (name,), low, high
+        elif hasattr(low, "_fields"):
+            yield from (((name, *rest), a, b) for rest, a, b in _numbers(low, high))
+
+
+def _with(params: Any, names: tuple[str, ...], value: float) -> Any:
+    name, *rest = names
+    return params._replace(**{name: _with(getattr(params, name), tuple(rest), value) if rest else value})
+
+
+def _least_known(lo_map: Any, hi_map: Any) -> tuple[tuple[str, ...], float, float] | None:
+    """Scalar parameter of largest relative width, None where all are known to some ulp."""
     widths = {
-        name: (getattr(hi_map, name) - low) / max(abs(low), abs(getattr(hi_map, name)), 1e-300)
-        for name, low in zip(lo_map._fields, lo_map, strict=True)
-        if isinstance(low, float)
+        number: (number[2] - number[1]) / max(abs(number[1]), abs(number[2]), 1e-300)
+        for number in _numbers(lo_map, hi_map)
+        if number[1] < number[2]
     }
-    name = max(widths, key=lambda key: widths[key], default=None)
-    return name if name is not None and widths[name] > 1e-9 else None
+    found = max(widths, key=lambda key: widths[key], default=None)
+    return found if found is not None and widths[found] > 1e-9 else None
 
 
 def _parameter_pieces(lo_map: Any, hi_map: Any, pieces: int) -> list[tuple[Any, Any]]:
-    name = _least_known(lo_map, hi_map)
-    if name is None:
+    found = _least_known(lo_map, hi_map)
+    if found is None:
         return [(lo_map, hi_map)]
-    cuts = np.linspace(getattr(lo_map, name), getattr(hi_map, name), pieces + 1).tolist()
-    return [(lo_map._replace(**{name: a}), hi_map._replace(**{name: b})) for a, b in pairwise(cuts)]
+    names, low, high = found
+    cuts = np.linspace(low, high, pieces + 1).tolist()
+    return [(_with(lo_map, names, a), _with(hi_map, names, b)) for a, b in pairwise(cuts)]
 
 
 def _cut(lo: Columns, hi: Columns, pieces: int) -> tuple[Columns, Columns]:

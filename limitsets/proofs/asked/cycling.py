@@ -38,6 +38,8 @@ def cycle_that(
     tuple of State
         The orbit, its first point again at the end.
     """
+    if found.cover.box.effects:
+        return ()
     box = parameter_box(scene, tree=found.cover.box.scene)
     quiet = replace(found, cover=replace(found.cover, box=box))
     scattered = found.cover.box.landing > 0.0

@@ -10,13 +10,15 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from limitsets.goals import FlipOrder
-from limitsets.maps import orbit
+from limitsets.maps import codes, orbit
 from limitsets.proofs.asked.cycling import cycle_that
 from limitsets.proofs.asked.kind import Answer, Kind, common, peeled, place, undecided
 from limitsets.proofs.asked.search import Choice, Path, State, replayed, settled
 from limitsets.proofs.attraction import Attraction
+from limitsets.proofs.certificate import targets
 from limitsets.scene import Scene
 
 __all__ = ["KIND"]
@@ -42,6 +44,10 @@ def _ask(found: Attraction, scene: Scene, goal: FlipOrder) -> Answer:
         return Answer("refuted" if against else "undecided", reason, {}, against, True)
     if goal.from_anywhere and found.missing:
         return undecided(found.missing, final=found.cover.box.landing > 0.0)
+    if any((ends[inside, 0] >= 0).any() for ends in _rolls(found)):
+        return undecided(
+            "parts may roll on to other sides than the next, in this version no order is proved then"
+        )
     visits, left = peeled(found, inside, np.zeros_like(inside), (0,))
     if left.size:
         stays = cycle_that(found, scene, lambda cycle: not cycle.branches.any())
@@ -49,6 +55,12 @@ def _ask(found: Attraction, scene: Scene, goal: FlipOrder) -> Answer:
         return Answer("refuted" if stays else "undecided", reason, {}, stays)
     section = {"kind": goal.kind, "order": list(goal.order), "jogs": max(visits - 1, 0)}
     return Answer("proved", "", section | ({"from_anywhere": True} if goal.from_anywhere else {}))
+
+
+def _rolls(found: Attraction) -> list[NDArray[np.int32]]:
+    """Target cells of all branches but jog and flip."""
+    others = {of for images in found.cover.images for _, of in images.hulls} - {codes.JOG, codes.FLIP}
+    return [targets(found.cover, branch) for branch in sorted(others)]
 
 
 def _is_cycle(order: tuple[int, ...], sides: int) -> bool:
@@ -63,7 +75,7 @@ def _against(found: Attraction, order: tuple[int, ...]) -> tuple[State, ...]:
     box = found.cover.box
     choice = Choice(0.5 * (box.lo.kappa + box.hi.kappa), 0.0)
     start, on = settled(found)
-    path = orbit(box.lo._replace(kappa=choice.kappa), start, on, THROWS)
+    path = orbit(box.at_kappa(choice.kappa), start, on, THROWS)
     allowed = set(zip(order, (*order[1:], order[0]), strict=True))
     pairs = list(zip(path.side[:-1].tolist(), path.side[1:].tolist(), strict=True))
     bad = [k + 1 for k, (a, b) in enumerate(pairs) if a != b and (a, b) not in allowed]

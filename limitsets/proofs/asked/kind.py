@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from limitsets.proofs.asked.search import State
 from limitsets.proofs.attraction import BELOW, Attraction
-from limitsets.proofs.certificate import targets
+from limitsets.proofs.certificate import everywhere, targets
 from limitsets.scene import Scene
 
 __all__ = ["Answer", "Kind", "above", "below", "common", "peeled", "place", "undecided"]
@@ -89,7 +89,7 @@ def above(x: float) -> float:
 
 
 def peeled(
-    found: Attraction, cells: Mask, wanted: Mask, branches: Sequence[int] = (0, 1)
+    found: Attraction, cells: Mask, wanted: Mask, branches: Sequence[int] | None = None
 ) -> tuple[int, NDArray[np.int64]]:
     """Count the throws after which every orbit from the cells has come to those wanted.
 
@@ -101,8 +101,8 @@ def peeled(
         Where orbits begin.
     wanted : ndarray of bool, shape (n_cells,)
         Where they have to come; a start there has arrived.
-    branches : sequence of int
-        Branches to follow; a throw of another one has arrived.
+    branches : sequence of int, optional
+        Branches to follow; a throw of another one has arrived.  Default: all.
 
     Returns
     -------
@@ -111,7 +111,9 @@ def peeled(
     ndarray of int64
         Cells from which it is not proved.
     """
-    ends = [targets(found.cover, branch) for branch in branches]
+    ends = (
+        everywhere(found.cover) if branches is None else [targets(found.cover, branch) for branch in branches]
+    )
     done = cells & wanted
     left = np.flatnonzero(cells & ~done & (found.cover.graph.ranges.exits == 0))
     throws = 0

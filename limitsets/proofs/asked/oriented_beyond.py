@@ -13,7 +13,7 @@ from limitsets.proofs.asked.kind import Answer, Kind, below, common, place
 from limitsets.proofs.asked.search import from_attracting
 from limitsets.proofs.asked.starts import one_throw
 from limitsets.proofs.attraction import Attraction
-from limitsets.proofs.certificate import targets
+from limitsets.proofs.certificate import everywhere
 from limitsets.scene import Scene
 
 __all__ = ["KIND"]
@@ -55,8 +55,7 @@ def _ask(found: Attraction, scene: Scene, goal: OrientedBeyond) -> Answer:
 def _thrown_there(found: Attraction, goal: OrientedBeyond, bad: NDArray[np.bool_]) -> str:
     """Name a throw that may land beyond x on another side; empty if there is none."""
     number = np.concatenate([[0], np.cumsum(bad)])
-    for branch in (0, 1):
-        ends = targets(found.cover, branch)
+    for ends in everywhere(found.cover):
         cells = np.flatnonzero(ends[:, 0] >= 0)
         hit = cells[number[ends[cells, 1] + 1] > number[ends[cells, 0]]]
         if hit.size:
@@ -65,7 +64,7 @@ def _thrown_there(found: Attraction, goal: OrientedBeyond, bad: NDArray[np.bool_
                 f" {goal.side}"
             )
     for side, near in enumerate(found.joint):
-        if side != goal.side and not near.reach <= below(goal.x):
+        if (side != goal.side or near.rolls) and not near.reach <= below(goal.x):
             return f"a throw from near the joint on side {side} may land beyond x = {goal.x:g}"
     return ""
 

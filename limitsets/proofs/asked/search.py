@@ -119,7 +119,7 @@ def throws(box: ParameterBox, x: Any, side: Any, options: list[Choice]) -> Throw
     """Images of all states under all choices."""
     found = []
     for kappa in sorted({option.kappa for option in options}):
-        map_now = box.lo._replace(kappa=kappa)
+        map_now = box.at_kappa(kappa)
         for s in np.unique(side).tolist():
             mine = np.flatnonzero(side == s)
             got = images(map_now, x[mine], s)
@@ -188,7 +188,7 @@ def settled(found: Attraction) -> tuple[float, int]:
     """
     start, on = middle(found, found.cells.numbers())
     box = found.cover.box
-    path = orbit(box.lo._replace(kappa=0.5 * (box.lo.kappa + box.hi.kappa)), start, on, SETTLING)
+    path = orbit(box.at_kappa(0.5 * (box.lo.kappa + box.hi.kappa)), start, on, SETTLING)
     return float(path.x[-1]), int(path.side[-1])
 
 
@@ -237,7 +237,7 @@ def long_orbit(
     """
     start, on = settled(found) if cells is None else middle(found, cells)
     (choice,) = {Choice(0.5 * (found.cover.box.lo.kappa + found.cover.box.hi.kappa), 0.0)}
-    path = orbit(found.cover.box.lo._replace(kappa=choice.kappa), start, on, throws)
+    path = orbit(found.cover.box.at_kappa(choice.kappa), start, on, throws)
     bad = np.flatnonzero(wrong(path.x * MORE_THAN_ROUNDING, path.side))
     if not bad.size:
         return None

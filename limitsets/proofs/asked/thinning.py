@@ -61,6 +61,8 @@ def thinned(found: Attraction, cells: Mask, wanted: Mask) -> tuple[int, str]:
         side = int(found.cover.grid.side_of(flat[0]))
         lo, hi = found.cover.grid.boxes([flat[0]], side)
         return 0, f"the slope is not proved positive on side {side}, x in [{lo[0, 0]:.6g}, {hi[0, 0]:.6g}]"
+    if any(of not in (0, 1) for images in found.cover.images for _, of in images.hulls):
+        return 0, "some throws roll on, and of these it is not proved in this version that they thin out"
     source, first, count = _groups(found, left)
     factor = (1.0 + SLACK) / steep[source]
     bound = np.where(left, 1.0, 0.0)

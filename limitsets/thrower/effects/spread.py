@@ -4,8 +4,8 @@
 
 `bounded`: delta and e anywhere in their intervals, drawn evenly when an orbit is followed; a proof takes the whole
 interval (`certify` does for a scene with this effect).  `gaussian`: normal, with these standard deviations.  What throw
-number t of start number s draws depends on the seed, on s and on t alone.  The image of a cell or of a point asked for
-by itself is that of the throw without scatter.  Source: docs/model.md, effects.
+number t of start number s draws depends on the seed, on s and on t alone.  The image of a point asked for by itself is
+that of the throw without scatter; the enclosed image of a cell holds all of them.  Source: docs/model.md, effects.
 """
 
 from __future__ import annotations

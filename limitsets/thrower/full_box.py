@@ -1,0 +1,138 @@
+"""The box twin of the throw with effects: landing, roll and bounded spread; of any other nothing is proved.
+
+The steps are those of `full.py`, each effect's in its own file.  What is not decided is followed in every way; where it
+comes to rest in more than two, the cell is said to be undecided, and whoever asked asks again for parts of it.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import limitsets.interval as iv
+from limitsets.interval.arithmetic import Interval
+from limitsets.jit import generic, proof_kernel
+from limitsets.maps.contract import fallback_box, image_box
+from limitsets.thrower.arrival_box import landed
+from limitsets.thrower.motion import FullThrow
+from limitsets.thrower.motion_box import NOTHING, FullSideBox, Ways, gather_full_box, no_way
+from limitsets.thrower.roll_box import rested
+from limitsets.thrower.throw_box import sure_throw_box, throw_box
+
+__all__ = ["full_fallback_box", "full_image_box", "full_ways", "gather_full_pair"]
+
+
+@proof_kernel
+def _bounded(spread: Any) -> bool:
+    if spread is None:
+        return True
+    return spread.law.bound < math.inf  # type: ignore[no-any-return]  # effects are Any
+
+
+@proof_kernel
+def _scattered(spread: Any, x: Interval) -> Interval:
+    """Widen a place of rest by what a landing deviates by."""
+    if spread is None:
+        return x
+    return iv.add(x, (-spread.landing, spread.landing))
+
+
+@proof_kernel
+def _none() -> Ways:
+    ways = no_way()
+    return Ways(NOTHING, ways.first, ways.second)
+
+
+@proof_kernel
+def _followed(
+    pivot: Any,
+    slip: Any,
+    bounce: Any,
+    drive: Any,
+    part: FullSideBox,
+    x: Interval,
+    phi: Interval,
+    jog: Interval,
+) -> Ways:
+    """Places of rest; with an effect that has no box twin what follows is never typed."""
+    if pivot is not None:
+        return _none()
+    if slip is not None:
+        return _none()
+    if bounce is not None:
+        return _none()
+    if drive is not None:
+        return _none()
+    return rested(part.roll, part, landed(part.landing, part, x, phi, jog))
+
+
+def full_ways(part: FullSideBox, x: Interval, state: int, phi: Interval, jog: Interval) -> Ways:
+    """Places of rest of every start in x, from what the minimal model proves of their landings."""
+
+
+# Not inlined: images, replays and the argument near the joint would each compile it anew.
+full_ways = generic(full_ways, proof=True, inlined=False)
+
+
+@proof_kernel
+def _full_ways(part: FullSideBox, x: Interval, state: int, phi: Interval, jog: Interval) -> Ways:
+    if (state == NOTHING) | (not _bounded(part.spread)):
+        return _none()
+    return _followed(part.pivot, part.slip, part.bounce, part.drive, part, x, phi, jog)
+
+
+full_ways.on(FullSideBox, _full_ways)  # type: ignore[attr-defined]  # generic functions carry `on`
+
+
+@proof_kernel
+def _slots(part: FullSideBox, ways: Ways, phi: Interval) -> Any:
+    """Count, images per branch, witness."""
+    n = part.lo.a.size
+    one, two = ways.first, ways.second
+    first = _scattered(part.spread, (one.lo, one.hi))
+    second = _scattered(part.spread, (two.lo, two.hi))
+    return (
+        ways.number if ways.number > 0 else NOTHING,
+        (first[0], first[1], (part.own.side + one.turned) % n, one.branch),
+        (second[0], second[1], (part.own.side + two.turned) % n, two.branch),
+        phi,
+    )
+
+
+@proof_kernel
+def side_full_image_box(part: FullSideBox, same: FullSideBox, lo: float, hi: float, side: int) -> Any:
+    """`image_box` on one side; the witness is the bracket of the left vertex's own landing."""
+    state, jog, phi, _, _ = throw_box(part.own, lo, hi)
+    return _slots(part, full_ways(part, (lo, hi), state, phi, jog), phi)
+
+
+@proof_kernel
+def side_full_fallback_box(part: FullSideBox, same: FullSideBox, lo: float, hi: float, side: int) -> Any:
+    """`fallback_box` on one side."""
+    state, jog, phi, _, _ = sure_throw_box(part.own, lo, hi)
+    return _slots(part, full_ways(part, (lo, hi), state, phi, jog), phi)
+
+
+@proof_kernel
+def gather_full_pair(lo: FullThrow, hi: FullThrow, side: int) -> tuple[FullSideBox, FullSideBox]:
+    """`on_side_box`: the same intervals stand for both corners."""
+    part = gather_full_box(lo, hi, side, (lo.bare.kappa, hi.bare.kappa))
+    return part, part
+
+
+@proof_kernel
+def full_image_box(lo_params: FullThrow, hi_params: FullThrow, lo: float, hi: float, side: int) -> Any:
+    """`image_box` of the throw with effects."""
+    part, same = gather_full_pair(lo_params, hi_params, side)
+    return side_full_image_box(part, same, lo, hi, side)
+
+
+@proof_kernel
+def full_fallback_box(lo_params: FullThrow, hi_params: FullThrow, lo: float, hi: float, side: int) -> Any:
+    """`fallback_box` of the throw with effects."""
+    part, same = gather_full_pair(lo_params, hi_params, side)
+    return side_full_fallback_box(part, same, lo, hi, side)
+
+
+image_box.on(FullSideBox, side_full_image_box)  # type: ignore[attr-defined]  # generic functions carry `on`
+fallback_box.on(FullSideBox, side_full_fallback_box)  # type: ignore[attr-defined]

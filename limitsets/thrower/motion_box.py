@@ -1,0 +1,191 @@
+"""The box twin of `motion.py`: what the box kernels with effects know of the part, and what they hand on.
+
+Everything is an interval, over a cell of starts and a box of parameters.  Where it is not decided what comes next, all
+that is possible *waits*, a row of `FullSideBox.waiting` each, and is followed in turn; what comes to rest is kept by
+where it rests in `Ways`.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+import limitsets.interval as iv
+from limitsets.interval.arithmetic import Interval
+from limitsets.jit import proof_kernel
+from limitsets.maps import codes
+from limitsets.thrower.motion import FullThrow
+from limitsets.thrower.params import Throw
+from limitsets.thrower.side_box import SideBox, gather_box, with_kappa
+
+__all__ = [
+    "NOTHING",
+    "ROOM",
+    "FullSideBox",
+    "Way",
+    "Ways",
+    "box_of",
+    "corner_box",
+    "gather_full_box",
+    "no_way",
+    "put",
+    "vertex_box",
+    "wait",
+]
+
+NOTHING = -1
+
+# Undecided continuations of one cell that may wait; where more are possible nothing is proved.
+ROOM = 16
+
+ROLLED = 2
+"""Code of the branch on which the part rolled on, or back."""
+
+
+class FullSideBox(NamedTuple):
+    """What the box kernels of one side need.
+
+    Attributes
+    ----------
+    own : SideBox
+        The minimal model of this side, thrown with the kappa of this throw.
+    lo, hi : Throw
+        Corners of the minimal model's parameters.
+    p_lo, p_hi, q_lo, q_hi : ndarray, shape (n,)
+        Bounds of where the vertices are, see `motion.Outline`.
+    landing, roll, pivot, slip, bounce, drive, spread : NamedTuple or None
+        What is simulated.
+    waiting : ndarray, shape (ROOM, 7)
+        A side the part may have come down on, see `wait`.
+    """
+
+    own: SideBox
+    lo: Throw
+    hi: Throw
+    p_lo: NDArray[np.float64]
+    p_hi: NDArray[np.float64]
+    q_lo: NDArray[np.float64]
+    q_hi: NDArray[np.float64]
+    landing: Any
+    roll: Any
+    pivot: Any
+    slip: Any
+    bounce: Any
+    drive: Any
+    spread: Any
+    waiting: NDArray[np.float64]
+
+
+class Way(NamedTuple):
+    """A place of rest: sides turned since the throw, code of the branch, bounds of x'."""
+
+    turned: int
+    branch: int
+    lo: float
+    hi: float
+
+
+class Ways(NamedTuple):
+    """Places of rest: how many, -1 where they are too many or not known; then the first two."""
+
+    number: int
+    first: Way
+    second: Way
+
+
+@proof_kernel
+def _scattered(spread: Any, kappa: Interval) -> Interval:
+    """kappa / (1 + delta)^2 for all the deviations of the speed."""
+    if spread is None:
+        return kappa
+    factor = iv.add((1.0, 1.0), (-spread.speed, spread.speed))
+    return iv.div(kappa, iv.sqr(factor))
+
+
+@proof_kernel
+def gather_full_box(lo: FullThrow, hi: FullThrow, side: int, kappa: Interval) -> FullSideBox:
+    """Intervals of one side, from the two corners of a parameter box, for throws with these kappa."""
+    thrown = _scattered(lo.spread, kappa)
+    return FullSideBox(
+        with_kappa(gather_box(lo.bare, hi.bare, side), thrown[0], thrown[1]),
+        lo.bare,
+        hi.bare,
+        lo.outline.p[side],
+        hi.outline.p[side],
+        lo.outline.q[side],
+        hi.outline.q[side],
+        lo.landing,
+        lo.roll,
+        lo.pivot,
+        lo.slip,
+        lo.bounce,
+        lo.drive,
+        lo.spread,
+        np.empty((ROOM, 7)),
+    )
+
+
+@proof_kernel
+def box_of(part: FullSideBox, k: int) -> SideBox:
+    """Return the minimal model of side number k, counted on without end."""
+    b = gather_box(part.lo, part.hi, k % part.lo.a.size)
+    return with_kappa(b, part.own.kappa[0], part.own.kappa[1])
+
+
+@proof_kernel
+def corner_box(part: FullSideBox, k: int) -> Interval:
+    """Exterior angle at vertex number k."""
+    n = k % part.lo.a.size
+    return part.lo.corner[n], part.hi.corner[n]
+
+
+@proof_kernel
+def vertex_box(part: FullSideBox, k: int) -> tuple[Interval, Interval]:
+    """Place of vertex number k from the centre of mass, before the throw."""
+    n = k % part.lo.a.size
+    return (part.p_lo[n], part.p_hi[n]), (part.q_lo[n], part.q_hi[n])
+
+
+@proof_kernel
+def wait(
+    part: FullSideBox, count: int, k: int, left: bool, rolled: bool, energy: Interval, x: Interval
+) -> int:
+    """Let a side that may have come down wait; how many then do.
+
+    Side number k, turned about its left end or its right, having rolled or not, with a kinetic energy just before in
+    m w^2, the centre of mass at x.
+    """
+    if count < ROOM:
+        row = part.waiting[count]
+        row[0], row[1], row[2] = k, 1.0 if left else 0.0, 1.0 if rolled else 0.0
+        row[3], row[4] = max(energy[0], 0.0), max(energy[1], 0.0)
+        row[5], row[6] = x
+    return count + 1
+
+
+@proof_kernel
+def no_way() -> Ways:
+    """Nothing yet."""
+    none = Way(0, 0, math.inf, -math.inf)
+    return Ways(0, none, none)
+
+
+@proof_kernel
+def put(ways: Ways, turned: int, rolled: bool, x: Interval) -> Ways:
+    """Keep a place of rest."""
+    branch = codes.JOG if turned == 0 else codes.FLIP
+    branch = ROLLED if rolled | (turned < 0) | (turned > 1) else branch
+    number, one, two = ways
+    mine = Way(turned, branch, x[0], x[1])
+    if number == 0:
+        return Ways(1, mine, two)
+    if (number > 0) & (one.turned == turned) & (one.branch == branch):
+        return Ways(number, Way(turned, branch, min(one.lo, x[0]), max(one.hi, x[1])), two)
+    if number == 1:
+        return Ways(2, one, mine)
+    if (number == 2) & (two.turned == turned) & (two.branch == branch):
+        return Ways(2, one, Way(turned, branch, min(two.lo, x[0]), max(two.hi, x[1])))
+    return Ways(NOTHING, one, two)

@@ -1,0 +1,72 @@
+"""The box twin of `effects/roll.py`: whether the part rests on a side that came down, or goes on over one of its ends.
+
+Only energies matter.  Coming down on side k about one end with kinetic energy E, of which the strike of the other end
+leaves E' = E [rho^2 + d^2 - a (L - a)]^2 / (M M') or nothing, the part rests where E' lifts it over neither end; over
+the other end it comes down on the next side, with E' and the height lost; otherwise it rocks back onto side k, with E'.
+Where that is not decided all that is possible is followed.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import limitsets.interval as iv
+from limitsets.jit import proof_kernel
+from limitsets.thrower.motion_box import NOTHING, ROOM, FullSideBox, Ways, box_of, no_way, put, wait
+
+__all__ = ["rested"]
+
+# Strikes of one cell, in all its ways, after which it is given up.
+MOST_STRIKES = 512
+
+
+@proof_kernel
+def rested(roll: Any, part: FullSideBox, count: int) -> Ways:
+    """Follow all that waits until it rests; without the effect it does so where it came down."""
+    ways = no_way()
+    if (count <= 0) | (count > ROOM):
+        return Ways(NOTHING, ways.first, ways.second)
+    if roll is None:
+        for number in range(count):
+            row = part.waiting[number]
+            ways = put(ways, int(row[0]) - part.own.side, False, (row[5], row[6]))
+        return ways
+    # a part that is said to turn on whichever way it rotates has no energy to follow
+    strikes = 0 if part.own.flip.sign > 0.0 else MOST_STRIKES
+    while (count > 0) & (count <= ROOM) & (strikes < MOST_STRIKES) & (ways.number >= 0):
+        count -= 1
+        ways, count = _strike(part, ways, count)
+        strikes += 1
+    return ways if count == 0 else Ways(NOTHING, ways.first, ways.second)
+
+
+@proof_kernel
+def _strike(part: FullSideBox, ways: Ways, count: int) -> tuple[Ways, int]:
+    """Let the last side that waits come down: it rests there, or another one waits."""
+    row = part.waiting[count]
+    k, left, rolled = int(row[0]), row[1] > 0.0, row[2] > 0.0
+    energy, x = (row[3], row[4]), (row[5], row[6])
+    b, before, after = box_of(part, k), box_of(part, k - 1), box_of(part, k + 1)
+    right = iv.sub(before.shift, before.a)  # L - a, of this side
+    flat = iv.add(b.rho2, iv.sqr(b.d))
+    reach2 = iv.sqr(right)
+    keeps = iv.sub(flat, iv.mul(b.a, right))
+    share = iv.div(iv.sqr(keeps), iv.mul(b.inertia, iv.add(flat, reach2)))
+    kinetic = iv.mul(energy, share)
+    at_left = iv.mul(b.kappa, iv.div(iv.sqr(b.a), iv.add(b.ell, b.d)))
+    at_right = iv.mul(b.kappa, iv.div(reach2, iv.add(iv.sqrt(iv.add(reach2, iv.sqr(b.d))), b.d)))
+    lift, top = iv.minimum(at_left, at_right), at_right if left else at_left
+    stops = (keeps[1] <= 0.0) | (kinetic[1] <= lift[0])
+    moves = (keeps[0] > 0.0) & (kinetic[0] > lift[1])
+    if not moves:
+        ways = put(ways, k - part.own.side, rolled, x)
+    if stops:
+        return ways, count
+    if not kinetic[0] > top[1]:
+        count = wait(part, count, k, not left, rolled, kinetic, x)
+    if not kinetic[1] < top[0]:
+        to, there = (k - 1, before.d) if left else (k + 1, after.d)
+        place = iv.add(x, before.shift) if left else iv.sub(x, b.shift)
+        higher = iv.add(kinetic, iv.mul(b.kappa, iv.sub(b.d, there)))
+        count = wait(part, count, to, left, True, higher, place)
+    return ways, count
