@@ -41,7 +41,7 @@ docs: .venv/dev.stamp  ## the reference, from the docstrings, into docs/api
 	$(PY) docs/build.py
 
 studies: .venv/dev.stamp  ## run every study again, writing its figures and numbers
-	set -e; for study in studies/*/study.py; do $(PY) $$study; done
+	set -e; for study in studies/*/study.py studies/*/effects.py; do $(PY) $$study; done
 
 notebooks: .venv/dev.stamp  ## run every notebook again, in place
 	set -e; for notebook in notebooks/*.ipynb; do .venv/bin/jupyter-execute --inplace $$notebook; done
