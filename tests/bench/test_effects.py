@@ -70,7 +70,8 @@ def test_absent_effects_cost_nothing(two_packages, table):
     pairs = np.array([(timed("with"), timed("without")) for _ in range(PAIRS)])
     turns = Turns(pairs[:, 0], {"without the effects' files": pairs[:, 1]}, None, {})
     what = "a bare throw, effects in the package"
-    table.append(versus(what, turns, "without the effects' files", unit="ns", within=1.02))
+    # the machine code is the same (tests/thrower/effects/test_absent.py): two processes differ by some percent anyway
+    table.append(versus(what, turns, "without the effects' files", unit="ns", within=1.05))
 
 
 @pytest.mark.parametrize("effects", EFFECTS, ids="+".join)
