@@ -32,6 +32,7 @@ __all__ = [
     "FullThrow",
     "Outline",
     "above",
+    "at_kappa",
     "on_to_next",
     "outline_of",
     "right_of",
@@ -170,6 +171,23 @@ class Face(NamedTuple):
     vertex: int
     omega: float
     slide: float
+
+
+@kernel
+def at_kappa(bare: Throw, kappa: float) -> Throw:
+    """Return the minimal model thrown with another kappa: compiled code has no `_replace`."""
+    return Throw(
+        bare.flight,
+        bare.flip,
+        kappa,
+        bare.surface_height,
+        bare.arm_length,
+        bare.radius_of_gyration,
+        bare.a,
+        bare.d,
+        bare.length,
+        bare.corner,
+    )
 
 
 @kernel

@@ -22,6 +22,7 @@ import math
 from typing import Any, NamedTuple
 
 from limitsets.jit import kernel
+from limitsets.thrower.motion import at_kappa
 from limitsets.thrower.params import Side, Throw
 
 __all__ = ["Drive", "all_the_way", "drive_of", "driven", "holds_in_stroke", "leant", "pulled", "rests_leant"]
@@ -51,18 +52,7 @@ def driven(drive: Any, bare: Throw) -> Throw:
     """Return the minimal model with gravity's share across the arm; without the effect as it is."""
     if drive is None:
         return bare
-    return Throw(
-        bare.flight,
-        bare.flip,
-        bare.kappa * drive.cosine,
-        bare.surface_height,
-        bare.arm_length,
-        bare.radius_of_gyration,
-        bare.a,
-        bare.d,
-        bare.length,
-        bare.corner,
-    )
+    return at_kappa(bare, bare.kappa * drive.cosine)
 
 
 @kernel

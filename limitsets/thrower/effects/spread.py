@@ -16,8 +16,7 @@ from typing import Any, NamedTuple
 from limitsets.errors import MapError
 from limitsets.jit import generic, kernel
 from limitsets.maps.counting_random import normal_pair, uniform_pair
-from limitsets.thrower.motion import FullThrow
-from limitsets.thrower.params import Throw
+from limitsets.thrower.motion import FullThrow, at_kappa
 
 __all__ = ["Even", "Normal", "Spread", "moved_by", "spread_of", "spread_over"]
 
@@ -89,22 +88,6 @@ def moved_by(spread: Any, shift: float) -> float:
 
 
 @kernel
-def _at_kappa(bare: Throw, kappa: float) -> Throw:
-    return Throw(
-        bare.flight,
-        bare.flip,
-        kappa,
-        bare.surface_height,
-        bare.arm_length,
-        bare.radius_of_gyration,
-        bare.a,
-        bare.d,
-        bare.length,
-        bare.corner,
-    )
-
-
-@kernel
 def spread_over(spread: Any, params: FullThrow, start: int, step: int) -> FullThrow:
     """Return the map of throw number `step` of start number `start`; without the effect the map as it is."""
     if spread is None:
@@ -112,7 +95,7 @@ def spread_over(spread: Any, params: FullThrow, start: int, step: int) -> FullTh
     speed, landing = drawn(spread.law, int(spread.seed), start, step)
     factor = 1.0 + spread.speed * speed
     return FullThrow(
-        _at_kappa(params.bare, params.bare.kappa / (factor * factor)),
+        at_kappa(params.bare, params.bare.kappa / (factor * factor)),
         params.outline,
         params.landing,
         params.roll,
