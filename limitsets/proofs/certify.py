@@ -298,16 +298,6 @@ def _chosen(scene: Scene, claims: Sequence[str] | None) -> tuple[str, ...]:
     return tuple(dict.fromkeys(claims))
 
 
-def _require_minimal(scene: Scene) -> None:
-    """Refuse effects: what is enclosed are the images of the minimal map."""
-    on = scene.effects.on()
-    if on:
-        allowed = "none: proofs are about the minimal model's map"
-        raise AnswerError(
-            "the effects", ", ".join(on), allowed, "leave [effects] out of the scene to be proved"
-        )
-
-
 def _deviations(scene: Scene, given: Mapping[str, str] | None) -> dict[str, str]:
     """Check deviations, and write them as a certificate has them: a decimal number, a space, a unit."""
     found = {}
@@ -366,7 +356,6 @@ def certify(
     [('attracts-all', 'proved'), ('goal', 'proved')]
     """
     asked = scene if isinstance(scene, Scene) else load(scene)
-    _require_minimal(asked)
     wanted = _chosen(asked, claims)
     noise = joined(_deviations(asked, noise), _deviations(asked, scattered(asked)))
     tolerance = _deviations(asked, tolerance)

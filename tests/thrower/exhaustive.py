@@ -12,9 +12,10 @@ from __future__ import annotations
 import math
 from typing import Any, NamedTuple
 
-from flint import arb, ctx
+from flint import arb
 
-ctx.prec = 320
+# Bits at which everything here is to be computed; a global of flint, so whoever calls sets it for the while.
+PRECISION = 320
 
 # Pieces of the turn narrower than this against their place are not halved any more: a touching root, or two within.
 NARROWEST = arb(2) ** -120

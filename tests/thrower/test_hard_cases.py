@@ -21,6 +21,12 @@ from tests.thrower.exhaustive import Part, arb  # noqa: E402
 ULPS = 4.0  # allowed, times the condition number
 
 
+@pytest.fixture(autouse=True)
+def digits():
+    with flint.ctx.workprec(exhaustive.PRECISION):
+        yield
+
+
 def ulps(exact: arb, found: float) -> float:
     """Error in units of the last place of the exact value."""
     return abs(float((exact - arb(found)).mid())) / math.ulp(float(exact.mid()))
