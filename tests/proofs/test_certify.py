@@ -366,8 +366,8 @@ def test_random_points_land_where_the_cells_say(flight, flip):
     assert met > 0.3 * total  # most scenes keep most of their parts
 
 
-def test_effects_are_refused_rather_than_left_out():
-    """The enclosures are those of the minimal map: nothing of it may pass for the map with effects."""
-    tree = ls.load("paper-initial").as_dict() | {"effects": {"roll": True}}
-    with pytest.raises(AnswerError, match="minimal model"):
+def test_effects_that_are_not_enclosed_are_refused_rather_than_left_out():
+    """Nothing of the minimal map may pass for a map with effects."""
+    tree = ls.load("paper-initial").as_dict() | {"effects": {"slip": True}, "world": {"friction": 0.5}}
+    with pytest.raises(AnswerError, match="slip"):
         ls.certify(ls.load(tree))
