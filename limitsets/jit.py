@@ -47,7 +47,18 @@ PACKAGE = Path(__file__).resolve().parent
 
 # Rooms without kernels: editing a picture must not throw away every compiled loop.  An import contract keeps
 # them from importing this file.
-KERNEL_FREE = {"scene", "goals", "engine", "auditing", "analysis", "plot", "report", "cli"}
+KERNEL_FREE = {
+    "scene",
+    "goals",
+    "engine",
+    "auditing",
+    "analysis",
+    "robust",
+    "inverse",
+    "plot",
+    "report",
+    "cli",
+}
 
 # And the checker of certificates, which imports nothing of the package; a test sees to that.
 LONE_CHECKER = "proofs/recheck.py"
