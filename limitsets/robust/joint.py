@@ -1,0 +1,1 @@
+def joint_margin(*a, **k): raise NotImplementedError
