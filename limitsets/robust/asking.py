@@ -23,8 +23,9 @@ from limitsets.scene import Scene
 
 __all__ = ["Asked", "Question"]
 
-# Cells per side to begin with, then borders over all that attracts; more cells to begin with where nothing attracts.
-BASE, FINE = 512, (0, 4000, 16_000, 32_000)
+# Cells per side to begin with, then borders over all that attracts, and pieces of a parameter where a cell is open to
+# both decisions; more cells to begin with where nothing attracts.
+BASE, FINE, PIECES = 512, (0, 4000, 16_000, 32_000), (8, 32, 128, 512)
 BASES = (512, 2048, 8192)
 
 # For goals about every start: cells per side, as no part of the arm matters more than the others.
@@ -124,7 +125,7 @@ class Question:
 
     def _coarse(self, box: ParameterBox) -> Attraction:
         for cells in BASES:
-            found = attraction(cover(box, cells, self._cuts(box.lo.a.size)))
+            found = attraction(cover(box, cells, self._cuts(box.lo.a.size), PIECES[0]))
             if (found.component >= 0).any():
                 break
         return found
@@ -133,14 +134,14 @@ class Question:
         """Cut what attracts into more cells; or everything, where a goal is about every start."""
         cuts = self._cuts(box.lo.a.size)
         if self.anywhere:
-            return attraction(cover(box, LADDER[step], cuts))
+            return attraction(cover(box, LADDER[step], cuts, PIECES[step]))
         extents = found.cells.extents()
         total = sum(hi - lo for parts in extents.values() for lo, hi in parts)
         for side, parts in extents.items():
             for lo, hi in parts:
                 count = max(2, round(FINE[step] * (hi - lo) / total))
                 cuts[side] = [*cuts[side], *np.linspace(lo, hi, count).tolist()]
-        return attraction(cover(box, BASE, cuts))
+        return attraction(cover(box, BASE, cuts, PIECES[step]))
 
     def refute(self, piece: Piece | None = None, noise: Mapping[str, str] | None = None) -> Asked:
         """Search for an orbit of one scene that violates one of the goals.

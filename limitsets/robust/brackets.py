@@ -43,6 +43,8 @@ class Bracket:
         What refutes it.
     reason : str
         Why the bracket is not closed, or does not end.
+    sign : int
+        The direction in which it is refuted.
     """
 
     proved: Fraction = Fraction(0)
@@ -50,6 +52,7 @@ class Bracket:
     pieces: list[Asked] = field(default_factory=list)
     against: Asked | None = None
     reason: str = ""
+    sign: int = 1
 
     def closed(self, width: Fraction) -> bool:
         """Whether it is narrower than a share of its upper end."""
@@ -129,7 +132,9 @@ def _grow(
     question: Question, measure: Measure, sign: int, target: Fraction, wall: Fraction, tell: Tell
 ) -> tuple[Fraction, list[Asked], str]:
     """Prove from the scene as it is outward, in pieces; how far, the pieces, and what stops it."""
-    low, pieces, step, reason = Fraction(0), list[Asked](), target, ""
+    low, pieces, reason = Fraction(0), list[Asked](), ""
+    share = Fraction(2, 5)
+    step = share * wall
     for _ in range(TRIALS):
         if low >= target:
             return low, pieces, ""
@@ -137,11 +142,13 @@ def _grow(
         found = question.prove(measure.piece(measure.between(sign * low, sign * high)))
         if found.verdict == "proved":
             pieces.append(found)
-            low, step = high, 3 * (wall - high) / 4
+            low, share = high, min(share * Fraction(9, 8), Fraction(3))
+            step = share * (wall - high)
             tell(float(low / target))
         else:
-            reason, step = found.reason, (high - low) / 2
-            if step < (wall - target) / 8:
+            reason, share = found.reason, share * Fraction(2, 3)
+            step = share * (wall - low)
+            if step < min((wall - target) / 8, target / 1000):
                 break
     return low, pieces, reason
 
@@ -157,6 +164,7 @@ def bracket_fixed(question: Question, measure: Measure, width: Fraction, tell: T
     if bad:
         first = min(bad, key=lambda way: way.bad or 0)
         found.refuted, found.against = first.bad, first.against
+        found.sign = next(sign for sign, way in ways.items() if way is first)
     ends = [way for way in ways.values() if way.end is not None]
     limits = [way.good for way in ends] if found.refuted is None else []
     goal = min(limits, default=min(way.good for way in ways.values()))
@@ -169,12 +177,13 @@ def bracket_fixed(question: Question, measure: Measure, width: Fraction, tell: T
 
 
 def _fixed_proof(question: Question, measure: Measure, found: Bracket, goal: Fraction, tell: Tell) -> Bracket:
-    """Grow the proof in both directions, the harder one first."""
+    """Grow the proof in both directions."""
     if goal <= NONE * measure.least:
         return found
     wall = found.refuted or goal * Fraction(101, 100)
     for sign in (-1, 1):
-        far, pieces, reason = _grow(question, measure, sign, goal, wall, tell)
+        near = found.against is not None and sign == found.sign
+        far, pieces, reason = _grow(question, measure, sign, goal, wall if near else 3 * wall, tell)
         found.pieces += pieces
         if far < goal:
             goal, found.reason = far, reason
@@ -184,55 +193,69 @@ def _fixed_proof(question: Question, measure: Measure, found: Bracket, goal: Fra
     return found
 
 
-def bracket_per_throw(question: Question, measure: Measure, width: Fraction, tell: Tell) -> Bracket:
-    """Bracket the margin of a quantity that is another one at every throw."""
-    found, size = Bracket(), measure.least
+class _Sizes:
+    """Sizes of a quantity that is another one at every throw, proved and refuted."""
 
-    def prove(size: Fraction, finest: int = 3) -> bool:
-        one = question.prove(None, {measure.quantity: measure.text(size)}, finest)
+    def __init__(self, question: Question, measure: Measure) -> None:
+        self.question, self.measure, self.found = question, measure, Bracket()
+
+    def proves(self, size: Fraction, finest: int) -> bool:
+        one = self.question.prove(None, {self.measure.quantity: self.measure.text(size)}, finest)
         if one.verdict == "proved":
-            found.proved, found.pieces = size, [one]
+            if size > self.found.proved:
+                self.found.proved, self.found.pieces = size, [one]
         else:
-            found.reason = one.reason
+            self.found.reason = one.reason
         return one.verdict == "proved"
 
-    def refute(size: Fraction) -> bool:
-        one = question.refute(None, {measure.quantity: measure.text(size)})
+    def refutes(self, size: Fraction) -> bool:
+        one = self.question.refute(None, {self.measure.quantity: self.measure.text(size)})
         if one.verdict == "refuted":
-            found.refuted, found.against = size, one
+            self.found.refuted, self.found.against = size, one
         return one.verdict == "refuted"
 
-    for _ in range(STEPS):
-        size = size if measure.most is None else min(size, measure.most / 2)
-        if not prove(size, 1) or size * 2 == measure.most:
-            break
-        size *= FACTOR
-    top = size
-    for _ in range(4):  # beyond where it is proved it may not be refuted at once
-        if refute(top) or found.proved == top:
-            break
-        top = top * 2 if measure.most is None else (top + measure.most) / 2
-    if found.refuted is None:
-        return _close_from_below(found, measure, top, width, prove)
-    low = found.proved
-    while found.refuted - low > width / 4 * found.refuted and found.refuted > NONE * measure.least:
-        middle = short((low + found.refuted) / 2)
-        quick = prove(middle, 1)
-        low = low if not quick and refute(middle) else middle
-        tell(float(low / found.refuted))
-    return _close_from_below(found, measure, found.refuted, width, prove)
+    def first(self) -> Fraction:
+        """Go outward until it is not proved with few cells, then halve to some percent; that size."""
+        size, most = self.measure.least, self.measure.most
+        for _ in range(STEPS):
+            if not self.proves(size, 1):
+                break
+            nearer = FACTOR * size
+            size = nearer if most is None or nearer < most else (size + most) / 2
+        while size - self.found.proved > size / 40 and size > NONE * self.measure.least:
+            middle = short((size + self.found.proved) / 2)
+            size = size if self.proves(middle, 1) else middle
+        return size
+
+    def against(self, size: Fraction) -> None:
+        """Find a size that is refuted, from one on that is not proved."""
+        for k in range(8):
+            beyond = short(size * (1 + Fraction(2**k - 1, 100)))
+            if (self.measure.most is None or beyond < self.measure.most) and self.refutes(beyond):
+                return
 
 
-def _close_from_below(
-    found: Bracket, measure: Measure, top: Fraction, width: Fraction, prove: Callable[[Fraction], bool]
-) -> Bracket:
-    """Raise what is proved towards the top: first to just below it, as it ought to be, then by halving."""
-    size = short(top * (1 - width * Fraction(6, 10)))
-    while not found.closed(width) and top - found.proved > width / 4 * top and top > NONE * measure.least:
-        if size <= found.proved:
+def bracket_per_throw(question: Question, measure: Measure, width: Fraction, tell: Tell) -> Bracket:
+    """Bracket the margin of a quantity that is another one at every throw."""
+    sizes = _Sizes(question, measure)
+    found = sizes.found
+    top = sizes.first()
+    tell(0.3)
+    sizes.against(top)
+    tell(0.5)
+    if found.refuted is not None and not found.closed(width):
+        sizes.proves(short(found.refuted * (1 - width * Fraction(9, 10))), 3)
+    low = high = None  # nothing is known between them
+    while found.refuted is not None and not found.closed(width) and found.refuted > NONE * measure.least:
+        middle = short(((high or found.proved) + found.refuted) / 2)
+        if found.refuted - (high or found.proved) > width / 4 * found.refuted:
+            if sizes.refutes(middle) or sizes.proves(middle, 3):
+                continue
+            low, high = low or middle, middle
+        elif low is not None and low - found.proved > width / 4 * low:
+            middle = short((found.proved + low) / 2)
+            low = low if sizes.proves(middle, 3) else middle
+        else:
             break
-        if not prove(size):
-            top = size
-        size = short((found.proved + top) / 2)
     found.reason = "" if found.closed(width) else found.reason
     return found
