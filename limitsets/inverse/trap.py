@@ -17,7 +17,7 @@ from limitsets.maps.critical import margins
 from limitsets.maps.forced import along
 from limitsets.thrower import Throw
 
-__all__ = ["Trap", "trap"]
+__all__ = ["Trap", "least_room", "trap"]
 
 Array = NDArray[np.float64]
 
@@ -94,6 +94,28 @@ def _parts(cuts: list[_Cuts], lo: Array, hi: Array) -> tuple[Array, NDArray[np.i
                 sides += [side, side]
                 branches += [branch, branch]
     return np.array(ends), np.array(sides, dtype=np.int64), np.array(branches, dtype=np.int64)
+
+
+def least_room(params: Throw) -> float:
+    """Give the room that the worst throw from anywhere on the arm leaves to where a part is lost; 0 or below: one is.
+
+    A part is lost off the arm's end, or where its left vertex comes down behind the joint.
+
+    Examples
+    --------
+    >>> import limitsets as ls
+    >>> least_room(ls.load("paper-designed").map) > 0
+    True
+    """
+    room = np.inf
+    for side in range(params.a.size):
+        cuts = _cuts(params, side)
+        for k, branch in enumerate(cuts.branches.tolist()):
+            after, on, _ = along(params, cuts.borders[k : k + 2], side, [branch])
+            # the jog from a_i itself moves nothing
+            lower = after[0] - params.a[on[0]] if k or branch else np.inf
+            room = min(room, lower, params.arm_length - after[1])
+    return float(room)
 
 
 def trap(params: Throw, x: float, side: int, *, landing: float = 0.0) -> Trap | None:

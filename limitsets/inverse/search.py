@@ -20,6 +20,7 @@ from limitsets.errors import AnswerError, SceneError
 from limitsets.inverse.lead import lead_of
 from limitsets.inverse.sharp import Box, Sharp, Signs, failing, sharp
 from limitsets.inverse.sound import assumptions_kept
+from limitsets.inverse.trap import least_room
 from limitsets.scene import Scene
 
 __all__ = ["Candidate", "Search", "VARY"]
@@ -81,6 +82,8 @@ class Search:
         A number for it, for the record.
     lead : bool
         Whether the part has to be a uniform plate with one point mass on it.
+    everywhere : bool
+        Whether no start on the arm may be lost, in the scene as it is.
     """
 
     scene: Scene
@@ -89,6 +92,7 @@ class Search:
     bounds: Mapping[str, tuple[float, float]]
     order: int = 0
     lead: bool = True
+    everywhere: bool = True
     hard: list[Signs] = field(default_factory=list)
     history: list[Candidate] = field(default_factory=list)
     evaluations: int = 0
@@ -119,6 +123,8 @@ class Search:
             return -10.0
         if found.margin > 0.0:
             lacking = assumptions_kept(scene, found.kept)
+            if self.everywhere:
+                lacking = min(lacking, least_room(scene.bare_map) / scene.arm_length)
             if lacking < 0.0:
                 return max(lacking, -9.0)
             self.history.append(Candidate(self._values(scene), found, self.order))
