@@ -78,5 +78,5 @@ def next_arrival(roll: Any, bounce: Any, slip: Any, part: FullSide, face: Face) 
 @kernel
 def _lift(part: FullSide, foot: float, d: float) -> float:
     """Energy it takes from lying on a side to the top over one of its ends, which is `foot` left of the centre."""
-    gravity, right, high = leant(part.drive, part.own.kappa, foot, d)
+    gravity, right, high = leant(part.effects.drive, part.own.kappa, foot, d)
     return gravity * right * right / (math.hypot(right, high) + high)  # ell - H
