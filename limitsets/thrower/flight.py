@@ -35,12 +35,10 @@ def impact_angle(flight: Any, part: Side, x: float) -> tuple[Turned, float, bool
     """Turn up to the impact, the angle's derivative with respect to x, and whether the answer can be vouched for."""
 
 
+# Not inlined: one piece of machine code then finds the angle for every caller, and x' is x plus the displacement told.
 @generic(inlined=False)
 def sure_impact_angle(flight: Any, part: Side, x: float) -> tuple[Turned, float]:
     """Turn up to the impact (nan: none within a full turn) and the angle's derivative, however long it takes."""
-
-
-# Not inlined: one piece of machine code then finds the angle for every caller, and x' is x plus the displacement told.
 
 
 @kernel

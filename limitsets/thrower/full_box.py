@@ -66,12 +66,10 @@ def _followed(
     return rested(part.effects.roll, part, landed(part.effects.landing, part, x, phi, jog))
 
 
+# Not inlined: images, replays and the argument near the joint would each compile it anew.
 @generic(proof=True, inlined=False)
 def full_ways(part: FullSideBox, x: Interval, state: int, phi: Interval, jog: Interval) -> Ways:
     """Places of rest of every start in x, from what the minimal model proves of their landings."""
-
-
-# Not inlined: images, replays and the argument near the joint would each compile it anew.
 
 
 @proof_kernel
