@@ -49,7 +49,7 @@ class Pivot(NamedTuple):
 def _held_by(pivot: Any) -> float:
     if pivot is None:
         return 0.0
-    return pivot.friction  # type: ignore[no-any-return]
+    return pivot.friction  # type: ignore[no-any-return]  # it comes as Any
 
 
 @kernel
@@ -57,7 +57,7 @@ def _friction(pivot: Any, slip: Any) -> float:
     """Of whichever effect is there: both read the one fact."""
     if slip is None:
         return _held_by(pivot)
-    return slip.friction  # type: ignore[no-any-return]
+    return slip.friction  # type: ignore[no-any-return]  # it comes as Any
 
 
 @kernel
