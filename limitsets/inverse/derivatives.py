@@ -1,7 +1,8 @@
 """First critical points with their derivatives by any quantities of the scene: the implicit function theorem.
 
 At a critical point r the deciding number F(r, q) is zero, so dr/dq = -(dF/dq) / (dF/dr).  F is evaluated on dual
-numbers: through the formulas of `geometry` from the scene's own words, and through the impact angle by the same theorem.
+numbers: from the scene's own words through the formulas of `geometry`, and through the impact angle by the same
+theorem.
 """
 
 from __future__ import annotations
@@ -188,7 +189,8 @@ class _Row:
         self.scene, self.side = scene, side
         self.part = Part(numbers.a[side], numbers.d[side], numbers.rho, numbers.kappa, numbers.h)
         self.slope = np.full(numbers.h.slope.size - 1, np.nan)
-        self.x, self.kind = (np.nan, None) if point is None else (point.x, point.kind)
+        self.x: float = np.nan if point is None else point.x
+        self.kind: str | None = None if point is None else point.kind
         self.reason = "every throw is decided alike" if point is None else self._differentiate(point.x)
 
     def _decision(self, x: float) -> Decision:

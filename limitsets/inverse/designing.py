@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -177,7 +177,9 @@ def design(
 def _names(vary: Sequence[str]) -> list[str]:
     names = [vary] if isinstance(vary, str) else list(vary)
     if not names or len(set(names)) != len(names):
-        raise AnswerError("the quantities to vary", ", ".join(map(str, names)), "one or more, each once", "name them")
+        raise AnswerError(
+            "the quantities to vary", ", ".join(map(str, names)), "one or more, each once", "name them"
+        )
     return names
 
 
@@ -279,8 +281,9 @@ def _message(search: Search, outcome: Outcome, residual: tuple[float | None, ...
     worst = max(abs(value) for value in residual if value is not None)
     rms = float(np.sqrt(np.mean([value**2 for value in residual if value is not None])))
     text = f"not reached: the nearest found misses by {worst:.3g} {unit} at most, {rms:.3g} {unit} rms"
-    if search.wanted.size > search.unknowns.start.size:
-        text += f"; {search.unknowns.start.size} quantities for {search.wanted.size} targets: least squares"
+    varied, wanted = search.unknowns.start.size, search.wanted.size
+    if wanted > varied:
+        text += f"; {varied} varied for {wanted} wanted: least squares"
     return text + "".join(f"; {reason}" for reason in _in_the_way(search, outcome.trial))
 
 
@@ -298,5 +301,7 @@ def _in_the_way(search: Search, trial: Trial) -> list[str]:
     words = ("the left end", "the right end", "the level")
     for k, slack in enumerate(trial.found.slack.tolist()):
         if slack < 2.0 * KEPT * size:
-            found.append(f"the centre of mass is at {words[k % 3]} of side {k // 3}: beyond it the part tips over")
+            found.append(
+                f"the centre of mass is at {words[k % 3]} of side {k // 3}: beyond it the part tips over"
+            )
     return found

@@ -112,6 +112,11 @@ class _Reader:
         value = convert(parse(node, place.dimension), base_unit(place.dimension, self.unit))
         return self.seeded(value, name)
 
+    def triple(self, name: str) -> tuple[Dual, Dual, Dual]:
+        """Return a point mass: x, y, mass."""
+        x, y, mass = (self.number(f"{name}.{word}") for word in ("x", "y", "mass"))
+        return x, y, mass
+
     def kappa(self) -> Dual:
         if "kappa" in self.tree["throw"]:
             kappa = self.number(KAPPA)
@@ -127,7 +132,8 @@ class _Reader:
 
     def body(self) -> tuple[list[Dual], list[Dual], list[Dual], Dual]:
         """Return a, d and the length per side, and the radius of gyration."""
-        part, lengths, vertices = self.tree["part"], None, []
+        part, lengths = self.tree["part"], None
+        vertices: list[Any]
         if "sides" in part:
             lengths = [self.number(f"part.sides[{k}]") for k in range(3)]
             vertices = list(triangle_of(lengths, square_root))
@@ -145,10 +151,7 @@ class _Reader:
                 self.number("part.mass.radius_of_gyration"),
             )
         else:
-            points: list[Any] = [
-                tuple(self.number(f"part.mass.points[{k}].{word}") for word in ("x", "y", "mass"))
-                for k in range(len(mass.get("points", ())))
-            ]
+            points = [self.triple(f"part.mass.points[{k}]") for k in range(len(mass.get("points", ())))]
             unit = base_unit("mass per area", self.unit)
             density = self.constant(convert(parse(mass["plate_density"], "mass per area"), unit))
             found: Any = mass_of(vertices, density, points, square_root)

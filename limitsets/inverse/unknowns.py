@@ -118,7 +118,9 @@ def _pair(scene: Scene, name: str, given: Sequence[Any] | None) -> tuple[float, 
     if given is None:
         return least, most
     if isinstance(given, str) or len(given) != 2:
-        raise AnswerError(f"the bounds of {name}", given, "(lowest, highest), None for no bound", "give a pair")
+        raise AnswerError(
+            f"the bounds of {name}", given, "(lowest, highest), None for no bound", "give a pair"
+        )
     ends = [_end(scene, name, end, other) for end, other in zip(given, (least, most), strict=True)]
     lo, hi = max(ends[0], least), min(ends[1], most)
     if not lo < hi:
