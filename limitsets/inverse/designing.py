@@ -23,8 +23,8 @@ __all__ = ["Design", "design"]
 
 Progress = Callable[[str, int, int], None]
 
-# Standard deviation of other starts, in the solver's numbers: shares, or sizes of the part.
-SPREAD = 0.15
+# Standard deviations of other starts by turns, in the solver's numbers: shares, or sizes of the part.
+SPREADS = (0.15, 0.3)
 
 
 @dataclass(frozen=True, eq=False)
@@ -227,7 +227,7 @@ def _searched(
         if found.reached:
             break
         search.step, search.of = "other starts", (number, starts)
-        found, how = restarted(search, center, SPREAD, random), f"start {number + 1} of {starts} drawn"
+        found, how = restarted(search, center, SPREADS[number % 2], random), f"start {number + 1} of {starts} drawn"
     if not found.reached:
         best = search.best()
         if best is None:

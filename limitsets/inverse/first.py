@@ -41,7 +41,7 @@ def first_points(scene: Scene) -> tuple[CriticalPoint | None, ...]:
     Examples
     --------
     >>> import limitsets as ls
-    >>> [round(point.x, 5) for point in first_points(ls.load("paper-designed").with_values({"arm.length": 15}))]
+    >>> [round(point.x, 5) for point in first_points(ls.load("paper-designed"))]
     [10.0, 10.0, 20.0]
     """
     own, sides = scene.domain, scene.sides
