@@ -11,7 +11,7 @@ import numpy as np
 from limitsets.errors import AnswerError
 from limitsets.inverse.derivatives import CriticalJacobian, condition_of, require_minimal
 from limitsets.inverse.nearest import KEPT, nearest_to_start, nearest_to_targets
-from limitsets.inverse.seeded import present
+from limitsets.inverse.seeded import present, with_present
 from limitsets.inverse.solving import REACHED, Outcome, continued, restarted, solved, staged
 from limitsets.inverse.trials import Search, Trial
 from limitsets.inverse.unknowns import Bounds, Unknowns, unknowns_of
@@ -169,6 +169,9 @@ def design(
     require_minimal(chosen)
     targets = _targets(chosen, critical_points)
     unknowns = unknowns_of(chosen, _names(vary), bounds)
+    with_present(
+        chosen, dict(zip(unknowns.names, unknowns.start.tolist(), strict=True))
+    )  # refuses what cannot be set
     search = Search(chosen, unknowns, targets, progress)
     outcome, how = _searched(search, unknowns, starts, stages, seed)
     return _answer(search, targets, outcome, how)
@@ -227,7 +230,10 @@ def _searched(
         if found.reached:
             break
         search.step, search.of = "other starts", (number, starts)
-        found, how = restarted(search, center, SPREADS[number % 2], random), f"start {number + 1} of {starts} drawn"
+        found, how = (
+            restarted(search, center, SPREADS[number % 2], random),
+            f"start {number + 1} of {starts} drawn",
+        )
     if not found.reached:
         best = search.best()
         if best is None:

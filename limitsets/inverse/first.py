@@ -57,14 +57,16 @@ def nearest_miss(scene: Scene, side: int, until: float) -> tuple[float, float] |
     Returns
     -------
     (float, float) or None
-        x, and the deciding number there; None where it has no extremum towards 0.
+        x, and the deciding number there; None where it comes nowhere near 0.
     """
     a, lo = float(scene.sides.a[side]), float(scene.domain.lo[side, 0])
     share = np.linspace(0.0, 1.0, BELOW)
     even, graded = lo + (until - lo) * share, a + (lo - a) * ((until - a) / (lo - a)) ** share
     x = np.unique(np.clip(np.concatenate([even, graded]), lo, until))
     values = _abs(scene, x, side)
-    dips = 1 + np.flatnonzero((values[1:-1] < values[:-2]) & (values[1:-1] <= values[2:]))
+    here, higher = values[1:-1], np.maximum(values[:-2], values[2:])
+    # a parabola through the three falls below the lowest by less than the highest stands above it
+    dips = 1 + np.flatnonzero((here < values[:-2]) & (here <= values[2:]) & (here <= higher - here))
     if dips.size == 0:
         return None
     left, right = x[dips - 1], x[dips + 1]

@@ -127,7 +127,10 @@ def test_a_plate_with_points_by_vertices_and_tilt():
                 "vertices": [["0 cm", "0 cm"], ["10 cm", "-1 cm"], ["12 cm", "7 cm"], ["3 cm", "8 cm"]],
                 "mass": {
                     "plate_density": "5 kg/m^2",
-                    "points": [{"x": "7 cm", "y": "2 cm", "mass": "30 g"}, {"x": "6 cm", "y": "5 cm", "mass": "20 g"}],
+                    "points": [
+                        {"x": "7 cm", "y": "2 cm", "mass": "30 g"},
+                        {"x": "6 cm", "y": "5 cm", "mass": "20 g"},
+                    ],
                 },
             },
             "arm": {"surface_height": "-5 mm", "length": "150 cm"},
@@ -140,7 +143,9 @@ def test_a_plate_with_points_by_vertices_and_tilt():
     names += [f"part.mass.points[{k}].{word}" for k in range(2) for word in ("x", "y", "mass")]
     names += ["throw.speed", "gravity.tilt", "arm.surface_height"]
     found = critical_jacobian(scene, *names)
-    assert found.x == pytest.approx([points[0].x for points in ls.critical_points(scene.map, scene.domain).values()])
+    assert found.x == pytest.approx(
+        [points[0].x for points in ls.critical_points(scene.map, scene.domain).values()]
+    )
     wanted = differences(scene, names)
     assert np.abs(found.matrix - wanted).max() < 1e-7 * np.abs(wanted).max()
     # moving the whole part moves nothing: the columns of all x, and of all y, add up to nothing
@@ -230,6 +235,32 @@ def test_where_the_first_two_of_three_meet():
     assert math.isnan(gone.matrix[0, 0])
     assert gone.reasons[1:] == (None, None)  # other sides keep theirs
     assert np.isfinite(gone.matrix[1:]).all()
+
+
+def roots_in_a_turn(scene, side, x):
+    """How often the height of the vertex over the arm changes its sign, by the plain formula."""
+    a, d, phi = (
+        float(scene.sides.a[side]),
+        float(scene.sides.d[side]),
+        np.linspace(1e-6, 2.0 * np.pi, 200_001),
+    )
+    over = x * phi - a * np.sin(phi) + d * (1.0 - np.cos(phi)) - 0.5 * scene.kappa * phi**2 > 0.0
+    return int(np.count_nonzero(over[1:] != over[:-1]))
+
+
+def test_where_the_decision_jumps():
+    """kappa < ell: on side 2 an earlier impact appears (a grazing flight), on side 1 a part lands upside down."""
+    scene = changed("paper-initial", ALONG=3.7577, ABOVE=1.0369, KAPPA=3.1744, RHO=1.6827, H=-1.4335)
+    found = critical_jacobian(scene, exact.KAPPA)
+    assert "the decision jumps" in found.reasons[1]
+    assert "the decision jumps" in found.reasons[2]
+    assert np.isnan(found.matrix[1:]).all()
+    x = found.x[2]
+    assert {roots_in_a_turn(scene, 2, x - 1e-3), roots_in_a_turn(scene, 2, x + 1e-3)} == {3, 1}
+    phi = impact_angles(scene.map, [found.x[1]], 1)[0]
+    a, d = scene.sides.a[1], scene.sides.d[1]
+    assert abs(a * math.cos(phi) - d * math.sin(phi)) < 1e-9  # X = 0
+    assert a * math.sin(phi) + d * math.cos(phi) < 0.0  # H < 0
 
 
 @pytest.mark.parametrize(
