@@ -154,7 +154,7 @@ def design(
 
     Notes
     -----
-    Source: the paper's section on design; docs/robustness.md here.  That a target is not reached is what was found,
+    Source: the paper's section on design; docs/design.md.  That a target is not reached is what was found,
     not a proof that there is no such scene.
 
     Examples
