@@ -24,6 +24,7 @@ if TYPE_CHECKING:  # each from the file that holds it: most rooms have a file of
     from limitsets.cells import grid
     from limitsets.graph.morse import morse_graph
     from limitsets.graph.transitions import transitions
+    from limitsets.inverse import design
     from limitsets.maps import critical_points, orbit, register
     from limitsets.proofs.certify import certify
     from limitsets.proofs.confirm import recheck
@@ -46,6 +47,7 @@ _ROOMS = {
     "certify": "proofs.certify",
     "critical_points": "maps",
     "cycles": "sets.cycles",
+    "design": "inverse",
     "dump": "scene",
     "engine": "engine",
     "grid": "cells",
@@ -71,6 +73,7 @@ __all__ = [
     "certify",
     "critical_points",
     "cycles",
+    "design",
     "dump",
     "engine",
     "grid",

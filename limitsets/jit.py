@@ -33,7 +33,7 @@ import sys
 import types as python_types
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, TypeVar, overload
+from typing import Any, ParamSpec, Protocol, TypeVar, overload
 
 import numba
 import numpy as np
@@ -42,6 +42,8 @@ from numba import extending, types
 __all__ = ["cover_foreign_class", "generic", "kernel", "named_tuple_class", "proof_kernel"]
 
 F = TypeVar("F", bound=Callable[..., Any])
+P = ParamSpec("P")
+R = TypeVar("R", covariant=True)
 
 PACKAGE = Path(__file__).resolve().parent
 
@@ -408,9 +410,30 @@ def named_tuple_class(numba_type: Any) -> type | None:
     return getattr(numba_type, "instance_class", None) if isinstance(numba_type, types.BaseTuple) else None
 
 
+class Generic(Protocol[P, R]):
+    """A function whose method is chosen by the class of its first argument: what `generic` makes of a stub."""
+
+    methods: dict[Any, Callable[..., Any]]
+
+    def __call__(self, *args: P.args, **kwargs: P.kwargs) -> R: ...
+
+    def on(self, key: type | int, method: Callable[..., Any]) -> None:
+        """Add the method of a class, or of plain tuples of a length: a module-level function."""
+
+
+@overload
+def generic(stub: Callable[P, R]) -> Generic[P, R]: ...
+@overload
 def generic(
-    stub: F, *, proof: bool = False, inlined: bool = True, default: Callable[..., Any] | None = None
-) -> F:
+    *, proof: bool = False, inlined: bool = True, default: Callable[..., Any] | None = None
+) -> Callable[[Callable[P, R]], Generic[P, R]]: ...
+def generic(
+    stub: Any = None,
+    *,
+    proof: bool = False,
+    inlined: bool = True,
+    default: Callable[..., Any] | None = None,
+) -> Any:
     """Make a function whose method is chosen by the class of its first argument.
 
     Parameters
@@ -427,7 +450,7 @@ def generic(
     Returns
     -------
     callable
-        The stub, with an attribute `on`: ``stub.on(Class, method)`` adds a module-level method.  For a plain tuple
+        The stub, a `Generic`: ``stub.on(Class, method)`` adds a module-level method.  For a plain tuple
         of equal entries the key is its length instead.  In compiled code the choice is made at compile time.
 
     Notes
@@ -435,6 +458,13 @@ def generic(
     The table is read by one numba overload per generic function.  A method is never passed as an argument nor kept
     in a closure: numba does not cache such code (numba issues 2065, 2952, 6264).
     """
+    if stub is None:
+        return lambda f: _generic(f, proof, inlined, default)
+    return _generic(stub, proof, inlined, default)
+
+
+def _generic(stub: Any, proof: bool, inlined: bool, default: Callable[..., Any] | None) -> Any:
+    """Make the table of methods and the overload that reads it."""
     methods: dict[Any, Callable[..., Any]] = {}
     options = {**(_PROOF if proof else _ESTIMATE), "forceinline": inlined}
     options.pop("nopython")
@@ -451,6 +481,6 @@ def generic(
     def on(key: type | int, method: Callable[..., Any]) -> None:
         methods[key] = getattr(method, "py_func", method)
 
-    stub.on = on  # type: ignore[attr-defined]  # a function may carry attributes
-    stub.methods = methods  # type: ignore[attr-defined]
+    stub.on = on
+    stub.methods = methods
     return stub

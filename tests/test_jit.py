@@ -106,9 +106,9 @@ from limitsets.jit import generic
 from method import method
 class WithGeneric(NamedTuple):
     size: float
+@generic
 def move(params, x):
     pass
-move = generic(move)
 def image(params, x, side):
     return move(params, x), side, 0
 ls.register(WithGeneric, image=image)
@@ -334,6 +334,7 @@ class Weight(NamedTuple):
     size: float
 
 
+@generic
 def weigh(params: Any, x: float, y: float) -> Any:
     """Stub of a generic function."""
 
@@ -342,14 +343,13 @@ def _weigh(params: Weight, x: float, y: float) -> float:
     return params.size * x + y
 
 
+@generic(proof=True)
 def weigh_for_proofs(params: Any, x: float, y: float) -> Any:
     """Stub of a generic function."""
 
 
-weigh = generic(weigh)
-weigh_for_proofs = generic(weigh_for_proofs, proof=True)
-weigh.on(Weight, _weigh)  # type: ignore[attr-defined]
-weigh_for_proofs.on(Weight, _weigh)  # type: ignore[attr-defined]
+weigh.on(Weight, _weigh)
+weigh_for_proofs.on(Weight, _weigh)
 
 
 def weigh_all(params: Weight, x: Any, out: Any) -> None:

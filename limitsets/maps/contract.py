@@ -75,56 +75,55 @@ def _no_fallback(params: Any, x: Any, side: int) -> Any:
     return x, side, codes.OUTSIDE_MODEL
 
 
+@generic
 def image(params: Any, x: Any, side: int) -> Any:
     """One step: ``(x', side', code)``."""
 
 
+@generic
 def image_on(params: Any, x: Any, side: int, branch: int) -> Any:
     """One step on a forced branch: ``(x', side', slope)``."""
 
 
+@generic(proof=True)
 def image_box(params_lo: Any, params_hi: Any, lo: Any, hi: Any, side: int) -> Any:
     """Boxes that contain the image of a box, for every parameter between the two."""
 
 
+@generic(proof=True, inlined=False, default=_no_fallback_box)
 def fallback_box(params_lo: Any, params_hi: Any, lo: Any, hi: Any, side: int) -> Any:
     """As `image_box`, slow and sure."""
 
 
+@generic(proof=True, default=_both)
 def on_side_box(params_lo: Any, params_hi: Any, side: int) -> Any:
     """Return what `image_box` needs to know of one side, for both corners."""
 
 
+@generic(default=_same)
 def on_side(params: Any, side: int) -> Any:
     """Return what the kernels need to know of one side."""
 
 
+@generic(inlined=False, default=_no_fallback)
 def fallback(params: Any, x: Any, side: int) -> Any:
     """One step, slow and sure."""
 
 
+@generic
 def margin(params: Any, x: Any, side: int) -> Any:
     """Return a number whose sign decides between branches 0 and 1."""
 
 
+@generic
 def displacement(params: Any, x: Any, side: int) -> Any:
     """x' - x without cancellation."""
 
 
+@generic(default=_as_they_are)
 def scattered(params: Any, start: int, step: int) -> Any:
     """Return the parameters of one step of one start."""
 
-
-image = generic(image)
-image_on = generic(image_on)
-image_box = generic(image_box, proof=True)
-on_side = generic(on_side, default=_same)
-fallback_box = generic(fallback_box, proof=True, inlined=False, default=_no_fallback_box)
-on_side_box = generic(on_side_box, proof=True, default=_both)
-fallback = generic(fallback, inlined=False, default=_no_fallback)
-margin = generic(margin)
-displacement = generic(displacement)
-scattered = generic(scattered, default=_as_they_are)
 
 EXITS_OF_A_MAP = {"outside": codes.OUTSIDE}
 

@@ -40,10 +40,12 @@ __all__ = [
 ]
 
 
+@generic
 def pick(xs: Any, k: int) -> Any:
     """State number k of a tuple of coordinate arrays: a number, or a tuple from two coordinates up."""
 
 
+@generic
 def put(xs: Any, k: int, x: Any) -> None:
     """Store state number k."""
 
@@ -72,11 +74,9 @@ def _put3(xs: Any, k: int, x: Any) -> None:
     xs[0][k], xs[1][k], xs[2][k] = x
 
 
-pick = generic(pick)
-put = generic(put)
 for _n, _get, _set in ((1, _pick1, _put1), (2, _pick2, _put2), (3, _pick3, _put3)):
-    pick.on(_n, _get)  # type: ignore[attr-defined]  # generic functions carry `on`
-    put.on(_n, _set)  # type: ignore[attr-defined]
+    pick.on(_n, _get)
+    put.on(_n, _set)
 
 
 @kernel

@@ -20,6 +20,7 @@ __all__ = ["Lyapunov", "lyapunov"]
 SMALL, LARGE = 1e-100, 1e100
 
 
+@generic
 def carry(xs: Any, slope: Any, tangent: Any, scale: float) -> Any:
     """Image of ``scale * tangent`` by a slope, and its size; chosen by the number of coordinates in `xs`."""
 
@@ -43,9 +44,8 @@ def _carry3(xs: Any, slope: Any, tangent: Any, scale: float) -> Any:
     return (u, v, w), abs(u) + abs(v) + abs(w)
 
 
-carry = generic(carry)
 for _n, _method in ((1, _carry1), (2, _carry2), (3, _carry3)):
-    carry.on(_n, _method)  # type: ignore[attr-defined]  # generic functions carry `on`
+    carry.on(_n, _method)
 
 
 @kernel(entry=True)

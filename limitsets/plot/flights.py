@@ -81,6 +81,7 @@ def flight(scene: Scene, x: float, side: int) -> Figure:
         axes.label_outer()
         axes.set_xlabel(f"distance from the joint [{scene.unit}]")
     above.set_ylabel(f"height over the joint [{scene.unit}]")
+    # The axes come from a grid (`_canvas`), so that neither subplotspec is None.
     below.set_ylabel(above.get_ylabel() if below.get_subplotspec().is_first_col() else "")  # type: ignore[union-attr]
     above.set_xlabel(below.get_xlabel() if above.get_subplotspec().is_last_row() else "")  # type: ignore[union-attr]
     _flight(above, scene, x, side, phi, air)

@@ -82,7 +82,7 @@ def limit_set(scene: Scene, found: Any, *, axes: Axes | None = None) -> Figure:
     if alone:
         rolls = any(patch.get_gid() == "roll" for patch in axes.patches)
         style.legend(figure, _legend(scene, len(sets), rolls), 4)
-    return axes.get_figure(root=True)  # type: ignore[return-value]
+    return axes.get_figure(root=True)  # type: ignore[return-value]  # these axes are in a figure: it is not None
 
 
 def _lanes(axes: Axes, scene: Scene) -> None:

@@ -72,7 +72,7 @@ def _pieces(found: Cover, cells: CellSet) -> Iterator[tuple[int, Any, Any, Any, 
         lo, hi = np.ascontiguousarray(cuts[:, :-1].ravel()), np.ascontiguousarray(cuts[:, 1:].ravel())
         _slopes(*found.box.bare, side, lo, hi, out)
         lowest = found.box.lo
-        if isinstance(lowest, FullThrow) and lowest.landing is not None:
+        if isinstance(lowest, FullThrow) and lowest.effects.landing is not None:
             # where another vertex may land the displacement is another function
             late = ~(found.images[side].witness[1, k] <= lowest.bare.corner[side])
             out.reshape(k.size, PIECES)[late] = -1.0

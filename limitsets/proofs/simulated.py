@@ -46,7 +46,7 @@ def simulated(scene: Scene) -> FullThrow | None:
     found = scene.map
     if not (isinstance(found, FullThrow) and set(on) & set(ENCLOSED)):
         return None
-    return found._replace(spread=None)
+    return found._replace(effects=found.effects._replace(spread=None))
 
 
 def scattered(scene: Scene) -> dict[str, str]:

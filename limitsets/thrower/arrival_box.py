@@ -126,15 +126,13 @@ def _place_of_cell(
     return max(whole[0], least) if rising else whole[0], min(whole[1], most) if rising else whole[1]
 
 
+# Not inlined, for it is called in three places: it would be most of the compile time.
+@generic(proof=True, inlined=False)
 def came_down(part: FullSideBox, k: int, x: Interval, phi: Interval, place: Interval, count: int) -> int:
     """Strike with vertex k and turn about it: the sides the part may come down on wait; how many then do.
 
     `place`: of the centre of mass, if the part fell back on side k.
     """
-
-
-# Not inlined, for it is called in three places: it would be most of the compile time.
-came_down = generic(came_down, proof=True, inlined=False)
 
 
 @proof_kernel
@@ -162,7 +160,7 @@ def _came_down(part: FullSideBox, k: int, x: Interval, phi: Interval, place: Int
     return count
 
 
-came_down.on(FullSideBox, _came_down)  # type: ignore[attr-defined]  # generic functions carry `on`
+came_down.on(FullSideBox, _came_down)
 
 
 @proof_kernel

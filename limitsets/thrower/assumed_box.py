@@ -70,11 +70,9 @@ class Pose(NamedTuple):
     start: Interval  # the height from which the energy counts
 
 
+@generic(proof=True)
 def pose_box(flight: Any, b: SideBox, x: Interval, phi: Interval) -> Pose:
     """Return the part at its landing."""
-
-
-pose_box = generic(pose_box, proof=True)
 
 
 @proof_kernel
@@ -94,9 +92,9 @@ def _small(flight: Any, b: SideBox, x: Interval, phi: Interval) -> Pose:
     return Pose(b.a, b.d, iv.sub(b.a, reach), iv.add(b.d, lost))
 
 
-pose_box.on(Exact, _exact)  # type: ignore[attr-defined]  # generic functions carry `on`
-pose_box.on(SmallAngle, _small)  # type: ignore[attr-defined]
-pose_box.on(SmallAngle2, _small)  # type: ignore[attr-defined]
+pose_box.on(Exact, _exact)
+pose_box.on(SmallAngle, _small)
+pose_box.on(SmallAngle2, _small)
 
 
 @proof_kernel

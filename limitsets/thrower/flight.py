@@ -30,19 +30,15 @@ LEAST_BEND = 2.0**-20
 STILL = 2.0**-52
 
 
+@generic
 def impact_angle(flight: Any, part: Side, x: float) -> tuple[Turned, float, bool]:
     """Turn up to the impact, the angle's derivative with respect to x, and whether the answer can be vouched for."""
 
 
-impact_angle = generic(impact_angle)
-
-
+# Not inlined: one piece of machine code then finds the angle for every caller, and x' is x plus the displacement told.
+@generic(inlined=False)
 def sure_impact_angle(flight: Any, part: Side, x: float) -> tuple[Turned, float]:
     """Turn up to the impact (nan: none within a full turn) and the angle's derivative, however long it takes."""
-
-
-# Not inlined: one piece of machine code then finds the angle for every caller, and x' is x plus the displacement told.
-sure_impact_angle = generic(sure_impact_angle, inlined=False)
 
 
 @kernel
@@ -146,9 +142,9 @@ def _small2_surely(flight: Any, part: Side, x: float) -> tuple[Turned, float]:
     return Turned(2.0 * (x - part.a) / (part.kappa - part.d), 0.0, 0.0, 0.0), 2.0 / (part.kappa - part.d)
 
 
-impact_angle.on(Exact, _exact)  # type: ignore[attr-defined]  # generic functions carry `on`
-impact_angle.on(SmallAngle, _small)  # type: ignore[attr-defined]
-impact_angle.on(SmallAngle2, _small2)  # type: ignore[attr-defined]
-sure_impact_angle.on(Exact, _exact_surely)  # type: ignore[attr-defined]
-sure_impact_angle.on(SmallAngle, _small_surely)  # type: ignore[attr-defined]
-sure_impact_angle.on(SmallAngle2, _small2_surely)  # type: ignore[attr-defined]
+impact_angle.on(Exact, _exact)
+impact_angle.on(SmallAngle, _small)
+impact_angle.on(SmallAngle2, _small2)
+sure_impact_angle.on(Exact, _exact_surely)
+sure_impact_angle.on(SmallAngle, _small_surely)
+sure_impact_angle.on(SmallAngle2, _small2_surely)

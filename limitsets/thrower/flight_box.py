@@ -25,25 +25,19 @@ SLACK = 2.0**-43
 FULL_TURN = 2.0 * math.pi
 
 
+@generic(proof=True)
 def bracket(flight: Any, b: SideBox, x: float) -> tuple[Interval, bool]:
     """Interval that holds the impact angle of a start x for all parameters, and whether that is proved."""
 
 
-bracket = generic(bracket, proof=True)
-
-
+@generic(proof=True)
 def sure_bracket(flight: Any, b: SideBox, x: float) -> tuple[Interval, bool]:
     """Return the same, however long it takes."""
 
 
-sure_bracket = generic(sure_bracket, proof=True)
-
-
+@generic(proof=True)
 def angle_slope(flight: Any, b: SideBox, x: Interval, phi: Interval) -> Interval:
     """Return the derivative of the impact angle with respect to x."""
-
-
-angle_slope = generic(angle_slope, proof=True)
 
 
 @proof_kernel
@@ -170,12 +164,12 @@ def _exact_surely(flight: Any, b: SideBox, x: float) -> tuple[Interval, bool]:
     return _marched(b, x)
 
 
-sure_bracket.on(Exact, _exact_surely)  # type: ignore[attr-defined]
-sure_bracket.on(SmallAngle, _small_bracket)  # type: ignore[attr-defined]
-sure_bracket.on(SmallAngle2, _small2_bracket)  # type: ignore[attr-defined]
-bracket.on(Exact, _exact_bracket)  # type: ignore[attr-defined]  # generic functions carry `on`
-bracket.on(SmallAngle, _small_bracket)  # type: ignore[attr-defined]
-bracket.on(SmallAngle2, _small2_bracket)  # type: ignore[attr-defined]
-angle_slope.on(Exact, _exact_slope)  # type: ignore[attr-defined]
-angle_slope.on(SmallAngle, _small_slope)  # type: ignore[attr-defined]
-angle_slope.on(SmallAngle2, _small2_slope)  # type: ignore[attr-defined]
+sure_bracket.on(Exact, _exact_surely)
+sure_bracket.on(SmallAngle, _small_bracket)
+sure_bracket.on(SmallAngle2, _small2_bracket)
+bracket.on(Exact, _exact_bracket)
+bracket.on(SmallAngle, _small_bracket)
+bracket.on(SmallAngle2, _small2_bracket)
+angle_slope.on(Exact, _exact_slope)
+angle_slope.on(SmallAngle, _small_slope)
+angle_slope.on(SmallAngle2, _small2_slope)

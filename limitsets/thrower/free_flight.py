@@ -72,7 +72,7 @@ def _descent(
 def _inward_of(part: FullSide, vertex: int, psi: Turned) -> float:
     """Return how far the centre of mass is left of where it would be on side `vertex`, about the same vertex."""
     k = side_number(part, vertex)
-    return part.a[k] * psi.v + part.d[k] * psi.s  # type: ignore[no-any-return]
+    return part.a[k] * psi.v + part.d[k] * psi.s  # type: ignore[no-any-return]  # kernels take arrays as Any
 
 
 @kernel

@@ -40,48 +40,41 @@ def gather_full(params: FullThrow, side: int) -> FullSide:
     """Return what the kernels need to know of one side (`on_side` of the throw map with effects)."""
     bare = params.bare
     return FullSide(
-        _gather(driven(params.drive, bare), side),
+        _gather(driven(params.effects.drive, bare), side),
         bare.a,
         bare.d,
         bare.length,
         bare.corner,
         params.outline.p[side],
         params.outline.q[side],
-        params.landing,
-        params.roll,
-        params.pivot,
-        params.slip,
-        params.bounce,
-        params.drive,
-        params.spread,
+        params.effects,
     )
 
 
 @kernel
 def full_outcome(part: FullSide, x: float, side: int) -> tuple[float, int, int]:
     """Where a throw ends: shift of the centre of mass, sides turned, code."""
-    hit, moving = first_arrival(part.landing, part, x)
-    if not (moving and holds_in_stroke(part.drive, part.own, part.length[side], x)):
+    on = part.effects
+    hit, moving = first_arrival(on.landing, part, x)
+    if not (moving and holds_in_stroke(on.drive, part.own, part.length[side], x)):
         return 0.0, 0, codes.OUTSIDE_MODEL
     impacts, rolls, before = 0, -1, side
     while moving and impacts < MOST_EVENTS:
         impacts += 1
-        contact, face, ends = turned_down(
-            part.pivot, part.slip, part, struck(part.bounce, part.slip, part, hit)
-        )
+        contact, face, ends = turned_down(on.pivot, on.slip, part, struck(on.bounce, on.slip, part, hit))
         if ends == LOST:
             return 0.0, 0, codes.OUTSIDE_MODEL
         if ends == OFF:
-            hit, moving = fly_on(part.pivot, part.slip, part.bounce, part, contact, hit)
+            hit, moving = fly_on(on.pivot, on.slip, on.bounce, part, contact, hit)
             if not moving:
                 return 0.0, 0, codes.OUTSIDE_MODEL
         else:
-            hit, moving = next_arrival(part.roll, part.bounce, part.slip, part, face)
+            hit, moving = next_arrival(on.roll, on.bounce, on.slip, part, face)
             rolls += rolls < 0 or face.side != before
             before = face.side
     k = side_number(part, face.side)
-    shift = moved_by(part.spread, face.shift + slid_on(part.slip, part, face))
-    if moving or not math.isfinite(shift) or not rests_leant(part.drive, part.a[k], part.d[k]):
+    shift = moved_by(on.spread, face.shift + slid_on(on.slip, part, face))
+    if moving or not math.isfinite(shift) or not rests_leant(on.drive, part.a[k], part.d[k]):
         return 0.0, 0, codes.OUTSIDE_MODEL
     turned = face.side - side
     code = codes.JOG if turned == 0 else codes.FLIP
@@ -110,15 +103,15 @@ def full_side_displacement(part: FullSide, x: float, side: int) -> float:
 def full_details(params: FullThrow, x: float, side: int) -> tuple[float, float, int, bool]:
     """`details` of the throw with effects."""
     part = gather_full(params, side)
-    hit, _ = first_arrival(part.landing, part, x)
+    hit, _ = first_arrival(part.effects.landing, part, x)
     shift, turned, _ = full_outcome(part, x, side)
     phi = hit.psi.phi
     for number in range(side, hit.vertex):
         phi += part.corner[side_number(part, number)]
-    return phi, shift, turned, False if part.landing is not None else phi > part.own.corner
+    return phi, shift, turned, False if part.effects.landing is not None else phi > part.own.corner
 
 
-details.on(FullThrow, full_details)  # type: ignore[attr-defined]  # generic functions carry `on`
+details.on(FullThrow, full_details)
 
 
 def _image(params: FullThrow, x: float, side: int) -> Any:
@@ -126,7 +119,7 @@ def _image(params: FullThrow, x: float, side: int) -> Any:
 
 
 def _scattered(params: FullThrow, start: int, step: int) -> Any:
-    return spread_over(params.spread, params, start, step)
+    return spread_over(params.effects.spread, params, start, step)
 
 
 def _displacement(params: FullThrow, x: float, side: int) -> Any:

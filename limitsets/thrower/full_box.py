@@ -63,25 +63,25 @@ def _followed(
         return _none()
     if drive is not None:
         return _none()
-    return rested(part.roll, part, landed(part.landing, part, x, phi, jog))
+    return rested(part.effects.roll, part, landed(part.effects.landing, part, x, phi, jog))
 
 
+# Not inlined: images, replays and the argument near the joint would each compile it anew.
+@generic(proof=True, inlined=False)
 def full_ways(part: FullSideBox, x: Interval, state: int, phi: Interval, jog: Interval) -> Ways:
     """Places of rest of every start in x, from what the minimal model proves of their landings."""
 
 
-# Not inlined: images, replays and the argument near the joint would each compile it anew.
-full_ways = generic(full_ways, proof=True, inlined=False)
-
-
 @proof_kernel
 def _full_ways(part: FullSideBox, x: Interval, state: int, phi: Interval, jog: Interval) -> Ways:
-    if (state == NOTHING) | (not _bounded(part.spread)):
+    if (state == NOTHING) | (not _bounded(part.effects.spread)):
         return _none()
-    return _followed(part.pivot, part.slip, part.bounce, part.drive, part, x, phi, jog)
+    return _followed(
+        part.effects.pivot, part.effects.slip, part.effects.bounce, part.effects.drive, part, x, phi, jog
+    )
 
 
-full_ways.on(FullSideBox, _full_ways)  # type: ignore[attr-defined]  # generic functions carry `on`
+full_ways.on(FullSideBox, _full_ways)
 
 
 @proof_kernel
@@ -89,8 +89,8 @@ def _slots(part: FullSideBox, ways: Ways, phi: Interval) -> Any:
     """Count, images per branch, witness."""
     n = part.lo.a.size
     one, two = ways.first, ways.second
-    first = _scattered(part.spread, (one.lo, one.hi))
-    second = _scattered(part.spread, (two.lo, two.hi))
+    first = _scattered(part.effects.spread, (one.lo, one.hi))
+    second = _scattered(part.effects.spread, (two.lo, two.hi))
     return (
         ways.number if ways.number > 0 else NOTHING,
         (first[0], first[1], (part.own.side + one.turned) % n, one.branch),
@@ -134,5 +134,5 @@ def full_fallback_box(lo_params: FullThrow, hi_params: FullThrow, lo: float, hi:
     return side_full_fallback_box(part, same, lo, hi, side)
 
 
-image_box.on(FullSideBox, side_full_image_box)  # type: ignore[attr-defined]  # generic functions carry `on`
-fallback_box.on(FullSideBox, side_full_fallback_box)  # type: ignore[attr-defined]
+image_box.on(FullSideBox, side_full_image_box)
+fallback_box.on(FullSideBox, side_full_fallback_box)

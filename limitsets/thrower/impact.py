@@ -20,18 +20,14 @@ from limitsets.thrower.turn import Turned
 __all__ = ["decide", "strike"]
 
 
+@generic
 def strike(flight: Any, part: Side, x: float, at: Turned) -> tuple[float, float, float]:
     """Rate after the impact, kinetic energy, barrier."""
 
 
-strike = generic(strike)
-
-
+@generic
 def decide(flip: Any, omega: float, kinetic: float, barrier: float) -> float:
     """Return a number that is positive where the part flips."""
-
-
-decide = generic(decide)
 
 
 @kernel
@@ -65,8 +61,8 @@ def _energy(flip: Any, omega: float, kinetic: float, barrier: float) -> float:
     return kinetic - barrier
 
 
-strike.on(Exact, _exact)  # type: ignore[attr-defined]  # generic functions carry `on`
-strike.on(SmallAngle, _small)  # type: ignore[attr-defined]
-strike.on(SmallAngle2, _small)  # type: ignore[attr-defined]
-decide.on(Signed, _signed)  # type: ignore[attr-defined]
-decide.on(Energy, _energy)  # type: ignore[attr-defined]
+strike.on(Exact, _exact)
+strike.on(SmallAngle, _small)
+strike.on(SmallAngle2, _small)
+decide.on(Signed, _signed)
+decide.on(Energy, _energy)

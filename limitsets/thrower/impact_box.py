@@ -17,18 +17,14 @@ __all__ = ["decide_box", "displacement_box", "strike_box"]
 # ---------------------------------------------------------------- impact
 
 
+@generic(proof=True)
 def strike_box(flight: Any, b: SideBox, x: Interval, phi: Interval) -> tuple[Interval, Interval]:
     """Rate after the impact, barrier."""
 
 
-strike_box = generic(strike_box, proof=True)
-
-
+@generic(proof=True)
 def decide_box(flip: Any, b: SideBox, omega: Interval, barrier: Interval) -> Interval:
     """Enclosure of the number that is positive where the part flips."""
-
-
-decide_box = generic(decide_box, proof=True)
 
 
 @proof_kernel
@@ -76,21 +72,19 @@ def _energy(flip: Any, b: SideBox, omega: Interval, barrier: Interval) -> Interv
     return iv.sub(iv.mul(iv.mul((0.5, 0.5), b.inertia), iv.sqr(omega)), barrier)
 
 
-strike_box.on(Exact, _exact_strike)  # type: ignore[attr-defined]
-strike_box.on(SmallAngle, _small_strike)  # type: ignore[attr-defined]
-strike_box.on(SmallAngle2, _small_strike)  # type: ignore[attr-defined]
-decide_box.on(Signed, _signed)  # type: ignore[attr-defined]
-decide_box.on(Energy, _energy)  # type: ignore[attr-defined]
+strike_box.on(Exact, _exact_strike)
+strike_box.on(SmallAngle, _small_strike)
+strike_box.on(SmallAngle2, _small_strike)
+decide_box.on(Signed, _signed)
+decide_box.on(Energy, _energy)
 
 
 # ---------------------------------------------------------------- landing
 
 
+@generic(proof=True)
 def displacement_box(flight: Any, b: SideBox, phi: Interval) -> tuple[Interval, Interval]:
     """Shift of the centre of mass by a jog, and its derivative with respect to phi."""
-
-
-displacement_box = generic(displacement_box, proof=True)
 
 
 @proof_kernel
@@ -105,6 +99,6 @@ def _small_displacement(flight: Any, b: SideBox, phi: Interval) -> tuple[Interva
     return iv.neg(iv.mul(b.h, phi)), iv.neg(b.h)
 
 
-displacement_box.on(Exact, _exact_displacement)  # type: ignore[attr-defined]
-displacement_box.on(SmallAngle, _small_displacement)  # type: ignore[attr-defined]
-displacement_box.on(SmallAngle2, _small_displacement)  # type: ignore[attr-defined]
+displacement_box.on(Exact, _exact_displacement)
+displacement_box.on(SmallAngle, _small_displacement)
+displacement_box.on(SmallAngle2, _small_displacement)

@@ -15,11 +15,9 @@ from limitsets.thrower.turn import Turned
 __all__ = ["jog_displacement"]
 
 
+@generic
 def jog_displacement(flight: Any, part: Side, at: Turned) -> tuple[float, float]:
     """Shift of the centre of mass by a jog, and its derivative with respect to phi."""
-
-
-jog_displacement = generic(jog_displacement)
 
 
 @kernel
@@ -32,6 +30,6 @@ def _small(flight: Any, part: Side, at: Turned) -> tuple[float, float]:
     return -part.h * at.phi, -part.h
 
 
-jog_displacement.on(Exact, _exact)  # type: ignore[attr-defined]  # generic functions carry `on`
-jog_displacement.on(SmallAngle, _small)  # type: ignore[attr-defined]
-jog_displacement.on(SmallAngle2, _small)  # type: ignore[attr-defined]
+jog_displacement.on(Exact, _exact)
+jog_displacement.on(SmallAngle, _small)
+jog_displacement.on(SmallAngle2, _small)

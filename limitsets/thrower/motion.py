@@ -27,6 +27,7 @@ __all__ = [
     "ON",
     "Arrival",
     "Contact",
+    "Effects",
     "Face",
     "FullSide",
     "FullThrow",
@@ -56,6 +57,18 @@ class Outline(NamedTuple):
     q: NDArray[np.float64]
 
 
+class Effects(NamedTuple):
+    """What is simulated beyond the minimal model: each effect's numbers, None where it is not."""
+
+    landing: Any = None
+    roll: Any = None
+    pivot: Any = None
+    slip: Any = None
+    bounce: Any = None
+    drive: Any = None
+    spread: Any = None
+
+
 class FullThrow(NamedTuple):
     """The throw map with effects beyond the minimal model; build it with `effects.with_effects`.
 
@@ -65,19 +78,13 @@ class FullThrow(NamedTuple):
         The minimal model: part, arm and throw.
     outline : Outline
         The part's vertices.
-    landing, roll, pivot, slip, bounce, drive, spread : NamedTuple or None
-        What is simulated: each effect's numbers, None where it is not.
+    effects : Effects
+        What is simulated.
     """
 
     bare: Throw
     outline: Outline
-    landing: Any = None
-    roll: Any = None
-    pivot: Any = None
-    slip: Any = None
-    bounce: Any = None
-    drive: Any = None
-    spread: Any = None
+    effects: Effects
 
     def __getattr__(self, name: str) -> Any:
         """Give the numbers of the minimal model under their own names, for all who only read them."""
@@ -96,13 +103,7 @@ class FullSide(NamedTuple):
     corner: NDArray[np.float64]
     p: NDArray[np.float64]
     q: NDArray[np.float64]
-    landing: Any
-    roll: Any
-    pivot: Any
-    slip: Any
-    bounce: Any
-    drive: Any
-    spread: Any
+    effects: Effects
 
 
 class Arrival(NamedTuple):
@@ -200,21 +201,21 @@ def side_number(part: FullSide, k: int) -> int:
 def right_of(part: FullSide, vertex: int, psi: Turned) -> float:
     """X: how far the centre of mass is right of a vertex that touches [length]."""
     k = side_number(part, vertex)
-    return part.a[k] * (1.0 - psi.v) - part.d[k] * psi.s  # type: ignore[no-any-return]
+    return part.a[k] * (1.0 - psi.v) - part.d[k] * psi.s  # type: ignore[no-any-return]  # kernels take arrays as Any
 
 
 @kernel
 def above(part: FullSide, vertex: int, psi: Turned) -> float:
     """H: how far the centre of mass is above a vertex that touches [length]."""
     k = side_number(part, vertex)
-    return part.a[k] * psi.s + part.d[k] * (1.0 - psi.v)  # type: ignore[no-any-return]
+    return part.a[k] * psi.s + part.d[k] * (1.0 - psi.v)  # type: ignore[no-any-return]  # kernels take arrays as Any
 
 
 @kernel
 def on_to_next(part: FullSide, vertex: int) -> float:
     """How much farther inward the part lies on side `vertex` + 1 than on side `vertex`, turned about that vertex."""
     k, after = side_number(part, vertex), side_number(part, vertex + 1)
-    return part.a[k] + (part.length[after] - part.a[after])  # type: ignore[no-any-return]
+    return part.a[k] + (part.length[after] - part.a[after])  # type: ignore[no-any-return]  # kernels take arrays as Any
 
 
 def outline_of(bare: Throw) -> Outline:

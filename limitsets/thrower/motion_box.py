@@ -17,7 +17,7 @@ import limitsets.interval as iv
 from limitsets.interval.arithmetic import Interval
 from limitsets.jit import proof_kernel
 from limitsets.maps import codes
-from limitsets.thrower.motion import FullThrow
+from limitsets.thrower.motion import Effects, FullThrow
 from limitsets.thrower.params import Throw
 from limitsets.thrower.side_box import SideBox, gather_box, with_kappa
 
@@ -56,7 +56,7 @@ class FullSideBox(NamedTuple):
         Corners of the minimal model's parameters.
     p_lo, p_hi, q_lo, q_hi : ndarray, shape (n,)
         Bounds of where the vertices are, see `motion.Outline`.
-    landing, roll, pivot, slip, bounce, drive, spread : NamedTuple or None
+    effects : Effects
         What is simulated.
     waiting : ndarray, shape (ROOM, 7)
         A side the part may have come down on, see `wait`.
@@ -69,13 +69,7 @@ class FullSideBox(NamedTuple):
     p_hi: NDArray[np.float64]
     q_lo: NDArray[np.float64]
     q_hi: NDArray[np.float64]
-    landing: Any
-    roll: Any
-    pivot: Any
-    slip: Any
-    bounce: Any
-    drive: Any
-    spread: Any
+    effects: Effects
     waiting: NDArray[np.float64]
 
 
@@ -108,7 +102,7 @@ def _scattered(spread: Any, kappa: Interval) -> Interval:
 @proof_kernel
 def gather_full_box(lo: FullThrow, hi: FullThrow, side: int, kappa: Interval) -> FullSideBox:
     """Intervals of one side, from the two corners of a parameter box, for throws with these kappa."""
-    thrown = _scattered(lo.spread, kappa)
+    thrown = _scattered(lo.effects.spread, kappa)
     return FullSideBox(
         with_kappa(gather_box(lo.bare, hi.bare, side), thrown[0], thrown[1]),
         lo.bare,
@@ -117,13 +111,7 @@ def gather_full_box(lo: FullThrow, hi: FullThrow, side: int, kappa: Interval) ->
         hi.outline.p[side],
         lo.outline.q[side],
         hi.outline.q[side],
-        lo.landing,
-        lo.roll,
-        lo.pivot,
-        lo.slip,
-        lo.bounce,
-        lo.drive,
-        lo.spread,
+        lo.effects,
         np.empty((ROOM, 7)),
     )
 

@@ -148,8 +148,8 @@ register(
     branches=("jog", "flip"),
     exits=EXITS,
 )
-fallback_box.on(SideBox, side_fallback_box)  # type: ignore[attr-defined]
-image_box.on(SideBox, side_image_box)  # type: ignore[attr-defined]  # generic functions carry `on`
+fallback_box.on(SideBox, side_fallback_box)
+image_box.on(SideBox, side_image_box)
 register(
     Side,
     image=side_image,

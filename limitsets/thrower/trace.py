@@ -24,11 +24,9 @@ __all__ = ["Flight", "Trace", "details", "fly", "impact_angles", "trace"]
 _gather = kernel(gather)
 
 
+@generic
 def details(params: Any, x: float, side: int) -> tuple[float, float, int, bool]:
     """Angle at the first impact, displacement, sides turned, whether another vertex would have landed first."""
-
-
-details = generic(details)
 
 
 @kernel
@@ -39,7 +37,7 @@ def _details(params: Throw, x: float, side: int) -> tuple[float, float, int, boo
     return at.phi, shift, int(flip_margin(part, x, at) > 0.0), at.phi > part.corner
 
 
-details.on(Throw, _details)  # type: ignore[attr-defined]  # generic functions carry `on`
+details.on(Throw, _details)
 
 
 @kernel(entry=True)

@@ -5,8 +5,6 @@ Run it as ``python studies/02_physics_engine/effects.py [--seed 0] [--throws 200
 
 from __future__ import annotations
 
-import argparse
-import json
 import math
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -287,11 +285,6 @@ def main(seed: int = 0, out: Path = HERE, throws: int = THROWS) -> dict[str, Any
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description="The map's effects against a rigid-body engine.")
-    parser.add_argument("--seed", type=int, default=0, help="of the starts")
-    parser.add_argument("--throws", type=int, default=THROWS, help="in each case")
-    parser.add_argument("--out", type=Path, default=HERE, help="folder of the figure")
-    parser.add_argument("--json", action="store_true", help="print all numbers as JSON")
-    words = parser.parse_args()
-    answer = main(words.seed, words.out, words.throws)
-    print(json.dumps(answer, indent=2) if words.json else table(answer))
+    from study import ask  # beside this file, which is the first place looked in when it is run
+
+    ask("The map's effects against a rigid-body engine.", main, table)

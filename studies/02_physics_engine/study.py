@@ -264,12 +264,17 @@ def main(seed: int = 0, out: Path = HERE, throws: int = THROWS) -> dict[str, Any
     return numbers
 
 
-if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description="The throw map against a rigid-body engine.")
+def ask(about: str, study: Callable[..., Any], as_table: Callable[[Any], str]) -> None:
+    """Run a study as the command line says, and print its table or all its numbers."""
+    parser = argparse.ArgumentParser(description=about)
     parser.add_argument("--seed", type=int, default=0, help="of the starts")
-    parser.add_argument("--throws", type=int, default=THROWS, help="in each scene")
+    parser.add_argument("--throws", type=int, default=THROWS, help="in each scene or case")
     parser.add_argument("--out", type=Path, default=HERE, help="folder of the figure")
     parser.add_argument("--json", action="store_true", help="print all numbers as JSON")
     words = parser.parse_args()
-    answer = main(words.seed, words.out, words.throws)
-    print(json.dumps(answer, indent=2) if words.json else table(answer))
+    answer = study(words.seed, words.out, words.throws)
+    print(json.dumps(answer, indent=2) if words.json else as_table(answer))
+
+
+if __name__ == "__main__":
+    ask("The throw map against a rigid-body engine.", main, table)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -14,10 +12,10 @@ import pytest
 import limitsets as ls
 from limitsets.maps import drivers
 from tests.bench.measure import Turns, take_turns, versus
+from tests.thrower.effects.copies import environment_of_copy
 
 pytestmark = pytest.mark.bench
 
-PACKAGE = Path(ls.__file__).parent
 PAIRS = 20
 COUNT = 4096
 
@@ -40,19 +38,12 @@ def two_packages(tmp_path):
     """Processes with the package whole, and with the effects deleted, each waiting to time throws."""
     workers = {}
     for word in ("with", "without"):
-        copy = tmp_path / word / "limitsets"
-        shutil.copytree(PACKAGE, copy, ignore=shutil.ignore_patterns("__pycache__"))
-        if word == "without":
-            shutil.rmtree(copy / "thrower" / "effects")
-            (copy / "thrower" / "full.py").unlink()
-        environment = {**os.environ, "PYTHONPATH": str(copy.parent)}
-        environment["NUMBA_CACHE_DIR"] = str(tmp_path / word / "cache")
         workers[word] = subprocess.Popen(
             [sys.executable, str(Path(__file__).with_name("timed_throws.py")), word],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             text=True,
-            env=environment,
+            env=environment_of_copy(tmp_path, word),
         )
     yield workers
     for worker in workers.values():

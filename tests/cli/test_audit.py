@@ -6,20 +6,7 @@ from pathlib import Path
 import pytest
 
 import limitsets as ls
-from limitsets.cli import main
-
-
-@pytest.fixture(autouse=True)
-def here(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-
-
-def run(capfd, *words):
-    code = main(words)
-    out, err = capfd.readouterr()
-    assert "Traceback" not in err
-    assert all(line.startswith("limitsets: ") for line in err.splitlines())
-    return code, out, err
+from tests.cli.command import run
 
 
 def test_table_says_what_breaks_where_and_how_often(capfd):

@@ -2,7 +2,6 @@
 
 import json
 import os
-import re
 import signal
 import subprocess
 import sys
@@ -11,23 +10,8 @@ from pathlib import Path
 import pytest
 
 import limitsets as ls
-from limitsets.cli import main
 from limitsets.proofs import confirm
-
-PROGRESS = re.compile(r" \([0-9]+ of [0-9]+\)$")  # of what takes over two seconds
-
-
-@pytest.fixture(autouse=True)
-def here(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-
-
-def run(capfd, *words):
-    code = main(words)
-    out, err = capfd.readouterr()
-    assert "Traceback" not in err
-    assert all(line.startswith("limitsets: ") for line in err.splitlines())
-    return code, out, err
+from tests.cli.command import PROGRESS, run
 
 
 def test_proved_is_exit_0_and_rechecks(capfd):

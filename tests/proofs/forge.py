@@ -51,16 +51,26 @@ def scene(model: str) -> dict:
     }
 
 
+def magnitude(text: str) -> float:
+    """Drop the unit."""
+    return float(text.split()[0])
+
+
+def box(lo: float, hi: float | None = None) -> list[str]:
+    """Widen by more than the error of plain floats, in the certificate's spelling."""
+    hi = lo if hi is None else hi
+    return [float(v).hex() for v in (lo - 1e-12 * (1 + abs(lo)), hi + 1e-12 * (1 + abs(lo)))]
+
+
 class Plain:
     """The throw in numpy floats."""
 
     def __init__(self, data: dict, noise: float = 0.0):
-        number = lambda text: float(text.split()[0])  # noqa: E731
         center = data["part"]["mass"]["center"]
-        self.h, self.arm = number(data["arm"]["surface_height"]), number(data["arm"]["length"])
-        self.kappa = number(data["throw"]["kappa"])
+        self.h, self.arm = magnitude(data["arm"]["surface_height"]), magnitude(data["arm"]["length"])
+        self.kappa = magnitude(data["throw"]["kappa"])
         self.k_lo, self.k_hi = self.kappa / (1 + noise) ** 2, self.kappa / (1 - noise) ** 2
-        self.rho = number(data["part"]["mass"]["radius_of_gyration"])
+        self.rho = magnitude(data["part"]["mass"]["radius_of_gyration"])
         self.exact = data["model"]["flight"] == "exact"
         self.signed = data["model"]["flip"] == "signed"
         # The triangle on side 2: (0, 0), (L2, 0) and the apex, which is the left vertex of side 0.
@@ -68,7 +78,7 @@ class Plain:
         x = (low**2 + left**2 - right**2) / (2 * low)
         apex = np.array([x, np.sqrt(left**2 - x**2)])
         zero, far = np.zeros(2), np.array([low, 0.0])
-        com = np.array([number(center["along"]), number(center["above"])])
+        com = np.array([magnitude(center["along"]), magnitude(center["above"])])
         self.a, self.d = np.empty(3), np.empty(3)
         for side, (start, end) in {2: (zero, far), 0: (apex, zero), 1: (far, apex)}.items():
             e = (end - start) / np.linalg.norm(end - start)
@@ -270,8 +280,6 @@ def forge(
         cells = inside[starts[i] : starts[i + 1]]
         x = np.concatenate([edges[i][:-1][cells], edges[i][1:][cells]])
         slopes += [m.slope(i, x, k).min() for k in (m.k_lo, m.k_hi) if len(x)]
-    box = lambda lo, hi=None: [float(v).hex() for v in (  # noqa: E731
-        lo - 1e-12 * (1 + abs(lo)), (lo if hi is None else hi) + 1e-12 * (1 + abs(lo)))]  # fmt: skip
     claims = [
         {
             "claim": "attracts-all",

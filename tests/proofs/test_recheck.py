@@ -23,7 +23,6 @@ import pytest
 
 pytest.importorskip("flint", reason="the checker needs python-flint")
 
-import flint
 from flint import arb
 
 from tests.proofs import forge
@@ -41,18 +40,10 @@ def load(name: str, path: Path):
 
 
 checker = load("lone_recheck", SOURCE)
+pytestmark = pytest.mark.usefixtures("precision")
 
 CLAIMS = ["attracts-all", "invariant", "trapping", "expanding", "goal"]
 COARSE = {"first": 0.1, "ratio": 0.012, "widest": 0.06}
-
-
-@pytest.fixture(autouse=True)
-def precision():
-    """The checker sets the precision in `recheck` and in its workers; tests of its parts need it as well."""
-    before = flint.ctx.prec
-    flint.ctx.prec = checker.PRECISION
-    yield
-    flint.ctx.prec = before
 
 
 @pytest.fixture(scope="module")

@@ -14,7 +14,6 @@ import pytest
 
 pytest.importorskip("flint", reason="the checker needs python-flint")
 
-import flint
 from flint import arb
 
 import limitsets as ls
@@ -25,16 +24,9 @@ from tests.proofs.test_recheck import COARSE, checker, parts, verdict, whole
 from tests.sets.part import Part
 from tests.test_paper import LIMIT_SETS
 
+pytestmark = pytest.mark.usefixtures("precision")
+
 INVARIANT, ENDS, CYCLES = range(3)
-
-
-@pytest.fixture(autouse=True)
-def precision():
-    """The checker sets the precision in `recheck`; tests of its parts need it as well."""
-    before = flint.ctx.prec
-    flint.ctx.prec = checker.PRECISION
-    yield
-    flint.ctx.prec = before
 
 
 @pytest.fixture(scope="module")

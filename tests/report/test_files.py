@@ -20,7 +20,7 @@ def test_all_at_once(tmp_path):
 @pytest.mark.parametrize("fault", [ValueError, KeyboardInterrupt, SystemExit])
 def test_a_fault_leaves_the_old_ones(tmp_path, fault):
     (tmp_path / "one").write_text("old")
-    with pytest.raises(fault), replaced(tmp_path) as draft:  # noqa: PT012
+    with pytest.raises(fault), replaced(tmp_path) as draft:  # noqa: PT012 - leaving the block is what is tested
         (draft / "one").write_text("half")
         raise fault
     assert [(path.name, path.read_text()) for path in tmp_path.iterdir()] == [("one", "old")]
@@ -38,7 +38,7 @@ def test_a_fault_between_two_renames_leaves_whole_files(tmp_path, monkeypatch):
         return rename(self, target)
 
     monkeypatch.setattr(Path, "replace", fails_second)
-    with pytest.raises(OSError, match="No space"), replaced(tmp_path) as draft:  # noqa: PT012
+    with pytest.raises(OSError, match="No space"), replaced(tmp_path) as draft:  # noqa: PT012 - leaving the block is what is tested
         (draft / "one").write_text("new")
         (draft / "two").write_text("new")
     assert {path.name: path.read_text() for path in tmp_path.iterdir()} == {"one": "new", "two": "old"}
@@ -47,7 +47,7 @@ def test_a_fault_between_two_renames_leaves_whole_files(tmp_path, monkeypatch):
 def test_only_regular_files_are_replaced(tmp_path):
     (tmp_path / "two").mkdir()
     (tmp_path / "one").write_text("old")
-    with pytest.raises(FileExistsError), replaced(tmp_path) as draft:  # noqa: PT012
+    with pytest.raises(FileExistsError), replaced(tmp_path) as draft:  # noqa: PT012 - leaving the block is what is tested
         (draft / "one").write_text("new")
         (draft / "two").write_text("new")
     assert (tmp_path / "one").read_text() == "old"

@@ -291,7 +291,7 @@ def test_refuses_places_without_a_scene(tmp_path: Path) -> None:
         ({3: 4}, "a key"),
     ]:
         with pytest.raises(SceneError) as caught:
-            load(source)  # type: ignore[arg-type]
+            load(source)  # type: ignore[arg-type]  # wrong on purpose
         assert words in str(caught.value)
         str(caught.value).encode("utf-8")
 

@@ -16,7 +16,7 @@ from limitsets.thrower import fly, throw_map, trace
 
 flint = pytest.importorskip("flint", reason="the balls of python-flint are the reference")
 from tests.thrower import exhaustive  # noqa: E402  # needs flint
-from tests.thrower.exhaustive import Part, arb  # noqa: E402
+from tests.thrower.exhaustive import Part, arb  # noqa: E402  # needs flint
 
 ULPS = 4.0  # allowed, times the condition number
 

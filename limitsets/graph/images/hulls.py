@@ -112,7 +112,7 @@ class Images:
         kept = (self.count, *self.slots, self.to, self.witness)
         _enclose(lo_map, hi_map, side, lo, hi, kept)
         again = np.flatnonzero(self.count == NOTHING)
-        if again.size and type(lo_map) in fallback_box.methods:  # type: ignore[attr-defined]  # a generic function has them
+        if again.size and type(lo_map) in fallback_box.methods:
             _enclose_surely(lo_map, hi_map, side, lo, hi, again, kept)
         _refuse(self.count, *self.slots)
 

@@ -19,7 +19,7 @@ from limitsets.thrower.effects.pivot import Pivot
 from limitsets.thrower.effects.roll import Roll
 from limitsets.thrower.effects.slip import Slip
 from limitsets.thrower.effects.spread import spread_of
-from limitsets.thrower.motion import FullThrow, outline_of
+from limitsets.thrower.motion import Effects, FullThrow, outline_of
 from limitsets.thrower.params import Exact, Throw
 
 __all__ = ["BUILT", "Effect", "with_effects"]
@@ -85,6 +85,4 @@ def with_effects(bare: Throw, effects: Mapping[str, Any], world: Any) -> FullThr
             "the flight", type(bare.flight).__name__, "the exact one", 'effects need flight = "exact"'
         )
     chosen = {name: BUILT[name].build(world, how) for name, how in effects.items()}
-    full: Any = FullThrow  # mypy does not follow unpacked fields
-    built: FullThrow = full(bare, outline_of(bare), **chosen)
-    return built
+    return FullThrow(bare, outline_of(bare), Effects(**chosen))

@@ -73,7 +73,7 @@ def first_arrival(landing: Any, part: FullSide, x: float) -> tuple[Arrival, bool
     own = part.own
     at, _ = settle(own, x)
     shift, _ = jog_displacement(own.flight, own, at)
-    pull, speed = pulled(part.drive, own.kappa, at.phi)
+    pull, speed = pulled(part.effects.drive, own.kappa, at.phi)
     left = Arrival(own.side, at, shift + pull, speed - (own.h + own.d), x - own.kappa * at.phi, 1.0)
     flies = (x > own.a) & (at.phi > 0.0) & (at.phi <= own.flight.full_turn)
     if landing is None:
@@ -89,7 +89,7 @@ def first_arrival(landing: Any, part: FullSide, x: float) -> tuple[Arrival, bool
     now = turn(phi)
     # X, how far the centre is right of the vertex that lands, and its shift if the part fell back on side `vertex`
     right = part.q[k] * now.s - part.p[k] * (1.0 - now.v)
-    pull, speed = pulled(part.drive, own.kappa, phi)
+    pull, speed = pulled(part.effects.drive, own.kappa, phi)
     moved = pull - (own.h + own.d) * phi + (part.a[k] - right)
     offset = own.corner
     for number in range(own.side + 1, vertex):

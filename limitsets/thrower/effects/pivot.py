@@ -49,7 +49,7 @@ class Pivot(NamedTuple):
 def _held_by(pivot: Any) -> float:
     if pivot is None:
         return 0.0
-    return pivot.friction  # type: ignore[no-any-return]
+    return pivot.friction  # type: ignore[no-any-return]  # it comes as Any
 
 
 @kernel
@@ -57,7 +57,7 @@ def _friction(pivot: Any, slip: Any) -> float:
     """Of whichever effect is there: both read the one fact."""
     if slip is None:
         return _held_by(pivot)
-    return slip.friction  # type: ignore[no-any-return]
+    return slip.friction  # type: ignore[no-any-return]  # it comes as Any
 
 
 @kernel
@@ -78,7 +78,7 @@ def _hinged(pivot: Any, part: FullSide, hit: Contact) -> Face:
     inertia = part.own.rho2 + (right * right + high * high)
     kinetic = 0.5 * inertia * hit.omega * hit.omega
     ell = math.sqrt(right * right + high * high)
-    gravity, right, high = leant(part.drive, part.own.kappa, right, high)
+    gravity, right, high = leant(part.effects.drive, part.own.kappa, right, high)
     near = right * abs(right) / (ell + abs(high))  # sgn(X) (ell - H), see impact.py
     far = (ell - high) if right > 0.0 else (high - ell)
     barrier = gravity * (near if high > 0.0 else far)
@@ -86,7 +86,7 @@ def _hinged(pivot: Any, part: FullSide, hit: Contact) -> Face:
     side = hit.vertex + 1 if over else hit.vertex
     k = side_number(part, side)
     foot = part.a[k] - part.length[k] if over else part.a[k]
-    _, _, low = leant(part.drive, part.own.kappa, foot, part.d[k])
+    _, _, low = leant(part.effects.drive, part.own.kappa, foot, part.d[k])
     energy = kinetic + gravity * (high - low)
     rate = math.sqrt(max(2.0 * energy / inertia, 0.0))
     shift = hit.shift - on_to_next(part, hit.vertex) if over else hit.shift

@@ -62,6 +62,7 @@ def _rolls(roll: Any, part: FullSide, face: Face, after: Contact) -> bool:
     right = right_of(part, after.vertex, after.psi)
     along, up = after.slide - after.omega * d, after.omega * right
     turning = part.own.rho2 * after.omega * after.omega + up * up
+    # kernels take arrays as Any, and with them d and all that comes of it
     return (after.omega * face.omega > 0.0) & (turning + along * along > 2.0 * lift) & (turning > FLAT * lift)  # type: ignore[no-any-return]
 
 
@@ -78,5 +79,5 @@ def next_arrival(roll: Any, bounce: Any, slip: Any, part: FullSide, face: Face) 
 @kernel
 def _lift(part: FullSide, foot: float, d: float) -> float:
     """Energy it takes from lying on a side to the top over one of its ends, which is `foot` left of the centre."""
-    gravity, right, high = leant(part.drive, part.own.kappa, foot, d)
+    gravity, right, high = leant(part.effects.drive, part.own.kappa, foot, d)
     return gravity * right * right / (math.hypot(right, high) + high)  # ell - H

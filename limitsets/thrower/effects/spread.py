@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 from limitsets.errors import MapError
 from limitsets.jit import generic, kernel
 from limitsets.maps.counting_random import normal_pair, uniform_pair
-from limitsets.thrower.motion import FullThrow, at_kappa
+from limitsets.thrower.motion import Effects, FullThrow, at_kappa
 
 __all__ = ["Even", "Normal", "Spread", "moved_by", "spread_of", "spread_over"]
 
@@ -57,11 +57,9 @@ class Spread(NamedTuple):
     shift: float = 0.0
 
 
+@generic
 def drawn(law: Any, seed: int, start: int, step: int) -> tuple[float, float]:
     """Return two independent deviations, in units of the largest or the standard one."""
-
-
-drawn = generic(drawn)
 
 
 @kernel
@@ -75,8 +73,8 @@ def _normal(law: Any, seed: int, start: int, step: int) -> tuple[float, float]:
     return normal_pair(seed, start, step)
 
 
-drawn.on(Even, _even)  # type: ignore[attr-defined]  # generic functions carry `on`
-drawn.on(Normal, _normal)  # type: ignore[attr-defined]
+drawn.on(Even, _even)
+drawn.on(Normal, _normal)
 
 
 @kernel
@@ -94,16 +92,12 @@ def spread_over(spread: Any, params: FullThrow, start: int, step: int) -> FullTh
         return params
     speed, landing = drawn(spread.law, int(spread.seed), start, step)
     factor = 1.0 + spread.speed * speed
+    on = params.effects
+    thrown = Spread(spread.law, spread.speed, spread.landing, spread.seed, spread.landing * landing)
     return FullThrow(
         at_kappa(params.bare, params.bare.kappa / (factor * factor)),
         params.outline,
-        params.landing,
-        params.roll,
-        params.pivot,
-        params.slip,
-        params.bounce,
-        params.drive,
-        Spread(spread.law, spread.speed, spread.landing, spread.seed, spread.landing * landing),
+        Effects(on.landing, on.roll, on.pivot, on.slip, on.bounce, on.drive, thrown),
     )
 
 

@@ -1,14 +1,10 @@
 """What a scene does not ask for is not in its machine code: the bare map's is the same with the effects deleted."""
 
-import os
-import shutil
 import subprocess
 import sys
 from pathlib import Path
 
-import limitsets
-
-PACKAGE = Path(limitsets.__file__).parent
+from tests.thrower.effects.copies import environment_of_copy
 
 # Prints a digest of the machine code of one compiled loop over throws; symbols carry counters, so they are left out.
 SCRIPT = """
@@ -29,22 +25,18 @@ print(len(lines), hashlib.sha256(body.encode()).hexdigest())
 
 
 def machine_code(folder: Path, word: str) -> str:
-    environment = {**os.environ, "PYTHONPATH": str(folder), "NUMBA_CACHE_DIR": str(folder / "cache")}
     done = subprocess.run(
-        [sys.executable, "-c", SCRIPT, word], capture_output=True, text=True, check=False, env=environment
+        [sys.executable, "-c", SCRIPT, word],
+        capture_output=True,
+        text=True,
+        check=False,
+        env=environment_of_copy(folder, word),
     )
     assert done.returncode == 0, done.stderr
     return done.stdout
 
 
 def test_the_bare_map_has_the_same_machine_code_without_the_effects(tmp_path: Path) -> None:
-    copies = []
-    for word in ("with", "without"):
-        copy = tmp_path / word / "limitsets"
-        shutil.copytree(PACKAGE, copy, ignore=shutil.ignore_patterns("__pycache__"))
-        if word == "without":
-            shutil.rmtree(copy / "thrower" / "effects")
-            (copy / "thrower" / "full.py").unlink()
-        copies.append(machine_code(copy.parent, word))
-    assert copies[0] == copies[1]
-    assert int(copies[0].split()[0]) > 500  # there is a loop in it
+    whole, bare = machine_code(tmp_path, "with"), machine_code(tmp_path, "without")
+    assert whole == bare
+    assert int(whole.split()[0]) > 500  # there is a loop in it

@@ -117,23 +117,23 @@ def _note(book: Any, line: int, column: int, one: float, two: float, three: floa
 def ledger(params: Any, x: float, side: int, book: Any) -> int:
     """Fill a book with the steps of a throw: kind, X and H, then height, velocities and rate before and after."""
     part = gather_full(params, side)
-    hit, moving = first_arrival(part.landing, part, x)
+    hit, moving = first_arrival(part.effects.landing, part, x)
     line = 0
     while moving and line + 3 < book.shape[0]:
         right, high = right_of(part, hit.vertex, hit.psi), above(part, hit.vertex, hit.psi)
-        start = struck(part.bounce, part.slip, part, hit)
+        start = struck(part.effects.bounce, part.effects.slip, part, hit)
         # the height, fourth, is written again by the next line
         _note(book, line, 0, IMPACT, right, high, high)
         _note(book, line, 3, high, hit.vx, hit.vy, hit.omega)
         vx, vy = start.slide - start.omega * high, start.lift + start.omega * right
         _note(book, line, 7, high, vx, vy, start.omega)
-        contact, face, ends = turned_down(part.pivot, part.slip, part, start)
+        contact, face, ends = turned_down(part.effects.pivot, part.effects.slip, part, start)
         if ends == LOST:
             return -1
         book[line + 1, 0] = TURN
         _note(book, line + 1, 3, high, vx, vy, start.omega)
         if ends == DOWN:
-            hit, moving = next_arrival(part.roll, part.bounce, part.slip, part, face)
+            hit, moving = next_arrival(part.effects.roll, part.effects.bounce, part.effects.slip, part, face)
             d = above(part, hit.vertex, hit.psi)
             _note(book, line + 1, 7, d, hit.vx, hit.vy, hit.omega)
             line += 2
@@ -144,7 +144,9 @@ def ledger(params: Any, x: float, side: int, book: Any) -> int:
             )
             vx, vy = contact.slide - contact.omega * high, contact.lift + contact.omega * right
             _note(book, line + 1, 7, high, vx, vy, contact.omega)
-            hit, moving = fly_on(part.pivot, part.slip, part.bounce, part, contact, hit)
+            hit, moving = fly_on(
+                part.effects.pivot, part.effects.slip, part.effects.bounce, part, contact, hit
+            )
             book[line + 2, 0] = FLIGHT
             _note(book, line + 2, 3, high, vx, vy, contact.omega)
             _note(book, line + 2, 7, above(part, hit.vertex, hit.psi), hit.vx, hit.vy, hit.omega)

@@ -150,7 +150,7 @@ def test_the_least_value_is_found_inside_the_stroke() -> None:
 def arrivals(params: Any, x: np.ndarray, side: int, out: np.ndarray) -> None:
     part = gather_full(params, side)
     for k in range(x.size):
-        hit, _ = first_arrival(part.landing, part, x[k])
+        hit, _ = first_arrival(part.effects.landing, part, x[k])
         out[k, 0], out[k, 1], out[k, 2], out[k, 3] = hit.shift, hit.vx, hit.vy, hit.omega
         out[k, 4], out[k, 5] = right_of(part, hit.vertex, hit.psi), above(part, hit.vertex, hit.psi)
 

@@ -108,7 +108,7 @@ def test_a_scatter_in_degrees_per_second_is_one_in_percent() -> None:
     }
     speed = np.degrees(np.sqrt(193.045 / DESIGNED.kappa))
     tree["world"] = {"scatter": {"speed": f"{float(0.004 * speed)!r} deg/s"}}
-    assert ls.load(tree).map.spread.speed == pytest.approx(0.004, rel=1e-12)
+    assert ls.load(tree).map.effects.spread.speed == pytest.approx(0.004, rel=1e-12)
     del tree["gravity"]
     with pytest.raises(ls.errors.SceneError, match="gravity"):
         _ = ls.load(tree).map

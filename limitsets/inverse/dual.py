@@ -1,0 +1,92 @@
+"""Dual numbers: a value and its derivatives with respect to several quantities, carried through one computation.
+
+Sent through the formulas of `geometry`, which are written on scalars with ``+ - * /`` and a passed-in ``sqrt``, they
+give exact derivatives of what those compute, to rounding; nothing is differenced.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+__all__ = ["Dual", "cosine", "sine", "square_root"]
+
+Array = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Dual:
+    """A number that knows its derivatives.
+
+    Parameters
+    ----------
+    value : float
+        The number.
+    slope : ndarray, shape (k,)
+        Its derivatives with respect to k quantities.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> x, y = Dual(3.0, np.array([1.0, 0.0])), Dual(2.0, np.array([0.0, 1.0]))
+    >>> (x * y / (x + y)).slope
+    array([0.16, 0.36])
+    """
+
+    value: float
+    slope: Array
+
+    def __float__(self) -> float:
+        return self.value
+
+    def __neg__(self) -> Dual:
+        return Dual(-self.value, -self.slope)
+
+    def __add__(self, other: Dual | float) -> Dual:
+        if isinstance(other, Dual):
+            return Dual(self.value + other.value, self.slope + other.slope)
+        return Dual(self.value + other, self.slope)
+
+    __radd__ = __add__
+
+    def __sub__(self, other: Dual | float) -> Dual:
+        return self + -other
+
+    def __rsub__(self, other: float) -> Dual:
+        return -self + other
+
+    def __mul__(self, other: Dual | float) -> Dual:
+        if isinstance(other, Dual):
+            return Dual(self.value * other.value, self.value * other.slope + other.value * self.slope)
+        return Dual(self.value * other, self.slope * other)
+
+    __rmul__ = __mul__
+
+    def __truediv__(self, other: Dual | float) -> Dual:
+        if isinstance(other, Dual):
+            quotient = self.value / other.value
+            return Dual(quotient, (self.slope - quotient * other.slope) / other.value)
+        return Dual(self.value / other, self.slope / other)
+
+    def __rtruediv__(self, other: float) -> Dual:
+        quotient = other / self.value
+        return Dual(quotient, -quotient / self.value * self.slope)
+
+
+def square_root(x: Dual) -> Dual:
+    """Square root of a number above 0; that of 0 has no derivative."""
+    root = math.sqrt(x.value)
+    return Dual(root, x.slope / (2.0 * root))
+
+
+def sine(x: Dual) -> Dual:
+    """Sine of an angle [rad]."""
+    return Dual(math.sin(x.value), math.cos(x.value) * x.slope)
+
+
+def cosine(x: Dual) -> Dual:
+    """Cosine of an angle [rad]."""
+    return Dual(math.cos(x.value), -math.sin(x.value) * x.slope)

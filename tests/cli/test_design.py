@@ -1,0 +1,97 @@
+"""`limitsets design`: words, JSON, files, exit codes."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+import limitsets as ls
+from limitsets.cli import main
+
+VARY = "part.mass.center.along,part.mass.center.above,throw.speed"
+
+
+@pytest.fixture(autouse=True)
+def here(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+
+
+def run(capfd, *words):
+    code = main(words)
+    out, err = capfd.readouterr()
+    assert "Traceback" not in err
+    return code, out, err
+
+
+def points_of(scene):
+    return [points[0].x for points in ls.critical_points(scene.map, scene.domain).values()]
+
+
+def test_words_and_a_scene_that_loads_again(capfd):
+    code, out, _ = run(capfd, "design", "paper-initial", "--critical-points", "10,10,20", "--vary", VARY)
+    assert code == 0
+    assert "Reached: every critical point wanted" in out
+    assert "condition number of the derivatives: 7.066" in out
+    rows = {
+        line.split()[0]: line.split()[1:3] for line in out.splitlines() if line.strip()[:2] in ("pa", "r_")
+    }
+    assert rows["r_0"] == ["19.9999992", "10"]
+    assert rows["part.mass.center.along"][0] == "3.9867006"
+    Path("printed.toml").write_text(out[out.index('name = "') :], encoding="utf-8")
+    assert points_of(ls.load("printed.toml")) == pytest.approx([10, 10, 20], abs=1e-9)
+    assert {path.name for path in Path().iterdir()} == {"printed.toml"}
+
+
+def test_a_file_and_a_folder(capfd):
+    words = ("design", "paper-initial", "--critical-points", "25.4 cm,10 in,20", "--vary", VARY)
+    code, out, _ = run(capfd, *words, "-o", "found.toml")
+    assert code == 0
+    assert out.splitlines()[-1] == "scene: found.toml"
+    assert points_of(ls.load("found.toml")) == pytest.approx([10, 10, 20], abs=1e-9)
+    code, out, _ = run(capfd, *words, "--stages", "2", "-o", "deep/found", "--json")
+    assert code == 0
+    folder = Path("deep/found")
+    assert {path.name for path in folder.iterdir()} == {
+        "paper-initial-design.toml",
+        "design.json",
+        "design.png",
+    }
+    record = json.loads(out)
+    assert record == json.loads((folder / "design.json").read_text(encoding="utf-8"))
+    assert record["reached"] is True
+    assert record["targets"] == [10, 10, 20]
+    assert len(record["path"]) == 3
+    assert ls.load(record["scene"]) == ls.load(folder / "paper-initial-design.toml")
+    assert (folder / "design.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_not_reached_is_exit_1(capfd):
+    words = ("--critical-points", "10,free,20", "--vary", "throw.speed", "--starts", "0")
+    bounds = ("--bounds", "throw.speed=:'150 deg/s'")
+    code, out, _ = run(capfd, "design", "paper-initial", *words, *bounds)
+    assert code == 1
+    assert "Not reached: the nearest found misses by" in out
+    assert "1 varied for 2 wanted: least squares; throw.speed is at its upper bound" in out
+    assert "(free)" in out
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("no-such-scene", "--critical-points", "10,10,20", "--vary", VARY),
+        ("paper-initial", "--critical-points", "10,10", "--vary", VARY),
+        ("paper-initial", "--critical-points", "10,ten,20", "--vary", VARY),
+        ("paper-initial", "--critical-points", "10,10,20", "--vary", "speed"),
+        ("paper-initial", "--critical-points", "10,10,20", "--vary", VARY, "--bounds", "throw.speed=3"),
+        ("paper-initial", "--critical-points", "10,10,20", "--vary", VARY, "-o", "taken/deeper"),
+        ("paper-initial", "--critical-points", "10,10,20", "--vary", VARY, "-o", "taken.toml/found.toml"),
+        ("paper-initial", "--vary", VARY),
+    ],
+)
+def test_bad_input_is_exit_2(capfd, words):
+    Path("taken").write_text("a file")
+    Path("taken.toml").write_text("a file")
+    code, out, err = run(capfd, "design", *words)
+    assert code == 2
+    assert out == ""
+    assert err
