@@ -14,6 +14,17 @@ from limitsets.plot.basin import basins
 from limitsets.plot.flights import flight
 from limitsets.plot.limit_sets import limit_set
 from limitsets.plot.maps import map  # noqa: A004 - ls.plot.map is the word for it
+from limitsets.plot.margins import margin_curve, tolerance_box, tornado
 from limitsets.plot.morse_graphs import morse
 
-__all__ = ["audit", "basins", "flight", "limit_set", "map", "morse"]
+__all__ = [
+    "audit",
+    "basins",
+    "flight",
+    "limit_set",
+    "map",
+    "margin_curve",
+    "morse",
+    "tolerance_box",
+    "tornado",
+]

@@ -1,6 +1,6 @@
 """How far a scene may drift, and what chance does to it: margins of goals, and noise by the transfer operator.
 
-A margin is a bracket of deviations: up to its lower end the goal is proved, at its upper end an orbit refutes it.  Noise
-that has a distribution instead of bounds is a Markov chain between cells (generalised cell mapping); it is sampled
-knowledge, never a proof, and every answer says so.
+A margin is a bracket of deviations: up to its lower end the goal is proved, at its upper end an orbit refutes it.
+Noise that has a distribution instead of bounds is a Markov chain between cells (generalised cell mapping); it is
+sampled knowledge, never a proof, and every answer says so.
 """
