@@ -61,8 +61,10 @@ class RobustDesign:
         The design, with [goal] (the first of `goals`) and [tolerance].
     goals : tuple of Goal
         What has to hold, all of it.
-    x : float
+    x, side : float, int
         Where parts are fed [scene's unit].
+    varied : tuple of str
+        What was varied.
     tolerance : dict of str to str
         What the margin multiplies.
     sampled : Sharp
@@ -92,6 +94,8 @@ class RobustDesign:
     scene: Scene
     goals: tuple[Goal, ...]
     x: float
+    side: int
+    varied: tuple[str, ...]
     tolerance: dict[str, str]
     sampled: Sharp
     margin: Margin | None
@@ -276,7 +280,7 @@ def robust_design(
             goals = fed_at(round(before.x, DECIMALS_OF_X), on)
             own = joint_margin(start, goals, texts, seconds=prove, tell=_telling(tell, "margin of the scene before"))
     return RobustDesign(
-        design, fed_at(x, on), x, texts, found, margin, lead_of(design), throws_to_feed(design, x, on, seed=seed),
+        design, fed_at(x, on), x, on, tuple(search.bounds), texts, found, margin, lead_of(design), throws_to_feed(design, x, on, seed=seed),
         front, history, start, before, own, sum(each.evaluations for each in searches), seconds,
     )
 
