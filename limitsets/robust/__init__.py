@@ -4,3 +4,12 @@ A margin is a bracket of deviations: up to its lower end the goal is proved, at 
 that has a distribution instead of bounds is a Markov chain between cells (generalised cell mapping); it is sampled
 knowledge, never a proof, and every answer says so.
 """
+
+from __future__ import annotations
+
+from limitsets.robust.laws import Gaussian as Gaussian
+from limitsets.robust.laws import Given as Given
+from limitsets.robust.laws import Samples as Samples
+from limitsets.robust.laws import Uniform as Uniform
+from limitsets.robust.scattering import Scattering as Scattering
+from limitsets.robust.transfer import transfer as transfer
