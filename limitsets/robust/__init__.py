@@ -13,3 +13,5 @@ from limitsets.robust.laws import Samples as Samples
 from limitsets.robust.laws import Uniform as Uniform
 from limitsets.robust.scattering import Scattering as Scattering
 from limitsets.robust.transfer import transfer as transfer
+from limitsets.robust.absorption import absorption as absorption
+from limitsets.robust.classes import classes as classes
