@@ -15,3 +15,6 @@ from limitsets.robust.scattering import Scattering as Scattering
 from limitsets.robust.transfer import transfer as transfer
 from limitsets.robust.absorption import absorption as absorption
 from limitsets.robust.classes import classes as classes
+from limitsets.robust.statistics import NoiseStatistics as NoiseStatistics
+from limitsets.robust.statistics import noise_levels as noise_levels
+from limitsets.robust.statistics import noise_statistics as noise_statistics

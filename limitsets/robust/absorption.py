@@ -30,7 +30,7 @@ class Absorption:
     Attributes
     ----------
     probability : dict of str to ndarray, shape (n_cells,)
-        By name: "goal", "class 0" and so on (closed classes in the order of their cells), and the ways out.
+        By name: "goal", "other" where asked for, "class 0" and so on (closed classes in the order of their cells), and the ways out.
     mean : ndarray, shape (n_cells,)
         Mean number of steps to the goal, of those that come to it; 0 on the goal, nan where none does.
     goal : ndarray of bool, shape (n_cells,)
@@ -105,7 +105,9 @@ class _Equations:
         return answer
 
 
-def absorption(chain: Transfer, goal: NDArray[np.bool_]) -> Absorption:
+def absorption(
+    chain: Transfer, goal: NDArray[np.bool_], *, other: NDArray[np.bool_] | None = None
+) -> Absorption:
     """Find where the chain ends, and after how many steps it is at the goal.
 
     Parameters
@@ -114,6 +116,8 @@ def absorption(chain: Transfer, goal: NDArray[np.bool_]) -> Absorption:
         The operator.
     goal : ndarray of bool, shape (n_cells,)
         Cells that absorb.
+    other : ndarray of bool, shape (n_cells,), optional
+        Cells that absorb too and are counted apart from the goal, as "other".
 
     Returns
     -------
@@ -132,12 +136,15 @@ def absorption(chain: Transfer, goal: NDArray[np.bool_]) -> Absorption:
     """
     goal = np.asarray(goal, dtype=bool)
     graph = graph_of(chain)
-    closed, _ = closed_sets(chain, graph, goal)
-    open_ = ~goal
+    absorbing = goal if other is None else goal | other
+    closed, _ = closed_sets(chain, graph, absorbing)
+    open_ = ~absorbing
     for cells in closed:
         open_[cells] = False
     equations = _Equations(chain, open_, strong_components(graph).label)
     ends: dict[str, Any] = {"goal": np.flatnonzero(goal)}
+    if other is not None:
+        ends["other"] = np.flatnonzero(other & ~goal)
     ends.update({f"class {number}": cells for number, cells in enumerate(closed)})
     probability = {}
     for name, cells in ends.items():
