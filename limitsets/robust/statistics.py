@@ -33,6 +33,8 @@ BEYOND_FOOT = 0.05
 # Relative change of the noise for derivatives, and half of it.
 STEP = 0.1
 WIDER = 1.25
+# Escapes per throw below which a class counts as one that parts settle in.
+KEPT = 1e-6
 
 Progress = Callable[[str, int, int], None]
 
@@ -78,7 +80,8 @@ class NoiseStatistics:
     classes : tuple of NoisyClass
         Closed classes, then those left at a small rate.
     settles : dict of str to float
-        Without a goal: share of the random starts that end in each closed class, and by each way out.
+        Without a goal: share of the random starts that end in each class left at less than 1e-6 per throw ("class 0"
+        is `classes[0]`), and by each way out.
     ends : Absorption
         With the goal: where each cell ends, and after how many throws.
     feeding : Feeding
@@ -95,7 +98,7 @@ class NoiseStatistics:
 
     Notes
     -----
-    Of the class that most random starts settle in (or, where none is closed, of the one left most slowly):
+    Of the class that most random starts settle in (or, where they stay in none, of the one left most slowly):
     "time on side k", "share of" each branch, "time beyond" (share of rests beyond x of the goal, on any side),
     "wrong beyond" (of these, the share on another side), "escape" (per throw).  Of random starts: "fed" (share that
     comes to the goal), "mean throws" of those, "95 % throws" of all, "first beyond is wrong" (the first rest beyond
@@ -239,9 +242,10 @@ def _solve(asked: _Asked, scatter: Scattering) -> _Found:
     beyond = np.concatenate([cover.centres(k) > x for k in range(cover.sides)])
     goal = beyond & (cover.side_of(np.arange(cover.n_cells)) == side)
     starts = random_starts(cover, asked.starts, x)
-    settling = absorption(chain, np.zeros(cover.n_cells, dtype=bool))
-    settles = {name: float(starts @ found) for name, found in settling.probability.items() if name != "goal"}
     parts = classes(chain)
+    kept = [np.flatnonzero(part.cells.mask) for part in parts if part.escape < KEPT]
+    settling = absorption(chain, np.zeros(cover.n_cells, dtype=bool), classes=kept)
+    settles = {name: float(starts @ found) for name, found in settling.probability.items() if name != "goal"}
     ends = absorption(chain, goal)
     fed = feeding(chain, ends, starts)
     first = absorption(chain, goal, other=beyond & ~goal).probability["other"]
@@ -251,9 +255,10 @@ def _solve(asked: _Asked, scatter: Scattering) -> _Found:
 
 
 def _main(parts: Sequence[NoisyClass], settles: dict[str, float]) -> NoisyClass | None:
-    closed = [part for part in parts if part.closed]
-    if closed:
-        return max(enumerate(closed), key=lambda pair: settles[f"class {pair[0]}"])[1]
+    # Classes come with those first that are not left, or least: they bear the numbers in `settles`.
+    kept = sum(part.escape < KEPT for part in parts)
+    if kept:
+        return parts[max(range(kept), key=lambda number: settles[f"class {number}"])]
     return min(parts, key=lambda part: part.escape, default=None)
 
 
@@ -361,8 +366,8 @@ def noise_statistics(
     >>> from limitsets.robust import Gaussian, Scattering, noise_statistics
     >>> noise = Scattering(speed=Gaussian(0.01), landing=Gaussian(0.05))
     >>> found = noise_statistics("paper-designed", noise, goal=(20.5, 2), cells=512, sensitivity=False)
-    >>> round(found.numbers["mean throws"], 1), round(found.feeding.survivors[40], 2)
-    (23.2, 0.14)
+    >>> round(found.numbers["mean throws"], 1), round(float(found.feeding.survivors[40]), 2)
+    (23.2, 0.2)
     """
     asked, read = _asked(scene, goal, cells, strata, offset)
     noise = scattering_of(read) if scatter is None else scatter
