@@ -13,7 +13,7 @@ from typing import Any
 import limitsets as ls
 from limitsets.robust import Gaussian, Scattering, noise_levels, noise_statistics
 from limitsets.robust.sampling import throw_many
-from limitsets.robust.statistics import starts_from
+from limitsets.robust.solving import starts_from
 
 HERE = Path(__file__).resolve().parent
 SCENE, GOAL = "paper-designed", (20.5, 2)

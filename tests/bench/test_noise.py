@@ -12,7 +12,7 @@ import limitsets as ls
 from limitsets.robust import Gaussian, Scattering, noise_statistics, transfer
 from limitsets.robust.sampling import scattering_map, throw_many
 from limitsets.robust.scattering import kappa_strata, still_map, thrown
-from limitsets.robust.statistics import starts_from
+from limitsets.robust.solving import starts_from
 from tests.bench.measure import limit, take_turns, versus
 
 pytestmark = pytest.mark.bench

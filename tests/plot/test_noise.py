@@ -7,7 +7,8 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 import limitsets as ls
 from limitsets.robust import Gaussian, Scattering, noise_statistics
 from limitsets.robust.sampling import throw_many
-from limitsets.robust.statistics import Levels, starts_from
+from limitsets.robust.solving import starts_from
+from limitsets.robust.statistics import Levels
 
 NOISE = Scattering(speed=Gaussian(0.005), landing=Gaussian(0.02))
 GOAL = (20.5, 2)
