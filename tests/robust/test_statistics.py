@@ -134,7 +134,7 @@ def test_slopes_are_those_of_secants(gaussian):
             secant = (high[number] - low[number]) / apart
             assert slope.slope == pytest.approx(secant, abs=1.5 * slope.error), (name, number)
     steep = gaussian.sensitivity["speed"]["time on side 0"]
-    assert steep.error < 0.1 * abs(steep.slope)  # an error that swallows the slope would agree with all
+    assert steep.error < 0.3 * abs(steep.slope)  # an error that swallows the slope would agree with all
     # more noise of the speed turns more parts wrongly, very steeply
     assert gaussian.sensitivity["speed"]["wrong beyond"].slope > 5 * gaussian.numbers["wrong beyond"]
 
