@@ -16,5 +16,17 @@ from limitsets.plot.flights import flight
 from limitsets.plot.limit_sets import limit_set
 from limitsets.plot.maps import map  # noqa: A004 - ls.plot.map is the word for it
 from limitsets.plot.morse_graphs import morse
+from limitsets.plot.noise import noise_arrivals, noise_density, noise_levels
 
-__all__ = ["audit", "basins", "design", "flight", "limit_set", "map", "morse"]
+__all__ = [
+    "audit",
+    "basins",
+    "design",
+    "flight",
+    "limit_set",
+    "map",
+    "morse",
+    "noise_arrivals",
+    "noise_density",
+    "noise_levels",
+]
