@@ -10,6 +10,7 @@ from limitsets.cli.analyse import analyse
 from limitsets.cli.audit import audit
 from limitsets.cli.certify import certify
 from limitsets.cli.design import design
+from limitsets.cli.margin import margin
 from limitsets.cli.plot import plot
 from limitsets.cli.recheck import recheck
 from limitsets.cli.scenes import scenes
@@ -45,5 +46,5 @@ def limitsets(
     """
 
 
-for command in (scenes, analyse, throw, plot, certify, recheck, audit, design):
+for command in (scenes, analyse, throw, plot, certify, recheck, audit, margin, design):
     app.command()(command)

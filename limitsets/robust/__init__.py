@@ -12,6 +12,8 @@ from limitsets.robust.laws import Gaussian as Gaussian
 from limitsets.robust.laws import Given as Given
 from limitsets.robust.laws import Samples as Samples
 from limitsets.robust.laws import Uniform as Uniform
+from limitsets.robust.margins import Margin as Margin
+from limitsets.robust.margins import margin as margin
 from limitsets.robust.scattering import Scattering as Scattering
 from limitsets.robust.settling import classes as classes
 from limitsets.robust.statistics import NoiseStatistics as NoiseStatistics
