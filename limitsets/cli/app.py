@@ -9,11 +9,8 @@ import typer
 from limitsets.cli.analyse import analyse
 from limitsets.cli.audit import audit
 from limitsets.cli.certify import certify
-<<<<<<< HEAD
 from limitsets.cli.design import design
-=======
 from limitsets.cli.margin import margin
->>>>>>> margin
 from limitsets.cli.plot import plot
 from limitsets.cli.recheck import recheck
 from limitsets.cli.scenes import scenes
@@ -49,9 +46,5 @@ def limitsets(
     """
 
 
-<<<<<<< HEAD
-for command in (scenes, analyse, throw, plot, certify, recheck, audit, design):
-=======
-for command in (scenes, analyse, throw, plot, certify, recheck, audit, margin):
->>>>>>> margin
+for command in (scenes, analyse, throw, plot, certify, recheck, audit, margin, design):
     app.command()(command)

@@ -17,19 +17,20 @@ from limitsets.plot.limit_sets import limit_set
 from limitsets.plot.maps import map  # noqa: A004 - ls.plot.map is the word for it
 from limitsets.plot.margins import margin_curve, tolerance_box, tornado
 from limitsets.plot.morse_graphs import morse
+from limitsets.plot.noise import noise_arrivals, noise_density, noise_levels
 
-<<<<<<< HEAD
-__all__ = ["audit", "basins", "design", "flight", "limit_set", "map", "morse"]
-=======
 __all__ = [
     "audit",
     "basins",
+    "design",
     "flight",
     "limit_set",
     "map",
     "margin_curve",
     "morse",
+    "noise_arrivals",
+    "noise_density",
+    "noise_levels",
     "tolerance_box",
     "tornado",
 ]
->>>>>>> margin

@@ -114,15 +114,27 @@ class Question:
             for step in range(finest + 1):
                 if step:
                     found = self._finer(found, box, step)
-                answers = tuple(prove(found, self.scene, goal) for goal in self.goals)
-                missing = [answer for answer in answers if answer.verdict != "proved"]
-                if not missing:
+                answers = self._each(found)
+                missing = answers[-1]
+                if missing.verdict == "proved":
                     return Asked("proved", "", found, answers, piece=piece, noise=noise)
-                if any(answer.final for answer in missing) or not (found.component >= 0).any():
+                if missing.final or not (found.component >= 0).any():
                     break
         except AnswerError as error:
             return Asked("impossible", _said(error), piece=piece, noise=noise)
-        return Asked("undecided", missing[0].reason, found, piece=piece, noise=noise)
+        reason = missing.reason
+        if not (found.component >= 0).any():
+            reason = f"{reason}: from some of them, parts may leave the arm"
+        return Asked("undecided", reason, found, piece=piece, noise=noise)
+
+    def _each(self, found: Attraction) -> tuple[Answer, ...]:
+        """Prove one goal after the other, up to the first that is not: it comes last then."""
+        answers: list[Answer] = []
+        for goal in self.goals:
+            answers.append(prove(found, self.scene, goal))
+            if answers[-1].verdict != "proved":
+                break
+        return tuple(answers)
 
     def cells(self, piece: Piece | None, step: int) -> Attraction:
         """Return the cells of one refinement, whatever they prove."""
@@ -180,8 +192,9 @@ class Question:
     def _against(self, found: Attraction, goal: Goal) -> Answer:
         """Search for what refutes one goal: where throws differ, for the worst that they can do."""
         wrong = _wrong(goal)
-        if isinstance(goal, Reaches):  # refuted by where cells end
-            found = self._finer(found, found.cover.box, 2)
+        if isinstance(goal, Reaches) and not goal.every_orbit:
+            # refuted by where attracting cells end; a periodic orbit that attracts is not looked for each time
+            return prove(self._finer(found, found.cover.box, 2), self.scene, goal)
         if wrong is None or not found.cover.box.noise or goal.from_anywhere:
             return ask(found, self.scene, goal)
         answer = prove(found, self.scene, goal)

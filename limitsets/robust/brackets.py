@@ -23,6 +23,12 @@ Tell = Callable[[float], None]
 # Steps outward at most, each `FACTOR` times as far; halvings of a bracket; trials of pieces in one direction.
 STEPS, FACTOR, HALVINGS, TRIALS = 24, 3, 40, 200
 
+# What to do about a bracket that does not close.
+NARROWER = "; it would need finer cells than are tried here: ask for a wider bracket, or another x"
+
+# From this share of the way to where the goal breaks, pieces are tried with the finest cells.
+NEAR = Fraction(3, 4)
+
 # What is smaller than this share of a small deviation counts as none.
 NONE = Fraction(1, 1000)
 
@@ -144,7 +150,9 @@ def _grow(
             return low, pieces, ""
         step = step if measure.widest is None else min(step, measure.widest)
         high = min(target, short(low + step, up=True))
-        found = question.prove(measure.piece(measure.between(sign * low, sign * high)))
+        # far from the wall narrower pieces do as well as finer cells, and to fail with these is what takes time
+        finest = 3 if low > NEAR * wall else 1
+        found = question.prove(measure.piece(measure.between(sign * low, sign * high)), finest=finest)
         if found.verdict == "proved":
             pieces.append(found)
             low, share = high, min(share * Fraction(9, 8), Fraction(3))
@@ -167,18 +175,21 @@ def bracket_fixed(question: Question, measure: Measure, width: Fraction, tell: T
     found = Bracket()
     bad = [way for way in ways.values() if way.bad is not None]
     if bad:
-        first = min(bad, key=lambda way: way.bad or 0)
-        found.refuted, found.against = first.bad, first.against
-        found.sign = next(sign for sign, way in ways.items() if way is first)
+        nearest = min(bad, key=lambda way: way.bad or 0)
+        found.refuted, found.against = nearest.bad, nearest.against
+        found.sign = next(sign for sign, way in ways.items() if way is nearest)
     ends = [way for way in ways.values() if way.end is not None]
     limits = [way.good for way in ends] if found.refuted is None else []
     goal = min(limits, default=min(way.good for way in ways.values()))
-    found.reason = next((way.reason for way in ends if way.good == goal), "")
     if found.refuted is not None:
-        goal, found.reason = found.refuted * (1 - width * Fraction(6, 10)), ""
-        nearest = min(way.good for way in ends) if ends else goal
-        goal = min(goal, nearest)
-    return _fixed_proof(question, measure, found, short(goal), tell)
+        goal = found.refuted * (1 - width * Fraction(6, 10))
+        goal = min([goal, *(way.good for way in ends)])
+    first = next((way for way in ends if way.good == goal and way.end is not None), None)
+    if first is not None and first.end is not None:
+        found.reason = f"from {measure.text(first.end)} on: {first.reason}"
+    found = _fixed_proof(question, measure, found, short(goal), tell)
+    found.reason = "" if found.closed(width) else found.reason
+    return found
 
 
 def _fixed_proof(question: Question, measure: Measure, found: Bracket, goal: Fraction, tell: Tell) -> Bracket:
@@ -191,7 +202,7 @@ def _fixed_proof(question: Question, measure: Measure, found: Bracket, goal: Fra
         far, pieces, reason = _grow(question, measure, sign, goal, wall if near else 3 * wall, tell)
         found.pieces += pieces
         if far < goal:
-            goal, found.reason = far, reason
+            goal, found.reason = far, reason + NARROWER
             if not far:
                 break
     found.proved = goal

@@ -178,6 +178,8 @@ class _Cutting:
         """Guess what is to spare on a part, and where to cut it."""
         low, high = (np.array([float(x) for x in end]) * float(self.factor) for end in (part.low, part.high))
         half, effects = 0.5 * (high - low), self.effects
+        if not half.size:
+            return _Guess(1.0, 1.0, 0, Fraction(0))
         if not effects.spare.size:
             k = int(np.argmax(half))
             return _Guess(1.0, 1.0, k, (part.low[k] + part.high[k]) / 2)
@@ -218,7 +220,11 @@ class _Cutting:
             over = time.perf_counter() > end or len(self.proved) + len(waiting) >= MOST_PIECES
             narrow = not count or part.high[k] - part.low[k] <= NARROWEST
             if over or narrow:
-                why = "it ran out of time: give it more seconds" if over else (found.reason if found else "")
+                why = (
+                    "the box of all quantities ran out of time: give it more seconds, or ask for a wider bracket"
+                    if over
+                    else (found.reason if found else "")
+                )
                 failed.append((part.near, why))
                 continue
             for piece in part.cut(k, guess.at, number):
