@@ -1,4 +1,4 @@
-"""`limitsets design`: quantities of a scene for which its critical points are where they are wanted."""
+"""`limitsets design`: quantities of a scene for which its critical points are as wanted, or the margin large."""
 
 from __future__ import annotations
 
@@ -24,7 +24,11 @@ FREE = "free"
 _BARE = re.compile(r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]{1,3})?")
 
 HELP_POINTS = "First critical point wanted on each side, like 10,10,20 or '25 cm',free,free."
+HELP_ROBUST = (
+    "Make the proved joint margin of [tolerance] large: only one side beyond X, and almost every orbit there."
+)
 HELP_VARY = "Quantities to vary, like part.mass.center.along,throw.speed; repeatable."
+HELP_EVALUATIONS = "With --robust: designs to look at."
 HELP_BOUNDS = (
     "Bounds of one of them, like part.mass.center.along='4 in':'5 in'; either may be left out; repeatable."
 )
@@ -32,9 +36,19 @@ HELP_BOUNDS = (
 
 def design(
     scene: Scene,
-    critical_points: Annotated[str, typer.Option("--critical-points", metavar="R,R,R", help=HELP_POINTS)],
-    vary: Annotated[list[str], typer.Option("--vary", metavar="Q,Q", help=HELP_VARY)],
+    critical_points: Annotated[
+        str | None, typer.Option("--critical-points", metavar="R,R,R", help=HELP_POINTS)
+    ] = None,
+    robust: Annotated[bool, typer.Option("--robust", help=HELP_ROBUST)] = False,
+    vary: Annotated[list[str] | None, typer.Option("--vary", metavar="Q,Q", help=HELP_VARY)] = None,
     bounds: Annotated[list[str] | None, typer.Option("--bounds", metavar="Q=LO:HI", help=HELP_BOUNDS)] = None,
+    evaluations: Annotated[
+        int, typer.Option("--evaluations", min=1, max=1_000_000, metavar="N", help=HELP_EVALUATIONS)
+    ] = 1200,
+    seconds: Annotated[
+        float,
+        typer.Option("--seconds", min=0.0, metavar="S", help="With --robust: for the proof of each margin."),
+    ] = 240.0,
     starts: Annotated[
         int, typer.Option("--starts", min=0, max=10_000, metavar="N", help="Other starts to draw at most.")
     ] = 8,
@@ -55,7 +69,24 @@ def design(
     ] = None,
     json: Json = False,
 ) -> None:
-    """Find a scene whose critical points are where they are wanted; exit 1 where none is found."""
+    """Find a scene whose critical points are where they are wanted, or that is fed in spite of large deviations.
+
+    Exit 1 where none is found, or no margin is proved.
+    """
+    if (critical_points is None) != robust:
+        raise LimitsetsError(
+            "the design",
+            "nothing is wanted" if critical_points is None else "two things are wanted",
+            "--critical-points R,R,R or --robust",
+            "give one of them",
+        )
+    names = [name.strip() for words in vary or [] for name in words.split(",")]
+    if critical_points is None:
+        from limitsets.cli.design_robust import run_robust
+
+        raise typer.Exit(
+            run_robust(scene, names, _bounds(bounds or []), evaluations, seconds, out, json=json)
+        )
     with progress() as tell:
         from limitsets.inverse import design as run
         from limitsets.scene import load
@@ -68,7 +99,7 @@ def design(
         found = run(
             chosen,
             critical_points=_points(critical_points),
-            vary=[name.strip() for words in vary for name in words.split(",")],
+            vary=names,
             bounds=_bounds(bounds or []),
             starts=starts,
             stages=stages,

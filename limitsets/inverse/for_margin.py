@@ -1,7 +1,8 @@
 """Robust design: the part for which the proved joint margin is large, and what it costs in throws.
 
 The goal is both that whatever rests beyond X lies on the side, and that almost every orbit comes to rest there: an X
-that nothing reaches does not count.  Search by floats (`search`), round to what can be made, prove (`limitsets.robust`).
+that nothing reaches does not count.  Search by floats (`search`), round to what can be made, have it proved
+(`limitsets.robust`).
 """
 
 from __future__ import annotations
@@ -85,6 +86,8 @@ class RobustDesign:
         The margin there, at the best X there, by floats.
     before_margin : Margin or None
         The same, proved and refuted.
+    before_feeding : Feeding or None
+        Throws to feed there, sampled.
     evaluations : int
         Designs looked at.
     seconds : float
@@ -106,6 +109,7 @@ class RobustDesign:
     before: Scene
     before_sampled: Sharp | None
     before_margin: Margin | None
+    before_feeding: Feeding | None
     evaluations: int
     seconds: float
 
@@ -149,12 +153,15 @@ def orders_of(scene: Scene) -> list[Scene]:
         left, right = (float(scene.sides.length[order[k]]) for k in (2, 0))
         centre = tree["part"].get("mass", {}).get("center")
         if order != (0, 1, 2) and isinstance(centre, dict):
-            centre |= {"along": f"{0.6 * left:.4f} {scene.unit}", "above": f"{0.15 * min(left, right):.4f} {scene.unit}"}
+            centre["along"] = f"{0.6 * left:.4f} {scene.unit}"
+            centre["above"] = f"{0.15 * min(left, right):.4f} {scene.unit}"
         found.append(load(tree))
     return found
 
 
-def _searched(searches: Sequence[Search], evaluations: int, seed: int, tell: Tell) -> tuple[Search, list[float]]:
+def _searched(
+    searches: Sequence[Search], evaluations: int, seed: int, tell: Tell
+) -> tuple[Search, list[list[float]]]:
     """Draw in every order, go on in the best, and give the best search with the unknowns of its best design."""
     rng = np.random.default_rng(seed)
     drawn = []
@@ -177,13 +184,11 @@ def _searched(searches: Sequence[Search], evaluations: int, seed: int, tell: Tel
 def _rounded(scene: Scene, search: Search) -> Scene:
     """Write what was varied with few decimals."""
     unit = scene.unit
-    return scene.with_values({
-        name: f"{scene.value(name):.{DECIMALS}f} {unit}" for name in search.bounds
-    })
+    return scene.with_values({name: f"{scene.value(name):.{DECIMALS}f} {unit}" for name in search.bounds})
 
 
 def _best_x(scene: Scene, box: Box, side: int, search: Search | None) -> Sharp | None:
-    """The margin on all corners: corners at which it fails are put first, and it is sought anew."""
+    """Find the margin on all corners: corners at which it fails are put first, and it is sought anew."""
     hard = [] if search is None else list(search.hard)
     for _ in range(6):
         found = sharp(scene, box, side, hard=hard, steps=FINE)
@@ -229,8 +234,8 @@ def robust_design(
         Quantities, with bounds in the scene's units or without; default centre of mass, radius of gyration, kappa and
         the surface's height.
     tolerance : mapping of str to str, optional
-        What the margin multiplies, ``{"throw.speed": "1 %", "landing.x": "0.01 in"}``; default the scene's, or `TOLERANCE`.
-        landing.x is noise at every throw, all else fixed but unknown.
+        What the margin multiplies, ``{"throw.speed": "1 %", "landing.x": "0.01 in"}``; default the scene's, or
+        `TOLERANCE`.  landing.x is noise at every throw, all else fixed but unknown.
     orders : bool
         Whether a triangle's sides may be put in another order.
     everywhere : bool
@@ -266,22 +271,46 @@ def robust_design(
     best = search.scene_of(population[0])
     found = None if best is None else _best_x(_rounded(best, search), box, on, search)
     if best is None or found is None or not found.margin > 0.0:
-        raise AnswerError("the design", "none that feeds", "one at least", "widen the bounds, or look at more designs")
+        raise AnswerError(
+            "the design", "none that feeds", "one at least", "widen the bounds, or look at more designs"
+        )
     x = round(found.x, DECIMALS_OF_X)
     design = _with_purpose(_rounded(best, search), x, on, texts, f"{start.name}-robust")
     before = _best_x(start, box, on, None)
     history = tuple(candidate for each in searches for candidate in each.history)
     front = front_of([each.scene for each in searches], history, on, seed, tell)
     seconds = time.perf_counter() - begin
+    known = before is not None and before.margin > 0.0
+    fed = throws_to_feed(start, before.x, on, seed=seed) if before is not None and known else None
     margin, own = None, None
     if prove > 0.0:
-        margin = joint_margin(design, fed_at(x, on), texts, seconds=prove, tell=_telling(tell, "margin of the design"))
-        if before is not None and before.margin > 0.0:
+        margin = joint_margin(
+            design, fed_at(x, on), texts, seconds=prove, tell=_telling(tell, "margin of the design")
+        )
+        if before is not None and known:
             goals = fed_at(round(before.x, DECIMALS_OF_X), on)
-            own = joint_margin(start, goals, texts, seconds=prove, tell=_telling(tell, "margin of the scene before"))
+            own = joint_margin(
+                start, goals, texts, seconds=prove, tell=_telling(tell, "margin of the scene before")
+            )
     return RobustDesign(
-        design, fed_at(x, on), x, on, tuple(search.bounds), texts, found, margin, lead_of(design), throws_to_feed(design, x, on, seed=seed),
-        front, history, start, before, own, sum(each.evaluations for each in searches), seconds,
+        scene=design,
+        goals=fed_at(x, on),
+        x=x,
+        side=on,
+        varied=tuple(search.bounds),
+        tolerance=texts,
+        sampled=found,
+        margin=margin,
+        lead=lead_of(design),
+        feeding=throws_to_feed(design, x, on, seed=seed),
+        front=front,
+        history=history,
+        before=start,
+        before_sampled=before,
+        before_margin=own,
+        before_feeding=fed,
+        evaluations=sum(each.evaluations for each in searches),
+        seconds=seconds,
     )
 
 

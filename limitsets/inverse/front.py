@@ -108,5 +108,7 @@ def front_of(
         feeding = throws_to_feed(scene, one.found.x, side, seed=seed)
         if feeding.fed and not feeding.lost:
             options.append(Option(one, feeding))
-    kept = unbeaten([each.candidate.found.margin for each in options], [each.feeding.mean for each in options])
+    kept = unbeaten(
+        [each.candidate.found.margin for each in options], [each.feeding.mean for each in options]
+    )
     return tuple(options[k] for k in kept)

@@ -46,7 +46,9 @@ def _quantities(scene: Scene, names: tuple[str, ...]) -> dict[str, float]:
 
 def to_json(found: RobustDesign) -> dict[str, Any]:
     """Give a robust design as plain tables; every number is finite or null."""
-    sides = tuple(f"part.sides[{k}]" for k in range(len(found.scene.sides)) if "sides" in found.scene.text["part"])
+    sides = tuple(
+        f"part.sides[{k}]" for k in range(len(found.scene.sides)) if "sides" in found.scene.text["part"]
+    )
     names = (*sides, *found.varied)
     lead = found.lead
     return {
@@ -63,6 +65,7 @@ def to_json(found: RobustDesign) -> dict[str, Any]:
         "ratio": ratio(found),
         "lead": {"share": lead.share, "x": lead.x, "y": lead.y, "inside": lead.inside},
         "throws": found.feeding.to_json(),
+        "before_throws": None if found.before_feeding is None else found.before_feeding.to_json(),
         "front": [option.to_json() for option in found.front],
         "evaluations": found.evaluations,
         "timings": {"search": found.seconds},
@@ -74,6 +77,8 @@ def save(found: RobustDesign, folder: Path) -> tuple[Path, ...]:
     folder.mkdir(parents=True, exist_ok=True)
     scene, answer = folder / f"{found.scene.name}.toml", folder / "design.json"
     dump(found.scene, scene)
-    answer.write_text(json.dumps(to_json(found), indent=2, allow_nan=False) + "\n", encoding="utf-8", newline="\n")
+    answer.write_text(
+        json.dumps(to_json(found), indent=2, allow_nan=False) + "\n", encoding="utf-8", newline="\n"
+    )
     certificates = () if found.margin is None else found.margin.save(folder)
     return (scene, answer, *certificates)

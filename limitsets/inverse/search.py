@@ -23,7 +23,7 @@ from limitsets.inverse.sound import assumptions_kept
 from limitsets.inverse.trap import least_room
 from limitsets.scene import Scene
 
-__all__ = ["Candidate", "Search", "VARY"]
+__all__ = ["VARY", "Candidate", "Search"]
 
 VARY: dict[str, tuple[str, str]] = {
     "part.mass.center.along": ("0.05", "0.95"),
@@ -181,7 +181,9 @@ def _scaled(share: float, lo: float, hi: float) -> float:
     return lo + share * (hi - lo)
 
 
-def bounds_of(scene: Scene, vary: Mapping[str, tuple[float, float]] | Sequence[str] | None) -> dict[str, tuple[float, float]]:
+def bounds_of(
+    scene: Scene, vary: Mapping[str, tuple[float, float]] | Sequence[str] | None
+) -> dict[str, tuple[float, float]]:
     """Give the bounds of what is varied [scene's units]."""
     if isinstance(vary, Mapping):
         return {name: (float(lo), float(hi)) for name, (lo, hi) in vary.items()}

@@ -222,7 +222,7 @@ def sharp(
     linear = (reach - threshold) / cost if cost > 0.0 else math.inf
     if linear <= above:
         return Sharp(linear, math.nan, threshold, reach, nominal, effects)
-    asked = [signs for signs in (hard or [])]
+    asked = list(hard or [])
     asked += [tuple(int(s) for s in np.where(row < 0.0, -1, 1)) for row in falls.T]
     margin, x = _sought(fed, list(dict.fromkeys(asked)), min(linear, 1e3), above, reach - threshold, steps)
     return Sharp(margin, x, threshold, reach, nominal, effects)
@@ -250,7 +250,7 @@ def failing(scene: Scene, box: Box, side: int, found: Sharp, factor: float) -> l
 
 
 def _start(found: Sharp, side: int) -> tuple[float, int]:
-    """A place in the limit set, near its end: from farther in an orbit may be lost that never comes back there."""
+    """Give a place in the limit set, near its end: from farther in an orbit may be lost that never comes back there."""
     return found.reach - 0.02 * (found.reach - found.threshold), side
 
 
@@ -266,7 +266,9 @@ def _sought(
             good, x = factor, 0.5 * (highest + least)
             # T and R close in on each other about evenly
             ahead = factor * spare / max(spare - (least - highest), 1e-9)
-            factor = min(max(0.998 * ahead, 0.9 * good + 0.1 * bad), 0.5 * (good + bad) if ahead > bad else bad)
+            factor = min(
+                max(0.998 * ahead, 0.9 * good + 0.1 * bad), 0.5 * (good + bad) if ahead > bad else bad
+            )
         else:
             bad = factor
             if factor == above:

@@ -13,6 +13,7 @@ from limitsets.plot.audits import audit
 from limitsets.plot.basin import basins
 from limitsets.plot.designs import design
 from limitsets.plot.flights import flight
+from limitsets.plot.fronts import robust_design
 from limitsets.plot.limit_sets import limit_set
 from limitsets.plot.maps import map  # noqa: A004 - ls.plot.map is the word for it
 from limitsets.plot.margins import margin_curve, tolerance_box, tornado
@@ -31,6 +32,7 @@ __all__ = [
     "noise_arrivals",
     "noise_density",
     "noise_levels",
+    "robust_design",
     "tolerance_box",
     "tornado",
 ]

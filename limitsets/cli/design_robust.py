@@ -1,0 +1,141 @@
+"""`limitsets design --robust`: the part for which the proved joint margin is large."""
+
+from __future__ import annotations
+
+import json as json_words
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import typer
+
+from limitsets.cli.output import progress, table
+from limitsets.errors import LimitsetsError
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from limitsets.inverse import RobustDesign
+    from limitsets.scene import Scene
+
+__all__ = ["run_robust"]
+
+DPI = 150
+Ends = tuple[float | str | None, float | str | None]
+
+
+def run_robust(
+    name: str,
+    vary: Sequence[str],
+    bounds: Mapping[str, Ends],
+    evaluations: int,
+    seconds: float,
+    out: Path | None,
+    *,
+    json: bool,
+) -> int:
+    """Search, prove, write and print; the exit code."""
+    with progress() as tell:
+        from limitsets.inverse import robust_design
+        from limitsets.report.writing import require_place
+        from limitsets.scene import load
+
+        scene = load(name)
+        if out is not None:
+            require_place(out)
+        found = robust_design(
+            scene,
+            vary=_varied(scene, vary, bounds),
+            evaluations=evaluations,
+            prove=seconds,
+            progress=tell,
+        )
+        files = [] if out is None else _written(found, out)
+    if json:
+        print(json_words.dumps(found.to_json(), indent=2, allow_nan=False))
+    else:
+        _text(found, files)
+    return 0 if seconds == 0.0 or (found.margin is not None and found.margin.proved > 0.0) else 1
+
+
+def _varied(
+    scene: Scene, names: Sequence[str], bounds: Mapping[str, Ends]
+) -> dict[str, tuple[float, float]] | None:
+    """Give the bounds of what is varied: those given, else the usual ones."""
+    from limitsets.inverse.search import bounds_of
+
+    if not names and not bounds:
+        return None
+    both = list(dict.fromkeys([*names, *bounds]))
+    usual = bounds_of(scene, [one for one in both if one not in bounds])
+    return {one: _ends(scene, one, bounds[one]) if one in bounds else usual[one] for one in both}
+
+
+def _ends(scene: Scene, name: str, ends: Ends) -> tuple[float, float]:
+    from limitsets.scene.quantities import base_unit, find
+    from limitsets.scene.units import convert, parse
+
+    dimension, numbers = find(name).dimension, []
+    for end in ends:
+        if end is None:
+            raise LimitsetsError("the bounds", name, "a lower and an upper one", "give both", key="--bounds")
+        unit = base_unit(dimension, scene.unit)
+        numbers.append(convert(parse(end, dimension), unit) if isinstance(end, str) else end)
+    return numbers[0], numbers[1]
+
+
+def _written(found: RobustDesign, out: Path) -> list[Path]:
+    """Write a folder: scene, answer, certificates, figure."""
+    from limitsets import plot
+    from limitsets.files import replaced
+    from limitsets.report.writing import refusal
+
+    try:
+        with replaced(out) as folder:
+            names = [path.name for path in found.save(folder)]
+            if found.front:
+                plot.robust_design(found).savefig(folder / "front.png", dpi=DPI)
+                names.append("front.png")
+    except OSError as error:
+        raise refusal(out, error.strerror or str(error)) from None
+    return [out / name for name in names]
+
+
+def _text(found: RobustDesign, files: list[Path]) -> None:
+    """Print what changed, both margins, the throws, and the lead weight."""
+    from limitsets.scene import dump
+
+    unit = found.scene.unit
+    sides = [f"part.sides[{k}]" for k in range(3) if "sides" in found.scene.text["part"]]
+    rows = [
+        [name, f"{found.before.value(name):.6g}", f"{found.scene.value(name):.6g}"]
+        for name in (*sides, *found.varied)
+    ]
+    table(["", "before", f"design [{unit}]"], rows)
+    for label, margin, sampled, feeding in (
+        ("before", found.before_margin, found.before_sampled, found.before_feeding),
+        ("design", found.margin, found.sampled, found.feeding),
+    ):
+        if sampled is None:
+            typer.echo(f"{label}: fed at no X in spite of any deviation")
+            continue
+        said = "not proved" if margin is None else f"proved up to {margin.proved:.4g}"
+        fails = (
+            "" if margin is None or margin.refuted is None else f", shown to fail from {margin.refuted:.4g}"
+        )
+        typer.echo(
+            f"{label}: X = {sampled.x:.4g} {unit}, joint margin {said}{fails} (by floats {sampled.margin:.4g})"
+        )
+        if feeding is not None:
+            typer.echo(
+                f"  throws to feed (sampled): mean {feeding.mean:.3g}, 95 % after {feeding.quantile_95:.3g}"
+            )
+    lead = found.lead
+    typer.echo(
+        f"lead weight: {100 * lead.share:.1f} % of the mass at x = {lead.x:.4g}, y = {lead.y:.4g} {unit}"
+        " in the frame of the vertices"
+    )
+    if files:
+        typer.echo(f"written: {', '.join(str(path) for path in files)}")
+    else:
+        typer.echo("")
+        typer.echo(dump(found.scene).rstrip("\n"))

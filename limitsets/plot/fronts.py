@@ -1,0 +1,110 @@
+"""A robust design: what its margin costs in throws to feed, and what each quantity of the tolerance costs."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from limitsets.errors import AnswerError
+from limitsets.plot import style
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from limitsets.inverse import RobustDesign
+
+__all__ = ["robust_design"]
+
+BEFORE, AFTER = "#6E6E6E", style.JOG
+# What is drawn of the quantities' names: the last word says which it is.
+MOST_ROWS = 12
+
+
+def robust_design(found: RobustDesign, *, wanted: float | None = None, bound: float | None = None) -> Figure:
+    """Draw the front of margin against throws to feed, and the cost of each quantity before and after.
+
+    Parameters
+    ----------
+    found : RobustDesign
+        From `limitsets.inverse.robust_design`.
+    wanted : float, optional
+        A margin that was wanted, as a line.
+    bound : float, optional
+        A margin that no design can have, as a line.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+
+    Raises
+    ------
+    AnswerError
+        There is no front to draw.
+    """
+    if not found.front:
+        raise AnswerError("the front", "empty", "one design at least", "look at more designs")
+    figure = Figure(figsize=(11.5, 5.4), layout="constrained")
+    left, right = figure.subplots(1, 2, width_ratios=[1.35, 1.0])
+    _front(left, found)
+    for value, text, line in ((wanted, "wanted", "--"), (bound, "no part rests beyond", ":")):
+        if value is not None:
+            left.axvline(value, color=style.INK, ls=line, lw=1.0)
+            left.annotate(
+                f"{text}\n{value:.2f}", (value, 0.98), xycoords=("data", "axes fraction"), ha="right", va="top",
+                xytext=(-4, 0), textcoords="offset points", fontsize=9,
+            )  # fmt: skip
+    _costs(right, found)
+    figure.suptitle(f"{found.before.name}: what the margin costs")
+    return figure
+
+
+def _front(axes: Axes, found: RobustDesign) -> None:
+    margins = [option.candidate.found.margin for option in found.front]
+    means = np.array([option.feeding.mean for option in found.front])
+    late = np.array([option.feeding.quantile_95 for option in found.front])
+    axes.vlines(margins, means, late, color=AFTER, lw=0.8, alpha=0.6)
+    axes.plot(margins, means, color=AFTER, marker="o", ms=4.0, lw=0.8)
+    handles = [
+        Line2D([], [], color=AFTER, marker="o", ms=4.0, lw=0.8, label="designs that none beats, sampled")
+    ]
+    points = [
+        (found.before_margin, found.before_sampled, found.before_feeding, BEFORE, "s", "the scene before"),
+        (found.margin, found.sampled, found.feeding, style.FLIP, "D", "the design"),
+    ]
+    for margin, sampled, feeding, colour, marker, label in points:
+        if sampled is None or feeding is None:
+            continue
+        axes.plot(sampled.margin, feeding.mean, color=colour, marker=marker, ms=7.0, ls="none")
+        said = label
+        if margin is not None:
+            axes.plot([margin.proved, sampled.margin], [feeding.mean] * 2, color=colour, lw=2.5, alpha=0.5)
+            said += f", proved {margin.proved:.2f}"
+        handles.append(Line2D([], [], color=colour, marker=marker, ms=7.0, lw=2.5, label=said))
+    axes.set_xlabel("joint margin, as a factor of the tolerance")
+    axes.set_ylabel("throws to feed from random starts")
+    axes.set_ylim(bottom=0.0)
+    axes.set_title("mean, and 95 % (upper end of each line)", loc="left", fontsize=10)
+    axes.legend(handles=handles, loc="upper center", bbox_to_anchor=(0.5, -0.16), ncols=3, fontsize=9)
+
+
+def _costs(axes: Axes, found: RobustDesign) -> None:
+    """Draw how much of the room between threshold and reach one tolerance of each quantity takes."""
+    names = list(found.sampled.effects)[:MOST_ROWS]
+    rows = np.arange(len(names))
+    for sampled, colour, shift, label in (
+        (found.before_sampled, BEFORE, -0.19, "before"),
+        (found.sampled, style.FLIP, 0.19, "design"),
+    ):
+        if sampled is None or not sampled.effects:
+            continue
+        room = sampled.reach - sampled.threshold
+        costs = [100.0 * sum(sampled.effects[name]) / room for name in names]
+        axes.barh(rows + shift, costs, height=0.36, color=colour, label=label)
+    axes.set_yticks(rows, [name.removeprefix("part.mass.").removeprefix("part.") for name in names])
+    axes.invert_yaxis()
+    axes.set_xlabel("% of the room for X that one tolerance takes")
+    axes.set_title("what limits it", loc="left", fontsize=10)
+    axes.legend(loc="lower right", fontsize=9)
