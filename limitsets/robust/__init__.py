@@ -4,3 +4,17 @@ A margin is a bracket of deviations: up to its lower end the goal is proved, at 
 Noise that has a distribution instead of bounds is a Markov chain between cells (generalised cell mapping); what it says
 is computed, never proved, and every answer says so.
 """
+
+from __future__ import annotations
+
+from limitsets.robust.laws import Gaussian as Gaussian
+from limitsets.robust.laws import Given as Given
+from limitsets.robust.laws import Samples as Samples
+from limitsets.robust.laws import Uniform as Uniform
+from limitsets.robust.scattering import Scattering as Scattering
+from limitsets.robust.transfer import transfer as transfer
+from limitsets.robust.absorption import absorption as absorption
+from limitsets.robust.classes import classes as classes
+from limitsets.robust.statistics import NoiseStatistics as NoiseStatistics
+from limitsets.robust.statistics import noise_levels as noise_levels
+from limitsets.robust.statistics import noise_statistics as noise_statistics
