@@ -5,13 +5,14 @@ elsewhere; it knows no map and no graph.
 """
 
 from limitsets.goals.ask import Verdict, evaluate
-from limitsets.goals.kinds import AttractsAll, FlipOrder, Goal, OrientedBeyond, Reaches, StaysOnArm
+from limitsets.goals.kinds import AttractsAll, FlipOrder, Goal, OrientedBeyond, Predicate, Reaches, StaysOnArm
 
 __all__ = [
     "AttractsAll",
     "FlipOrder",
     "Goal",
     "OrientedBeyond",
+    "Predicate",
     "Reaches",
     "StaysOnArm",
     "Verdict",

@@ -6,7 +6,9 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
-from limitsets.goals.kinds import AttractsAll, FlipOrder, Goal, OrientedBeyond, Reaches
+import numpy as np
+
+from limitsets.goals.kinds import AttractsAll, FlipOrder, Goal, OrientedBeyond, Predicate, Reaches
 
 __all__ = ["Verdict", "evaluate"]
 
@@ -77,6 +79,9 @@ def evaluate(
         return Verdict(None if goal.every_orbit and threshold >= goal.x else threshold >= goal.x, threshold)
     if isinstance(goal, AttractsAll):
         return Verdict(len(fractions) == 1 and fractions[0] >= _WHOLE, None)
+    if isinstance(goal, Predicate):
+        parts = [(side, np.array(spans).reshape(-1, 2)) for side, spans in extents.items()]
+        return Verdict(all(np.all(goal.holds(span[:, 0], span[:, 1], side)) for side, span in parts), None)
     if isinstance(goal, FlipOrder):
         return Verdict(flip_order is not None and _same_cycle(tuple(flip_order), goal.order), None)
     return Verdict(leaving <= 0, None)

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import ClassVar, TypeAlias
+from typing import Any, ClassVar, TypeAlias
 
-__all__ = ["AttractsAll", "FlipOrder", "Goal", "OrientedBeyond", "Reaches", "StaysOnArm"]
+__all__ = ["AttractsAll", "FlipOrder", "Goal", "OrientedBeyond", "Predicate", "Reaches", "StaysOnArm"]
 
 
 @dataclass(frozen=True)
@@ -84,4 +85,28 @@ class StaysOnArm:
     from_anywhere: bool = False
 
 
-Goal: TypeAlias = OrientedBeyond | Reaches | AttractsAll | FlipOrder | StaysOnArm
+@dataclass(frozen=True)
+class Predicate:
+    """Whatever the caller can say of places: every state is good.  Python only: a scene runs no code.
+
+    Parameters
+    ----------
+    holds : callable
+        ``holds(lo, hi, side)``: from the ends of intervals, float64 of shape (n,), and their one side to bool of shape
+        (n,): True where every place in [lo, hi] is good.  Of a single place, lo = hi, it has to be right both ways.
+    name : str
+        What it says, for people: "below 21 in on side 0".
+    cuts : tuple of float
+        Places at which it changes, borders of cells [scene's length unit].
+    from_anywhere : bool
+        Ask it of every landing from every start, not only of the limit set.
+    """
+
+    kind: ClassVar[str] = "predicate"
+    holds: Callable[[Any, Any, int], Any]
+    name: str = "the predicate"
+    cuts: tuple[float, ...] = ()
+    from_anywhere: bool = False
+
+
+Goal: TypeAlias = OrientedBeyond | Reaches | AttractsAll | FlipOrder | StaysOnArm | Predicate

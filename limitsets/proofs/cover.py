@@ -71,7 +71,12 @@ def _widened(found: Enclosures, edges: NDArray[np.float64], landing: float) -> E
     return Enclosures(hulls, found.witness, found.lost)
 
 
-def cover(box: ParameterBox, cells: int, cuts: Mapping[int, Sequence[float]] | None = None) -> Cover:
+def cover(
+    box: ParameterBox,
+    cells: int,
+    cuts: Mapping[int, Sequence[float]] | None = None,
+    pieces: int | None = None,
+) -> Cover:
     """Cut the sides into cells and enclose their images.
 
     Parameters
@@ -82,6 +87,8 @@ def cover(box: ParameterBox, cells: int, cuts: Mapping[int, Sequence[float]] | N
         Cells per side.
     cuts : mapping of int to sequence of float, optional
         Borders wanted on each side.
+    pieces : int, optional
+        Pieces of the parameter that is known least, where the decision of a cell is open: fewer are quicker.
 
     Returns
     -------
@@ -108,7 +115,7 @@ def cover(box: ParameterBox, cells: int, cuts: Mapping[int, Sequence[float]] | N
         sides.append((np.union1d(edges, wanted),))
     cells_of = Grid(plain.domain, tuple(sides))
     found = tuple(
-        _widened(enclosures(box.lo, box.hi, edges, side), edges, box.landing)
+        _widened(enclosures(box.lo, box.hi, edges, side, pieces), edges, box.landing)
         for side, (edges,) in enumerate(sides)
     )
     return Cover(box, cells_of, found, _graph(box, cells_of, found), points)

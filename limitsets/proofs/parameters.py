@@ -278,8 +278,8 @@ def parameter_box(
     landing = scatter.outward()[1] if scatter.hi > 0 else 0.0
     try:
         sides, radius = reader.body()
-    except ZeroDivisionError:  # so wide that a length may be nothing
-        raise AnswerError("the part", tree, "one that can be, throughout the tolerance", NARROWER) from None
+    except (ZeroDivisionError, ValueError):  # so wide that a length may be nothing, or sides that do not meet
+        raise AnswerError("the part", "such sides", "one that can be, throughout the tolerance", NARROWER) from None
     _require_rest(sides, kappa, radius)
     scalars = [kappa, reader.span("arm.surface_height"), reader.span("arm.length"), radius]
     ends = [span.outward() for span in scalars]

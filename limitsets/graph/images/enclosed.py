@@ -118,7 +118,13 @@ def _check(map: Any, upper: Any) -> None:  # noqa: A002  # the field's word
     guard()
 
 
-def enclosures(map: Any, upper: Any, edges: Floats | Columns, side: int) -> Enclosures:  # noqa: A002  # the field's word
+def enclosures(
+    map: Any,  # noqa: A002  # the field's word
+    upper: Any,
+    edges: Floats | Columns,
+    side: int,
+    pieces: int | None = None,
+) -> Enclosures:
     """Enclose the images of the cells between consecutive edges of one side.
 
     Parameters
@@ -129,6 +135,8 @@ def enclosures(map: Any, upper: Any, edges: Floats | Columns, side: int) -> Encl
         Borders of the cells; cells are numbered with the last axis running fastest.
     side : int
         The side.
+    pieces : int, optional
+        Pieces of the parameter that is known least, where a cell is undecided; default `PIECES_OF_PARAMETER`.
 
     Raises
     ------
@@ -150,10 +158,10 @@ def enclosures(map: Any, upper: Any, edges: Floats | Columns, side: int) -> Encl
         hulls.join(part, decided[some], 0, cells)
     rest = np.flatnonzero(~decided)
     if rest.size:
-        pieces = PIECES_OF_X[len(axes)]
-        below, above = _cut(tuple(x[rest] for x in lo), tuple(x[rest] for x in hi), pieces)
-        owner = np.repeat(rest, pieces ** len(axes))
-        for one, two in _parameter_pieces(map, upper, PIECES_OF_PARAMETER[len(axes)]):
+        parts = PIECES_OF_X[len(axes)]
+        below, above = _cut(tuple(x[rest] for x in lo), tuple(x[rest] for x in hi), parts)
+        owner = np.repeat(rest, parts ** len(axes))
+        for one, two in _parameter_pieces(map, upper, pieces or PIECES_OF_PARAMETER[len(axes)]):
             part = Images(one, two, side, below, above)
             lost[owner[part.count == NOTHING]] = True
             hulls.join(part, part.count != NOTHING, 0, rest)

@@ -10,18 +10,19 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from limitsets.goals import Goal
-from limitsets.proofs.asked import attracts_all, flip_order, oriented_beyond, reaches, stays_on_arm
+from limitsets.proofs.asked import attracts_all, flip_order, oriented_beyond, predicate, reaches, stays_on_arm
 from limitsets.proofs.asked.kind import Answer, Kind
 from limitsets.proofs.asked.search import State
 from limitsets.proofs.attraction import Attraction
 from limitsets.scene import Scene
 
-__all__ = ["Answer", "State", "ask", "borders", "sentence"]
+__all__ = ["Answer", "State", "ask", "borders", "prove", "sentence"]
 
 KINDS: dict[str, Kind] = {
     "attracts_all": attracts_all.KIND,
     "flip_order": flip_order.KIND,
     "oriented_beyond": oriented_beyond.KIND,
+    "predicate": predicate.KIND,
     "reaches": reaches.KIND,
     "stays_on_arm": stays_on_arm.KIND,
 }
@@ -40,6 +41,22 @@ def ask(found: Attraction, scene: Scene, goal: Goal) -> Answer:
         Its goal.
     """
     return KINDS[goal.kind].ask(found, scene, goal)
+
+
+def prove(found: Attraction, scene: Scene, goal: Goal) -> Answer:
+    """Prove a goal, or say what is missing; what refutes it is not searched for where that would take longer.
+
+    Parameters
+    ----------
+    found : Attraction
+        What is proved of where starts end.
+    scene : Scene
+        The scene.
+    goal : Goal
+        What is asked.
+    """
+    kind = KINDS[goal.kind]
+    return (kind.prove or kind.ask)(found, scene, goal)
 
 
 def borders(goal: Goal | None) -> Sequence[float]:

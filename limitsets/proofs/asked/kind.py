@@ -46,11 +46,14 @@ class Kind(NamedTuple):
         From the section of a proved goal to a sentence.
     borders : callable
         From the goal to the borders of cells that it needs.
+    prove : callable or None
+        As `ask` without the search for what refutes, where that takes longer than the proof; None where it is `ask`.
     """
 
     ask: Callable[[Attraction, Scene, Any], Answer]
     sentence: Callable[[Mapping[str, Any]], str]
     borders: Callable[[Any], Sequence[float]]
+    prove: Callable[[Attraction, Scene, Any], Answer] | None = None
 
 
 def undecided(reason: str, *, final: bool = False) -> Answer:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from limitsets.goals import OrientedBeyond
-from limitsets.proofs.asked.kind import Answer, Kind, below, common, place
+from limitsets.proofs.asked.kind import Answer, Kind, below, common, place, undecided
 from limitsets.proofs.asked.search import from_attracting
 from limitsets.proofs.asked.starts import one_throw
 from limitsets.proofs.attraction import Attraction
@@ -28,28 +28,40 @@ def _exceptions(found: Attraction, goal: OrientedBeyond) -> NDArray[np.bool_]:
     return bad
 
 
-def _ask(found: Attraction, scene: Scene, goal: OrientedBeyond) -> Answer:
-    def wrong(x: Any, side: Any) -> Any:
-        return (x > goal.x) & (side != goal.side)
-
+def _prove(found: Attraction, scene: Scene, goal: OrientedBeyond) -> Answer:
     missing = common(found, anywhere=goal.from_anywhere)
     bad = _exceptions(found, goal)
     if goal.from_anywhere:
         reason = _thrown_there(found, goal, bad)
-        orbit = one_throw(found, wrong) if reason else ()
         # above the joint no cells are near enough: say that, not that a throw from there may land anywhere
-        reason = missing if found.cover.points and not orbit else reason or missing
+        reason = missing if found.cover.points else reason or missing
     else:
         bad &= found.component >= 0
         reason = (
             f"{int(bad.sum())} attracting cells reach beyond x = {goal.x:g} on other sides than {goal.side}"
         )
         reason = missing or (reason if bad.any() else "")
-        orbit = from_attracting(found, wrong) if reason and not missing else ()
     if reason:
-        return Answer("refuted" if orbit else "undecided", reason, {}, orbit)
+        return undecided(reason)
     section = {"kind": goal.kind, "x": f"{goal.x!r} {scene.unit}", "side": goal.side}
     return Answer("proved", "", section | ({"from_anywhere": True} if goal.from_anywhere else {}))
+
+
+def _ask(found: Attraction, scene: Scene, goal: OrientedBeyond) -> Answer:
+    def wrong(x: Any, side: Any) -> Any:
+        return (x > goal.x) & (side != goal.side)
+
+    answer = _prove(found, scene, goal)
+    if answer.verdict == "proved":
+        return answer
+    reason = answer.reason
+    if goal.from_anywhere:
+        thrown = _thrown_there(found, goal, _exceptions(found, goal))
+        orbit = one_throw(found, wrong) if thrown else ()
+        reason = thrown if orbit else reason
+    else:
+        orbit = from_attracting(found, wrong) if not common(found, anywhere=False) else ()
+    return Answer("refuted" if orbit else "undecided", reason, {}, orbit)
 
 
 def _thrown_there(found: Attraction, goal: OrientedBeyond, bad: NDArray[np.bool_]) -> str:
@@ -76,4 +88,4 @@ def _sentence(section: Mapping[str, Any]) -> str:
     return f"In the attracting cells, every part {beyond}"
 
 
-KIND = Kind(_ask, _sentence, lambda goal: [below(goal.x)])
+KIND = Kind(_ask, _sentence, lambda goal: [below(goal.x)], _prove)

@@ -33,6 +33,20 @@ def _wanted(found: Attraction, goal: Reaches) -> Mask:
 
 
 def _ask(found: Attraction, scene: Scene, goal: Reaches) -> Answer:
+    answer = _prove(found, scene, goal)
+    if answer.verdict != "undecided" or common(found, anywhere=False):
+        return answer
+    quiet = not found.cover.box.noise  # throws that differ may carry a part away from what attracts
+    if goal.every_orbit:
+        never = cycle_that(found, scene, lambda cycle: not _arrives(cycle, goal))
+    elif quiet and not (_not_null(found) if goal.from_anywhere else ""):
+        never = cycle_that(found, scene, lambda cycle: cycle.attracts and not _arrives(cycle, goal))
+    else:
+        never = ()
+    return answer._replace(verdict="refuted", counterexample=never) if never else answer
+
+
+def _prove(found: Attraction, scene: Scene, goal: Reaches) -> Answer:
     missing = common(found, anywhere=False)
     if missing:
         return undecided(missing)
@@ -47,9 +61,7 @@ def _ask(found: Attraction, scene: Scene, goal: Reaches) -> Answer:
         return undecided(missing, final=found.cover.box.landing > 0.0)
     throws, reason = thinned(found, inside, wanted)
     if reason:
-        attracts = cycle_that(found, scene, lambda cycle: cycle.attracts and not _arrives(cycle, goal))
-        quiet = not found.cover.box.noise  # throws that differ may carry a part away from it
-        return Answer("refuted" if attracts and quiet else "undecided", reason, {}, attracts if quiet else ())
+        return undecided(reason)
     # a little more, so that other arithmetic can confirm it
     return Answer("proved", "", _section(scene, goal, throws + throws // 8 + 1))
 
@@ -74,9 +86,7 @@ def _every(found: Attraction, scene: Scene, goal: Reaches, wanted: Mask) -> Answ
     cells = np.ones_like(wanted) if goal.from_anywhere else found.component >= 0
     throws, left = peeled(found, cells, wanted)
     if left.size:
-        never = cycle_that(found, scene, lambda cycle: not _arrives(cycle, goal))
-        reason = f"an orbit from {place(found, int(left[0]))} may never get there"
-        return Answer("refuted" if never else "undecided", reason, {}, never)
+        return undecided(f"an orbit from {place(found, int(left[0]))} may never get there")
     if missing:
         return undecided(missing, final=found.cover.box.landing > 0.0)
     return Answer("proved", "", _section(scene, goal, throws))
@@ -125,4 +135,4 @@ def _sentence(section: Mapping[str, Any]) -> str:
     return f"From every start {where}, but for starts of total length zero, a part {there}."
 
 
-KIND = Kind(_ask, _sentence, lambda goal: [above(goal.x)])
+KIND = Kind(_ask, _sentence, lambda goal: [above(goal.x)], _prove)

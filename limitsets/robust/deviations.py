@@ -1,0 +1,269 @@
+"""Deviations of one quantity: which there are, in which unit people give them, and the values that they stand for.
+
+A deviation has a size, a rational number of its unit: percent of the value, or a length or an angle.  The texts made
+here are what `limitsets.certify` and a certificate take, so a size is always one that a short decimal can say.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from decimal import ROUND_CEILING, ROUND_FLOOR, Context, Decimal
+from fractions import Fraction
+from typing import Any
+
+from limitsets.errors import AnswerError
+from limitsets.proofs.parameters import VARYING
+from limitsets.proofs.rational import Span
+from limitsets.proofs.tolerance import Piece
+from limitsets.scene import Scene
+from limitsets.scene.quantities import NAMES, find
+from limitsets.scene.units import exact_factor, parse
+
+__all__ = ["READINGS", "Measure", "decimal", "given", "measure", "measures", "short"]
+
+READINGS = ("fixed", "per-throw")
+"""Fixed but unknown, or another one at every throw."""
+
+# Digits of a size.
+DIGITS = 9
+
+_WIDE = Context(prec=60)
+
+# Of these a deviation is given as a share of the value.
+_SHARES = (
+    "throw.speed",
+    "throw.kappa",
+    "part.mass.radius_of_gyration",
+    "part.sides",
+    "gravity.acceleration",
+)
+
+
+def decimal(value: Fraction) -> str:
+    """Write a rational that a decimal of at most 25 places can say.
+
+    Examples
+    --------
+    >>> decimal(Fraction(-397, 1000)), decimal(Fraction(12))
+    ('-0.397', '12')
+    """
+    text = format(_WIDE.divide(Decimal(value.numerator), Decimal(value.denominator)), "f")
+    return text.rstrip("0").rstrip(".") if "." in text else text
+
+
+def short(value: Fraction | float, *, up: bool = False) -> Fraction:
+    """Round a positive number to `DIGITS` significant digits, towards zero or away from it.
+
+    Examples
+    --------
+    >>> short(Fraction(2, 3)), short(1234567.8999, up=True)
+    (Fraction(333333333, 500000000), Fraction(12345679, 10))
+    """
+    exact = Fraction(value)
+    context = Context(prec=DIGITS, rounding=ROUND_CEILING if up else ROUND_FLOOR)
+    return Fraction(context.divide(Decimal(exact.numerator), Decimal(exact.denominator)))
+
+
+@dataclass(frozen=True)
+class Measure:
+    """One quantity of a scene, read in one way.
+
+    Attributes
+    ----------
+    quantity : str
+        Its name.
+    reading : str
+        Of `READINGS`.
+    unit : str
+        Of a deviation: "%", or the unit of a length or an angle.
+    scene : Scene
+        The scene.
+    """
+
+    quantity: str
+    reading: str
+    unit: str
+    scene: Scene
+
+    @property
+    def relative(self) -> bool:
+        """Whether sizes are percents of the value."""
+        return self.unit == "%"
+
+    @property
+    def key(self) -> str:
+        """The quantity that the scene gives instead, where it is given by kappa."""
+        by_kappa = self.quantity == "throw.speed" and "kappa" in self.scene.text["throw"]
+        return "throw.kappa" if by_kappa else self.quantity
+
+    @property
+    def nominal(self) -> Fraction:
+        """The value of `key`, in the unit in which the scene gives it."""
+        return Fraction(parse(_text_at(self.scene, self.key), find(self.key).dimension).number)
+
+    @property
+    def least(self) -> Fraction:
+        """A size that is small for such a quantity: where a search begins."""
+        if self.relative:
+            return Fraction(1, 10)
+        if self.unit in ("deg", "rad"):
+            return Fraction(1, 20) if self.unit == "deg" else Fraction(1, 1000)
+        # lengths: about a thousandth of the part
+        sides = [float(length) for length in self.scene.sides.length]
+        return short(exact_factor(self.scene.unit, self.unit) * Fraction(min(sides)) / 1000)
+
+    @property
+    def most(self) -> Fraction | None:
+        """Sizes have to stay below it; None where the part says how far one can go."""
+        return Fraction(100) if self.relative else None
+
+    def text(self, size: Fraction) -> str:
+        """Write a size with its unit, as `limitsets.certify` takes it."""
+        return f"{decimal(size)} {self.unit}"
+
+    def value(self, size: Fraction) -> Fraction:
+        """Return the value of `key` at a deviation with its sign."""
+        if self.key != self.quantity:  # kappa = g / w^2
+            return self.nominal / (1 + size / 100) ** 2
+        if self.relative:
+            return self.nominal * (1 + size / 100)
+        own = parse(_text_at(self.scene, self.key), find(self.key).dimension).unit
+        return self.nominal + size * exact_factor(self.unit, own)
+
+    def between(self, one: Fraction, other: Fraction) -> Span:
+        """Return the values at all deviations between two."""
+        ends = self.value(one), self.value(other)
+        return Span(min(ends), max(ends))
+
+    def at(self, size: Fraction) -> Span:
+        """Return the value at a deviation, as a decimal that is not farther from the nominal one."""
+        exact, places = self.value(size), 10**18
+        scaled = exact * places
+        rounded = Fraction(scaled.numerator // scaled.denominator, places)
+        if rounded != exact and exact < self.nominal:
+            rounded += Fraction(1, places)
+        return Span(rounded, rounded)
+
+    def piece(self, span: Span) -> Piece:
+        """Return the box of scenes with these values."""
+        return Piece(self.scene, {self.key: span})
+
+
+def _text_at(scene: Scene, name: str) -> str:
+    node: Any = scene.text
+    for word in find(name).path:
+        known = word in node if isinstance(node, dict) else isinstance(word, int) and word < len(node)
+        if not known:
+            raise AnswerError(
+                "the quantity", name, f"one that the scene gives: {', '.join(given(scene))}", "name another"
+            )
+        node = node[word]
+    return str(node)
+
+
+def _names(node: Any, name: str) -> Iterator[str]:
+    """Walk a scene for what bears the name of a quantity."""
+    if isinstance(node, str):
+        parts = name.split("[")
+        pattern = "[i]".join([parts[0], *(part.split("]", 1)[1] for part in parts[1:])])
+        if pattern in NAMES:
+            yield name
+    elif isinstance(node, dict):
+        for word, inner in node.items():
+            yield from _names(inner, f"{name}.{word}" if name else word)
+    elif isinstance(node, list):
+        corner = name.startswith("part.vertices[")
+        for k, inner in enumerate(node):
+            yield from _names(inner, f"{name}.{'xy'[k]}" if corner else f"{name}[{k}]")
+
+
+def given(scene: Scene) -> tuple[str, ...]:
+    """Name the quantities that a scene gives and that its throws depend on, and the speed, and where parts land.
+
+    Examples
+    --------
+    >>> import limitsets as ls
+    >>> given(ls.load("paper-designed"))[-3:]
+    ('arm.length', 'throw.speed', 'landing.x')
+    """
+    by_kappa = "kappa" in scene.text["throw"]
+    gravity = ("gravity.acceleration", "gravity.tilt")
+    tables = {word: scene.text[word] for word in ("part", "arm", "throw", "gravity") if word in scene.text}
+    found = [name for name in _names(tables, "") if name not in ("throw.kappa", "throw.speed")]
+    kept = [name for name in found if not (by_kappa and name in gravity[:1])]
+    return (*kept, "throw.speed", "landing.x")
+
+
+def _unit(scene: Scene, quantity: str, reading: str) -> str:
+    """Choose the unit: as the scene's [tolerance] has it, or as people give such a deviation."""
+    text = scene.text.get("tolerance", {}).get(quantity)
+    if text is not None:
+        share = text.rstrip().endswith("%")
+        return str(parse(text, "share" if share else find(quantity).dimension).unit)
+    if quantity.startswith(_SHARES) or quantity.endswith(".mass"):
+        return "%"
+    if quantity == "gravity.tilt":
+        return str(parse(_text_at(scene, quantity), "angle").unit)
+    return scene.unit
+
+
+def measure(scene: Scene, quantity: str, reading: str | None = None) -> Measure:
+    """Say how deviations of a quantity are measured.
+
+    Parameters
+    ----------
+    scene : Scene
+        The scene.
+    quantity : str
+        Its name, "landing.x" included.
+    reading : str, optional
+        Of `READINGS`; default "fixed", but of landing.x "per-throw", its only one.
+
+    Raises
+    ------
+    AnswerError
+        A quantity that the scene does not give or its throws do not depend on, or a reading that it does not have.
+    """
+    find(quantity)
+    reading = reading or ("per-throw" if quantity == "landing.x" else "fixed")
+    if reading not in READINGS:
+        raise AnswerError("the reading", reading, " or ".join(READINGS), "correct the word")
+    if reading == "per-throw" and quantity not in VARYING:
+        allowed = f"per-throw for {', '.join(VARYING)}; fixed"
+        raise AnswerError(f"the reading of {quantity}", reading, allowed, "ask for it fixed but unknown")
+    if reading == "fixed" and quantity == "landing.x":
+        raise AnswerError(
+            "the reading of landing.x", reading, "per-throw", "where a part lands differs at every throw"
+        )
+    by_kappa = "kappa" in scene.text["throw"]
+    if by_kappa and quantity.startswith("gravity.") and reading == "fixed":
+        remedy = "give the throw by its speed, or ask for throw.speed"
+        raise AnswerError(
+            "the quantity", quantity, "one that the throw depends on; it is given by kappa", remedy
+        )
+    found = Measure(quantity, reading, _unit(scene, quantity, reading), scene)
+    if quantity not in ("landing.x", "throw.speed"):
+        _text_at(scene, quantity)
+    return found
+
+
+def measures(scene: Scene, reading: str | None = None) -> tuple[Measure, ...]:
+    """List what can deviate in a scene, fixed but unknown first.
+
+    Parameters
+    ----------
+    scene : Scene
+        The scene.
+    reading : str, optional
+        Only this one.
+    """
+    by_kappa = "kappa" in scene.text["throw"]
+    found = []
+    for word in READINGS if reading is None else (reading,):
+        for name in given(scene):
+            if word == "fixed" and (name == "landing.x" or (by_kappa and name == "gravity.tilt")):
+                continue
+            if word == "fixed" or name in VARYING:
+                found.append(measure(scene, name, word))
+    return tuple(found)

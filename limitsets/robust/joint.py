@@ -1,0 +1,316 @@
+"""The joint margin: the factor on a whole vector of tolerances, up to which goals are proved.
+
+Every quantity is fixed but unknown, but for the landing place, which differs at every throw.  The box is cut where it
+pays: proved as a whole a piece counts as noise, which costs about as much again as its deviation does, so pieces have
+to be narrow near the worst corner, in the quantities that matter there, and nowhere else.
+"""
+
+from __future__ import annotations
+
+import heapq
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from fractions import Fraction
+
+import numpy as np
+
+from limitsets.errors import AnswerError
+from limitsets.goals import Goal
+from limitsets.proofs.tolerance import Piece
+from limitsets.robust.asking import Asked, Question
+from limitsets.robust.deviations import Measure, decimal, measure, short
+from limitsets.robust.effect import Effects, effects_of, scene_at
+from limitsets.robust.margins import Margin, asked_of
+from limitsets.scene import Scene
+from limitsets.scene.quantities import deviation
+from limitsets.scene.units import parse
+
+__all__ = ["joint_margin"]
+
+# Seconds and pieces after which the proof of the box ends with what it has.
+SECONDS, MOST_PIECES = 150.0, 4000
+
+# What a piece costs, proved as a whole, against what its corner alone costs; learned while the box is cut.
+COST, LEAST_COST, MOST_COST = 1.6, 1.1, 4.0
+
+# A piece narrower than this share of the box is not cut again.
+NARROWEST = Fraction(1, 4096)
+
+Tell = Callable[[float], None]
+Sizes = tuple[Fraction, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Tolerance:
+    """A vector of deviations.
+
+    Attributes
+    ----------
+    measures : tuple of Measure
+        What is fixed but unknown.
+    sizes : tuple of Fraction
+        A size for each.
+    landing : Measure or None
+        Where parts land, at every throw, if that is in it.
+    landing_size : Fraction
+        How far.
+    """
+
+    measures: tuple[Measure, ...]
+    sizes: tuple[Fraction, ...]
+    landing: Measure | None
+    landing_size: Fraction
+
+    @classmethod
+    def of(cls, scene: Scene, texts: Mapping[str, str]) -> Tolerance:
+        """Read it from texts by quantity."""
+        measures, sizes, landing, landing_size = [], [], None, Fraction(0)
+        if not texts:
+            raise AnswerError("the tolerance", "empty", "deviations by quantity", "give the scene [tolerance]")
+        for name, text in texts.items():
+            deviation(text, name, scene.unit, key=f'tolerance."{name}"')
+            one = measure(scene, name)
+            share = text.rstrip().endswith("%")
+            given = parse(text, "share" if share else _dimension(name))
+            one = replace(one, unit=given.unit)
+            if name == "throw.speed" and one.key != name and not share:
+                raise AnswerError("the tolerance", text, "percent, for a scene given by kappa", "give it so")
+            if name == "landing.x":
+                landing, landing_size = one, Fraction(given.number)
+            else:
+                measures.append(one)
+                sizes.append(Fraction(given.number))
+        return cls(tuple(measures), tuple(sizes), landing, landing_size)
+
+    def noise(self, factor: Fraction) -> dict[str, str]:
+        """What differs at every throw."""
+        return {} if self.landing is None else {"landing.x": self.landing.text(short(factor * self.landing_size))}
+
+    def texts(self, factor: Fraction) -> dict[str, str]:
+        """What is fixed but unknown, as `limitsets.certify` takes it."""
+        return {
+            one.quantity: one.text(factor * size) for one, size in zip(self.measures, self.sizes, strict=True)
+        }
+
+    def corner(self, factor: Fraction, signs: tuple[int, ...]) -> Piece | None:
+        """The scene at one corner."""
+        if not self.measures:
+            return None
+        sizes = [factor * size * sign for size, sign in zip(self.sizes, signs, strict=True)]
+        return scene_at(self.measures, sizes)
+
+    def piece(self, low: Sizes, high: Sizes, factor: Fraction) -> Piece | None:
+        """The scenes between two corners, given as parts of the whole deviation."""
+        if not self.measures:
+            return None
+        spans = {
+            one.key: one.between(factor * size * lo, factor * size * hi)
+            for one, size, lo, hi in zip(self.measures, self.sizes, low, high, strict=True)
+        }
+        return Piece(self.measures[0].scene, spans)
+
+
+def _dimension(name: str) -> str:
+    from limitsets.scene.quantities import find
+
+    return find(name).dimension
+
+
+@dataclass(order=True)
+class _Part:
+    """A box of parts of the whole deviation, by how near to the scene as it is it comes."""
+
+    near: Fraction
+    number: int
+    low: Sizes = field(compare=False)
+    high: Sizes = field(compare=False)
+
+    def halves(self, k: int, number: int) -> list[_Part]:
+        """Cut in the middle along one quantity."""
+        middle = (self.low[k] + self.high[k]) / 2
+        parts = []
+        for low, high in (
+            (self.low, (*self.high[:k], middle, *self.high[k + 1 :])),
+            ((*self.low[:k], middle, *self.low[k + 1 :]), self.high),
+        ):
+            number += 1
+            parts.append(_Part(_nearness(low, high), number, low, high))
+        return parts
+
+
+def _nearness(low: Sizes, high: Sizes) -> Fraction:
+    """Least factor of the whole box at which a part begins to count."""
+    return max(max(lo, -hi, Fraction(0)) for lo, hi in zip(low, high, strict=True))
+
+
+class _Cutting:
+    """Proof of a box, piece by piece."""
+
+    def __init__(self, question: Question, tolerance: Tolerance, factor: Fraction, effects: Effects) -> None:
+        self.question, self.tolerance, self.factor, self.effects = question, tolerance, factor, effects
+        self.cost, self.noise = COST, tolerance.noise(factor)
+        self.proved: list[tuple[_Part, Asked]] = []
+        self.tried = 0
+
+    def spare(self, part: _Part) -> tuple[float, int]:
+        """What is expected to be to spare on a part, proved as a whole, and the quantity that costs most."""
+        low, high = (np.array([float(x) for x in end]) * float(self.factor) for end in (part.low, part.high))
+        half = 0.5 * (high - low)
+        if not self.effects.spare.size:
+            return 1.0, int(np.argmax(half))
+        fall = np.abs(self.effects.fall)
+        left = self.effects.spare - self.effects.fall @ (0.5 * (low + high)) - self.cost * fall @ half
+        worst = int(np.argmin(left))
+        return float(left[worst]), int(np.argmax(fall[worst] * half))
+
+    def run(self, seconds: float, tell: Tell) -> tuple[Fraction, str]:
+        """Prove parts, nearest first; up to which part of the factor all are proved, and what stops it."""
+        count = len(self.tolerance.measures)
+        whole = (Fraction(-1),) * count, (Fraction(1),) * count
+        waiting, number, end = [_Part(Fraction(0), 0, *whole)], 0, time.perf_counter() + seconds
+        failed: list[tuple[Fraction, str]] = []
+        while waiting:
+            part = heapq.heappop(waiting)
+            if failed and part.near >= min(near for near, _ in failed):
+                continue
+            left, k = self.spare(part)
+            found = self._try(part) if left > 0.0 or not count else None
+            if found is not None and found.verdict == "proved":
+                self.proved.append((part, found))
+                self.cost = max(LEAST_COST, self.cost * (0.98 if left < 0.1 else 1.0))
+                tell(self.done(waiting))
+                continue
+            if found is not None and self.effects.spare.size:
+                self.cost = min(MOST_COST, self.cost * 1.05)
+            over = time.perf_counter() > end or len(self.proved) + len(waiting) >= MOST_PIECES
+            narrow = not count or part.high[k] - part.low[k] <= NARROWEST
+            if over or narrow:
+                why = "it ran out of time: give it more seconds" if over else (found.reason if found else "")
+                failed.append((part.near, why))
+                continue
+            halves = part.halves(k, number)
+            number += 2
+            for half in halves:
+                heapq.heappush(waiting, half)
+        return min(failed, default=(Fraction(1), ""))
+
+    def done(self, waiting: list[_Part]) -> float:
+        """Share of the pieces known so far."""
+        return len(self.proved) / (len(self.proved) + len(waiting))
+
+    def _try(self, part: _Part) -> Asked:
+        self.tried += 1
+        return self.question.prove(self.tolerance.piece(part.low, part.high, self.factor), self.noise)
+
+
+def _worst(
+    question: Question, tolerance: Tolerance, effects: Effects, width: Fraction
+) -> tuple[Fraction, Fraction | None, Asked | None, str]:
+    """Bracket the factor at the worst corners, as single scenes: proved, refuted, by what, why not."""
+    corners = effects.corners() or [(1,) * len(tolerance.measures), (-1,) * len(tolerance.measures)]
+    bad: Fraction | None = None
+    against, good_all, reason = None, None, ""
+    for signs in corners[:4]:
+        good, own, by, why = _at_corner(question, tolerance, signs, width, bad)
+        good_all = good if good_all is None else min(good_all, good)
+        if own is not None and (bad is None or own < bad):
+            bad, against = own, by
+        reason = reason or why
+    return good_all or Fraction(0), bad, against, "" if bad is not None else reason
+
+
+def _at_corner(
+    question: Question, tolerance: Tolerance, signs: tuple[int, ...], width: Fraction, known: Fraction | None
+) -> tuple[Fraction, Fraction | None, Asked | None, str]:
+    good, bad, against, reason = Fraction(0), None, None, ""
+
+    def proves(factor: Fraction) -> bool:
+        nonlocal good, reason
+        found = question.prove(tolerance.corner(factor, signs), tolerance.noise(factor))
+        good, reason = (max(good, factor), reason) if found.verdict == "proved" else (good, found.reason)
+        return found.verdict == "proved"
+
+    def refutes(factor: Fraction) -> bool:
+        nonlocal bad, against
+        found = question.refute(tolerance.corner(factor, signs), tolerance.noise(factor))
+        if found.verdict == "refuted":
+            bad, against = factor, found
+        return found.verdict == "refuted"
+
+    factor = known or Fraction(1, 16)
+    while proves(factor):
+        if known is not None or factor > 10**6:
+            return good, None, None, ""
+        factor *= 2
+    top = factor
+    while top - good > width * top and top > Fraction(1, 10**6):
+        middle = _round((good + top) / 2)
+        top = top if proves(middle) else middle
+    for k in range(10):
+        if refutes(_round(top * (1 + Fraction(2**k - 1, 400)))):
+            break
+    return good, bad, against, reason
+
+
+def _round(value: Fraction) -> Fraction:
+    """Five digits: a factor that people can read, and whose multiples are short decimals."""
+    return Fraction(f"{float(value):.5g}")
+
+
+def joint_margin(
+    scene: Scene,
+    goals: tuple[Goal, ...],
+    tolerance: Mapping[str, str] | None = None,
+    *,
+    width: float = 0.01,
+    seconds: float = SECONDS,
+    tell: Tell = lambda _: None,
+) -> Margin:
+    """Bracket the factor on a tolerance up to which goals hold.
+
+    Parameters
+    ----------
+    scene : Scene
+        The scene.
+    goals : tuple of Goal
+        What has to hold, all of it.
+    tolerance : mapping of str to str, optional
+        Deviations by quantity, ``{"throw.speed": "1 %", "landing.x": "0.01 in"}``; default the scene's.  landing.x is
+        noise at every throw, all else fixed but unknown.
+    width : float
+        How close the two ends have to be, as a share of the upper one.
+    seconds : float
+        Time for the proof of the box; what is proved by then counts.
+    tell : callable
+        Called with the share that is done.
+
+    Returns
+    -------
+    Margin
+        Its `quantity` is "joint", `proved` and `refuted` are factors.
+    """
+    begin = time.perf_counter()
+    question = asked_of(scene, goals)
+    vector = Tolerance.of(question.scene, tolerance if tolerance is not None else scene.text.get("tolerance", {}))
+    share = Fraction(repr(width))
+    effects = effects_of(question, vector.measures, _sizes(vector)) if vector.measures else Effects(np.zeros(0), np.zeros((0, 0)))
+    good, bad, against, reason = _worst(question, vector, effects, share / 8)
+    target = _round(min(good, bad * (1 - share * Fraction(9, 10))) if bad is not None else good)
+    tell(0.05)
+    proved, pieces = Fraction(0), []
+    if target > 0:
+        cutting = _Cutting(question, vector, target, effects)
+        part, why = cutting.run(seconds, tell)
+        proved, reason = part * target, why or reason
+        pieces = [found for _, found in cutting.proved]
+    closed = bad is not None and bad - proved <= share * bad
+    return Margin(
+        "joint", "tolerance", goals, float(proved), None if bad is None else float(bad), "", None,
+        "" if closed else reason, closed, time.perf_counter() - begin, question.scene, (proved, bad), vector,
+        tuple(pieces), against,
+    )
+
+
+def _sizes(vector: Tolerance) -> dict[str, Fraction]:
+    return {one.quantity: size for one, size in zip(vector.measures, vector.sizes, strict=True)}

@@ -1,0 +1,159 @@
+"""The worst that noise can do: orbits that violate a goal by the best choice at every throw.
+
+Random throws miss them, and so does a search forward that keeps one state per cell once the violation is small.  So
+go backward: places from which one throw can violate the goal, from which two can, and so on, on a fine raster; then
+forward from a long orbit without noise, which comes to such places by itself, with every throw computed anew.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from limitsets.maps import orbit
+from limitsets.proofs.asked.search import (
+    MORE_THAN_ROUNDING,
+    Choice,
+    Path,
+    Reached,
+    State,
+    Wrong,
+    choices,
+    replayed,
+    settled,
+    throws,
+)
+from limitsets.proofs.attraction import Attraction
+
+__all__ = ["worst_orbit"]
+
+# Places of the raster, values of kappa at a throw, throws back from the violation, throws of the orbit, states kept.
+PLACES, KAPPAS, BACK, LENGTH, KEPT = 120_000, 9, 4, 200_000, 4000
+
+# Throws of the long orbit that are shown before the noise begins.
+SHOWN = 12
+
+Array = NDArray[np.float64]
+Sides = NDArray[np.int64]
+
+
+class _Raster:
+    """Places evenly over the attracting cells, and the nearest of them to any place."""
+
+    def __init__(self, found: Attraction) -> None:
+        extents = found.cells.extents()
+        total = sum(hi - lo for parts in extents.values() for lo, hi in parts)
+        self.step = total / PLACES
+        self.low, self.first = {}, {}
+        x, side, count = [], [], 0
+        for s, parts in extents.items():
+            if not parts:
+                continue
+            lo, hi = parts[0][0], parts[-1][1]
+            some = np.arange(lo, hi + self.step, self.step)
+            self.low[s], self.first[s] = lo, count
+            x.append(some)
+            side.append(np.full(some.size, s))
+            count += some.size
+        self.x, self.side = np.concatenate(x), np.concatenate(side)
+
+    def nearest(self, x: Array, side: Sides) -> Sides:
+        """Number of the nearest place; -1 where there is none."""
+        found = np.full(x.size, -1)
+        for s, first in self.first.items():
+            mine = np.flatnonzero(side == s)
+            number = first + np.rint((x[mine] - self.low[s]) / self.step).astype(np.int64)
+            last = first + int((self.side == s).sum())
+            found[mine] = np.where((number >= first) & (number < last), number, -1)
+        return found
+
+
+def _beside(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Add the neighbours."""
+    wide = mask.copy()
+    wide[1:] |= mask[:-1]
+    wide[:-1] |= mask[1:]
+    return wide
+
+
+def worst_orbit(found: Attraction, wrong: Wrong) -> tuple[State, ...]:
+    """Find an orbit from the limit set that violates a goal, with the noise chosen at every throw, and prove it.
+
+    Parameters
+    ----------
+    found : Attraction
+        Cells and images, of a box of parameters with noise.
+    wrong : callable
+        From places and sides to whether each violates the goal.
+
+    Returns
+    -------
+    tuple of State
+        The orbit, enclosed; empty if none is found.
+    """
+    box, options = found.cover.box, choices(found.cover.box, KAPPAS)
+    raster = _Raster(found)
+    start, on = settled(found)
+    usual = Choice(0.5 * (box.lo.kappa + box.hi.kappa), 0.0)
+    path = orbit(box.at_kappa(usual.kappa), start, on, LENGTH)
+    here = raster.nearest(path.x, path.side)
+    levels = [_beside(wrong(raster.x, raster.side))]
+    known = np.zeros(raster.x.size, dtype=bool)
+    for back in range(1, BACK + 1):
+        left = np.flatnonzero(~known)
+        thrown = throws(box, raster.x[left], raster.side[left], options)
+        to = raster.nearest(thrown.x, thrown.side)
+        hit = (to >= 0) & thrown.stays & levels[-1][to]
+        good = np.zeros(raster.x.size, dtype=bool)
+        good[left[thrown.state[hit]]] = True
+        levels.append(_beside(good))
+        known |= good
+        begin = np.flatnonzero((here >= 0) & levels[back][here])
+        begin = begin[begin >= SHOWN][:KEPT]
+        for states in _followed(found, wrong, raster, levels, path.x, path.side, begin, options, usual):
+            return states
+    return ()
+
+
+def _followed(
+    found: Attraction,
+    wrong: Wrong,
+    raster: _Raster,
+    levels: list[NDArray[np.bool_]],
+    x: Array,
+    side: Sides,
+    begin: Sides,
+    options: list[Choice],
+    usual: Choice,
+):
+    """Throw on from states of the orbit along the levels; yield the orbit if it is proved to violate the goal."""
+    if not begin.size:
+        return
+    box = found.cover.box
+    reached = Reached.of(x[begin], np.asarray(side)[begin])
+    for level in reversed(levels[:-1]):
+        thrown = throws(box, reached.x[-1], reached.side[-1], options)
+        to = raster.nearest(thrown.x, thrown.side)
+        if level is levels[0]:
+            keep = np.flatnonzero(wrong(thrown.x * MORE_THAN_ROUNDING, thrown.side) & thrown.stays)
+            keep = keep[np.argsort(-thrown.x[keep])[:1]]
+        else:
+            keep = np.flatnonzero((to >= 0) & level[to] & thrown.stays)
+            keep = keep[:: max(1, keep.size // KEPT)]
+        if not keep.size:
+            return
+        reached.add(thrown, keep)
+    tail = reached.path(0, options)
+    first = int(begin[np.flatnonzero((x[begin] == tail.x[0]) & (np.asarray(side)[begin] == tail.side[0]))[0]])
+    before = range(first - SHOWN, first)
+    whole = Path(
+        [*(float(x[k]) for k in before), *tail.x],
+        [*(int(side[k]) for k in before), *tail.side],
+        [*([usual] * SHOWN), *tail.thrown],
+    )
+    states = replayed(box, whole)
+    if not states or not wrong(np.array([states[-1].lo]), np.array([states[-1].side])).all():
+        return
+    (cell,) = found.cover.grid.index([whole.x[0]], whole.side[0])
+    if cell >= 0 and found.component[cell] >= 0:
+        yield states
