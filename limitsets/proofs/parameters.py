@@ -7,7 +7,8 @@ go through; only the last step rounds to doubles, outward.
 from __future__ import annotations
 
 import copy
-from collections.abc import Mapping, Sequence
+import re
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
@@ -17,10 +18,11 @@ import numpy as np
 from limitsets.errors import AnswerError
 from limitsets.geometry import OnSide, mass_of, rest_of, side_ends, triangle_of
 from limitsets.geometry.polygon import above_side
+from limitsets.proofs.mean_value import Slope, about, middle, root
 from limitsets.proofs.rational import Span, angle, pi, sine, square_root
 from limitsets.proofs.simulated import simulated
 from limitsets.scene import Scene
-from limitsets.scene.quantities import find
+from limitsets.scene.quantities import NAMES, find
 from limitsets.scene.units import exact_factor, parse
 from limitsets.thrower import Throw
 from limitsets.thrower.motion import FullThrow, Outline
@@ -79,17 +81,40 @@ def _at(tree: Mapping[str, Any], name: str) -> Any:
     return node
 
 
+def _pattern(name: str) -> str:
+    return re.sub(r"\[[0-9]+\]", "[i]", name)
+
+
+def _wide(node: Any, name: str) -> Iterator[str]:
+    """Name the quantities of a tree that are pairs of texts."""
+    if isinstance(node, dict):
+        for word, inner in node.items():
+            yield from _wide(inner, f"{name}.{word}")
+    elif isinstance(node, list):
+        corner = name.startswith("part.vertices[")
+        if len(node) == 2 and all(isinstance(one, str) for one in node) and name != "part.sides":
+            if _pattern(name) in NAMES:
+                yield name
+                return
+        for k, inner in enumerate(node):
+            yield from _wide(inner, f"{name}.{'xy'[k]}" if corner else f"{name}[{k}]")
+
+
 class _Reader:
     """Spans of the quantities of one scene, in its unit of length."""
 
-    def __init__(self, scene: Scene, tree: Mapping[str, Any]) -> None:
-        self.scene, self.tree, self.unit = scene, tree, scene.unit
+    def __init__(
+        self, scene: Scene, tree: Mapping[str, Any], instead: Mapping[str, Span | Slope] | None = None
+    ) -> None:
+        self.scene, self.tree, self.unit, self.instead = scene, tree, scene.unit, instead or {}
 
     def has(self, table: str, key: str) -> bool:
         return key in self.tree.get(table, {})
 
-    def span(self, name: str) -> Span:
-        """Return a quantity, or the span between the two texts of a tolerance."""
+    def span(self, name: str) -> Any:
+        """Return a quantity, or the span between the two texts of a tolerance, or what stands in for it."""
+        if name in self.instead:
+            return self.instead[name]
         found = _at(self.tree, name)
         texts = found if isinstance(found, list) else [found, found]
         lo, hi = (self.one(text, find(name).dimension) for text in texts)
@@ -175,7 +200,7 @@ class _Reader:
         vertices: list[Any]
         if "sides" in part:
             lengths = [self.span(f"part.sides[{k}]") for k in range(3)]
-            vertices = list(triangle_of(lengths, square_root))
+            vertices = list(triangle_of(lengths, root))
         else:
             vertices = [
                 tuple(self.span(f"part.vertices[{k}].{axis}") for axis in "xy")
@@ -192,7 +217,7 @@ class _Reader:
                 for k in range(len(mass.get("points", ())))
             ]
             density = self.one(mass["plate_density"], "mass per area")
-            found: Any = mass_of(vertices, density, points, square_root)
+            found: Any = mass_of(vertices, density, points, root)
             centre, radius = found.centre, found.radius_of_gyration
         return vertices, centre, lengths, radius
 
@@ -200,8 +225,27 @@ class _Reader:
         """Return (a, d, length) of every side, and the radius of gyration."""
         vertices, centre, lengths, radius = self.shape()
         corner = Span.of(0, 4)  # of no use to a proof about the minimal map
-        sides = rest_of(vertices, centre, lengths, square_root, lambda _y, _x: corner)
+        sides = rest_of(vertices, centre, lengths, root, lambda _y, _x: corner)
         return [side[:3] for side in sides], radius
+
+    def narrow_body(self) -> tuple[list[tuple[Any, ...]], Span]:
+        """As `body`, but narrower where several of its numbers are known to a tolerance only."""
+        plain, radius = self.body()
+        names = [name for name in _wide(self.tree["part"], "part") if NAMES[_pattern(name)] == "length"]
+        if not names:
+            return plain, radius
+        box = [self.span(name) for name in names]
+        middles = [middle(span) for span in box]
+        unit = [[Span.of(int(j == k)) for j in range(len(names))] for k in range(len(names))]
+        rising = [Slope(span, tuple(row)) for span, row in zip(box, unit, strict=True)]
+        centre = _Reader(self.scene, self.tree, dict(zip(names, middles, strict=True))).body()
+        steep = _Reader(self.scene, self.tree, dict(zip(names, rising, strict=True))).body()
+        offsets = [span - mid for span, mid in zip(box, middles, strict=True)]
+        sides = [
+            tuple(about(*each, offsets, known) for *each, known in zip(*rows, strict=True))
+            for rows in zip(centre[0], steep[0], plain, strict=True)
+        ]
+        return sides, about(centre[1], steep[1], offsets, radius)
 
     def outline(self) -> tuple[list[Span], list[list[Span]], list[list[Span]]]:
         """Return the exterior angles, and where the vertices are: p and q of `thrower.motion.Outline`."""
@@ -277,7 +321,7 @@ def parameter_box(
     scatter = reader.deviation("landing.x", noise or {})[1]
     landing = scatter.outward()[1] if scatter.hi > 0 else 0.0
     try:
-        sides, radius = reader.body()
+        sides, radius = reader.narrow_body()
     except (ZeroDivisionError, ValueError):  # so wide that a length may be nothing, or sides that do not meet
         raise AnswerError("the part", "such sides", "one that can be, throughout the tolerance", NARROWER) from None
     _require_rest(sides, kappa, radius)

@@ -11,6 +11,7 @@ import math
 from dataclasses import dataclass
 from fractions import Fraction
 from math import isqrt
+from typing import Any
 
 __all__ = ["Span", "angle", "pi", "sine", "square_root"]
 
@@ -52,12 +53,16 @@ class Span:
 
     def __add__(self, other: Span | int) -> Span:
         b = _span(other)
+        if b is None:
+            return NotImplemented
         return _short(self.lo + b.lo, self.hi + b.hi)
 
     __radd__ = __add__
 
     def __sub__(self, other: Span | int) -> Span:
         b = _span(other)
+        if b is None:
+            return NotImplemented
         return _short(self.lo - b.hi, self.hi - b.lo)
 
     def __rsub__(self, other: int) -> Span:
@@ -65,6 +70,8 @@ class Span:
 
     def __mul__(self, other: Span | int) -> Span:
         b = _span(other)
+        if b is None:
+            return NotImplemented
         ends = [self.lo * b.lo, self.lo * b.hi, self.hi * b.lo, self.hi * b.hi]
         if other is self:  # a square
             ends = [self.lo**2, self.hi**2, *([Fraction(0)] if self.lo < 0 < self.hi else [])]
@@ -74,6 +81,8 @@ class Span:
 
     def __truediv__(self, other: Span | int) -> Span:
         b = _span(other)
+        if b is None:
+            return NotImplemented
         if b.lo <= 0 <= b.hi:
             raise ZeroDivisionError
         return self * Span(1 / b.hi, 1 / b.lo)
@@ -82,8 +91,11 @@ class Span:
         return _span(other) / self
 
 
-def _span(value: Span | int) -> Span:
-    return value if isinstance(value, Span) else Span(Fraction(value), Fraction(value))
+def _span(value: Any) -> Any:
+    """A span of a number; None of anything else, which may know what to do with a span."""
+    if isinstance(value, Span):
+        return value
+    return Span(Fraction(value), Fraction(value)) if isinstance(value, int) else None
 
 
 def _short(lo: Fraction, hi: Fraction) -> Span:
