@@ -27,6 +27,7 @@ if TYPE_CHECKING:  # each from the file that holds it: most rooms have a file of
     from limitsets.maps import critical_points, orbit, register
     from limitsets.proofs.certify import certify
     from limitsets.proofs.confirm import recheck
+    from limitsets.robust.gathering import robustness
     from limitsets.scene import dump, load, scenes
     from limitsets.sets.attractors import attractors
     from limitsets.sets.basins import basins
@@ -57,6 +58,7 @@ _ROOMS = {
     "plot": "plot",
     "recheck": "proofs.confirm",
     "register": "maps",
+    "robustness": "robust.gathering",
     "scenes": "scene",
     "transitions": "graph.transitions",
 }
@@ -81,6 +83,7 @@ __all__ = [
     "plot",
     "recheck",
     "register",
+    "robustness",
     "scenes",
     "transitions",
 ]

@@ -11,9 +11,10 @@ whoever imports that file last.
 
 from limitsets.plot.audits import audit
 from limitsets.plot.basin import basins
+from limitsets.plot.counterexamples import counterexample
 from limitsets.plot.flights import flight
 from limitsets.plot.limit_sets import limit_set
 from limitsets.plot.maps import map  # noqa: A004 - ls.plot.map is the word for it
 from limitsets.plot.morse_graphs import morse
 
-__all__ = ["audit", "basins", "flight", "limit_set", "map", "morse"]
+__all__ = ["audit", "basins", "counterexample", "flight", "limit_set", "map", "morse"]

@@ -1,181 +1,157 @@
-"""The robustness of a scene, put together: every margin, the factor on the tolerance, where X is best, the noise."""
+"""Ask everything that a sheet of tolerances says, one question after the other."""
 
 from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from limitsets.errors import AnswerError, SceneError
+from limitsets.errors import AnswerError
 from limitsets.goals import Goal, OrientedBeyond, Reaches
-from limitsets.proofs.parameters import parameter_box
-from limitsets.robust.deviations import Measure, measures
-from limitsets.robust.entries import Entry
+from limitsets.robust.chance import noise_of, still
+from limitsets.robust.deviations import Measure, measure, measures
+from limitsets.robust.entries import Entry, nominal_of
 from limitsets.robust.joint import Tolerance, joint_margin
 from limitsets.robust.keeping import Kept
-from limitsets.robust.laws import Gaussian, Uniform
 from limitsets.robust.margins import GoalLike, Margin, asked_of, goals_of, margin
-from limitsets.robust.scattering import Scattering, scattering_of
+from limitsets.robust.scattering import Scattering
 from limitsets.robust.statistics import CELLS, Levels, NoiseStatistics, noise_levels, noise_statistics
+from limitsets.robust.summary import PARTS, Robustness
 from limitsets.scene import Scene, load
 
 if TYPE_CHECKING:
     from limitsets.auditing import Audit
 
-__all__ = ["PARTS", "Robustness", "robustness", "scattering_from", "still"]
+__all__ = ["robustness"]
 
-PARTS = ("margins", "joint", "curve", "noise", "audit")
-"""What a sheet is put together from."""
-
+# Levels of the noise that the figure shows.
 FACTORS = (0.0, 0.5, 1.0, 1.5, 2.0)
 
-EXAMPLE = '[goal] oriented_beyond = { x = "20 in", side = 2 }'
+NO_TOLERANCE = (
+    "the scene has no [tolerance]; give it one, a deviation for each quantity that deviates together with others: "
+    '"throw.speed" = "1 %"'
+)
+NO_NOISE = "no noise is given; add scatter = { speed = \"0.5 %\" } to [world], or pass it: --scatter throw.speed='0.5 %'"
+NO_PLACE = "it is asked for goals with an x and a side, oriented_beyond or reaches"
 
 Progress = Callable[[str, int, int], None]
 
 
-@dataclass(frozen=True, eq=False)
-class Robustness:
-    """How far a scene may drift, and what chance does to it.
+class _Gathering:
+    """One sheet while it is put together."""
 
-    Attributes
-    ----------
-    scene : Scene
-        The scene that was asked, its scatter left out.
-    goals : tuple of Goal
-        What has to hold, all of it.
-    verdict : str
-        Of the goals in the scene as it is: "proved", "refuted" or "undecided".
-    entries : tuple of Entry
-        One per quantity and reading; the last is joint, where there is a tolerance.  Proved and refuted.
-    tolerance : dict of str to str
-        The vector that the joint factor is on.
-    curve : object or None
-        The margin against X.  Proved and refuted.
-    noise : NoiseStatistics or None
-        What chance does.  Computed between cells, not proved.
-    levels : Levels or None
-        Its numbers at other levels of the noise.
-    law : str
-        How the law of the noise was come by.
-    audit : Audit or None
-        Assumptions of the model that the scene breaks.
-    left_out : dict of str to str
-        Which of `PARTS` there is nothing of, and why.
-    width : float
-        How close brackets had to be.
-    digest : str
-        Of all that margins depend on.
-    again : int
-        How many margins were found by an earlier run.
-    seconds : float
-        Time it took.
-    """
+    def __init__(
+        self,
+        scene: Scene,
+        goals: tuple[Goal, ...],
+        todo: Sequence[Measure],
+        tolerance: dict[str, str],
+        kept: Kept,
+        progress: Progress,
+    ) -> None:
+        self.scene, self.goals, self.todo, self.tolerance = scene, goals, todo, tolerance
+        self.kept, self.progress = kept, progress
+        self.left_out: dict[str, str] = {}
+        self.done, self.steps = 0, 1
 
-    scene: Scene
-    goals: tuple[Goal, ...]
-    verdict: str
-    entries: tuple[Entry, ...]
-    tolerance: dict[str, str]
-    curve: Any
-    noise: NoiseStatistics | None
-    levels: Levels | None
-    law: str
-    audit: Audit | None
-    left_out: dict[str, str]
-    width: float
-    digest: str
-    again: int
-    seconds: float
+    def tell(self, step: str, share: float = 0.0) -> None:
+        """Say what is being done."""
+        self.progress(step if not share else f"{step}, {100 * share:.0f} %", self.done, self.steps)
 
-    @property
-    def singles(self) -> tuple[Entry, ...]:
-        """The margins of single quantities."""
-        return tuple(entry for entry in self.entries if entry.quantity != "joint")
+    def singles(self, width: float, verdict: str) -> list[Entry]:
+        """Find the margins of single quantities."""
+        found: list[Entry] = []
+        for one in self.todo:
+            label = f"margin of {one.quantity}, {one.reading}"
+            self.tell(label)
+            entry = self.kept.find(one.quantity, one.reading, one.unit)
+            if entry is None and verdict != "proved" and found:
+                nominal, unit = nominal_of(self.scene, one.quantity)
+                words = {"quantity": one.quantity, "reading": one.reading, "unit": one.unit}
+                entry = replace(found[0], **words, nominal=nominal, nominal_unit=unit, seconds=0.0)
+            found.append(entry or self.kept.add(self._single(one, width, label)))
+            self.done += 1
+        return found
 
-    @property
-    def joint(self) -> Entry | None:
-        """The factor on the tolerance."""
-        return next((entry for entry in self.entries if entry.quantity == "joint"), None)
+    def _single(self, one: Measure, width: float, label: str) -> Margin:
+        def told(step: str, _: int, __: int) -> None:
+            self.progress(step, self.done, self.steps)
 
-    def to_json(self) -> dict[str, Any]:
-        """Give it as plain tables for JSON: null, never nan."""
-        levels = self.levels
-        return {
-            "complete": True,
-            "digest": self.digest,
-            "scene": self.scene.as_dict(),
-            "holds": {"proved": True, "refuted": False}.get(self.verdict),
-            "margins": [entry.to_json() for entry in self.entries],
-            "tolerance": self.tolerance or None,
-            "curve": None if self.curve is None else self.curve.to_json(),
-            "noise": None if self.noise is None else self.noise.to_json() | {"law": self.law},
-            "noise_levels": None
-            if levels is None
-            else {
-                "factors": levels.factors.tolist(),
-                "numbers": {
-                    name: [None if value != value else float(value) for value in row]
-                    for name, row in levels.numbers.items()
-                },
-            },
-            "assumptions": None if self.audit is None else self.audit.to_json(),
-            "left_out": self.left_out,
-            "width": self.width,
-            "seconds": self.seconds,
-        }
+        (found,) = margin(
+            self.scene, one.quantity, reading=one.reading, goal=self.goals, width=width, progress=told
+        )
+        return found
+
+    def joint(self, width: float) -> Entry:
+        """Find the factor on the tolerance."""
+        label = "margin of all together"
+        self.tell(label)
+        entry = self.kept.find("joint", "tolerance", "")
+        if entry is None:
+            told = lambda share: self.tell(label, share)  # noqa: E731 - one line, used once
+            entry = self.kept.add(
+                joint_margin(self.scene, self.goals, self.tolerance, width=width, tell=told)
+            )
+        self.done += 1
+        return entry
+
+    def audit(self) -> Audit:
+        """Ask which assumptions of the model the scene breaks."""
+        from limitsets.auditing import audit
+
+        self.tell("assumptions")
+        self.done += 1
+        return audit(self.scene)
+
+    def chance(
+        self, scene: Scene, noise: Scattering, place: tuple[float, int], cells: int
+    ) -> tuple[NoiseStatistics, Levels]:
+        """Find what noise does, at its level and at others."""
+        self.tell("noise")
+        found = noise_statistics(
+            scene,
+            noise,
+            goal=place,
+            cells=cells,
+            progress=lambda _, done, of: self.tell("noise", done / of),
+        )
+        self.done += 1
+        self.tell("noise at other levels")
+        levels = noise_levels(scene, noise, factors=FACTORS, goal=place, cells=max(cells // 2, 1))
+        self.done += 1
+        return found, levels
 
 
-def still(scene: Scene) -> Scene:
-    """Return a scene without its scatter: margins are about throws that deviate as the margin says, and else do not."""
-    if scene.effects.spread is None:
-        return scene
-    tree = scene.as_dict()
-    tree["effects"].pop("spread")
-    return replace(load(tree), file=scene.file)
+def _place(goals: Sequence[Goal]) -> tuple[float, int] | None:
+    """Return x and side of the rests that count as fed."""
+    return next(((goal.x, goal.side) for goal in goals if isinstance(goal, OrientedBeyond | Reaches)), None)
 
 
-def scattering_from(scene: Scene, texts: Mapping[str, str], law: str = "gaussian") -> Scattering:
-    """Read noise from texts, ``{"throw.speed": "0.5 %", "landing.x": "0.02 in"}``.
+def _goals(scene: Scene, goal: GoalLike | Sequence[GoalLike] | None) -> tuple[Goal, ...]:
+    if goal is None and scene.goal is None:
+        x, last = 0.7 * scene.arm_length, len(scene.sides) - 1
+        example = f'oriented_beyond = {{ x = "{x:.4g} {scene.unit}", side = {last} }}'
+        raise AnswerError(
+            "the goal",
+            None,
+            "a scene with [goal]",
+            f"say what has to hold: add [goal] with, for instance, {example}",
+            key="goal",
+            file=scene.file,
+        )
+    return goals_of(scene, goal)
 
-    Parameters
-    ----------
-    scene : Scene
-        The scene.
-    texts : mapping of str to str
-        Standard deviations, or bounds of an even law, by quantity.
-    law : str
-        "gaussian" or "bounded".
 
-    Examples
-    --------
-    >>> import limitsets as ls
-    >>> scattering_from(ls.load("paper-designed"), {"throw.speed": "0.5 %"}).words()
-    {'speed': 'Gaussian(sigma=0.005)'}
-    """
-    from limitsets.scene.quantities import base_unit, deviation, find
-
-    kinds = {"gaussian": Gaussian, "bounded": Uniform}
-    if law not in kinds:
-        raise AnswerError("the law of the noise", law, " or ".join(kinds), "correct the word")
-    fields = {"throw.speed": "speed", "gravity.tilt": "tilt", "landing.x": "landing"}
-    found: dict[str, Any] = {}
-    for name, text in texts.items():
-        find(name)
-        if name not in fields:
-            allowed = f"noise of {', '.join(fields)}"
-            raise AnswerError("the noise", name, allowed, "what is fixed but unknown is a tolerance")
-        given = deviation(text, name, scene.unit, key=name)
-        size, relative = given.value, given.relative
-        if name == "throw.speed" and not relative:
-            size /= scene.value("throw.speed")
-        if name == "gravity.tilt" and relative:
-            size *= scene.value("gravity.tilt")
-        found[fields[name]] = kinds[law](size)
-        assert base_unit  # units of the other quantities are the scene's own
-    return Scattering(**found)
+def _todo(scene: Scene, quantities: Sequence[str], reading: str | None) -> list[Measure]:
+    """List what is asked of single quantities; refuse what the scene does not give."""
+    every = measures(scene, reading)
+    chosen: list[Measure] = []
+    for name in dict.fromkeys(quantities):
+        least = measure(scene, name, reading)
+        chosen += [one for one in every if one.quantity == name] or [least]
+    return chosen or list(every)
 
 
 def robustness(
@@ -236,5 +212,71 @@ def robustness(
     (True, '%')
     """
     begin = time.perf_counter()
-    sheet = _Sheet(scene, quantities, goal, reading, tolerance, scatter, width, cells, leave_out, folder)
-    return sheet.fill(progress or (lambda step, done, of: None), begin)
+    for part in leave_out:
+        if part not in PARTS:
+            raise AnswerError("what to leave out", part, ", ".join(PARTS), "correct the word")
+    given = scene if isinstance(scene, Scene) else load(scene)
+    goals, asked = _goals(given, goal), still(given)
+    question = asked_of(asked, goals)
+    question.box(None, {})  # refuses a scene of which nothing can be proved
+    todo = _todo(question.scene, quantities, reading)
+    vector = dict(tolerance if tolerance is not None else given.text.get("tolerance", {}))
+    if vector:
+        Tolerance.of(question.scene, vector)  # refuses what the scene does not give
+    noise, law = noise_of(given, scatter)
+    kept = Kept(None if folder is None else Path(folder), asked, goals, vector, width)
+    sheet = _Gathering(asked, goals, todo, vector, kept, progress or (lambda step, done, of: None))
+    return _filled(sheet, given, noise, law, width, cells, frozenset(leave_out), begin)
+
+
+def _filled(
+    sheet: _Gathering,
+    given: Scene,
+    noise: Scattering | None,
+    law: str,
+    width: float,
+    cells: int,
+    leave_out: frozenset[str],
+    begin: float,
+) -> Robustness:
+    """Ask part by part; of those that there is nothing of, say why."""
+    scene, goals, place = sheet.scene, sheet.goals, _place(sheet.goals)
+    missing = sheet.left_out
+    missing |= {part: "it was not asked for" for part in PARTS if part in leave_out}
+    if not sheet.tolerance:
+        missing.setdefault("joint", NO_TOLERANCE)
+    if noise is None:
+        missing.setdefault("noise", NO_NOISE)
+    if place is None:
+        missing |= {part: NO_PLACE for part in ("curve", "noise") if part not in leave_out}
+    sheet.steps = (len(sheet.todo) if "margins" not in missing else 0) + 1
+    sheet.steps += sum(part not in missing for part in ("joint", "curve", "audit")) + 2 * (
+        "noise" not in missing
+    )
+    sheet.tell("the goal in the scene as it is")
+    question = asked_of(scene, goals)
+    verdict = question.prove().verdict
+    verdict = verdict if verdict == "proved" else question.refute().verdict
+    sheet.done += 1
+    entries = [] if "margins" in missing else sheet.singles(width, verdict)
+    entries += [] if "joint" in missing else [sheet.joint(width)]
+    curve: Any = None
+    found, levels = (None, None) if "noise" in missing else sheet.chance(given, noise, place, cells)
+    flagged = None if "audit" in missing else sheet.audit()
+    return Robustness(
+        scene,
+        goals,
+        verdict,
+        tuple(entries),
+        sheet.tolerance,
+        curve,
+        found,
+        levels,
+        law,
+        flagged,
+        missing,
+        width,
+        sheet.kept.digests,
+        sheet.kept.again,
+        time.perf_counter() - begin,
+    )

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -18,17 +18,20 @@ from limitsets.robust.entries import Entry, goal_record
 from limitsets.robust.margins import Margin
 from limitsets.scene import Scene
 
-__all__ = ["CERTIFICATES", "RECORD", "Kept", "digest_of"]
+__all__ = ["CERTIFICATES", "RECORD", "Kept"]
 
 RECORD, CERTIFICATES = "robustness.json", "certificates"
 
+# Tables of a scene that its throws depend on.
+THROWN = ("part", "arm", "throw", "gravity", "model", "effects", "world")
 
-def digest_of(scene: Scene, goals: Iterable[Goal], tolerance: Mapping[str, str], width: float) -> str:
-    """Make a word of all that margins depend on, the version of the package among it."""
+
+def digest_of(*words: Any) -> str:
+    """Make a word of all that a margin depends on, the version of the package among it."""
     from limitsets import __version__
 
-    words = [scene.as_dict(), [goal_record(goal) for goal in goals], dict(tolerance), width, __version__]
-    return hashlib.sha256(json.dumps(words, sort_keys=True).encode()).hexdigest()
+    text = json.dumps([*words, __version__], sort_keys=True)
+    return hashlib.sha256(text.encode()).hexdigest()
 
 
 class Kept:
@@ -56,34 +59,40 @@ class Kept:
         tolerance: Mapping[str, str],
         width: float,
     ) -> None:
-        self.folder, self.scene = folder, scene
-        self.digest = digest_of(scene, goals, tolerance, width)
+        self.folder, self.scene, self.again = folder, scene, 0
+        tables = {word: scene.text[word] for word in THROWN if word in scene.text}
+        single = digest_of(tables, [goal_record(goal) for goal in goals], width)
+        self.digests = {"single": single, "joint": digest_of(single, dict(tolerance))}
         # code of the caller's has no digest
         known = folder is not None and not any(isinstance(goal, Predicate) for goal in goals)
         self.entries = self._read() if known else {}
-        self.again = 0
 
     def _read(self) -> dict[str, Entry]:
         """Read the entries of an earlier run that are still good; a file that is no such record counts as none."""
         assert self.folder is not None
         try:
             record = json.loads((self.folder / RECORD).read_text(encoding="utf-8"))
-            if record["digest"] != self.digest:
-                return {}
             entries = [Entry.read(row) for row in record["margins"]]
+            good = {word for word, digest in self.digests.items() if record["digests"][word] == digest}
         except (OSError, ValueError, KeyError, TypeError):
             return {}
-        return {entry.key: entry for entry in entries if self._complete(entry)}
+        return {
+            entry.key: entry
+            for entry in entries
+            if ("joint" if entry.quantity == "joint" else "single") in good and self._complete(entry)
+        }
 
     def _complete(self, entry: Entry) -> bool:
         assert self.folder is not None
         files = [name for name in (entry.certificate, entry.against) if name is not None]
         return all((self.folder / name).is_file() for name in files)
 
-    def find(self, quantity: str, reading: str) -> Entry | None:
-        """Return an entry of an earlier run."""
+    def find(self, quantity: str, reading: str, unit: str) -> Entry | None:
+        """Return an entry of an earlier run, if it is in the unit asked for."""
         found = self.entries.get(f"{quantity} {reading}")
-        self.again += found is not None
+        if found is None or found.unit != unit:
+            return None
+        self.again += 1
         return found
 
     def add(self, margin: Margin) -> Entry:
@@ -94,7 +103,7 @@ class Kept:
         self.entries[entry.key] = entry
         record: dict[str, Any] = {
             "complete": False,
-            "digest": self.digest,
+            "digests": self.digests,
             "scene": self.scene.as_dict(),
             "margins": [each.to_json() for each in self.entries.values()],
         }
