@@ -27,6 +27,7 @@ if TYPE_CHECKING:  # each from the file that holds it: most rooms have a file of
     from limitsets.maps import critical_points, orbit, register
     from limitsets.proofs.certify import certify
     from limitsets.proofs.confirm import recheck
+    from limitsets.robust.margins import margin
     from limitsets.robust.gathering import robustness
     from limitsets.scene import dump, load, scenes
     from limitsets.sets.attractors import attractors
@@ -53,6 +54,7 @@ _ROOMS = {
     "limit_set": "sets.limit_set",
     "load": "scene",
     "maps": "maps",
+    "margin": "robust.margins",
     "morse_graph": "graph",
     "orbit": "maps",
     "plot": "plot",
@@ -78,6 +80,7 @@ __all__ = [
     "limit_set",
     "load",
     "maps",
+    "margin",
     "morse_graph",
     "orbit",
     "plot",

@@ -9,6 +9,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from limitsets.errors import AnswerError
+from limitsets.goals import Goal, OrientedBeyond, Reaches
 from limitsets.plot import style
 
 if TYPE_CHECKING:
@@ -42,8 +43,8 @@ def counterexample(
         The scene.
     orbit : sequence of mapping
         States with "x" and "side", as `limitsets.robust.entries.Entry` and the JSON of a proof have them.
-    violated : mapping, optional
-        The goal: "kind" and, of an orientation goal, "x" and "side".
+    violated : Goal, optional
+        What it violates.
     name : str
         What deviates, for the title.
 
@@ -60,8 +61,8 @@ def counterexample(
     --------
     >>> import limitsets as ls
     >>> orbit = [{"x": 17.3, "side": 2}, {"x": 20.1, "side": 0}]
-    >>> goal = {"kind": "oriented_beyond", "x": 20.0, "side": 2}
-    >>> figure = counterexample(ls.load("paper-designed"), orbit, goal)
+    >>> scene = ls.load("paper-designed")
+    >>> figure = counterexample(scene, orbit, scene.goal)
     >>> [patch.get_gid() for patch in figure.axes[0].patches]
     ['forbidden']
     """
@@ -77,14 +78,14 @@ def counterexample(
         look = {"color": COLOURS[side % len(COLOURS)], "marker": MARKERS[side % len(MARKERS)]}
         mine = [k for k, on in enumerate(sides) if on == side]
         axes.plot([throws[k] for k in mine], [x[k] for k in mine], ls="", ms=6.5, zorder=3, **look)
-    low, high = min(x), max([*x, *([violated["x"]] if violated and "x" in violated else [])])
+    low, high = min(x), max([*x, *([violated.x] if isinstance(violated, OrientedBeyond | Reaches) else [])])
     span = max(high - low, 1e-3 * scene.arm_length)
     axes.set_ylim(low - 0.12 * span, high + 0.22 * span)
     areas = _areas(axes, violated, scene.unit)
-    if violated and violated["kind"] == "oriented_beyond":
+    if isinstance(violated, OrientedBeyond):
         axes.plot(throws[-1], x[-1], "o", ms=15, mfc="none", mec=style.FLIP, mew=1.6, zorder=4)
         axes.annotate(
-            f"on side {sides[-1]}, {x[-1] - violated['x']:.2g} {scene.unit} beyond",
+            f"on side {sides[-1]}, {x[-1] - violated.x:.2g} {scene.unit} beyond",
             (throws[-1], x[-1]),
             xytext=(0, -26),
             textcoords="offset points",
@@ -100,12 +101,12 @@ def counterexample(
     return figure
 
 
-def _areas(axes: Axes, violated: Mapping[str, Any] | None, unit: str) -> list[Any]:
+def _areas(axes: Axes, violated: Goal | None, unit: str) -> list[Any]:
     """Shade where only one side is allowed, or where the part should come."""
-    if not violated or violated["kind"] not in ("oriented_beyond", "reaches"):
+    if not isinstance(violated, OrientedBeyond | Reaches):
         return []
-    at, side, top = violated["x"], violated["side"], axes.get_ylim()[1]
-    forbids = violated["kind"] == "oriented_beyond"
+    at, side, top = violated.x, violated.side, axes.get_ylim()[1]
+    forbids = isinstance(violated, OrientedBeyond)
     look = FORBIDDEN if forbids else WANTED
     axes.axhspan(at, top, gid="forbidden" if forbids else "wanted", zorder=0, **look)
     axes.axhline(at, color=style.INK, lw=1.0, zorder=1)

@@ -28,7 +28,7 @@ from limitsets.scene import Scene, load
 from limitsets.scene.quantities import deviation, find
 from limitsets.scene.units import parse
 
-__all__ = ["CLAIMS", "Claim", "Proof", "certify"]
+__all__ = ["CLAIMS", "Claim", "Proof", "certify", "weakest_of"]
 
 # Cells per side, tried in turn until everything asked for is proved or refuted.
 LADDER = (2048, 8192, 32768, 131072)
@@ -453,12 +453,12 @@ def _halved(
         else:
             # a narrower box of parameters is worth finer cells
             waiting += [(half, min(cells * 6 // 5, LADDER[-1])) for half in part.halves(scales)]
-    joined = tuple(_joined([answers[k] for _, answers in proved]) for k in range(len(wanted)))
+    joined = tuple(weakest_of([answers[k] for _, answers in proved]) for k in range(len(wanted)))
     return tuple(one for one, _ in proved), joined
 
 
-def _joined(claims: Sequence[Claim]) -> Claim:
-    """One claim proved on every piece: with the weakest of the numbers."""
+def weakest_of(claims: Sequence[Claim]) -> Claim:
+    """Join one claim, proved on every piece: with the weakest of the numbers."""
     sections = [claim.section for claim in claims]
     section = dict(sections[0])
     if "max_rank" in section:

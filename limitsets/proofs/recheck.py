@@ -16,6 +16,7 @@ Exit status: 0 every claim proved, 1 not proved, 2 not a readable certificate, 1
 """
 
 import argparse
+import bisect
 import copy
 import hashlib
 import itertools
@@ -405,26 +406,10 @@ def read_scene(raw: object, noise: object) -> Scene:
         q = quantity(value, "length", where)
         return span(q.lo / unit, q.hi / unit)
 
-    vertices = read_polygon(scene["part"], length)
-    n = len(vertices)
-    mass = scene["part"]["mass"]
-    if "plate_density" in mass:
-        table(mass, "part.mass", "plate_density", "points")
-        require("vertices" in scene["part"] or not mass.get("points"), "points of mass need vertices")
-        start, rho2 = read_plate(mass, vertices, unit, length)
-        (ex, ey), along, above, rho, own = (ONE, ZERO), ZERO, ZERO, rho2.sqrt(), -1
-    else:
-        table(mass, "part.mass", "center radius_of_gyration")
-        center = table(mass["center"], "part.mass.center", "side along above")
-        fits = type(center["side"]) is int and 0 <= center["side"] < n
-        require(fits, "part.mass.center.side is not a side")
-        along = length(center["along"], "part.mass.center.along")
-        above = length(center["above"], "part.mass.center.above")
-        own = center["side"]
-        start, (ex, ey), _ = side_frame(vertices, own)
-        rho = length(mass["radius_of_gyration"], "part.mass.radius_of_gyration")
-        require(bool(rho > 0), "the radius of gyration is not positive")
-        rho2 = rho * rho
+    rests, rho = narrow_part(scene["part"], unit)
+    n = len(rests)
+    require(bool(rho > 0), "the radius of gyration is not positive")
+    rho2 = rho * rho
 
     k_lo, k_hi = read_kappa(scene, noise, unit)
     scatter = read_noise(noise, "landing.x", "length").ball() / exact(unit)
@@ -439,19 +424,10 @@ def read_scene(raw: object, noise: object) -> Scene:
     h = length(arm["surface_height"], "arm.surface_height")
     reach_ball = span(reach.lo / unit, reach.hi / unit)
     sides = []
-    for i in range(n):
-        (px, py), (ux, uy), long = side_frame(vertices, i)
-        x, y = start[0] - px, start[1] - py
-        with_e, across_e = ex * ux + ey * uy, ux * ey - uy * ex
-        a = x * ux + y * uy + along * with_e - above * across_e  # the centre is start + along e + above n
-        d = ux * y - uy * x + along * across_e + above * with_e
-        # what stands in the scene is narrower than what is computed, where something is known to a tolerance only
-        a, d = (along, above) if i == own else (a, d)
-        long = length(scene["part"]["sides"][i], "part.sides") if "sides" in scene["part"] else long
+    for i, (a, d, long, shift) in enumerate(rests):
         require(bool(a > 0) and bool(a < long) and bool(d > 0), f"the part does not rest on side {i}")
-        sides.append(Side(a, d, long, h, rho2, reach_ball, is_exact, is_signed))
-    for side, after in zip(sides, sides[1:] + sides[:1], strict=True):
-        side.shift = side.a + after.length - after.a
+        sides.append(Side(a, d, long, h, rho2, reach_ball, is_exact, is_signed, shift=shift))
+    for side in sides:
         side.ell = (side.a**2 + side.d**2).sqrt()
         side.hd = side.h + side.d
         side.over_2m = HALF / (side.rho2 + side.ell**2)
@@ -467,6 +443,144 @@ def read_scene(raw: object, noise: object) -> Scene:
     if whole.cuts():
         whole.loose = sum(float(ball.rad()) for s in sides for ball in (s.a, s.d, s.h, s.shift, whole.rho))
     return whole
+
+
+class Rising:
+    """A ball with its derivatives by some quantities, for the mean value theorem."""
+
+    __slots__ = ("by", "x")
+
+    def __init__(self, x: Arb, by: list[Arb]):
+        self.x, self.by = x, by
+
+    def __neg__(self) -> "Rising":
+        return Rising(-self.x, [-d for d in self.by])
+
+    def __add__(self, other: Any) -> "Rising":
+        if isinstance(other, Rising):
+            return Rising(self.x + other.x, [d + e for d, e in zip(self.by, other.by, strict=True)])
+        return Rising(self.x + other, self.by)
+
+    def __sub__(self, other: Any) -> "Rising":
+        return self + (-other)
+
+    def __rsub__(self, other: Any) -> "Rising":
+        return -self + other
+
+    def __mul__(self, other: Any) -> "Rising":
+        if isinstance(other, Rising):
+            pairs = zip(self.by, other.by, strict=True)
+            return Rising(self.x * other.x, [d * other.x + self.x * e for d, e in pairs])
+        return Rising(self.x * other, [d * other for d in self.by])
+
+    def __truediv__(self, other: Any) -> "Rising":
+        if isinstance(other, Rising):
+            ratio, pairs = self.x / other.x, zip(self.by, other.by, strict=True)
+            return Rising(ratio, [(d - ratio * e) / other.x for d, e in pairs])
+        return Rising(self.x / other, [d / other for d in self.by])
+
+    def __rtruediv__(self, other: Any) -> "Rising":
+        ratio = other / self.x
+        return Rising(ratio, [-ratio * d / self.x for d in self.by])
+
+    def __pow__(self, two: int) -> "Rising":
+        return Rising(self.x**two, [two * self.x ** (two - 1) * d for d in self.by])
+
+    def sqrt(self) -> "Rising":
+        """Take the square root."""
+        root = self.x.sqrt()
+        return Rising(root, [d / (2 * root) for d in self.by])
+
+    def __gt__(self, other: Any) -> bool:
+        return bool(self.x > (other.x if isinstance(other, Rising) else other))
+
+    __radd__, __rmul__ = __add__, __mul__
+
+
+def narrow_part(part: object, unit: Fraction) -> tuple[list[tuple[Any, ...]], Arb]:
+    """Enclose (a_i, d_i, L_i, a_i + L_next - a_next) of every side, and rho.
+
+    Where lengths are intervals a formula that names one of them twice is too wide: f(c) + f'(box) (q - c) is narrower.
+    """
+
+    def length(value: object, where: str) -> Arb:
+        q = quantity(value, "length", where)
+        return span(q.lo / unit, q.hi / unit)
+
+    plain_rests, rho = read_part(part, unit, length)
+    wide: dict[int, tuple[int, Fraction, Fraction]] = {}
+
+    def look(value: object, where: str) -> Arb:
+        q = quantity(value, "length", where)
+        if q.lo < q.hi:
+            wide.setdefault(id(value), (len(wide), q.lo / unit, q.hi / unit))
+        return length(value, where)
+
+    read_part(part, unit, look)
+    if not wide:
+        return plain_rests, rho
+
+    def middle(value: object, where: str) -> Arb:
+        known = wide.get(id(value))
+        return length(value, where) if known is None else exact((known[1] + known[2]) / 2)
+
+    def rising(value: object, where: str) -> Any:
+        known = wide.get(id(value))
+        own = None if known is None else known[0]
+        return Rising(length(value, where), [ONE if k == own else ZERO for k in range(len(wide))])
+
+    centre, rho_centre = read_part(part, unit, middle)
+    steep, rho_steep = read_part(part, unit, rising)
+    half = [span(-(hi - lo) / 2, (hi - lo) / 2) for _, lo, hi in wide.values()]
+
+    def about(c: Arb, f: Any, known: Arb) -> Arb:
+        if not isinstance(f, Rising):
+            return known
+        total = c
+        for slope, offset in zip(f.by, half, strict=True):
+            total = total + slope * offset
+        return known if not total.is_finite() or known in total else known.intersection(total)
+
+    rests = [
+        tuple(about(*each) for each in zip(*rows_of_side, strict=True))
+        for rows_of_side in zip(centre, steep, plain_rests, strict=True)
+    ]
+    return rests, about(rho_centre, rho_steep, rho)
+
+
+def read_part(part: Any, unit: Fraction, length: Callable[[object, str], Any]) -> tuple[list[tuple[Any, ...]], Any]:
+    """Compute (a_i, d_i, L_i, a_i + L_next - a_next) of every side, and rho, in whatever arithmetic `length` gives."""
+    vertices = read_polygon(part, length)
+    n = len(vertices)
+    mass = part["mass"]
+    if "plate_density" in mass:
+        table(mass, "part.mass", "plate_density", "points")
+        require("vertices" in part or not mass.get("points"), "points of mass need vertices")
+        start, rho2 = read_plate(mass, vertices, unit, length)
+        (ex, ey), along, above, rho, own = (ONE, ZERO), ZERO, ZERO, rho2.sqrt(), -1
+    else:
+        table(mass, "part.mass", "center radius_of_gyration")
+        center = table(mass["center"], "part.mass.center", "side along above")
+        fits = type(center["side"]) is int and 0 <= center["side"] < n
+        require(fits, "part.mass.center.side is not a side")
+        along = length(center["along"], "part.mass.center.along")
+        above = length(center["above"], "part.mass.center.above")
+        own = center["side"]
+        start, (ex, ey), _ = side_frame(vertices, own)
+        rho = length(mass["radius_of_gyration"], "part.mass.radius_of_gyration")
+    rests = []
+    for i in range(n):
+        (px, py), (ux, uy), long = side_frame(vertices, i)
+        x, y = start[0] - px, start[1] - py
+        with_e, across_e = ex * ux + ey * uy, ux * ey - uy * ex
+        a = x * ux + y * uy + along * with_e - above * across_e  # the centre is start + along e + above n
+        d = ux * y - uy * x + along * across_e + above * with_e
+        # what stands in the scene is narrower than what is computed, where something is known to a tolerance only
+        a, d = (along, above) if i == own else (a, d)
+        long = length(part["sides"][i], "part.sides") if "sides" in part else long
+        rests.append((a, d, long))
+    after = rests[1:] + rests[:1]
+    return [(a, d, long, a + ll - aa) for (a, d, long), (aa, _, ll) in zip(rests, after, strict=True)], rho
 
 
 def read_polygon(part: object, length: Callable[[object, str], Arb]) -> list[tuple[Arb, Arb]]:
@@ -1601,10 +1715,114 @@ def check_orbits(scene: Scene, c: Cells, section: dict[str, Any]) -> str:
 
 def check_sets(scene: Scene, c: Cells, claims: dict[str, dict[str, Any]]) -> Iterator[tuple[list[str], str]]:
     """Check end points and periodic orbits of attracting cells that are proved; yields what fails."""
-    for name, check in (("end-points", check_ends), ("cycles", check_orbits)):
+    for name, check in (("end-points", check_ends), ("cycles", check_orbits), ("refuted", check_refuted)):
         bad = check(scene, c, claims[name]) if name in claims else ""
         if bad:
             yield [name], bad
+
+
+# -------------------------------------------------------------------------------------------- an orbit that refutes
+
+INSIDE = arb(2) ** -80  # a stated kappa keeps this share of it from the ends of its noise: these are known to 100 bits
+
+
+def read_refutation(section: dict[str, Any], n_sides: int) -> dict[str, Any]:
+    """Read an orbit that refutes a goal: its start and what each throw was like."""
+    goal = table(section["goal"], "refuted.goal", "kind x side", "from_anywhere")
+    require(goal["kind"] == "oriented_beyond", "refuted.goal: not a kind that an orbit refutes")
+    start = table(section["start"], "refuted.start", "x side")
+    throws = []
+    for each in rows(section["throws"], "refuted.throws", 1, 100_000):
+        one = table(each, "a throw", "kappa landing")
+        numbers = (None if one[key] is None else arb(hex_float(one[key], key)) for key in ("kappa", "landing"))
+        throws.append(tuple(numbers))
+    nominal, tolerance = section["nominal"], section["tolerance"]
+    same = isinstance(nominal, dict) and isinstance(tolerance, dict) and set(nominal) == set(tolerance)
+    require(same and len(nominal) <= 64, "refuted: nominal values and tolerance do not name the same quantities")
+    return {
+        "goal": read_goal(goal, n_sides),
+        "x": hex_float(start["x"], "refuted.start.x"),
+        "side": read_side(start["side"], n_sides),
+        "throws": throws,
+        "nominal": nominal,
+        "tolerance": tolerance,
+    }
+
+
+def statement_of_refutation(section: dict[str, Any]) -> str:
+    """Put it in words."""
+    near = ", ".join(
+        f"{plain(name)} within {plain(dev)} of {plain(section['nominal'][name])}"
+        for name, dev in section["tolerance"].items()
+    )
+    goal = section["goal"]
+    where = "on the arm" if goal["anywhere"] else "in the attracting cells"
+    return (
+        f"refuted: the orbit from x = {section['x']!r} on side {section['side']}, {where}, of"
+        f" {len(section['throws'])} throws ends beyond x = {plain(goal['text'])} on another side than {goal['side']}"
+        + (f"; {near}" if near else "")
+    )
+
+
+def check_deviations(scene: Scene, section: dict[str, Any]) -> str:
+    """Check that the scene deviates from the nominal values by no more than is said; "" or what fails."""
+    kinds = "length angle speed acceleration mass density share"
+    flat = dict(quantities(scene.raw))
+    for name, text in section["tolerance"].items():
+        square = name == "throw.speed" and "throw.kappa" in flat
+        key = "throw.kappa" if square else name
+        require(key in flat, f"refuted: {plain(name)} is not a quantity of the scene")
+        q, nominal = quantity(flat[key], kinds, key), quantity(section["nominal"][name], kinds, key)
+        dev = quantity(text, kinds, "tolerance")
+        require(dev.lo == dev.hi >= 0 and nominal.lo == nominal.hi, "refuted: a deviation is not one number")
+        if dev.unit == "%":
+            power = 2 if square else 1
+            low, high = nominal.lo * (1 - dev.lo), nominal.lo * (1 + dev.lo)
+            if square:
+                require(dev.lo < 1, "refuted: a deviation of 100 %")
+                low, high = nominal.lo / (1 + dev.lo) ** power, nominal.lo / (1 - dev.lo) ** power
+            low, high = min(low, high), max(low, high)
+        else:
+            require(not square and dev.pi == q.pi == nominal.pi, f"refuted: {plain(name)} is in another unit")
+            low, high = nominal.lo - dev.lo, nominal.lo + dev.lo
+        if q.pi != nominal.pi or not low <= q.lo <= q.hi <= high:
+            return f"{plain(name)} is not within {plain(text)} of {plain(section['nominal'][name])}"
+    return ""
+
+
+def check_refuted(scene: Scene, c: Cells, section: dict[str, Any]) -> str:
+    """Throw the orbit again in balls, given that the attracting cells are what they say; "" or what fails."""
+    bad = check_deviations(scene, section)
+    if bad:
+        return bad
+    goal, side, x = section["goal"], section["side"], arb(section["x"])
+    inside = any(lo <= section["x"] <= hi for lo, hi in attracting(c)[side])
+    if not (inside or goal["anywhere"]):
+        return "the orbit does not start in the attracting cells"
+    throws, fixed = Throws(scene), scene.k_lo.union(scene.k_hi)
+    varies = isinstance(scene.noise, dict) and bool({"throw.speed", "gravity.tilt"} & set(scene.noise))
+    try:
+        for number, (kappa, landing) in enumerate(section["throws"]):
+            s = scene.sides[side]
+            prove(bool(x > s.a and x <= s.arm), f"the part does not lie on the arm before throw {number + 1}")
+            if kappa is None:
+                prove(not varies, f"throw {number + 1} does not say its kappa")
+            else:
+                within = kappa > scene.k_lo * (1 + INSIDE) and kappa < scene.k_hi * (1 - INSIDE)
+                prove(varies and bool(within), f"the kappa of throw {number + 1} is not within the noise")
+            k, shift = fixed if kappa is None else kappa, ZERO if landing is None else landing
+            prove(bool(abs(shift) <= s.landing), f"throw {number + 1} lands farther off than the noise allows")
+            thrown = throws.box(side, x.lower(), x.upper(), k.lower(), k.upper())
+            prove(thrown.decision != 2, f"the decision of throw {number + 1} is not settled")
+            x = thrown.lo.union(thrown.hi) + shift
+            if thrown.decision == 1:
+                x, side = x - s.shift, (side + 1) % len(scene.sides)
+    except UnprovedError as error:
+        return str(error)
+    s, end = scene.sides[side], goal["x"].ball() / exact(LENGTHS[scene.unit])
+    if not (side != goal["side"] and x > end and x <= s.arm):
+        return f"the orbit ends on side {side} at x = {x.str(12)}, which the goal allows"
+    return ""
 
 
 # --------------------------------------------------------------------------------------------------- near the joint
@@ -1822,6 +2040,7 @@ SECTIONS = {  # the claims that are known, and the keys of their sections
     "expanding": "least_slope",
     "end-points": "images ends pieces",
     "cycles": "cycles complete",
+    "refuted": "goal start throws nominal tolerance",
 }
 
 
@@ -1858,13 +2077,13 @@ def quantities(value: object, where: str = "") -> Iterator[tuple[str, object]]:
 def check_tolerance(raw: list[Any], tolerance: object) -> tuple[dict[str, str], str]:
     """Check that the boxes cover the tolerance: the range of each quantity for people, and what fails.
 
-    All boxes agree but in the quantities named.  Between neighbouring ends of intervals each little box must lie in
-    a box of the certificate, and the whole must be as wide as the tolerance around some middle.
+    All boxes agree but in the quantities named; they cover the box that holds all of them, and that must be as wide as
+    the tolerance around some middle.
     """
     if tolerance is None:
         require(len(raw) == 1, "several boxes need a tolerance")
         return {}, ""
-    require(isinstance(tolerance, dict) and 0 < len(tolerance) <= 6, "tolerance is not an object")
+    require(isinstance(tolerance, dict) and 0 < len(tolerance) <= 64, "tolerance is not an object")
     assert isinstance(tolerance, dict)
     flat = [dict(quantities(scene)) for scene in raw]
     kinds = "length angle speed acceleration mass density share"
@@ -1899,15 +2118,45 @@ def check_tolerance(raw: list[Any], tolerance: object) -> tuple[dict[str, str], 
     same = all(r == rest[0] and scene["model"] == raw[0]["model"] for r, scene in zip(rest, raw, strict=True))
     if not same:
         return shown, "the boxes differ in something else than the tolerance"
-    cuts = [sorted({end for q in own for end in (q.lo, q.hi)}) for own in ranges]
-    require(math.prod(len(c) for c in cuts) * len(raw) <= 10_000_000, "too many boxes")
-    for point in itertools.product(*([(a + b) / 2 for a, b in itertools.pairwise(c)] or c for c in cuts)):
-        inside = (
-            all(q[b].lo <= x <= q[b].hi for q, x in zip(ranges, point, strict=True)) for b in range(len(raw))
-        )
-        if not any(inside):
-            return shown, "the boxes leave a gap in the tolerance"
+    boxes = [[(own[b].lo, own[b].hi) for own in ranges] for b in range(len(raw))]
+    whole = [(min(q.lo for q in own), max(q.hi for q in own)) for own in ranges]
+    if not covered(whole, boxes):
+        return shown, "the boxes leave a gap in the tolerance"
     return shown, ""
+
+
+Ends = list[tuple[Fraction, Fraction]]
+
+
+def covered(whole: Ends, boxes: list[Ends]) -> bool:
+    """Whether boxes cover a box, exactly: it lies in one of them, or is cut at an end of one and both parts are covered.
+
+    Cut where the fewest boxes lie on both sides; points that only touch a box lie in it.
+    """
+    stack, looked = [(whole, boxes)], 0
+    while stack:
+        region, some = stack.pop()
+        looked += len(some)
+        require(looked <= 20_000_000, "too many boxes")
+        if any(all(lo <= a and b <= hi for (a, b), (lo, hi) in zip(region, box, strict=True)) for box in some):
+            continue
+        best: tuple[int, int, Fraction] | None = None
+        for k, (a, b) in enumerate(region):
+            lows, highs = sorted(box[k][0] for box in some), sorted(box[k][1] for box in some)
+            for cut in {end for ends in (lows, highs) for end in ends if a < end < b}:
+                both = bisect.bisect_left(lows, cut) - bisect.bisect_right(highs, cut)
+                uneven = max(bisect.bisect_left(lows, cut), len(some) - bisect.bisect_right(highs, cut))
+                if best is None or (both, uneven) < best[:2]:  # type: ignore[comparison-overlap]
+                    best = (both, uneven, cut)  # type: ignore[assignment]
+                    axis = k
+        if best is None:
+            return False
+        cut = best[2]
+        for part in ((region[axis][0], cut), (cut, region[axis][1])):
+            inner = [*region[:axis], part, *region[axis + 1 :]]
+            meeting = [box for box in some if all(lo < b and a < hi or a == b for (a, b), (lo, hi) in zip(inner, box, strict=True))]
+            stack.append((inner, meeting))
+    return True
 
 
 def read_claims(
@@ -1954,6 +2203,8 @@ def read_section(name: str, section: dict[str, Any], n_sides: int) -> dict[str, 
         return read_ends(section, n_sides)
     if name == "cycles":
         return read_orbits(section, n_sides)
+    if name == "refuted":
+        return read_refutation(section, n_sides)
     return {}
 
 
@@ -2301,6 +2552,8 @@ def statement_of(name: str, section: dict[str, Any], noisy: bool) -> str:
         return ends_statement(section, noisy)
     if name == "cycles":
         return orbits_statement(section)
+    if name == "refuted":
+        return statement_of_refutation(section)
     if name == "trapping":
         return "trapping: the attracting cells are mapped into their interior (relative to x <= arm.length)"
     return "invariant: no throw leaves the attracting cells, nor the component it starts in"

@@ -54,6 +54,8 @@ class Asked:
         The scenes it was asked of; None for the scene as it is.
     noise : dict of str to str
         The noise.
+    within : dict of str to str
+        Deviations that those of a single scene do not exceed, by quantity.
     """
 
     verdict: str
@@ -64,6 +66,7 @@ class Asked:
     counterexample: tuple[Any, ...] = ()
     piece: Piece | None = None
     noise: Mapping[str, str] = field(default_factory=dict)
+    within: Mapping[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,6 +121,11 @@ class Question:
         except AnswerError as error:
             return Asked("impossible", str(error), piece=piece, noise=noise)
         return Asked("undecided", missing[0].reason, found, piece=piece, noise=noise)
+
+    def cells(self, piece: Piece | None, step: int) -> Attraction:
+        """Return the cells of one refinement, whatever they prove."""
+        box = self.box(piece, {})
+        return self._finer(self._coarse(box), box, step)
 
     def _cuts(self, sides: int) -> dict[int, list[float]]:
         wanted = [float(x) for goal in self.goals for x in borders(goal)]

@@ -9,7 +9,7 @@ spare; but no piece is proved twice.  Another one at every throw: there is no cu
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 
 from limitsets.robust.asking import Asked, Question
@@ -77,7 +77,9 @@ def _point(question: Question, measure: Measure, size: Fraction, finest: int = 3
     if found.verdict in ("proved", "impossible"):
         return found
     against = question.refute(piece)
-    return against if against.verdict == "refuted" else question.prove(piece, finest=finest)
+    if against.verdict == "refuted":
+        return replace(against, within={measure.quantity: measure.text(abs(size))})
+    return question.prove(piece, finest=finest)
 
 
 def _reach(question: Question, measure: Measure, sign: int, width: Fraction, known: Fraction | None) -> _Reach:

@@ -28,6 +28,9 @@ __all__ = ["Effects", "effects_of", "scene_at"]
 # Throws of an orbit that is read, after so many that are not.
 LENGTH, BEFORE = 60_000, 2000
 
+# Refinement of the cells with which the cost of a piece is measured.
+STEP = 2
+
 # Part of the tolerance by which a quantity is changed to either side.
 CHANGE = Fraction(1, 4)
 
@@ -48,10 +51,13 @@ class Effects:
         In the scene as it is, one number for each way in which a goal can fail; negative where one does.
     fall : ndarray, shape (n, quantities)
         By how much each falls when a quantity rises by its tolerance.
+    cost : ndarray, shape (n, quantities)
+        By how much less is proved of each when a quantity may be anywhere in its tolerance, proved as a whole.
     """
 
     spare: NDArray[np.float64]
     fall: NDArray[np.float64]
+    cost: NDArray[np.float64]
 
     def corners(self) -> list[tuple[int, ...]]:
         """Signs of the worst corner for each way to fail, the worst of all first."""
@@ -95,10 +101,11 @@ def effects_of(question: Question, measures: Sequence[Measure], tolerance: Mappi
     """
     nominal = question.prove(finest=1)
     if nominal.found is None or not (nominal.found.component >= 0).any():
-        return Effects(np.zeros(0), np.zeros((0, len(measures))))
+        return Effects(np.zeros(0), *(np.zeros((0, len(measures))),) * 2)
     start, none = settled(nominal.found), [Fraction(0)] * len(measures)
     spare = _spare(question, scene_at(measures, none), start)
-    falls = []
+    falls, costs = [], []
+    level = _proved_of(question, None)
     for k, one in enumerate(measures):
         ends = []
         for sign in (-1, 1):
@@ -109,5 +116,25 @@ def effects_of(question: Question, measures: Sequence[Measure], tolerance: Mappi
             except AnswerError:
                 ends.append(spare)
         falls.append((ends[0] - ends[1]) / (2 * float(CHANGE)))
-    usable = np.isfinite(spare) & np.isfinite(np.array(falls)).all(axis=0)
-    return Effects(spare[usable], np.array(falls).T[usable])
+        costs.append((level - _over(question, one, CHANGE * tolerance[one.quantity], level)) / float(CHANGE))
+    fall = np.array(falls)
+    cost = np.maximum(np.array(costs), 1.2 * np.abs(fall))
+    usable = np.isfinite(spare) & np.isfinite(fall).all(axis=0) & np.isfinite(cost).all(axis=0)
+    return Effects(spare[usable], fall.T[usable], cost.T[usable])
+
+
+def _proved_of(question: Question, piece: Piece | None) -> NDArray[np.float64]:
+    """What is proved to be to spare; of a place to be reached, nothing of the kind is."""
+    extents = question.cells(piece, STEP).cells.extents()
+    highest = [max((hi for _, hi in parts), default=-math.inf) for _, parts in sorted(extents.items())]
+    found: list[float] = []
+    for goal in question.goals:
+        found += [math.nan] if isinstance(goal, Reaches) else _to_spare(goal, highest)
+    return np.where(np.isnan(found), 0.0, np.array(found))
+
+
+def _over(question: Question, one: Measure, size: Fraction, level: NDArray[np.float64]) -> NDArray[np.float64]:
+    try:
+        return _proved_of(question, one.piece(one.between(-size, size)))
+    except AnswerError:
+        return level

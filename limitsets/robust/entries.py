@@ -8,15 +8,32 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
-from typing import Any
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
-from limitsets.goals import Goal
-from limitsets.proofs.asked import State
-from limitsets.robust.margins import Margin
-from limitsets.scene import Scene
+from limitsets.scene.quantities import find
+from limitsets.scene.units import exact_factor, parse
 
-__all__ = ["Entry", "goal_record", "nominal_of", "percent_of"]
+if TYPE_CHECKING:
+    from limitsets.robust.margins import Margin
+    from limitsets.scene import Scene
+
+__all__ = ["Entry", "nominal_of", "percent_of"]
+
+REFUTED = ".refuted.zip"
+
+# Fields that JSON has by the same name and in the same form.
+SAME = (
+    "quantity",
+    "reading",
+    "proved",
+    "refuted",
+    "nominal",
+    "nominal_unit",
+    "closed",
+    "violated",
+    "pieces",
+)
 
 
 @dataclass(frozen=True)
@@ -29,12 +46,12 @@ class Entry:
         Its name; "joint" for all of the tolerance together.
     reading : str
         "fixed" (but unknown), "per-throw" (another one at every throw), or "tolerance" for joint.
-    goal : tuple of dict
+    goals : tuple of dict
         What has to hold, all of it.
     proved : float
         Proved for every deviation up to this; 0 if for none.
     refuted : float or None
-        At this deviation an orbit violates the goal; None if no such deviation is found.
+        At this deviation an orbit violates a goal; None if no such deviation is found.
     unit : str
         Of both; "" for joint, a factor on the tolerance.
     nominal : float or None
@@ -45,19 +62,23 @@ class Entry:
         Whether the two ends are as close as was asked.
     reason : str
         Why there is no upper end, or why the ends are farther apart; empty otherwise.
-    violated : dict or None
-        Which goal the orbit violates.
+    violated : int or None
+        Which of the goals the orbit violates.
     counterexample : tuple of dict
         The orbit: x, the interval that holds it, side, parameters of the throw; empty without one.
-    certificate, against : str or None
-        Names of the files of the proof and of the counterexample; None where there is none.
+    certificates : tuple of str
+        Names of the files that prove it.
+    against : str or None
+        Name of the file of the counterexample.
+    pieces : int
+        Boxes that the proof took.
     seconds : float
         Time it took.
     """
 
     quantity: str
     reading: str
-    goal: tuple[dict[str, Any], ...]
+    goals: tuple[dict[str, Any], ...]
     proved: float
     refuted: float | None
     unit: str
@@ -65,10 +86,11 @@ class Entry:
     nominal_unit: str
     closed: bool
     reason: str
-    violated: dict[str, Any] | None
+    violated: int | None
     counterexample: tuple[dict[str, Any], ...]
-    certificate: str | None
+    certificates: tuple[str, ...]
     against: str | None
+    pieces: int
     seconds: float
 
     @property
@@ -76,65 +98,59 @@ class Entry:
         """What tells it from the other lines of a sheet."""
         return f"{self.quantity} {self.reading}"
 
+    @property
+    def holds(self) -> bool:
+        """Whether the goal holds without any deviation."""
+        return self.proved > 0.0
+
     @classmethod
-    def of(cls, margin: Margin, files: Sequence[str | None] = (None, None)) -> Entry:
-        """Write a margin down, with the names of its two files."""
-        against = margin.against
+    def of(cls, margin: Margin, files: Sequence[str] = ()) -> Entry:
+        """Write a margin down, with the names of its files."""
         nominal, unit = nominal_of(margin.scene, margin.quantity)
-        found = against is not None and against.refuted is not None
-        return cls(
-            margin.quantity,
-            margin.reading,
-            tuple(goal_record(goal) for goal in margin.goals),
-            margin.proved,
-            margin.refuted,
-            margin.unit,
-            nominal,
-            unit,
-            margin.closed,
-            margin.reason,
-            goal_record(against.refuted) if found else None,  # type: ignore[union-attr, arg-type]  # found says so
-            _orbit(margin),
-            files[0],
-            files[1],
-            margin.seconds,
+        broken = None if margin.against is None else margin.against.refuted
+        record = margin.to_json()
+        return cls.read(
+            record
+            | {
+                "nominal": nominal,
+                "nominal_unit": unit,
+                "violated": margin.goals.index(broken) if broken is not None else None,
+                "certificate": [name for name in files if not name.endswith(REFUTED)],
+                "refutation": next((name for name in files if name.endswith(REFUTED)), None),
+            }
         )
 
     @classmethod
     def read(cls, record: Mapping[str, Any]) -> Entry:
         """Read what `to_json` wrote."""
-        found = cls(**record)
-        return replace(found, goal=tuple(found.goal), counterexample=tuple(found.counterexample or ()))
+        goals, proofs = record["goal"], record["certificate"] or []
+        return cls(
+            goals=tuple(goals) if isinstance(goals, list) else (goals,),
+            unit=record["unit"] or "",
+            reason=record["reason"] or "",
+            counterexample=tuple(record["counterexample"] or ()),
+            certificates=tuple(proofs) if isinstance(proofs, list) else (proofs,),
+            against=record["refutation"],
+            seconds=record["timings"]["margin"],
+            **{name: record[name] for name in SAME},
+        )
 
     def to_json(self) -> dict[str, Any]:
-        """Give it as a plain table for JSON."""
-        record = asdict(self)
-        return record | {
-            "goal": list(self.goal),
+        """Give it as a plain table for JSON, in the words of `Margin.to_json` and some more."""
+        proofs = self.certificates
+        return {name: getattr(self, name) for name in SAME} | {
+            "goal": list(self.goals) if len(self.goals) > 1 else self.goals[0],
+            "unit": self.unit or None,
+            "reason": self.reason or None,
             "counterexample": list(self.counterexample) or None,
+            "certificate": (list(proofs) if len(proofs) > 1 else proofs[0]) if proofs else None,
+            "refutation": self.against,
+            "timings": {"margin": self.seconds},
         }
-
-
-def goal_record(goal: Goal) -> dict[str, Any]:
-    """Write a goal as a table of plain values: kind, and what it says; of a predicate its name.
-
-    Examples
-    --------
-    >>> from limitsets.goals import OrientedBeyond
-    >>> goal_record(OrientedBeyond(20.0, 2))
-    {'kind': 'oriented_beyond', 'x': 20.0, 'side': 2, 'from_anywhere': False}
-    """
-    plain = {name: value for name, value in vars(goal).items() if not callable(value)}
-    return {"kind": goal.kind} | {
-        name: list(value) if isinstance(value, tuple) else value for name, value in plain.items()
-    }
 
 
 def nominal_of(scene: Scene, quantity: str) -> tuple[float | None, str]:
     """Find the value of a quantity as people say it, and its unit; None for what has none."""
-    from limitsets.scene.quantities import find
-    from limitsets.scene.units import parse
-
     if quantity in ("joint", "landing.x"):
         return None, scene.unit
     place = find(quantity)
@@ -159,31 +175,5 @@ def percent_of(entry: Entry, size: float | None) -> float | None:
     if not entry.nominal or entry.unit == "":
         return None
     if entry.unit != entry.nominal_unit:
-        from limitsets.scene.units import exact_factor
-
         size *= float(exact_factor(entry.unit, entry.nominal_unit))
     return 100.0 * size / abs(entry.nominal)
-
-
-def _orbit(margin: Margin) -> tuple[dict[str, Any], ...]:
-    """Write the orbit that refutes, as `limitsets.certify` writes its own."""
-    against = margin.against
-    if against is None:
-        return ()
-    fixed: dict[str, Any] = {} if against.piece is None else dict(against.piece.texts())
-    return tuple(
-        {
-            "x": state.lo if state.lo == state.hi else 0.5 * (state.lo + state.hi),
-            "between": [state.lo, state.hi],
-            "side": state.side,
-            "parameters": None if state.kappa is None else fixed | _thrown(state, margin.scene.unit),
-        }
-        for state in against.counterexample
-    )
-
-
-def _thrown(state: State, unit: str) -> dict[str, str]:
-    found = {"throw.kappa": f"{state.kappa!r} {unit}"}
-    if state.landing is not None:
-        found["landing.x"] = f"{state.landing!r} {unit}"
-    return found

@@ -12,6 +12,7 @@ import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
+from typing import NamedTuple
 
 import numpy as np
 
@@ -31,8 +32,14 @@ __all__ = ["joint_margin"]
 # Seconds and pieces after which the proof of the box ends with what it has.
 SECONDS, MOST_PIECES = 150.0, 4000
 
-# What a piece costs, proved as a whole, against what its corner alone costs; learned while the box is cut.
-COST, LEAST_COST, MOST_COST = 1.6, 1.1, 4.0
+# What a piece costs, proved as a whole, against what was measured one quantity at a time; learned on the way.
+COST, LEAST_COST, MOST_COST = 1.0, 0.7, 3.0
+
+# Share of what was to spare at first, below which cells have to be finer: the steps of `Question.prove`.
+FINER = (0.06, 0.015)
+
+# A part is worth a try from this share of what its worst corner has to spare.
+WORTH = 0.15
 
 # A piece narrower than this share of the box is not cut again.
 NARROWEST = Fraction(1, 4096)
@@ -126,13 +133,12 @@ class _Part:
     low: Sizes = field(compare=False)
     high: Sizes = field(compare=False)
 
-    def halves(self, k: int, number: int) -> list[_Part]:
-        """Cut in the middle along one quantity."""
-        middle = (self.low[k] + self.high[k]) / 2
+    def cut(self, k: int, at: Fraction, number: int) -> list[_Part]:
+        """Cut along one quantity."""
         parts = []
         for low, high in (
-            (self.low, (*self.high[:k], middle, *self.high[k + 1 :])),
-            ((*self.low[:k], middle, *self.low[k + 1 :]), self.high),
+            (self.low, (*self.high[:k], at, *self.high[k + 1 :])),
+            ((*self.low[:k], at, *self.low[k + 1 :]), self.high),
         ):
             number += 1
             parts.append(_Part(_nearness(low, high), number, low, high))
@@ -144,6 +150,15 @@ def _nearness(low: Sizes, high: Sizes) -> Fraction:
     return max(max(lo, -hi, Fraction(0)) for lo, hi in zip(low, high, strict=True))
 
 
+class _Guess(NamedTuple):
+    """What is to spare on a part, proved as a whole, and at its worst corner alone; the quantity to cut, and where."""
+
+    left: float
+    at_corner: float
+    k: int
+    at: Fraction
+
+
 class _Cutting:
     """Proof of a box, piece by piece."""
 
@@ -153,16 +168,26 @@ class _Cutting:
         self.proved: list[tuple[_Part, Asked]] = []
         self.tried = 0
 
-    def spare(self, part: _Part) -> tuple[float, int]:
-        """What is expected to be to spare on a part, proved as a whole, and the quantity that costs most."""
+    def judge(self, part: _Part) -> _Guess:
+        """Guess what is to spare on a part, and where to cut it."""
         low, high = (np.array([float(x) for x in end]) * float(self.factor) for end in (part.low, part.high))
-        half = 0.5 * (high - low)
-        if not self.effects.spare.size:
-            return 1.0, int(np.argmax(half))
-        fall = np.abs(self.effects.fall)
-        left = self.effects.spare - self.effects.fall @ (0.5 * (low + high)) - self.cost * fall @ half
+        half, effects = 0.5 * (high - low), self.effects
+        if not effects.spare.size:
+            k = int(np.argmax(half))
+            return _Guess(1.0, 1.0, k, (part.low[k] + part.high[k]) / 2)
+        costs, fall = self.cost * effects.cost, np.abs(effects.fall)
+        at_corner = effects.spare - effects.fall @ (0.5 * (low + high)) - fall @ half
+        left = at_corner - np.maximum(costs - fall, 0.0) @ half
         worst = int(np.argmin(left))
-        return float(left[worst]), int(np.argmax(fall[worst] * half))
+        k = int(np.argmax(costs[worst] * half))
+        # the part on the good side is to be as long as it may be
+        wanted = WORTH * at_corner[worst] - left[worst]
+        share = 2.0 * wanted / max((fall + costs)[worst, k] * 2.0 * half[k], 1e-300)
+        share = share if 0.1 < share < 0.6 else 0.5
+        steps = max(1, min(15, round(16 * share)))
+        width = (part.high[k] - part.low[k]) * Fraction(steps, 16)
+        at = part.high[k] - width if effects.fall[worst, k] > 0.0 else part.low[k] + width
+        return _Guess(float(left[worst]), float(at_corner[worst]), k, at)
 
     def run(self, seconds: float, tell: Tell) -> tuple[Fraction, str]:
         """Prove parts, nearest first; up to which part of the factor all are proved, and what stops it."""
@@ -174,34 +199,55 @@ class _Cutting:
             part = heapq.heappop(waiting)
             if failed and part.near >= min(near for near, _ in failed):
                 continue
-            left, k = self.spare(part)
-            found = self._try(part) if left > 0.0 or not count else None
+            guess = self.judge(part)
+            k = guess.k
+            found = self._try(part, guess.left) if guess.left > WORTH * guess.at_corner or not count else None
             if found is not None and found.verdict == "proved":
                 self.proved.append((part, found))
-                self.cost = max(LEAST_COST, self.cost * (0.98 if left < 0.1 else 1.0))
+                self.cost = max(LEAST_COST, self.cost * 0.99)
                 tell(self.done(waiting))
                 continue
             if found is not None and self.effects.spare.size:
-                self.cost = min(MOST_COST, self.cost * 1.05)
+                self.cost = min(MOST_COST, self.cost * 1.03)
             over = time.perf_counter() > end or len(self.proved) + len(waiting) >= MOST_PIECES
             narrow = not count or part.high[k] - part.low[k] <= NARROWEST
             if over or narrow:
                 why = "it ran out of time: give it more seconds" if over else (found.reason if found else "")
                 failed.append((part.near, why))
                 continue
-            halves = part.halves(k, number)
+            for piece in part.cut(k, guess.at, number):
+                heapq.heappush(waiting, piece)
             number += 2
-            for half in halves:
-                heapq.heappush(waiting, half)
         return min(failed, default=(Fraction(1), ""))
+
+    def within(self, share: Fraction) -> list[Asked]:
+        """What proves a share of the box: parts that reach beyond it are cut back; their cells serve for less."""
+        kept = []
+        for part, found in self.proved:
+            low = tuple(max(x, -share) for x in part.low)
+            high = tuple(min(x, share) for x in part.high)
+            if any(a >= b for a, b in zip(low, high, strict=True)) or found.found is None:
+                continue
+            piece = self.tolerance.piece(low, high, self.factor)
+            if piece is not None:
+                cover = found.found.cover
+                box = replace(cover.box, scene=piece.tree())
+                found = replace(found, found=replace(found.found, cover=replace(cover, box=box)), piece=piece)
+            kept.append(found)
+        return kept
 
     def done(self, waiting: list[_Part]) -> float:
         """Share of the pieces known so far."""
         return len(self.proved) / (len(self.proved) + len(waiting))
 
-    def _try(self, part: _Part) -> Asked:
+    def _try(self, part: _Part, left: float) -> Asked:
         self.tried += 1
-        return self.question.prove(self.tolerance.piece(part.low, part.high, self.factor), self.noise)
+        finest = 3
+        if self.effects.spare.size:
+            finest = 1 + sum(left < share * float(self.effects.spare.min()) for share in FINER)
+        return self.question.prove(
+            self.tolerance.piece(part.low, part.high, self.factor), self.noise, finest
+        )
 
 
 def _worst(
@@ -235,7 +281,7 @@ def _at_corner(
         nonlocal bad, against
         found = question.refute(tolerance.corner(factor, signs), tolerance.noise(factor))
         if found.verdict == "refuted":
-            bad, against = factor, found
+            bad, against = factor, replace(found, within=tolerance.texts(factor))
         return found.verdict == "refuted"
 
     factor = known or Fraction(1, 16)
@@ -294,21 +340,33 @@ def joint_margin(
     question = asked_of(scene, goals)
     vector = Tolerance.of(question.scene, tolerance if tolerance is not None else scene.text.get("tolerance", {}))
     share = Fraction(repr(width))
-    effects = effects_of(question, vector.measures, _sizes(vector)) if vector.measures else Effects(np.zeros(0), np.zeros((0, 0)))
+    effects = effects_of(question, vector.measures, _sizes(vector)) if vector.measures else Effects(np.zeros(0), np.zeros((0, 0)), np.zeros((0, 0)))
     good, bad, against, reason = _worst(question, vector, effects, share / 8)
     target = _round(min(good, bad * (1 - share * Fraction(9, 10))) if bad is not None else good)
     tell(0.05)
-    proved, pieces = Fraction(0), []
+    proved, pieces, noise = Fraction(0), list[Asked](), dict[str, str]()
     if target > 0:
         cutting = _Cutting(question, vector, target, effects)
         part, why = cutting.run(seconds, tell)
-        proved, reason = part * target, why or reason
-        pieces = [found for _, found in cutting.proved]
+        proved, reason, noise = part * target, why or reason, cutting.noise
+        pieces = cutting.within(part)
     closed = bad is not None and bad - proved <= share * bad
     return Margin(
-        "joint", "tolerance", goals, float(proved), None if bad is None else float(bad), "", None,
-        "" if closed else reason, closed, time.perf_counter() - begin, question.scene, (proved, bad), vector,
-        tuple(pieces), against,
+        "joint",
+        "tolerance",
+        goals,
+        float(proved),
+        None if bad is None else float(bad),
+        "",
+        None,
+        "" if closed else reason,
+        closed,
+        time.perf_counter() - begin,
+        question.scene,
+        vector.texts(proved) if proved else {},
+        noise if proved else {},
+        tuple(pieces),
+        against,
     )
 
 

@@ -12,9 +12,11 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from limitsets.errors import AnswerError
 from limitsets.files import replaced
 from limitsets.goals import Goal, Predicate
-from limitsets.robust.entries import Entry, goal_record
+from limitsets.robust.answer import goal_table
+from limitsets.robust.entries import Entry
 from limitsets.robust.margins import Margin
 from limitsets.scene import Scene
 
@@ -61,7 +63,7 @@ class Kept:
     ) -> None:
         self.folder, self.scene, self.again = folder, scene, 0
         tables = {word: scene.text[word] for word in THROWN if word in scene.text}
-        single = digest_of(tables, [goal_record(goal) for goal in goals], width)
+        single = digest_of(tables, [goal_table(goal, scene.unit) for goal in goals], width)
         self.digests = {"single": single, "joint": digest_of(single, dict(tolerance))}
         # code of the caller's has no digest
         known = folder is not None and not any(isinstance(goal, Predicate) for goal in goals)
@@ -84,7 +86,7 @@ class Kept:
 
     def _complete(self, entry: Entry) -> bool:
         assert self.folder is not None
-        files = [name for name in (entry.certificate, entry.against) if name is not None]
+        files = [*entry.certificates, *([] if entry.against is None else [entry.against])]
         return all((self.folder / name).is_file() for name in files)
 
     def find(self, quantity: str, reading: str, unit: str) -> Entry | None:
@@ -112,6 +114,11 @@ class Kept:
             (draft / RECORD).write_text(words + "\n", encoding="utf-8", newline="\n")
         return entry
 
-    def _files(self, margin: Margin) -> tuple[str | None, str | None]:
-        """Write the proof and the counterexample; their names, from the folder of the report."""
-        return None, None
+    def _files(self, margin: Margin) -> list[str]:
+        """Write the proof and the counterexample; their names, seen from the folder of the report."""
+        assert self.folder is not None
+        try:
+            written = margin.save(self.folder / CERTIFICATES)
+        except AnswerError:  # effects are on, or a goal is code: nothing rechecks it, the margin stands
+            return []
+        return [f"{CERTIFICATES}/{path.name}" for path in written]

@@ -8,13 +8,14 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
 from limitsets.errors import AnswerError
 from limitsets.goals import Goal, Predicate
+from limitsets.proofs.asked import State
 from limitsets.robust.asking import Asked, Question
 from limitsets.robust.brackets import Bracket, bracket_fixed, bracket_per_throw
 from limitsets.robust.deviations import Measure, measure, measures
@@ -54,8 +55,8 @@ class Margin:
         Time it took.
     scene : Scene
         The scene.
-    deviations : dict of str to str
-        What each quantity may do at `proved`, as text.
+    deviations, noise : dict of str to str
+        What may be fixed but unknown and what differs at every throw, as it is proved, as `limitsets.certify` takes it.
     pieces : tuple of Asked
         What proves it.
     against : Asked or None
@@ -73,10 +74,38 @@ class Margin:
     closed: bool
     seconds: float
     scene: Scene
-    sizes: tuple[Fraction, Fraction | None]
-    measure: Any
-    pieces: tuple[Asked, ...]
-    against: Asked | None
+    deviations: dict[str, str]
+    noise: dict[str, str]
+    pieces: tuple[Asked, ...] = field(repr=False)
+    against: Asked | None = field(repr=False)
+
+    @property
+    def counterexample(self) -> tuple[State, ...]:
+        """The orbit that violates a goal, every state enclosed; empty if there is none."""
+        return () if self.against is None else self.against.counterexample
+
+    def to_json(self) -> dict[str, Any]:
+        """Give it as a plain table for JSON."""
+        from limitsets.robust.answer import to_json
+
+        return to_json(self)
+
+    def save(self, folder: str | Path) -> tuple[Path, ...]:
+        """Write what `limitsets.recheck` checks: a certificate for each goal, and the orbit that refutes one.
+
+        Parameters
+        ----------
+        folder : str or Path
+            Where; it is made.
+
+        Raises
+        ------
+        AnswerError
+            Effects are on, which no recheck knows, or a goal is a function of the caller's.
+        """
+        from limitsets.robust.answer import save
+
+        return save(self, Path(folder))
 
 
 def goals_of(scene: Scene, goal: GoalLike | Sequence[GoalLike] | None) -> tuple[Goal, ...]:
@@ -202,11 +231,18 @@ def _single(question: Question, one: Measure, width: Fraction, tell: Callable[[f
         found.closed(width),
         time.perf_counter() - begin,
         question.scene,
-        (found.proved, found.refuted),
-        one,
+        *_texts(one, found.proved),
         tuple(found.pieces),
         found.against,
     )
+
+
+def _texts(one: Measure, size: Fraction) -> tuple[dict[str, str], dict[str, str]]:
+    """What is fixed but unknown, and what differs at every throw."""
+    if not size:
+        return {}, {}
+    said = {one.quantity: one.text(size)}
+    return (said, {}) if one.reading == "fixed" else ({}, said)
 
 
 def _nominal(scene: Scene, one: Measure) -> float | None:

@@ -1,0 +1,80 @@
+"""Writing an orbit that refutes a goal, so that a stranger can throw it again.
+
+A certificate with the one claim "refuted": the attracting cells, which are checked as for "invariant"; a start in them;
+what each throw was like; and within which deviations of which nominal values the scene lies.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from limitsets.goals import OrientedBeyond
+from limitsets.proofs.asked import State
+from limitsets.proofs.attraction import Attraction
+from limitsets.proofs.certificate import write
+from limitsets.scene import Scene
+from limitsets.scene.quantities import find
+
+__all__ = ["write_refutation"]
+
+
+def _nominal(scene: Scene, name: str) -> str:
+    by_kappa = name == "throw.speed" and "kappa" in scene.text["throw"]
+    node: Any = scene.text
+    for word in find("throw.kappa" if by_kappa else name).path:
+        node = node[word]
+    return str(node)
+
+
+def write_refutation(
+    path: str | Path,
+    found: Attraction,
+    goal: OrientedBeyond,
+    states: Sequence[State],
+    within: Mapping[str, str],
+    scene: Scene,
+) -> None:
+    """Write it, replacing an older file whole.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file.
+    found : Attraction
+        The cells, of the scene that refutes and its noise.
+    goal : OrientedBeyond
+        What is refuted.
+    states : sequence of State
+        The orbit.
+    within : mapping of str to str
+        Deviations from the nominal scene that its own do not exceed, by quantity.
+    scene : Scene
+        The nominal scene.
+    """
+    box = found.cover.box
+    varies = "throw.speed" in box.noise or "gravity.tilt" in box.noise
+    asked: dict[str, Any] = {"kind": goal.kind, "x": f"{goal.x!r} {scene.unit}", "side": goal.side}
+    section = {
+        "goal": asked | ({"from_anywhere": True} if goal.from_anywhere else {}),
+        "start": {"x": float(states[0].lo).hex(), "side": states[0].side},
+        "throws": [
+            {
+                "kappa": float(state.kappa).hex() if varies and state.kappa is not None else None,
+                "landing": float(state.landing).hex() if state.landing else None,
+            }
+            for state in states[:-1]
+        ],
+        "nominal": {name: _nominal(scene, name) for name in within},
+        "tolerance": dict(within),
+    }
+    write(
+        path,
+        [found],
+        [{"claim": "refuted", "section": section}],
+        noise=box.noise or None,
+        tolerance=None,
+        unit=scene.unit,
+        producer={},
+    )
