@@ -12,9 +12,9 @@ from limitsets.robust.laws import Given as Given
 from limitsets.robust.laws import Samples as Samples
 from limitsets.robust.laws import Uniform as Uniform
 from limitsets.robust.scattering import Scattering as Scattering
-from limitsets.robust.transfer import transfer as transfer
-from limitsets.robust.absorption import absorption as absorption
-from limitsets.robust.classes import classes as classes
+from limitsets.robust.ulam import transfer as transfer
+from limitsets.robust.absorbing import absorption as absorption
+from limitsets.robust.settling import classes as classes
 from limitsets.robust.statistics import NoiseStatistics as NoiseStatistics
 from limitsets.robust.statistics import noise_levels as noise_levels
 from limitsets.robust.statistics import noise_statistics as noise_statistics

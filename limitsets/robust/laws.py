@@ -22,8 +22,8 @@ __all__ = ["Gaussian", "Given", "Law", "Samples", "Strata", "Uniform", "regroupe
 SIGMAS = 6.0
 # Probability that is cut off at each end of a user's distribution without bounds.
 TAIL = 1e-9
-# Where the running means of a stratum are taken: abscissae of Gauss and Legendre.
-ABSCISSAE = 24
+# Where the moments of a stratum are summed: panels, in case the density has kinks, with abscissae of Gauss and Legendre.
+PANELS, ABSCISSAE = 12, 6
 # Points on which the cuts between strata are looked up.
 TABLE = 4097
 
@@ -89,8 +89,9 @@ def _strata(law: Any, lo: float, hi: float, count: int) -> Strata:
     upper = a > law.median()
     weight = np.where(upper, law.sf(a) - law.sf(b), law.cdf(b) - law.cdf(a))
     node, share = np.polynomial.legendre.leggauss(ABSCISSAE)
-    x = 0.5 * (a + b)[:, None] + 0.5 * (b - a)[:, None] * node
-    density = share * law.pdf(x)
+    place = (np.arange(PANELS)[:, None] + 0.5 + 0.5 * node).ravel() / PANELS
+    x = a[:, None] + (b - a)[:, None] * place
+    density = np.tile(share, PANELS) * law.pdf(x)
     total = density.sum(axis=1)
     some = (total > 0.0) & (weight > 0.0)
     x, density, total, weight = x[some], density[some], total[some], weight[some]

@@ -194,7 +194,7 @@ def _long_run(
             on_side[k] += here
             found[k] += np.histogram(many.x[here], borders[k])[0]
         for k in range(len(names)):
-            by_branch[k] += code == k
+            by_branch[k] += (code == k) & alive
         if progress is not None:
             progress(done + 1, rounds)
     total = on_side.sum(axis=0)

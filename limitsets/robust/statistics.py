@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,11 +13,11 @@ from numpy.typing import NDArray
 from limitsets.cells import Grid, grid
 from limitsets.errors import AnswerError
 from limitsets.goals import OrientedBeyond, Reaches
-from limitsets.robust.absorption import Absorption, absorption
-from limitsets.robust.classes import NoisyClass, classes
-from limitsets.robust.feeding import Feeding, feeding, random_starts, with_border
+from limitsets.robust.absorbing import Absorption, absorption
+from limitsets.robust.settling import NoisyClass, classes
+from limitsets.robust.arrivals import Feeding, feeding, random_starts, with_border
 from limitsets.robust.scattering import Scattering, kappa_strata, scattering_of, still_map, thrown
-from limitsets.robust.transfer import STRATA, Transfer, transfer
+from limitsets.robust.ulam import STRATA, Transfer, transfer
 
 if TYPE_CHECKING:
     from limitsets.scene import Scene
@@ -82,8 +82,8 @@ class NoiseStatistics:
     numbers : dict of str to float
         The answers in numbers, nan where there is none; see the notes.
     errors : dict of str to float
-        How much each changes from half as many cells and strata: an estimate that errs on the safe side as long as the
-        error falls with the width of the cells.
+        How much each changes from half as many cells and from half as many strata: an estimate of the error, on the
+        safe side as long as it falls with their width.
     sensitivity : dict of str to dict of str to Sensitivity
         By quantity, then by number.
     how : str
@@ -341,19 +341,17 @@ def noise_statistics(
     asked, read = _asked(scene, goal, cells, strata, offset)
     noise = scattering_of(read) if scatter is None else scatter
     names = noise.given() if sensitivity else ()
-    stages = 2 + 4 * len(names)
+    stages = 3 + 4 * len(names)
     tell = progress or (lambda stage, done, total: None)
     tell("noise", 0, stages)
     found = _solve(asked, noise)
     tell("noise", 1, stages)
-    coarse = _Asked(read, asked.goal, asked.starts, max(cells // 2, 1), max(strata // 2, 1))
-    check = _solve(coarse, noise).numbers
+    errors = _errors(asked, noise, found.numbers)
     slopes = {}
     for number, name in enumerate(names):
-        tell("noise", 2 + 4 * number, stages)
+        tell("noise", 3 + 4 * number, stages)
         slopes[name] = _slopes(asked, noise, name)
     tell("noise", stages, stages)
-    errors = {key: abs(value - check.get(key, math.nan)) for key, value in found.numbers.items()}
     return NoiseStatistics(
         read.name,
         read.unit,
@@ -371,6 +369,18 @@ def noise_statistics(
         errors,
         slopes,
     )
+
+
+def _errors(asked: _Asked, noise: Scattering, numbers: dict[str, float]) -> dict[str, float]:
+    """How much the numbers change from half as many cells, and from half as many strata, added up."""
+    total = dict.fromkeys(numbers, 0.0)
+    for coarse in (
+        replace(asked, cells=max(asked.cells // 2, 1)),
+        replace(asked, strata=max(asked.strata // 2, 1)),
+    ):
+        check = _solve(coarse, noise).numbers
+        total = {key: total[key] + abs(value - check.get(key, math.nan)) for key, value in numbers.items()}
+    return total
 
 
 def _slopes(asked: _Asked, noise: Scattering, name: str) -> dict[str, Sensitivity]:

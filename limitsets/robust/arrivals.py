@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 
 from limitsets.cells import Grid
 from limitsets.errors import GridError
-from limitsets.robust.absorption import Absorption
+from limitsets.robust.absorbing import Absorption
 from limitsets.robust.sheets import Array
-from limitsets.robust.transfer import Transfer
+from limitsets.robust.ulam import Transfer
 
 __all__ = ["Feeding", "feeding", "random_starts", "with_border"]
 
@@ -67,7 +67,7 @@ def with_border(grid: Grid, x: float) -> Grid:
     Examples
     --------
     >>> import limitsets as ls
-    >>> from limitsets.robust.feeding import with_border
+    >>> from limitsets.robust.arrivals import with_border
     >>> with_border(ls.grid([(0.0, 1.0)], cells=2), 0.75).edges[0][0]
     array([0.  , 0.5 , 0.75, 1.  ])
     """
@@ -116,7 +116,7 @@ def feeding(chain: Transfer, ends: Absorption, starts: Array) -> Feeding:
         masses = chain.adjoint(masses)
         arrived.append(float(masses[ends.goal].sum()))
         masses[stopped] = 0.0
-    share = float(starts @ chance)
+    share = min(float(starts @ chance), 1.0)
     known = np.where(np.isfinite(ends.mean), ends.mean, 0.0)
     mean = float(starts @ (known * chance)) / share if share > 0.0 else None
     return Feeding(

@@ -19,7 +19,7 @@ from limitsets.graph.components import Components, strong_components
 from limitsets.graph.ranges import Ranges
 from limitsets.maps import kind_of
 from limitsets.robust.sheets import Array, Sheets
-from limitsets.robust.transfer import Transfer
+from limitsets.robust.ulam import Transfer
 
 __all__ = ["NoisyClass", "classes", "closed_sets", "distribution", "graph_of"]
 

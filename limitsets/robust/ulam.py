@@ -28,7 +28,9 @@ from limitsets.robust.sheets import Array, Boxes, Sheet, Sheets, laid, shared
 
 __all__ = ["STRATA", "Transfer", "transfer"]
 
-STRATA = 16
+STRATA = 24
+# Landing places are cut more finely, into boxcars about as narrow as cells, as long as there are no more than this.
+LANDING_STRATA, LANDING_BOXCARS = 128, 4_000_000
 # Entries up to which the operator is written out: a sparse product is then faster than sums along the cells.
 WRITTEN_OUT = 30_000_000
 # Most cells that go on beyond an end of the domain.
@@ -266,7 +268,7 @@ def transfer(
     landing : Law, optional
         Noise added to x after every step, in one dimension.
     strata : int
-        Into how many pieces each law is cut.
+        Into how many pieces the law of the parameter is cut, and at least that of the landing place.
 
     Returns
     -------
@@ -296,7 +298,8 @@ def transfer(
         )
     if landing is not None and kind.dimension != 1:
         raise AnswerError("the noise of x", landing, "none in more than one dimension", "leave it out")
-    added = None if landing is None else landing.strata(strata)
+    finer = max(strata, min(LANDING_STRATA, LANDING_BOXCARS // grid.n_cells))
+    added = None if landing is None else landing.strata(finer)
     reach = (0.0, 0.0) if added is None else (added.lo, added.hi)
     edges = _beyond(grid, reach) if kind.dimension == 1 else ()
     build = _from_pieces if uses_pieces(params) else _from_points

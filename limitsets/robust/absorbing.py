@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from limitsets.graph.components import strong_components
-from limitsets.robust.classes import closed_sets, graph_of
+from limitsets.robust.settling import closed_sets, graph_of
 from limitsets.robust.sheets import Array
-from limitsets.robust.transfer import Transfer
+from limitsets.robust.ulam import Transfer
 
 __all__ = ["Absorption", "absorption"]
 

@@ -1,0 +1,232 @@
+"""The transfer operator where it is known on paper, or from a kernel integrated by other means."""
+
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+from scipy import stats
+
+import limitsets as ls
+from limitsets.errors import AnswerError
+from limitsets.robust import Gaussian, Samples, Scattering, Uniform, classes, transfer
+from limitsets.robust.scattering import kappa_strata, still_map, thrown
+from limitsets.robust.sheets import Boxes, Sheets, laid
+from limitsets.sets import invariant_measures
+
+LINE = [(0.0, 1.0)]
+
+
+class Tent(NamedTuple):
+    """A tent map, with forced branches."""
+
+    slope: float
+
+
+def _tent(params, x, side):
+    return (params.slope * x, side, 0) if x < 0.5 else (params.slope * (1.0 - x), side, 1)
+
+
+def _tent_on(params, x, side, branch):
+    if branch == 0:
+        return params.slope * x, side, params.slope
+    return params.slope * (1.0 - x), side, -params.slope
+
+
+ls.register(Tent, image=_tent, image_on=_tent_on, branches=("left", "right"))
+
+
+def kernel_of(map_, law, n):
+    """P of x -> map(x) + noise on [0, 1], by 16 points per cell and the distribution function of the law."""
+    edges = np.linspace(0.0, 1.0, n + 1)
+    x = (np.arange(16 * n) + 0.5) / (16 * n)
+    cdf = law.cdf(edges[None, :] - map_(x)[:, None])
+    return np.diff(cdf, axis=1).reshape(n, 16, n).mean(axis=1)
+
+
+def stationary(matrix):
+    """Leading eigenvalue and left vector, by squaring the matrix: P^(2^k) keeps nothing else."""
+    power = matrix / np.abs(matrix).sum(axis=1).max()
+    for _ in range(16):
+        power = power @ power
+        power /= power.max()
+    vector = power.sum(axis=0) / power.sum()
+    return float((vector @ matrix).sum()), vector
+
+
+def test_rows_and_ways_out_add_up_to_one():
+    scene = ls.load("paper-designed")
+    noise = Scattering(speed=Gaussian(0.01), landing=Gaussian(0.1))
+    for grading in ("uniform", "graded"):
+        cover = ls.grid(scene.domain, cells=300, grading=grading)
+        chain = transfer(
+            thrown(still_map(scene)),
+            cover,
+            parameter=kappa_strata(noise, scene, 8),
+            landing=noise.landing,
+            strata=8,
+        )
+        total = chain.matrix.sum(axis=1) + chain.sinks.sum(axis=1)
+        np.testing.assert_allclose(total, 1.0, rtol=0, atol=1e-13)
+        assert chain.sinks.min() >= 0.0
+        assert chain.sinks[:, 0].max() > 0.1  # near a_i landings scatter inward
+
+
+def test_boxcars_and_the_matrix_written_out_are_the_same():
+    rng = np.random.default_rng(1)
+    edges = (np.sort(rng.uniform(0.0, 3.0, 40)), np.linspace(-1.0, 4.0, 23))
+    sheets = []
+    for target in (0, 1):
+        lo = rng.uniform(-1.5, 4.5, 50)
+        boxes = Boxes(10 * target, target, 0, lo, lo + rng.exponential(0.5, 50), rng.uniform(0, 1, 50))
+        sheets.append(laid(boxes, edges[target])[0])
+    stage = Sheets(60, edges, tuple(sheets))
+    dense = stage.matrix().toarray()
+    v, u = rng.uniform(size=dense.shape[1]), rng.uniform(size=60)
+    np.testing.assert_allclose(stage.apply(v), dense @ v, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(stage.adjoint(u), dense.T @ u, rtol=0, atol=1e-12)
+    # against an integral of one boxcar by hand
+    overlap = np.clip(np.minimum(boxes.hi[3], edges[1][1:]) - np.maximum(boxes.lo[3], edges[1][:-1]), 0, None)
+    by_hand = boxes.weight[3] * overlap / (boxes.hi[3] - boxes.lo[3])
+    only = Sheets(60, edges, (sheets[1],)).matrix().toarray()[13, 39:]
+    np.testing.assert_allclose(only, by_hand, rtol=0, atol=1e-14)
+
+
+def test_doubling_map_with_noise_stays_uniform():
+    """On the circle noise would leave the density uniform; on the interval Q loses what jumps the ends."""
+    chain = transfer(ls.maps.Doubling(), ls.grid(LINE, cells=256), landing=Uniform(0.05))
+    even = np.full(256, 1.0 / 256)
+    after = chain.adjoint(even)
+    middle = slice(15, 241)  # further than 0.05 and a cell from both ends
+    np.testing.assert_allclose(after[middle], 1.0 / 256, rtol=1e-12)
+    # the mean loss: from even x' in [0, 1], E max(0, e - x') = e^2 / (4 b), twice: b / 4 at each end
+    assert float(chain.sinks[:, 0].mean()) == pytest.approx(2 * 0.05 / 4, rel=1e-3)
+
+
+def test_baker_map_is_uniform_in_two_dimensions():
+    chain = transfer(ls.maps.Baker(), ls.grid([(0.0, 1.0), (0.0, 1.0)], cells=16))
+    (found,) = classes(chain)
+    np.testing.assert_allclose(found.density, 1.0, rtol=0, atol=1e-11)
+    assert found.escape == 0.0
+    rate, weight = stationary(chain.matrix.toarray())
+    assert rate == pytest.approx(1.0, abs=1e-12)
+    np.testing.assert_allclose(weight, 1.0 / 256, rtol=0, atol=1e-14)
+
+
+def test_arcsine_density_without_noise():
+    cells = 4096
+    (found,) = classes(transfer(ls.maps.Logistic(4.0), ls.grid(LINE, cells=cells)))
+    exact = np.diff(2.0 / np.pi * np.arcsin(np.sqrt(np.linspace(0.0, 1.0, cells + 1))))
+    assert np.abs(found.weight - exact).sum() < 0.04  # sqrt(width) ln(1/width), see tests/sets/test_measure.py
+    assert found.residual < 1e-12
+
+
+@pytest.mark.parametrize(
+    "params", [ls.maps.Logistic(3.7), ls.maps.Doubling(), Tent(1.8)], ids=lambda p: type(p).__name__
+)
+def test_no_noise_agrees_with_invariant_measures(params):
+    cover = ls.grid(LINE, cells=512)
+    (measure,) = invariant_measures(ls.transitions(params, cover))
+    (found,) = [part for part in classes(transfer(params, cover)) if part.closed]
+    np.testing.assert_allclose(found.weight, measure.weight, rtol=0, atol=1e-9)
+
+
+def test_no_noise_agrees_with_invariant_measures_of_a_scene():
+    scene = ls.load("paper-designed")
+    cover = ls.grid(scene.domain, cells=1024)
+    (measure,) = invariant_measures(ls.transitions(scene.map, cover))
+    (found,) = [part for part in classes(transfer(scene.map, cover)) if part.closed]
+    np.testing.assert_allclose(found.weight, measure.weight, rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("params", "map_"),
+    [
+        (ls.maps.Logistic(3.6), lambda x: 3.6 * x * (1.0 - x)),
+        (Tent(1.6), lambda x: 1.6 * np.minimum(x, 1.0 - x)),
+    ],
+    ids=["logistic", "tent"],
+)
+@pytest.mark.parametrize(
+    ("law", "exact"),
+    [(Gaussian(0.02), stats.norm(scale=0.02)), (Uniform(0.05), stats.uniform(-0.05, 0.1))],
+    ids=["gaussian", "uniform"],
+)
+def test_additive_noise_against_the_exact_kernel(params, map_, law, exact):
+    n = 400
+    rate, weight = stationary(kernel_of(map_, exact, n))
+    parts = classes(transfer(params, ls.grid(LINE, cells=n), landing=law, strata=32))
+    found = max(parts, key=lambda part: part.weight @ (weight > weight.mean()))
+    assert 1.0 - found.escape == pytest.approx(rate, abs=2e-5)
+    assert np.abs(found.weight - weight).sum() < 4e-3
+
+
+def test_errors_fall_with_cells():
+    """Against the exact kernel on 800 cells, compared on 50 bins."""
+    _, fine = stationary(kernel_of(lambda x: 3.6 * x * (1.0 - x), stats.norm(scale=0.02), 800))
+    truth = fine.reshape(50, -1).sum(axis=1)
+    errors = []
+    for n in (100, 200, 400):
+        found = classes(transfer(ls.maps.Logistic(3.6), ls.grid(LINE, cells=n), landing=Gaussian(0.02)))[0]
+        errors.append(np.abs(found.weight.reshape(50, -1).sum(axis=1) - truth).sum())
+    assert errors[1] < 0.5 * errors[0]
+    assert errors[2] < 0.5 * errors[1]
+    assert errors[2] < 5e-3
+
+
+def test_a_parameter_that_scatters():
+    """x -> r x (1 - x) with r even in [3.5, 3.7]: the transition density integrated over r on 64 nodes."""
+    n, nodes = 300, 64
+    r = 3.5 + 0.2 * (np.arange(nodes) + 0.5) / nodes
+    x = (np.arange(100 * n) + 0.5) / (100 * n)
+    exact = np.zeros((n, n))
+    for value in r:
+        cell = np.minimum((value * x * (1.0 - x) * n).astype(int), n - 1)
+        exact += np.bincount(np.repeat(np.arange(n), 100) * n + cell, minlength=n * n).reshape(n, n)
+    exact /= exact.sum(axis=1, keepdims=True)
+    _, weight = stationary(exact)
+    centred = lambda deviation: ls.maps.Logistic(3.6 + deviation)  # noqa: E731
+    (found,) = [
+        part
+        for part in classes(transfer(centred, ls.grid(LINE, cells=n), parameter=Uniform(0.1)))
+        if part.closed
+    ]
+    assert np.abs(found.weight - weight).sum() < 0.02
+
+
+def test_two_values_of_a_parameter_are_two_maps():
+    cover = ls.grid(LINE, cells=64)
+    both = transfer(lambda r: ls.maps.Logistic(r), cover, parameter=Samples([3.0, 4.0], [1, 3]))
+    one, two = (transfer(ls.maps.Logistic(r), cover).matrix.toarray() for r in (3.0, 4.0))
+    np.testing.assert_allclose(both.matrix.toarray(), 0.25 * one + 0.75 * two, rtol=0, atol=1e-13)
+
+
+def test_what_lands_beyond_may_be_brought_back():
+    """Doubling with x' shifted by -0.25 always: [0, 1/2) lands in [-1/4, 3/4), what is below 0 leaves."""
+    chain = transfer(ls.maps.Doubling(), ls.grid(LINE, cells=8), landing=Samples([-0.25]))
+    np.testing.assert_allclose(chain.sinks[:, 0], [1, 0, 0, 0, 1, 0, 0, 0], rtol=0, atol=1e-9)
+    # and a throw that lands beyond the arm's end before it is shifted back stays
+    scene = ls.load("paper-designed").with_values({"arm.length": 23.0})
+    cover = ls.grid(scene.domain, cells=200, grading="uniform")
+    off = transfer(scene.map, cover).sinks[:, 1].sum()
+    back = transfer(scene.map, cover, landing=Samples([-0.6])).sinks[:, 1].sum()
+    assert off > 1.0
+    assert back == 0.0  # landings end at 23.383
+
+
+def test_implicit_and_written_out_give_the_same_classes(monkeypatch):
+    cover = ls.grid(LINE, cells=200)
+    written = classes(transfer(ls.maps.Logistic(3.6), cover, landing=Gaussian(0.01)))
+    monkeypatch.setattr("limitsets.robust.ulam.WRITTEN_OUT", 0)
+    chain = transfer(ls.maps.Logistic(3.6), cover, landing=Gaussian(0.01))
+    assert not chain.written_out
+    implicit = classes(chain)
+    assert len(implicit) == len(written)
+    np.testing.assert_allclose(implicit[0].weight, written[0].weight, rtol=0, atol=1e-9)
+    assert implicit[0].escape == pytest.approx(written[0].escape, rel=1e-6)
+
+
+def test_noise_of_x_in_two_dimensions_is_refused():
+    with pytest.raises(AnswerError, match="noise of x"):
+        transfer(ls.maps.Baker(), ls.grid([(0.0, 1.0), (0.0, 1.0)], cells=4), landing=Uniform(0.1))
+    with pytest.raises(AnswerError, match="dimension"):
+        transfer(ls.maps.Baker(), ls.grid(LINE, cells=4))
