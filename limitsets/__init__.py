@@ -27,8 +27,8 @@ if TYPE_CHECKING:  # each from the file that holds it: most rooms have a file of
     from limitsets.maps import critical_points, orbit, register
     from limitsets.proofs.certify import certify
     from limitsets.proofs.confirm import recheck
-    from limitsets.robust.margins import margin
     from limitsets.robust.gathering import robustness
+    from limitsets.robust.margins import margin
     from limitsets.scene import dump, load, scenes
     from limitsets.sets.attractors import attractors
     from limitsets.sets.basins import basins

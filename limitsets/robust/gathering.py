@@ -33,7 +33,10 @@ NO_TOLERANCE = (
     "the scene has no [tolerance]; give it one, a deviation for each quantity that deviates together with others: "
     '"throw.speed" = "1 %"'
 )
-NO_NOISE = "no noise is given; add scatter = { speed = \"0.5 %\" } to [world], or pass it: --scatter throw.speed='0.5 %'"
+NO_NOISE = (
+    "no noise is given; add scatter = { speed = \"0.5 %\" } to [world], "
+    "or pass it: --scatter throw.speed='0.5 %'"
+)
 NO_PLACE = "it is asked for goals with an x and a side, oriented_beyond or reaches"
 
 Progress = Callable[[str, int, int], None]
