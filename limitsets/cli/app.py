@@ -9,6 +9,7 @@ import typer
 from limitsets.cli.analyse import analyse
 from limitsets.cli.audit import audit
 from limitsets.cli.certify import certify
+from limitsets.cli.margin import margin
 from limitsets.cli.plot import plot
 from limitsets.cli.recheck import recheck
 from limitsets.cli.scenes import scenes
@@ -44,5 +45,5 @@ def limitsets(
     """
 
 
-for command in (scenes, analyse, throw, plot, certify, recheck, audit):
+for command in (scenes, analyse, throw, plot, certify, recheck, audit, margin):
     app.command()(command)

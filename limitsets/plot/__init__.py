@@ -15,6 +15,18 @@ from limitsets.plot.counterexamples import counterexample
 from limitsets.plot.flights import flight
 from limitsets.plot.limit_sets import limit_set
 from limitsets.plot.maps import map  # noqa: A004 - ls.plot.map is the word for it
+from limitsets.plot.margins import margin_curve, tolerance_box, tornado
 from limitsets.plot.morse_graphs import morse
 
-__all__ = ["audit", "basins", "counterexample", "flight", "limit_set", "map", "morse"]
+__all__ = [
+    "audit",
+    "basins",
+    "counterexample",
+    "flight",
+    "limit_set",
+    "map",
+    "margin_curve",
+    "morse",
+    "tolerance_box",
+    "tornado",
+]

@@ -92,10 +92,9 @@ def _wide(node: Any, name: str) -> Iterator[str]:
             yield from _wide(inner, f"{name}.{word}")
     elif isinstance(node, list):
         corner = name.startswith("part.vertices[")
-        if len(node) == 2 and all(isinstance(one, str) for one in node) and name != "part.sides":
-            if _pattern(name) in NAMES:
-                yield name
-                return
+        if _pattern(name) in NAMES:
+            yield name
+            return
         for k, inner in enumerate(node):
             yield from _wide(inner, f"{name}.{'xy'[k]}" if corner else f"{name}[{k}]")
 
@@ -242,7 +241,7 @@ class _Reader:
         steep = _Reader(self.scene, self.tree, dict(zip(names, rising, strict=True))).body()
         offsets = [span - mid for span, mid in zip(box, middles, strict=True)]
         sides = [
-            tuple(about(*each, offsets, known) for *each, known in zip(*rows, strict=True))
+            tuple(about(mid, rise, offsets, known) for mid, rise, known in zip(*rows, strict=True))
             for rows in zip(centre[0], steep[0], plain, strict=True)
         ]
         return sides, about(centre[1], steep[1], offsets, radius)
@@ -323,7 +322,9 @@ def parameter_box(
     try:
         sides, radius = reader.narrow_body()
     except (ZeroDivisionError, ValueError):  # so wide that a length may be nothing, or sides that do not meet
-        raise AnswerError("the part", "such sides", "one that can be, throughout the tolerance", NARROWER) from None
+        raise AnswerError(
+            "the part", "such sides", "one that can be, throughout the tolerance", NARROWER
+        ) from None
     _require_rest(sides, kappa, radius)
     scalars = [kappa, reader.span("arm.surface_height"), reader.span("arm.length"), radius]
     ends = [span.outward() for span in scalars]

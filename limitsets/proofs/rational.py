@@ -66,7 +66,7 @@ class Span:
         return _short(self.lo - b.hi, self.hi - b.lo)
 
     def __rsub__(self, other: int) -> Span:
-        return _span(other) - self
+        return Span.of(other) - self
 
     def __mul__(self, other: Span | int) -> Span:
         b = _span(other)
@@ -85,14 +85,15 @@ class Span:
             return NotImplemented
         if b.lo <= 0 <= b.hi:
             raise ZeroDivisionError
-        return self * Span(1 / b.hi, 1 / b.lo)
+        found: Span = self * Span(1 / b.hi, 1 / b.lo)
+        return found
 
     def __rtruediv__(self, other: int) -> Span:
-        return _span(other) / self
+        return Span.of(other) / self
 
 
 def _span(value: Any) -> Any:
-    """A span of a number; None of anything else, which may know what to do with a span."""
+    """Make a span of a number; None of anything else, which may know what to do with a span."""
     if isinstance(value, Span):
         return value
     return Span(Fraction(value), Fraction(value)) if isinstance(value, int) else None

@@ -336,7 +336,9 @@ class Scene:
     raw: dict[str, Any] = field(default_factory=dict)  # what it was read from, and the noise
     noise: object = None
     loose: float = 0.0  # how wide its sides' enclosures are together, as far as `halves` can narrow them
-    parts: "list[Scene]" = field(default_factory=list)  # its halves, once they are asked for
+    parts: "dict[tuple[str, int], list[Scene]]" = field(
+        default_factory=dict
+    )  # its halves, once they are asked for
 
     def cuts(self) -> list[str]:
         """Name the quantities of part and arm that are intervals; kappa is halved apart, the arm ends where it ends."""
@@ -344,15 +346,27 @@ class Scene:
         halved = [name for name, value in known if isinstance(value, Quantity) and value.lo < value.hi]
         return halved + [name for name, value in known if isinstance(value, list)]
 
-    def halves(self) -> "list[Scene]":
+    def halves(self, of: str = "", side: int = 0) -> "list[Scene]":
         """Return two scenes that hold it together, [] if it is a point: halved in what narrows its enclosures most.
 
-        A quantity is halved, not a_i or d_i: they and the lengths go together.
+        A quantity is halved, not a_i or d_i: they and the lengths go together.  `of`: what is wanted narrower, on one
+        side; everything on all sides by default.
         """
-        if self.loose > 0 and not self.parts:
+        key = (of, side)
+        if self.loose > 0 and key not in self.parts:
             pairs = [[read_scene(raw, self.noise) for raw in halved(self.raw, name)] for name in self.cuts()]
-            self.parts = min(pairs, key=lambda pair: sum(half.loose for half in pair), default=[])
-        return self.parts
+            self.parts[key] = min(
+                pairs, key=lambda pair: sum(half.width(of, side) for half in pair), default=[]
+            )
+        return self.parts.get(key, [])
+
+    def width(self, of: str = "", side: int = 0) -> float:
+        """Say how wide the enclosures are: all, or those that the decision or the image of one side depends on."""
+        if not of:
+            return self.loose
+        s = self.sides[side]
+        balls = [s.a, s.d, s.h, self.rho] + ([s.shift] if of == "image" else [])
+        return sum(float(ball.rad()) for ball in balls)
 
 
 def halved(raw: dict[str, Any], name: str) -> Iterator[dict[str, Any]]:
@@ -407,7 +421,6 @@ def read_scene(raw: object, noise: object) -> Scene:
         return span(q.lo / unit, q.hi / unit)
 
     rests, rho = narrow_part(scene["part"], unit)
-    n = len(rests)
     require(bool(rho > 0), "the radius of gyration is not positive")
     rho2 = rho * rho
 
@@ -462,10 +475,10 @@ class Rising:
         return Rising(self.x + other, self.by)
 
     def __sub__(self, other: Any) -> "Rising":
-        return self + (-other)
+        return self.__add__(-other)
 
     def __rsub__(self, other: Any) -> "Rising":
-        return -self + other
+        return (-self).__add__(other)
 
     def __mul__(self, other: Any) -> "Rising":
         if isinstance(other, Rising):
@@ -548,7 +561,9 @@ def narrow_part(part: object, unit: Fraction) -> tuple[list[tuple[Any, ...]], Ar
     return rests, about(rho_centre, rho_steep, rho)
 
 
-def read_part(part: Any, unit: Fraction, length: Callable[[object, str], Any]) -> tuple[list[tuple[Any, ...]], Any]:
+def read_part(
+    part: Any, unit: Fraction, length: Callable[[object, str], Any]
+) -> tuple[list[tuple[Any, ...]], Any]:
     """Compute (a_i, d_i, L_i, a_i + L_next - a_next) of every side, and rho, in whatever arithmetic `length` gives."""
     vertices = read_polygon(part, length)
     n = len(vertices)
@@ -1050,7 +1065,7 @@ def check_cell(
         boxes += 1
         failure = check_box(box.scene.sides[side], box, targets, least)
         if failure is not None:
-            halves = box.halves(side)
+            halves = box.halves(side, "decision" if failure.text.endswith("is not excluded") else "image")
             if not halves or boxes + len(stack) > MOST_BOXES:
                 return failure, boxes
             for half in halves:
@@ -1075,16 +1090,19 @@ class Box(NamedTuple):
     in_k: int
     in_s: int
 
-    def halves(self, side: int) -> list["Box"]:
-        """Halve it in what matters more to the angle, x, kappa or a quantity; [] if it has been halved enough."""
+    def halves(self, side: int, of: str) -> list["Box"]:
+        """Halve it in what matters more to the angle, x, kappa or a quantity; [] if it has been halved enough.
+
+        `of`: what is too wide, the "decision" or the "image".
+        """
         xm = arb(float((HALF * (self.x0 + self.x1)).mid()))
         km = arb(float((HALF * (self.k0 + self.k1)).mid()))
         by_x = self.in_x < DEPTH and self.x0 < xm and xm < self.x1
         by_k = self.in_k < DEPTH and self.k0 < km and km < self.k1
         of_x = float(self.x1 - self.x0) if by_x else 0.0
         of_k = float(HALF * self.high.p * (self.k1 - self.k0)) if by_k else 0.0
-        if self.in_s < DEPTH and self.scene.loose > max(of_x, of_k):
-            return [self.of(half, side) for half in self.scene.halves()]
+        if self.in_s < DEPTH and self.scene.loose > 0 and self.scene.width(of, side) > max(of_x, of_k):
+            return [self.of(half, side) for half in self.scene.halves(of, side)]
         if by_k and of_k >= of_x:
             return [self._replace(k0=km, in_k=self.in_k + 1), self._replace(k1=km, in_k=self.in_k + 1)]
         if by_x:
@@ -1723,7 +1741,9 @@ def check_sets(scene: Scene, c: Cells, claims: dict[str, dict[str, Any]]) -> Ite
 
 # -------------------------------------------------------------------------------------------- an orbit that refutes
 
-INSIDE = arb(2) ** -80  # a stated kappa keeps this share of it from the ends of its noise: these are known to 100 bits
+INSIDE = (
+    arb(2) ** -80
+)  # a stated kappa keeps this share of it from the ends of its noise: these are known to 100 bits
 
 
 def read_refutation(section: dict[str, Any], n_sides: int) -> dict[str, Any]:
@@ -1734,11 +1754,15 @@ def read_refutation(section: dict[str, Any], n_sides: int) -> dict[str, Any]:
     throws = []
     for each in rows(section["throws"], "refuted.throws", 1, 100_000):
         one = table(each, "a throw", "kappa landing")
-        numbers = (None if one[key] is None else arb(hex_float(one[key], key)) for key in ("kappa", "landing"))
+        numbers = (
+            None if one[key] is None else arb(hex_float(one[key], key)) for key in ("kappa", "landing")
+        )
         throws.append(tuple(numbers))
     nominal, tolerance = section["nominal"], section["tolerance"]
     same = isinstance(nominal, dict) and isinstance(tolerance, dict) and set(nominal) == set(tolerance)
-    require(same and len(nominal) <= 64, "refuted: nominal values and tolerance do not name the same quantities")
+    require(
+        same and len(nominal) <= 64, "refuted: nominal values and tolerance do not name the same quantities"
+    )
     return {
         "goal": read_goal(goal, n_sides),
         "x": hex_float(start["x"], "refuted.start.x"),
@@ -1811,7 +1835,9 @@ def check_refuted(scene: Scene, c: Cells, section: dict[str, Any]) -> str:
                 within = kappa > scene.k_lo * (1 + INSIDE) and kappa < scene.k_hi * (1 - INSIDE)
                 prove(varies and bool(within), f"the kappa of throw {number + 1} is not within the noise")
             k, shift = fixed if kappa is None else kappa, ZERO if landing is None else landing
-            prove(bool(abs(shift) <= s.landing), f"throw {number + 1} lands farther off than the noise allows")
+            prove(
+                bool(abs(shift) <= s.landing), f"throw {number + 1} lands farther off than the noise allows"
+            )
             thrown = throws.box(side, x.lower(), x.upper(), k.lower(), k.upper())
             prove(thrown.decision != 2, f"the decision of throw {number + 1} is not settled")
             x = thrown.lo.union(thrown.hi) + shift
@@ -2129,7 +2155,7 @@ Ends = list[tuple[Fraction, Fraction]]
 
 
 def covered(whole: Ends, boxes: list[Ends]) -> bool:
-    """Whether boxes cover a box, exactly: it lies in one of them, or is cut at an end of one and both parts are covered.
+    """Whether boxes cover a box, exactly: it lies in one, or is cut at an end of one and both parts are covered.
 
     Cut where the fewest boxes lie on both sides; points that only touch a box lie in it.
     """
@@ -2138,7 +2164,9 @@ def covered(whole: Ends, boxes: list[Ends]) -> bool:
         region, some = stack.pop()
         looked += len(some)
         require(looked <= 20_000_000, "too many boxes")
-        if any(all(lo <= a and b <= hi for (a, b), (lo, hi) in zip(region, box, strict=True)) for box in some):
+        if any(
+            all(lo <= a and b <= hi for (a, b), (lo, hi) in zip(region, box, strict=True)) for box in some
+        ):
             continue
         best: tuple[int, int, Fraction] | None = None
         for k, (a, b) in enumerate(region):
@@ -2146,15 +2174,19 @@ def covered(whole: Ends, boxes: list[Ends]) -> bool:
             for cut in {end for ends in (lows, highs) for end in ends if a < end < b}:
                 both = bisect.bisect_left(lows, cut) - bisect.bisect_right(highs, cut)
                 uneven = max(bisect.bisect_left(lows, cut), len(some) - bisect.bisect_right(highs, cut))
-                if best is None or (both, uneven) < best[:2]:  # type: ignore[comparison-overlap]
-                    best = (both, uneven, cut)  # type: ignore[assignment]
+                if best is None or (both, uneven) < best[:2]:
+                    best = (both, uneven, cut)
                     axis = k
         if best is None:
             return False
         cut = best[2]
         for part in ((region[axis][0], cut), (cut, region[axis][1])):
             inner = [*region[:axis], part, *region[axis + 1 :]]
-            meeting = [box for box in some if all(lo < b and a < hi or a == b for (a, b), (lo, hi) in zip(inner, box, strict=True))]
+            meeting = [
+                box
+                for box in some
+                if all((lo < b and a < hi) or a == b for (a, b), (lo, hi) in zip(inner, box, strict=True))
+            ]
             stack.append((inner, meeting))
     return True
 

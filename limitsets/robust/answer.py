@@ -8,11 +8,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from limitsets.errors import AnswerError
-from limitsets.goals import Goal, OrientedBeyond
+from limitsets.goals import Goal, OrientedBeyond, Predicate
 from limitsets.proofs.asked import State
 from limitsets.proofs.certify import Claim, Proof, weakest_of
 from limitsets.proofs.refutation import write_refutation
-from limitsets.robust.deviations import given
 
 if TYPE_CHECKING:
     from limitsets.robust.margins import Margin
@@ -22,15 +21,14 @@ __all__ = ["file_stem", "goal_table", "save", "to_json"]
 
 def goal_table(goal: Goal, unit: str) -> dict[str, Any]:
     """Give a goal as a scene would name it; a function by its name."""
-    if goal.kind == "predicate":
+    if isinstance(goal, Predicate):
         return {"predicate": goal.name, "from_anywhere": goal.from_anywhere}
-    table = asdict(goal)
+    table: dict[str, Any] = asdict(goal)
     anywhere = table.pop("from_anywhere")
     if "x" in table:
         table["x"] = f"{table['x']!r} {unit}"
-    if goal.kind == "flip_order":
-        table = list(table["order"])
-    return {goal.kind: table or True, "from_anywhere": anywhere}
+    words = list(table["order"]) if "order" in table else table or True
+    return {goal.kind: words, "from_anywhere": anywhere}
 
 
 def to_json(margin: Margin) -> dict[str, Any]:
@@ -91,7 +89,7 @@ def _require_checkable(margin: Margin) -> None:
             "nothing rechecks other maps; the margin stands",
         )
     for goal in margin.goals:
-        if goal.kind == "predicate":
+        if isinstance(goal, Predicate):
             raise AnswerError(
                 "the certificate",
                 goal.name,
@@ -106,9 +104,7 @@ def save(margin: Margin, folder: Path) -> tuple[Path, ...]:
     folder.mkdir(parents=True, exist_ok=True)
     stem, written = file_stem(margin), []
     for number, goal in enumerate(margin.goals if margin.pieces else ()):
-        claims = [
-            Claim("goal", "proved", "", dict(piece.answers[number].section)) for piece in margin.pieces
-        ]
+        claims = [Claim("goal", "proved", "", dict(piece.answers[number].section)) for piece in margin.pieces]
         found = tuple(piece.found for piece in margin.pieces if piece.found is not None)
         proof = Proof(
             margin.scene, margin.noise, margin.deviations, found, (weakest_of(claims),), margin.seconds
@@ -119,6 +115,8 @@ def save(margin: Margin, folder: Path) -> tuple[Path, ...]:
     # what refutes the other goals is no single place
     if against is not None and against.found is not None and isinstance(against.refuted, OrientedBeyond):
         path = folder / f"{stem}.refuted.zip"
-        write_refutation(path, against.found, against.refuted, against.counterexample, against.within, margin.scene)
+        write_refutation(
+            path, against.found, against.refuted, against.counterexample, against.within, margin.scene
+        )
         written.append(path)
     return tuple(written)

@@ -1,4 +1,4 @@
-"""One question: does a goal hold for all of a box of scenes, and every sequence of throws with some noise?
+"""One question: whether goals hold for all of a box of scenes, and every sequence of throws with some noise.
 
 Cells are made fine where it pays: first some hundreds of them a side, then borders spread evenly over what attracts.
 """
@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from limitsets.errors import AnswerError
-from limitsets.goals import Goal, OrientedBeyond, Predicate
+from limitsets.goals import Goal, OrientedBeyond, Predicate, Reaches
 from limitsets.proofs.asked import Answer, ask, borders, prove
 from limitsets.proofs.attraction import Attraction, attraction
 from limitsets.proofs.cover import cover
@@ -93,7 +93,9 @@ class Question:
         """Enclose the parameters."""
         return parameter_box(self.scene, tree=None if piece is None else piece.tree(), noise=dict(noise))
 
-    def prove(self, piece: Piece | None = None, noise: Mapping[str, str] | None = None, finest: int = 3) -> Asked:
+    def prove(
+        self, piece: Piece | None = None, noise: Mapping[str, str] | None = None, finest: int = 3
+    ) -> Asked:
         """Prove the goals, with finer and finer cells; or say what is missing.
 
         Parameters
@@ -119,7 +121,7 @@ class Question:
                 if any(answer.final for answer in missing) or not (found.component >= 0).any():
                     break
         except AnswerError as error:
-            return Asked("impossible", str(error), piece=piece, noise=noise)
+            return Asked("impossible", _said(error), piece=piece, noise=noise)
         return Asked("undecided", missing[0].reason, found, piece=piece, noise=noise)
 
     def cells(self, piece: Piece | None, step: int) -> Attraction:
@@ -129,7 +131,7 @@ class Question:
 
     def _cuts(self, sides: int) -> dict[int, list[float]]:
         wanted = [float(x) for goal in self.goals for x in borders(goal)]
-        return {side: wanted for side in range(sides)}
+        return dict.fromkeys(range(sides), wanted)
 
     def _coarse(self, box: ParameterBox) -> Attraction:
         for cells in BASES:
@@ -167,7 +169,7 @@ class Question:
             box = self.box(piece, noise)
             found = self._coarse(box)
         except AnswerError as error:
-            return Asked("impossible", str(error), piece=piece, noise=noise)
+            return Asked("impossible", _said(error), piece=piece, noise=noise)
         for goal in self.goals:
             answer = self._against(found, goal)
             if answer.verdict == "refuted":
@@ -178,11 +180,19 @@ class Question:
     def _against(self, found: Attraction, goal: Goal) -> Answer:
         """Search for what refutes one goal: where throws differ, for the worst that they can do."""
         wrong = _wrong(goal)
+        if isinstance(goal, Reaches):  # refuted by where cells end
+            found = self._finer(found, found.cover.box, 2)
         if wrong is None or not found.cover.box.noise or goal.from_anywhere:
             return ask(found, self.scene, goal)
         answer = prove(found, self.scene, goal)
         orbit = worst_orbit(found, wrong) if (found.component >= 0).any() else ()
         return answer._replace(verdict="refuted" if orbit else answer.verdict, counterexample=orbit)
+
+
+def _said(error: AnswerError) -> str:
+    """Say why there is no such scene."""
+    value = f"{error.value:.6g}" if isinstance(error.value, float) else error.value
+    return f"there is no such part or throw: {error.thing} is {value}; it has to be {error.allowed}"
 
 
 def _wrong(goal: Goal) -> Callable[[Any, Any], Any] | None:

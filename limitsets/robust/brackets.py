@@ -82,7 +82,9 @@ def _point(question: Question, measure: Measure, size: Fraction, finest: int = 3
     return question.prove(piece, finest=finest)
 
 
-def _reach(question: Question, measure: Measure, sign: int, width: Fraction, known: Fraction | None) -> _Reach:
+def _reach(
+    question: Question, measure: Measure, sign: int, width: Fraction, known: Fraction | None
+) -> _Reach:
     """Go outward from the scene as it is until single scenes are refuted or cannot be, then halve."""
     reach, step = _Reach(), measure.least
 
@@ -140,6 +142,7 @@ def _grow(
     for _ in range(TRIALS):
         if low >= target:
             return low, pieces, ""
+        step = step if measure.widest is None else min(step, measure.widest)
         high = min(target, short(low + step, up=True))
         found = question.prove(measure.piece(measure.between(sign * low, sign * high)))
         if found.verdict == "proved":

@@ -30,6 +30,9 @@ DIGITS = 9
 
 _WIDE = Context(prec=60)
 
+# Of a piece of a part's quantity, relative to it.
+_WIDEST = Fraction(4, 100)
+
 # Of these a deviation is given as a share of the value.
 _SHARES = (
     "throw.speed",
@@ -117,6 +120,16 @@ class Measure:
     def most(self) -> Fraction | None:
         """Sizes have to stay below it; None where the part says how far one can go."""
         return Fraction(100) if self.relative else None
+
+    @property
+    def widest(self) -> Fraction | None:
+        """Width of a piece at most, so that others can confirm it: a part that varies much is enclosed badly."""
+        if not self.quantity.startswith("part."):
+            return None
+        if self.relative:
+            return 100 * _WIDEST
+        own = parse(_text_at(self.scene, self.key), find(self.key).dimension).unit
+        return max(abs(self.nominal) * exact_factor(own, self.unit) * _WIDEST, self.least)
 
     def text(self, size: Fraction) -> str:
         """Write a size with its unit, as `limitsets.certify` takes it."""

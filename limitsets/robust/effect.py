@@ -124,7 +124,7 @@ def effects_of(question: Question, measures: Sequence[Measure], tolerance: Mappi
 
 
 def _proved_of(question: Question, piece: Piece | None) -> NDArray[np.float64]:
-    """What is proved to be to spare; of a place to be reached, nothing of the kind is."""
+    """Say what is proved to be to spare; of a place to be reached, nothing of the kind is."""
     extents = question.cells(piece, STEP).cells.extents()
     highest = [max((hi for _, hi in parts), default=-math.inf) for _, parts in sorted(extents.items())]
     found: list[float] = []
@@ -133,7 +133,9 @@ def _proved_of(question: Question, piece: Piece | None) -> NDArray[np.float64]:
     return np.where(np.isnan(found), 0.0, np.array(found))
 
 
-def _over(question: Question, one: Measure, size: Fraction, level: NDArray[np.float64]) -> NDArray[np.float64]:
+def _over(
+    question: Question, one: Measure, size: Fraction, level: NDArray[np.float64]
+) -> NDArray[np.float64]:
     try:
         return _proved_of(question, one.piece(one.between(-size, size)))
     except AnswerError:

@@ -20,7 +20,7 @@ from limitsets.errors import AnswerError
 from limitsets.goals import Goal
 from limitsets.proofs.tolerance import Piece
 from limitsets.robust.asking import Asked, Question
-from limitsets.robust.deviations import Measure, decimal, measure, short
+from limitsets.robust.deviations import Measure, measure, short
 from limitsets.robust.effect import Effects, effects_of, scene_at
 from limitsets.robust.margins import Margin, asked_of
 from limitsets.scene import Scene
@@ -74,7 +74,9 @@ class Tolerance:
         """Read it from texts by quantity."""
         measures, sizes, landing, landing_size = [], [], None, Fraction(0)
         if not texts:
-            raise AnswerError("the tolerance", "empty", "deviations by quantity", "give the scene [tolerance]")
+            raise AnswerError(
+                "the tolerance", "empty", "deviations by quantity", "give the scene [tolerance]"
+            )
         for name, text in texts.items():
             deviation(text, name, scene.unit, key=f'tolerance."{name}"')
             one = measure(scene, name)
@@ -91,24 +93,28 @@ class Tolerance:
         return cls(tuple(measures), tuple(sizes), landing, landing_size)
 
     def noise(self, factor: Fraction) -> dict[str, str]:
-        """What differs at every throw."""
-        return {} if self.landing is None else {"landing.x": self.landing.text(short(factor * self.landing_size))}
+        """Say what differs at every throw."""
+        return (
+            {}
+            if self.landing is None
+            else {"landing.x": self.landing.text(short(factor * self.landing_size))}
+        )
 
     def texts(self, factor: Fraction) -> dict[str, str]:
-        """What is fixed but unknown, as `limitsets.certify` takes it."""
+        """Say what is fixed but unknown, as `limitsets.certify` takes it."""
         return {
             one.quantity: one.text(factor * size) for one, size in zip(self.measures, self.sizes, strict=True)
         }
 
     def corner(self, factor: Fraction, signs: tuple[int, ...]) -> Piece | None:
-        """The scene at one corner."""
+        """Return the scene at one corner."""
         if not self.measures:
             return None
         sizes = [factor * size * sign for size, sign in zip(self.sizes, signs, strict=True)]
         return scene_at(self.measures, sizes)
 
     def piece(self, low: Sizes, high: Sizes, factor: Fraction) -> Piece | None:
-        """The scenes between two corners, given as parts of the whole deviation."""
+        """Return the scenes between two corners, given as parts of the whole deviation."""
         if not self.measures:
             return None
         spans = {
@@ -221,7 +227,7 @@ class _Cutting:
         return min(failed, default=(Fraction(1), ""))
 
     def within(self, share: Fraction) -> list[Asked]:
-        """What proves a share of the box: parts that reach beyond it are cut back; their cells serve for less."""
+        """Return what proves a share of the box: parts that reach beyond are cut back, their cells serve for less."""
         kept = []
         for part, found in self.proved:
             low = tuple(max(x, -share) for x in part.low)
@@ -245,9 +251,7 @@ class _Cutting:
         finest = 3
         if self.effects.spare.size:
             finest = 1 + sum(left < share * float(self.effects.spare.min()) for share in FINER)
-        return self.question.prove(
-            self.tolerance.piece(part.low, part.high, self.factor), self.noise, finest
-        )
+        return self.question.prove(self.tolerance.piece(part.low, part.high, self.factor), self.noise, finest)
 
 
 def _worst(
@@ -338,9 +342,14 @@ def joint_margin(
     """
     begin = time.perf_counter()
     question = asked_of(scene, goals)
-    vector = Tolerance.of(question.scene, tolerance if tolerance is not None else scene.text.get("tolerance", {}))
+    texts = dict(scene.text.get("tolerance", {}) if tolerance is None else tolerance)
+    vector = Tolerance.of(question.scene, texts)
     share = Fraction(repr(width))
-    effects = effects_of(question, vector.measures, _sizes(vector)) if vector.measures else Effects(np.zeros(0), np.zeros((0, 0)), np.zeros((0, 0)))
+    effects = (
+        effects_of(question, vector.measures, _sizes(vector))
+        if vector.measures
+        else Effects(np.zeros(0), np.zeros((0, 0)), np.zeros((0, 0)))
+    )
     good, bad, against, reason = _worst(question, vector, effects, share / 8)
     target = _round(min(good, bad * (1 - share * Fraction(9, 10))) if bad is not None else good)
     tell(0.05)
@@ -363,6 +372,7 @@ def joint_margin(
         closed,
         time.perf_counter() - begin,
         question.scene,
+        dict(texts),
         vector.texts(proved) if proved else {},
         noise if proved else {},
         tuple(pieces),

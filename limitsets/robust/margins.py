@@ -55,6 +55,8 @@ class Margin:
         Time it took.
     scene : Scene
         The scene.
+    tolerance : dict of str to str
+        Of joint: the deviations of which `proved` and `refuted` are factors; empty otherwise.
     deviations, noise : dict of str to str
         What may be fixed but unknown and what differs at every throw, as it is proved, as `limitsets.certify` takes it.
     pieces : tuple of Asked
@@ -74,6 +76,7 @@ class Margin:
     closed: bool
     seconds: float
     scene: Scene
+    tolerance: dict[str, str]
     deviations: dict[str, str]
     noise: dict[str, str]
     pieces: tuple[Asked, ...] = field(repr=False)
@@ -231,6 +234,7 @@ def _single(question: Question, one: Measure, width: Fraction, tell: Callable[[f
         found.closed(width),
         time.perf_counter() - begin,
         question.scene,
+        {},
         *_texts(one, found.proved),
         tuple(found.pieces),
         found.against,
@@ -238,7 +242,7 @@ def _single(question: Question, one: Measure, width: Fraction, tell: Callable[[f
 
 
 def _texts(one: Measure, size: Fraction) -> tuple[dict[str, str], dict[str, str]]:
-    """What is fixed but unknown, and what differs at every throw."""
+    """Say what is fixed but unknown, and what differs at every throw."""
     if not size:
         return {}, {}
     said = {one.quantity: one.text(size)}
@@ -252,7 +256,7 @@ def _nominal(scene: Scene, one: Measure) -> float | None:
 
 
 def _of_none(question: Question, nominal: Asked) -> Bracket:
-    """The scene as it is does not have the goal: no deviation is small enough."""
+    """Answer for a scene that does not have the goal as it is: no deviation is small enough."""
     against = question.refute()
     if against.verdict == "refuted":
         reason = f"the goal fails in the scene as it is: {against.reason}"

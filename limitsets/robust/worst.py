@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from limitsets.maps import orbit
+from limitsets.maps import Orbit, orbit
 from limitsets.proofs.asked.search import (
     MORE_THAN_ROUNDING,
     Choice,
@@ -58,7 +58,7 @@ class _Raster:
         self.x, self.side = np.concatenate(x), np.concatenate(side)
 
     def nearest(self, x: Array, side: Sides) -> Sides:
-        """Number of the nearest place; -1 where there is none."""
+        """Return the number of the nearest place; -1 where there is none."""
         found = np.full(x.size, -1)
         for s, first in self.first.items():
             mine = np.flatnonzero(side == s)
@@ -110,7 +110,8 @@ def worst_orbit(found: Attraction, wrong: Wrong) -> tuple[State, ...]:
         known |= good
         begin = np.flatnonzero((here >= 0) & levels[back][here])
         begin = begin[begin >= SHOWN][:KEPT]
-        for states in _followed(found, wrong, raster, levels, path.x, path.side, begin, options, usual):
+        states = _followed(found, wrong, raster, levels, path, begin, options)
+        if states:
             return states
     return ()
 
@@ -120,40 +121,44 @@ def _followed(
     wrong: Wrong,
     raster: _Raster,
     levels: list[NDArray[np.bool_]],
-    x: Array,
-    side: Sides,
+    path: Orbit,
     begin: Sides,
     options: list[Choice],
-    usual: Choice,
-):
-    """Throw on from states of the orbit along the levels; yield the orbit if it is proved to violate the goal."""
+) -> tuple[State, ...]:
+    """Throw on from states of the long orbit along the levels, and prove what then violates the goal."""
     if not begin.size:
-        return
-    box = found.cover.box
-    reached = Reached.of(x[begin], np.asarray(side)[begin])
-    for level in reversed(levels[:-1]):
-        thrown = throws(box, reached.x[-1], reached.side[-1], options)
-        to = raster.nearest(thrown.x, thrown.side)
-        if level is levels[0]:
+        return ()
+    reached = Reached.of(path.x[begin], path.side[begin].astype(np.int64))
+    for back, level in reversed(list(enumerate(levels[:-1]))):
+        thrown = throws(found.cover.box, reached.x[-1], reached.side[-1], options)
+        if back == 0:
             keep = np.flatnonzero(wrong(thrown.x * MORE_THAN_ROUNDING, thrown.side) & thrown.stays)
             keep = keep[np.argsort(-thrown.x[keep])[:1]]
         else:
+            to = raster.nearest(thrown.x, thrown.side)
             keep = np.flatnonzero((to >= 0) & level[to] & thrown.stays)
             keep = keep[:: max(1, keep.size // KEPT)]
         if not keep.size:
-            return
+            return ()
         reached.add(thrown, keep)
     tail = reached.path(0, options)
-    first = int(begin[np.flatnonzero((x[begin] == tail.x[0]) & (np.asarray(side)[begin] == tail.side[0]))[0]])
-    before = range(first - SHOWN, first)
+    same = (path.x[begin] == tail.x[0]) & (path.side[begin] == tail.side[0])
+    first = int(begin[np.flatnonzero(same)[0]])
+    return _proved(found, wrong, path, first, tail)
+
+
+def _proved(found: Attraction, wrong: Wrong, path: Orbit, first: int, tail: Path) -> tuple[State, ...]:
+    """Prove the orbit, with some throws of the long one before; empty if it cannot be."""
+    box = found.cover.box
+    before = slice(first - SHOWN, first)
+    usual = Choice(0.5 * (box.lo.kappa + box.hi.kappa), 0.0)
     whole = Path(
-        [*(float(x[k]) for k in before), *tail.x],
-        [*(int(side[k]) for k in before), *tail.side],
+        [*path.x[before].tolist(), *tail.x],
+        [*path.side[before].tolist(), *tail.side],
         [*([usual] * SHOWN), *tail.thrown],
     )
     states = replayed(box, whole)
     if not states or not wrong(np.array([states[-1].lo]), np.array([states[-1].side])).all():
-        return
+        return ()
     (cell,) = found.cover.grid.index([whole.x[0]], whole.side[0])
-    if cell >= 0 and found.component[cell] >= 0:
-        yield states
+    return states if cell >= 0 and found.component[cell] >= 0 else ()

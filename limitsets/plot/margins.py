@@ -1,0 +1,185 @@
+"""Margins: a bar per quantity, curves over X, and the box of a joint margin; proved and refuted."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+
+from limitsets.errors import AnswerError
+from limitsets.plot import style
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from limitsets.robust.beyond import MarginsBeyond
+    from limitsets.robust.margins import Margin
+
+__all__ = ["margin_curve", "tolerance_box", "tornado"]
+
+SAFE: dict[str, Any] = {"facecolor": "#9BD1B8", "edgecolor": "#2F6B52", "lw": 0.7}
+OPEN: dict[str, Any] = {"facecolor": "#F4F4F4", "edgecolor": "#9A9A9A", "hatch": "....", "lw": 0.6}
+FAILS: dict[str, Any] = {"color": style.FLIP, "marker": "D", "ms": 5.0, "ls": "none"}
+READINGS = {"fixed": "", "per-throw": ", every throw"}
+
+
+def _percent(margin: Margin, size: float) -> tuple[float, str]:
+    """Give a size as percent, and of what."""
+    if margin.unit == "%":
+        return size, ""
+    nominal = margin.nominal
+    if nominal:
+        return 100.0 * size / abs(nominal), ""
+    from limitsets.scene.units import exact_factor
+
+    least = float(margin.scene.sides.length.min())
+    return 100.0 * size * float(
+        exact_factor(margin.unit, margin.scene.unit)
+    ) / least, " (of the shortest side)"
+
+
+def _said(size: float, unit: str) -> str:
+    return f"{size:.4g} {unit}".strip()
+
+
+def tornado(margins: Sequence[Margin]) -> Figure:
+    """Draw the margins of single quantities, the smallest on top, as percent of the value.
+
+    Parameters
+    ----------
+    margins : sequence of Margin
+        From `limitsets.margin`; joint ones are left out.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+
+    Examples
+    --------
+    >>> import limitsets as ls
+    >>> figure = ls.plot.tornado(ls.margin("paper-designed", "throw.speed", "arm.surface_height", width=0.1))
+    >>> [label.get_text() for label in figure.axes[0].get_yticklabels()]
+    ['throw.speed', 'arm.surface_height']
+    """
+    single = [each for each in margins if each.quantity != "joint"]
+    single.sort(key=lambda each: _percent(each, each.proved if each.refuted is None else each.refuted)[0])
+    figure, (axes,) = style.canvas(7.6, 0.42 * max(len(single), 2) + 1.7)
+    known = [_percent(each, size)[0] for each in single for size in (each.proved, each.refuted) if size]
+    low, high = (min(known) / 3.0, max(known) * 12.0) if known else (0.1, 100.0)
+    for row, each in enumerate(single):
+        _bar(axes, each, row, low, high)
+    names = [each.quantity + READINGS[each.reading] for each in single]
+    names = [name + _percent(each, 0.0)[1] for name, each in zip(names, single, strict=True)]
+    axes.set_yticks(range(len(single)), names, fontsize=style.SMALL)
+    axes.set_ylim(len(single) - 0.4, -0.6)
+    axes.set_xscale("log")
+    axes.set_xlim(low, high)
+    axes.set_xlabel("deviation to either side [% of the value]")
+    axes.tick_params(axis="y", length=0)
+    for border in ("top", "right", "left"):
+        axes.spines[border].set_visible(False)
+    name = single[0].scene.name if single else "margins"
+    style.title(figure, f"{name}: how much each quantity may deviate")
+    handles = [Patch(label="proved safe", **SAFE), Line2D([], [], label="shown to fail from here", **FAILS)]
+    if any(each.refuted is None or not each.closed for each in single):
+        handles.append(Patch(label="nothing is shown", **OPEN))
+    style.legend(figure, handles, 3)
+    return figure
+
+
+def _bar(axes: Axes, margin: Margin, row: int, low: float, high: float) -> None:
+    proved = max(_percent(margin, margin.proved)[0], low)
+    refuted = high if margin.refuted is None else max(_percent(margin, margin.refuted)[0], low)
+    end = refuted if margin.refuted is not None else min(3.0 * proved, high)
+    axes.barh(row, end - proved, left=proved, height=0.62, gid="open", zorder=1, **OPEN)
+    axes.barh(row, proved - low, left=low, height=0.62, gid="proved", zorder=2, **SAFE)
+    words = f"{_said(margin.proved, margin.unit)} / "
+    if margin.refuted is None:
+        words += "none"
+    else:
+        axes.plot([refuted], [row], gid="refuted", zorder=3, **FAILS)
+        words += _said(margin.refuted, margin.unit)
+    axes.annotate(
+        words, (end, row), (7, 0), textcoords="offset points", va="center", fontsize=style.SMALL - 0.5
+    )
+
+
+def margin_curve(found: MarginsBeyond) -> Figure:
+    """Draw margins against X: between the lines lies the sharp one.
+
+    Parameters
+    ----------
+    found : MarginsBeyond
+        From `limitsets.robust.beyond.margins_beyond`.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        One panel per quantity.
+    """
+    figure, panels = style.canvas(6.4, 2.5 * len(found.names) + 0.9, len(found.names), 1, sharex=True)
+    for k, (axes, name, unit) in enumerate(zip(panels, found.names, found.units, strict=True)):
+        proved, refuted = found.proved[:, k], found.refuted[:, k]
+        axes.fill_between(found.x, 0.0, proved, color="#CFE8DC", gid="proved", zorder=1)
+        axes.plot(found.x, proved, "o-", color="#2F6B52", ms=3.5, lw=1.3, label="proved safe", zorder=3)
+        axes.plot(found.x, refuted, "D--", color=style.FLIP, ms=3.5, lw=1.1, label="shown to fail", zorder=2)
+        best, top = found.best(name)
+        axes.axvline(best, color=style.FAINT, lw=0.9, ls=":")
+        axes.annotate(
+            f"best: X = {best:.4g} {found.scene.unit}",
+            (best, 0.0),
+            (5, 6),
+            textcoords="offset points",
+            fontsize=style.SMALL,
+        )
+        axes.set_ylabel(f"{name} [{unit or 'times the tolerance'}]", fontsize=style.SMALL)
+        axes.set_ylim(0.0, 1.12 * max(float(np.nanmax([*refuted, top])), 1e-12))
+        for border in ("top", "right"):
+            axes.spines[border].set_visible(False)
+    panels[-1].set_xlabel(f"X, beyond which only side {found.side} [{found.scene.unit}]")
+    panels[0].legend(fontsize=style.SMALL, frameon=False, loc="upper right")
+    style.title(figure, f"{found.scene.name}: margins by where the arm ends")
+    return figure
+
+
+def tolerance_box(margin: Margin) -> Figure:
+    """Draw a joint margin: what each quantity may do together with all others, proved and refuted.
+
+    Parameters
+    ----------
+    margin : Margin
+        Of "joint".
+
+    Raises
+    ------
+    AnswerError
+        For a margin of one quantity.
+    """
+    if margin.quantity != "joint":
+        raise AnswerError("the margin", margin.quantity, "a joint one", "draw others with plot.tornado")
+    texts = {**margin.tolerance}
+    figure, (axes,) = style.canvas(6.8, 0.4 * len(texts) + 1.6)
+    for row, (name, text) in enumerate(texts.items()):
+        size, unit = float(text.split()[0]), text.split()[1]
+        axes.barh(row, 2 * margin.proved, left=-margin.proved, height=0.6, gid="proved", zorder=2, **SAFE)
+        if margin.refuted is not None:
+            axes.plot([-margin.refuted, margin.refuted], [row, row], gid="refuted", zorder=3, **FAILS)
+        words = f"+- {margin.proved * size:.3g} {unit}" + (", every throw" if name == "landing.x" else "")
+        axes.annotate(words, (0, row), ha="center", va="center", fontsize=style.SMALL, zorder=4)
+    axes.set_yticks(range(len(texts)), list(texts), fontsize=style.SMALL)
+    axes.set_ylim(len(texts) - 0.4, -0.6)
+    axes.set_xlabel("deviation as a factor of the tolerance")
+    axes.tick_params(axis="y", length=0)
+    for border in ("top", "right", "left"):
+        axes.spines[border].set_visible(False)
+    style.title(figure, f"{margin.scene.name}: all quantities together")
+    handles = [
+        Patch(label="proved safe", **SAFE),
+        Line2D([], [], label="a corner of this box is shown to fail", **FAILS),
+    ]
+    style.legend(figure, handles, 2)
+    return figure
