@@ -30,7 +30,8 @@ class Absorption:
     Attributes
     ----------
     probability : dict of str to ndarray, shape (n_cells,)
-        By name: "goal", "other" where asked for, "class 0" and so on (closed classes in the order of their cells), and the ways out.
+        By name: "goal", "other" where asked for, "class 0" and so on (closed classes in the order of their cells),
+        and the ways out.
     mean : ndarray, shape (n_cells,)
         Mean number of steps to the goal, of those that come to it; 0 on the goal, nan where none does.
     goal : ndarray of bool, shape (n_cells,)

@@ -1,8 +1,8 @@
 """Where the cells go under the noise of the throw itself: from a map and a stratum of its parameter to boxcars.
 
 In one dimension, with forced branches, cells are cut where the map of each stratum changes its branch, turns or jumps:
-a critical point moves with the noise and is cut where it then is.  Otherwise points of the cells are sent, and stretches
-between neighbouring points that take the same branch are spread between their images.
+a critical point moves with the noise and is cut where it then is.  Otherwise points of the cells are sent; where
+neighbouring points take the same branch, each is spread over the distance between their images.
 """
 
 from __future__ import annotations
@@ -15,7 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from limitsets.cells import Grid
-from limitsets.maps import along, images, kind_of, monotone_pieces
+from limitsets.maps import along, images, kind_of
+from limitsets.robust.cutting import Pieces
 from limitsets.robust.sheets import Boxes
 
 __all__ = ["boxes_of_pieces", "rows_of_points", "uses_pieces"]
@@ -42,7 +43,7 @@ def _within(map_of: MapOf, mean: float, half: float, x: Array, side: int, branch
 
 
 def boxes_of_pieces(
-    map_of: MapOf, grid: Grid, mean: float, sd: float, weight: float
+    map_of: MapOf, grid: Grid, pieces: Pieces, mean: float, sd: float, weight: float
 ) -> Iterator[Boxes]:
     """Boxcars of all cells under one stratum of the map's parameter, piece by piece.
 
@@ -52,39 +53,40 @@ def boxes_of_pieces(
         From the parameter to the map.
     grid : Grid
         The cells.
+    pieces : dict
+        Monotone pieces of every side at the stratum's mean.
     mean, sd, weight : float
         The stratum.
     """
     params, half = map_of(mean), math.sqrt(3.0) * sd
-    for side, pieces in monotone_pieces(params, grid.domain).items():
+    for side, cuts in pieces.items():
         edges = grid.edges[side][0]
-        ends = [*(piece.lo for piece in pieces[1:]), np.inf]
-        for piece, end in zip(pieces, ends, strict=True):
-            # The last float of a piece and the first of the next are neighbours: the gap between them is nothing.
-            top = end if np.nextafter(piece.hi, np.inf) == end else piece.hi
-            lo, hi = max(piece.lo, float(edges[0])), min(top, float(edges[-1]))
+        for cut in cuts:
+            lo, hi = max(cut.lo, float(edges[0])), min(cut.hi, float(edges[-1]))
             if not hi > lo:
                 continue
             first = int(np.searchsorted(edges, lo, side="right")) - 1
-            inner = edges[(edges > lo) & (edges < hi)]
-            x = np.concatenate([[lo], inner, [hi]])
-            y, to, _ = along(params, x, side, [piece.branch])
+            last = int(np.searchsorted(edges, hi, side="left"))
+            x = edges[first : last + 1].copy()
+            x[0], x[-1] = lo, hi
+            y, to, _ = along(params, x, side, [cut.branch])
             if not 0 <= int(to[0]) < grid.sides:
                 continue
-            known = np.isfinite(y[1:]) & np.isfinite(y[:-1])  # elsewhere the mass is missing: outside the model
+            known = np.isfinite(y[1:]) & np.isfinite(
+                y[:-1]
+            )  # elsewhere the mass is missing: outside the model
             y = np.where(np.isfinite(y), y, 0.0)
-            width, shift = _within(map_of, mean, half, 0.5 * (x[1:] + x[:-1]), side, piece.branch)
+            width, shift = _within(map_of, mean, half, 0.5 * (x[1:] + x[:-1]), side, cut.branch)
             middle = 0.5 * (y[1:] + y[:-1]) + shift
             reach = 0.5 * np.hypot(np.diff(y), width)
-            cells = np.diff(edges)[first : first + x.size - 1]
-            share = np.where(known, weight * np.diff(x) / cells, 0.0)
+            share = np.where(known, weight * np.diff(x) / np.diff(edges[first : last + 1]), 0.0)
             number = int(grid.offset[side]) + first
-            yield Boxes(number, int(to[0]), piece.branch, middle - reach, middle + reach, share)
+            yield Boxes(number, int(to[0]), cut.branch, middle - reach, middle + reach, share)
 
 
 def rows_of_points(
     map_of: MapOf, grid: Grid, mean: float, sd: float, weight: float, side: int
-) -> tuple[NDArray[np.int64], ...]:
+) -> tuple[NDArray[Any], ...]:
     """Send evenly spread points of the cells of one side, each for an equal share of its cell.
 
     Returns

@@ -22,7 +22,7 @@ __all__ = ["Gaussian", "Given", "Law", "Samples", "Strata", "Uniform", "regroupe
 SIGMAS = 6.0
 # Probability that is cut off at each end of a user's distribution without bounds.
 TAIL = 1e-9
-# Where the moments of a stratum are summed: panels, in case the density has kinks, with abscissae of Gauss and Legendre.
+# Where the moments of a stratum are summed: panels, as densities may have kinks, each by Gauss and Legendre.
 PANELS, ABSCISSAE = 12, 6
 # Points on which the cuts between strata are looked up.
 TABLE = 4097
@@ -184,7 +184,9 @@ class Given:
 
     def __post_init__(self) -> None:
         _require_scale(self.factor, "the factor")
-        if not all(hasattr(self.distribution, name) for name in ("cdf", "sf", "pdf", "ppf", "isf", "support")):
+        if not all(
+            hasattr(self.distribution, name) for name in ("cdf", "sf", "pdf", "ppf", "isf", "support")
+        ):
             allowed = "a frozen continuous distribution of scipy.stats"
             raise MapError("the law", self.distribution, allowed, "pass Samples(values) for a discrete one")
 
@@ -248,14 +250,19 @@ class Samples:
         """Take every distinct value for itself where they are few, or else group them."""
         values, weights = self._arrays()
         values, where = np.unique(values, return_inverse=True)
-        weights = np.bincount(where, weights=weights) / weights.sum()
-        whole = Strata(weights, values, np.zeros(values.size), float(values[0]), float(values[-1]))
+        total = _sums(where, weights / weights.sum())
+        whole = Strata(total, values, np.zeros(values.size), float(values[0]), float(values[-1]))
         return regrouped(whole, count)
 
     def scaled(self, factor: float) -> Samples:
         """Return the law of `factor` times the deviation."""
         _require_scale(factor, "the factor")
         return Samples(np.asarray(self.values, dtype=np.float64) * factor, self.weights)
+
+
+def _sums(group: NDArray[np.int64], values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Add up the values of each group."""
+    return np.asarray(np.bincount(group, weights=values), dtype=np.float64)
 
 
 def regrouped(strata: Strata, count: int) -> Strata:
@@ -268,9 +275,9 @@ def regrouped(strata: Strata, count: int) -> Strata:
     extent = (mean - mean[0]) / (mean[-1] - mean[0])
     group = np.minimum((0.5 * (middle + extent) * count).astype(np.int64), count - 1)
     group = np.unique(group, return_inverse=True)[1]
-    total = np.bincount(group, weights=weight)
-    centre = np.bincount(group, weights=weight * mean) / total
-    square = np.bincount(group, weights=weight * (sd**2 + (mean - centre[group]) ** 2)) / total
+    total = _sums(group, weight)
+    centre = _sums(group, weight * mean) / total
+    square = _sums(group, weight * (sd**2 + (mean - centre[group]) ** 2)) / total
     return Strata(total, centre, np.sqrt(square), strata.lo, strata.hi, strata.cut)
 
 

@@ -59,7 +59,7 @@ class Thrown:
 
 
 def scattering_map(scene: Scene, scatter: Scattering, seed: int = 0) -> Any:
-    """The map whose throws scatter by these laws when an orbit is followed.
+    """Return the map whose throws scatter by these laws when an orbit is followed.
 
     Raises
     ------

@@ -114,7 +114,7 @@ def kappa_strata(scattering: Scattering, scene: Scene, count: int) -> Strata:
 
 def _tilted(deviation: Strata, scene: Scene) -> Strata:
     tilt = scene.value("gravity.tilt")
-    if not (0.0 < tilt + deviation.lo and tilt + deviation.hi <= 0.5 * math.pi):
+    if not (tilt + deviation.lo > 0.0 and tilt + deviation.hi <= 0.5 * math.pi):
         allowed = "tilts above 0 and up to 90 deg"
         found = (tilt + deviation.lo, tilt + deviation.hi)
         raise SceneError("the range of the tilt [rad]", found, allowed, "lower its noise")
@@ -134,10 +134,11 @@ def _sum(one: Strata, two: Strata) -> Strata:
 
 
 def still_map(scene: Scene) -> Any:
-    """The scene's map without its scatter: the minimal one where no other effect is on."""
+    """Return the scene's map without its scatter: the minimal one where no other effect is on."""
     if scene.effects.spread is None:
         return scene.map
-    plain = scene.map._replace(spread=None)
+    full: Any = scene.map
+    plain = full._replace(spread=None)
     effects = replace(scene.effects, spread=None)
     return plain if effects.on() else scene.bare_map
 

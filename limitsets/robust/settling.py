@@ -134,16 +134,28 @@ def _ranges(chain: Transfer, source: Cells, start: Cells, run: Cells) -> Ranges:
 def _members(parts: Components) -> list[Cells]:
     """Cells of each recurrent component."""
     ends = np.concatenate([[0], np.cumsum(parts.size)])
-    return [np.sort(parts.order[ends[c] : ends[c + 1]]).astype(np.int64) for c in np.flatnonzero(parts.recurrent)]
+    return [
+        np.sort(parts.order[ends[c] : ends[c + 1]]).astype(np.int64) for c in np.flatnonzero(parts.recurrent)
+    ]
 
 
 def _without(r: Ranges, cells: NDArray[np.bool_]) -> Ranges:
-    """The graph in which the marked cells lead nowhere."""
+    """Return the graph in which the marked cells lead nowhere."""
     counts = np.where(cells, 0, np.diff(r.first))
     kept = np.repeat(~cells, np.diff(r.first))
     first = np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
-    boxes = [column[kept] for column in (r.start, r.run, r.rows, r.planes, r.side)]
-    return Ranges(first, *boxes, r.row_stride, r.plane_stride, r.exits)
+    return r._replace(
+        first=first,
+        start=r.start[kept],
+        run=r.run[kept],
+        rows=r.rows[kept],
+        planes=r.planes[kept],
+        side=r.side[kept],
+    )
+
+
+def _first(cells: Cells) -> int:
+    return int(cells[0])
 
 
 def closed_sets(
@@ -153,7 +165,8 @@ def closed_sets(
     gone = np.zeros(chain.n_cells, dtype=bool) if absorbing is None else absorbing
     sets = _members(strong_components(graph if absorbing is None else _without(graph, gone)))
     source = np.repeat(np.arange(chain.n_cells), np.diff(graph.first))
-    closed, open_ = [], []
+    closed: list[Cells] = []
+    open_: list[Cells] = []
     label = np.full(chain.n_cells, -1)
     for number, cells in enumerate(sets):
         label[cells] = number
@@ -165,8 +178,7 @@ def closed_sets(
     leaves[source[~stays]] = True
     for cells in sets:
         (open_ if leaves[cells].any() else closed).append(cells)
-    key = lambda part: int(part[0])  # noqa: E731
-    return sorted(closed, key=key), sorted(open_, key=key)
+    return sorted(closed, key=_first), sorted(open_, key=_first)
 
 
 class _Part:
@@ -236,9 +248,7 @@ def _described(chain: Transfer, cells: Cells, closed: bool) -> NoisyClass:
     outside = np.ones(chain.n_cells)
     outside[cells] = 0.0
     leads_to["other cells"] = float(part @ np.maximum(chain.apply(outside), 0.0)[cells])
-    sides = {
-        side: float(weight[chain.grid.of_side(side)].sum()) for side in range(chain.grid.sides)
-    }
+    sides = {side: float(weight[chain.grid.of_side(side)].sum()) for side in range(chain.grid.sides)}
     names = kind_of(chain.map).branches
     shares = part @ chain.branches[cells]
     shares = shares / max(float(shares.sum()), 1e-300)

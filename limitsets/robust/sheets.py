@@ -77,8 +77,8 @@ def _position(edges: Array, x: Array) -> Array:
     """Where x lies, counted in cells."""
     k = np.clip(np.searchsorted(edges, x, side="right") - 1, 0, edges.size - 2)
     base = edges[k]
-    position: Array = k + np.clip((x - base) / (edges[k + 1] - base), 0.0, 1.0)
-    return position
+    share: Array = np.clip((x - base) / (edges[k + 1] - base), 0.0, 1.0)
+    return k + share
 
 
 def _over(pieces: Array, running: Array, lo: Array, hi: Array) -> Array:
@@ -89,7 +89,9 @@ def _over(pieces: Array, running: Array, lo: Array, hi: Array) -> Array:
     """
     first = np.minimum(lo.astype(np.int64), pieces.size - 1)
     last = np.minimum(hi.astype(np.int64), pieces.size - 1)
-    between = (first + 1 - lo) * pieces[first] + (hi - last) * pieces[last] + (running[last] - running[first + 1])
+    between = (
+        (first + 1 - lo) * pieces[first] + (hi - last) * pieces[last] + (running[last] - running[first + 1])
+    )
     value: Array = np.where(first == last, (hi - lo) * pieces[first], between)
     return value
 
@@ -108,7 +110,10 @@ def laid(boxes: Boxes, edges: Array) -> tuple[Sheet, Array, Array]:
     below = per_width * np.clip(edges[0] - lo, 0.0, hi - lo)
     above = per_width * np.clip(hi - edges[-1], 0.0, hi - lo)
     mass = np.maximum(boxes.weight - below - above, 0.0)
-    at_lo, at_hi = _position(edges, np.clip(lo, *edges[[0, -1]])), _position(edges, np.clip(hi, *edges[[0, -1]]))
+    at_lo, at_hi = (
+        _position(edges, np.clip(lo, *edges[[0, -1]])),
+        _position(edges, np.clip(hi, *edges[[0, -1]])),
+    )
     # The length as the operator will find it: the rows then add up to the mass exactly.
     extent = np.diff(edges)
     length = _over(extent, _running(extent), at_lo, at_hi)

@@ -1,4 +1,4 @@
-"""What noise makes of a scene: where it settles, how a goal is reached, and how that changes with the level of noise."""
+"""What noise makes of a scene: where it settles, how a goal is reached, and what more or less noise changes."""
 
 from __future__ import annotations
 
@@ -14,9 +14,12 @@ from limitsets.cells import Grid, grid
 from limitsets.errors import AnswerError
 from limitsets.goals import OrientedBeyond, Reaches
 from limitsets.robust.absorbing import Absorption, absorption
-from limitsets.robust.settling import NoisyClass, classes
 from limitsets.robust.arrivals import Feeding, feeding, random_starts, with_border
+from limitsets.robust.casting import uses_pieces
+from limitsets.robust.cutting import Cutter
+from limitsets.robust.laws import Strata
 from limitsets.robust.scattering import Scattering, kappa_strata, scattering_of, still_map, thrown
+from limitsets.robust.settling import NoisyClass, classes
 from limitsets.robust.ulam import STRATA, Transfer, transfer
 
 if TYPE_CHECKING:
@@ -29,6 +32,7 @@ CELLS = 1024
 BEYOND_FOOT = 0.05
 # Relative change of the noise for derivatives, and half of it.
 STEP = 0.1
+WIDER = 1.25
 
 Progress = Callable[[str, int, int], None]
 
@@ -91,11 +95,11 @@ class NoiseStatistics:
 
     Notes
     -----
-    Of the class that most random starts settle in (or, where none is closed, of the one left most slowly): "time on side
-    k", "share of" each branch, "time beyond" (share of rests beyond x of the goal, on any side), "wrong beyond" (of these,
-    the share on another side), "escape" (per throw).  Of random starts: "fed" (share that comes to the goal), "mean throws" of those, "95 %
-    throws" of all, "first beyond is wrong" (the first rest beyond x is on another side), "lost" (leave the arm without
-    having been fed).
+    Of the class that most random starts settle in (or, where none is closed, of the one left most slowly):
+    "time on side k", "share of" each branch, "time beyond" (share of rests beyond x of the goal, on any side),
+    "wrong beyond" (of these, the share on another side), "escape" (per throw).  Of random starts: "fed" (share that
+    comes to the goal), "mean throws" of those, "95 % throws" of all, "first beyond is wrong" (the first rest beyond
+    x is on another side), "lost" (leave the arm without having been fed).
     """
 
     scene: str
@@ -168,7 +172,9 @@ def _number(value: float | None) -> float | None:
 def _class_as_json(part: NoisyClass) -> dict[str, Any]:
     return {
         "closed": part.closed,
-        "extents": {str(side): [list(pair) for pair in pairs] for side, pairs in part.cells.extents().items()},
+        "extents": {
+            str(side): [list(pair) for pair in pairs] for side, pairs in part.cells.extents().items()
+        },
         "escape": part.escape,
         "leads_to": part.leads_to,
         "sides": {str(side): share for side, share in part.sides.items()},
@@ -186,6 +192,24 @@ class _Asked:
     starts: NDArray[np.float64]
     cells: int
     strata: int
+    cutters: dict[
+        tuple[float, float], Cutter
+    ]  # by range of the factor on kappa: found once, used at every solution
+
+    def cutter(self, factors: Strata) -> Cutter | None:
+        """Where the sides are cut; None for a map without pieces."""
+        params = still_map(self.scene)
+        if not uses_pieces(params):
+            return None
+        key = (float(factors.mean.min()), float(factors.mean.max()))
+        for (lo, hi), known in self.cutters.items():
+            if lo <= key[0] and key[1] <= hi:
+                return known
+        # A little wider than asked, for the same law cut otherwise or scaled up for a derivative.
+        lo, hi = (1.0 + (end - 1.0) * WIDER for end in key)
+        values = np.linspace(lo, hi, 2 * STRATA if hi > lo else 1)
+        self.cutters[lo, hi] = Cutter(thrown(params), self.scene.domain, values)
+        return self.cutters[lo, hi]
 
 
 @dataclass(frozen=True, eq=False)
@@ -203,12 +227,14 @@ def _solve(asked: _Asked, scatter: Scattering) -> _Found:
     scene, (x, side) = asked.scene, asked.goal
     # Uniform: noise makes grading towards the joint needless, and cells are wanted where the part is.
     cover = with_border(grid(scene.domain, cells=asked.cells, grading="uniform"), x)
+    factors = kappa_strata(scatter, scene, asked.strata)
     chain = transfer(
         thrown(still_map(scene)),
         cover,
-        parameter=kappa_strata(scatter, scene, asked.strata),
+        parameter=factors,
         landing=scatter.landing,
         strata=asked.strata,
+        cutter=asked.cutter(factors),
     )
     beyond = np.concatenate([cover.centres(k) > x for k in range(cover.sides)])
     goal = beyond & (cover.side_of(np.arange(cover.n_cells)) == side)
@@ -284,7 +310,7 @@ def _asked(
     from limitsets.scene import load
 
     read = load(scene) if isinstance(scene, str) else scene
-    return _Asked(read, _goal_of(read, goal), starts_from(read, offset), cells, strata), read
+    return _Asked(read, _goal_of(read, goal), starts_from(read, offset), cells, strata, {}), read
 
 
 def noise_statistics(
@@ -335,8 +361,8 @@ def noise_statistics(
     >>> from limitsets.robust import Gaussian, Scattering, noise_statistics
     >>> noise = Scattering(speed=Gaussian(0.01), landing=Gaussian(0.05))
     >>> found = noise_statistics("paper-designed", noise, goal=(20.5, 2), cells=512, sensitivity=False)
-    >>> round(found.numbers["mean throws"], 1), found.feeding.quantile(0.95)
-    (23.2, 63)
+    >>> round(found.numbers["mean throws"], 1), round(found.feeding.survivors[40], 2)
+    (23.2, 0.14)
     """
     asked, read = _asked(scene, goal, cells, strata, offset)
     noise = scattering_of(read) if scatter is None else scatter
@@ -384,8 +410,9 @@ def _errors(asked: _Asked, noise: Scattering, numbers: dict[str, float]) -> dict
 
 
 def _slopes(asked: _Asked, noise: Scattering, name: str) -> dict[str, Sensitivity]:
-    """Derivatives by central differences over two steps, extrapolated."""
-    wide, narrow = ({}, {})  # type: tuple[dict[str, float], dict[str, float]]
+    """Take central differences over two steps, and extrapolate."""
+    wide: dict[str, float] = {}
+    narrow: dict[str, float] = {}
     for step, slope in ((STEP, wide), (0.5 * STEP, narrow)):
         above = _solve(asked, noise.scaled(1.0 + step, name)).numbers
         below = _solve(asked, noise.scaled(1.0 - step, name)).numbers

@@ -23,6 +23,7 @@ from limitsets.cells import Grid
 from limitsets.errors import AnswerError
 from limitsets.maps import codes, kind_of
 from limitsets.robust.casting import boxes_of_pieces, rows_of_points, uses_pieces
+from limitsets.robust.cutting import Cutter
 from limitsets.robust.laws import Law, Strata
 from limitsets.robust.sheets import Array, Boxes, Sheet, Sheets, laid, shared
 
@@ -108,7 +109,7 @@ class Transfer:
         return not isinstance(self.throw, Sheets) or self.entries <= WRITTEN_OUT
 
     def apply(self, values: Array) -> Array:
-        """Expected value of a function one step later, from each cell: P v; ways out count nothing."""
+        """Return a function's expected value one step later, from each cell: P v; ways out count nothing."""
         if self.written_out:
             return self.matrix @ values  # type: ignore[no-any-return]  # scipy is untyped
         return self.throw.apply(values if self.landing is None else self.landing.apply(values))  # type: ignore[no-any-return]
@@ -119,7 +120,7 @@ class Transfer:
             return self._transposed @ masses  # type: ignore[no-any-return]  # scipy is untyped
         moved = self.throw.adjoint(masses)
         # Sums along the cells leave rounding errors of either sign where nothing lands.
-        return np.maximum(moved if self.landing is None else self.landing.adjoint(moved), 0.0)  # type: ignore[no-any-return]
+        return np.maximum(moved if self.landing is None else self.landing.adjoint(moved), 0.0)
 
     def linear_operator(self) -> Any:
         """P as `scipy.sparse.linalg.LinearOperator`."""
@@ -150,7 +151,11 @@ def _sink_numbers(exits: dict[str, int]) -> tuple[int, int, int]:
 
 
 def _from_pieces(
-    map_of: Callable[[float], Any], grid: Grid, strata: Strata, edges: tuple[Array, ...]
+    map_of: Callable[[float], Any],
+    grid: Grid,
+    strata: Strata,
+    edges: tuple[Array, ...],
+    cutter: Cutter | None,
 ) -> tuple[Sheets, Array, Array]:
     """First stage by monotone pieces: sheets, ways out, branches."""
     kind = kind_of(map_of(float(strata.mean[0])))
@@ -158,8 +163,9 @@ def _from_pieces(
     sinks = np.zeros((grid.n_cells, len(kind.exits)))
     branches = np.zeros((grid.n_cells, len(kind.branches)))
     sheets: list[Sheet] = []
+    cuts = Cutter(map_of, grid.domain, strata.mean) if cutter is None else cutter
     for weight, mean, sd in zip(*(column.tolist() for column in strata[:3]), strict=True):
-        for boxes in boxes_of_pieces(map_of, grid, mean, sd, weight):
+        for boxes in boxes_of_pieces(map_of, grid, cuts.at(mean), mean, sd, weight):
             sheet, under, over = laid(boxes, edges[boxes.target])
             sheets.append(sheet)
             rows = slice(boxes.first, boxes.first + under.size)
@@ -198,7 +204,9 @@ def _from_points(
             for target in range(grid.sides):
                 here = to == target
                 here &= (code >= 0) | (np.isin(code, (codes.INWARD, codes.OUTWARD)) if edges else False)
-                rows, cells, mass, under, over = _landed(grid, edges, target, x[here], width[here], share[here])
+                rows, cells, mass, under, over = _landed(
+                    grid, edges, target, x[here], width[here], share[here]
+                )
                 sinks[:, low] += np.bincount(source[here], under, grid.n_cells)
                 sinks[:, high] += np.bincount(source[here], over, grid.n_cells)
                 place = (source[here][rows], cells + offset[target])
@@ -254,6 +262,7 @@ def transfer(
     parameter: Law | Strata | None = None,
     landing: Law | None = None,
     strata: int = STRATA,
+    cutter: Cutter | None = None,
 ) -> Transfer:
     """Build the transfer operator of a map with noise.
 
@@ -269,6 +278,8 @@ def transfer(
         Noise added to x after every step, in one dimension.
     strata : int
         Into how many pieces the law of the parameter is cut, and at least that of the landing place.
+    cutter : Cutter, optional
+        Where the sides are cut, if that is known already.
 
     Returns
     -------
@@ -302,8 +313,10 @@ def transfer(
     added = None if landing is None else landing.strata(finer)
     reach = (0.0, 0.0) if added is None else (added.lo, added.hi)
     edges = _beyond(grid, reach) if kind.dimension == 1 else ()
-    build = _from_pieces if uses_pieces(params) else _from_points
-    throw, sinks, branches = build(at, grid, pieces, edges)
+    if uses_pieces(params):
+        throw, sinks, branches = _from_pieces(at, grid, pieces, edges, cutter)
+    else:
+        throw, sinks, branches = _from_points(at, grid, pieces, edges)
     cut = pieces.cut
     second = None
     if added is not None:

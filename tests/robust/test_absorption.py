@@ -150,7 +150,12 @@ def test_two_closed_classes_are_kept_apart():
     chain = replace(free, throw=csr_array(matrix), landing=None, sinks=np.zeros((n + 1, 1)))
     parts = classes(chain)
     assert [part.cells.mask.nonzero()[0].tolist() for part in parts if part.closed] == [
-        [0], [1], [2], [8], [9], [10],
+        [0],
+        [1],
+        [2],
+        [8],
+        [9],
+        [10],
     ]
     found = absorption(chain, np.zeros(n + 1, dtype=bool))
     # from 3 .. 7 a ruin between 2 and 8

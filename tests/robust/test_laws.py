@@ -82,7 +82,9 @@ def test_kappa_of_speed_and_tilt():
     noise = Scattering(speed=Uniform(0.02), tilt=Gaussian(0.01))
     strata = kappa_strata(noise, scene, 16)
     inverse = integrate.quad(lambda d: (1 + d) ** -2 / 0.04, -0.02, 0.02)[0]
-    tilted = integrate.quad(lambda t: math.sin(math.pi / 6 + t) * stats.norm.pdf(t, scale=0.01), -0.06, 0.06)[0]
+    tilted = integrate.quad(lambda t: math.sin(math.pi / 6 + t) * stats.norm.pdf(t, scale=0.01), -0.06, 0.06)[
+        0
+    ]
     assert strata.weight @ strata.mean == pytest.approx(inverse * tilted / 0.5, rel=1e-6)
     assert strata.lo == pytest.approx(1.02**-2 * math.sin(math.pi / 6 - 0.06) / 0.5, rel=1e-9)
 

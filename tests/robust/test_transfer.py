@@ -116,7 +116,9 @@ def test_arcsine_density_without_noise():
     cells = 4096
     (found,) = classes(transfer(ls.maps.Logistic(4.0), ls.grid(LINE, cells=cells)))
     exact = np.diff(2.0 / np.pi * np.arcsin(np.sqrt(np.linspace(0.0, 1.0, cells + 1))))
-    assert np.abs(found.weight - exact).sum() < 0.04  # sqrt(width) ln(1/width), see tests/sets/test_measure.py
+    assert (
+        np.abs(found.weight - exact).sum() < 0.04
+    )  # sqrt(width) ln(1/width), see tests/sets/test_measure.py
     assert found.residual < 1e-12
 
 

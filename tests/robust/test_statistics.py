@@ -1,0 +1,202 @@
+"""Statistics of noisy scenes against throws with counted random numbers, and what is said about them."""
+
+import json
+import math
+
+import numpy as np
+import pytest
+
+import limitsets as ls
+from limitsets.errors import AnswerError, SceneError
+from limitsets.goals import OrientedBeyond
+from limitsets.robust import (
+    Gaussian,
+    Samples,
+    Scattering,
+    Uniform,
+    classes,
+    noise_levels,
+    noise_statistics,
+    transfer,
+)
+from limitsets.robust.sampling import scattering_map, throw_many
+from limitsets.robust.statistics import starts_from
+
+GOAL = (20.5, 2)
+
+
+@pytest.fixture(scope="module")
+def gaussian():
+    noise = Scattering(speed=Gaussian(0.005), landing=Gaussian(0.02))
+    return noise_statistics("paper-designed", noise, goal=GOAL, cells=512)
+
+
+def within(found, thrown, names, sigmas=4.0):
+    """Each number within its error bars of what was thrown."""
+    for name in names:
+        error = math.hypot(thrown.errors[name], found.errors[name])
+        assert abs(found.numbers[name] - thrown.numbers[name]) < sigmas * error, name
+
+
+NUMBERS = (
+    "time on side 0",
+    "time on side 1",
+    "time on side 2",
+    "share of jog",
+    "time beyond",
+    "mean throws",
+    "95 % throws",
+    "fed",
+    "first beyond is wrong",
+)
+
+
+def test_gaussian_noise_against_throws(gaussian):
+    scene = ls.load("paper-designed")
+    thrown = throw_many(
+        scene, gaussian.scatter, GOAL, starts_from(scene), throws=1_000_000, parts=10_000, seed=4
+    )
+    assert thrown.errors["time on side 0"] < 2e-4
+    assert thrown.errors["mean throws"] < 0.3
+    within(gaussian, thrown, NUMBERS)
+    # the density in 40 bins per side: 5 000 throws a bin, correlated along an orbit
+    for side in range(3):
+        ours = density_in_bins(gaussian, side, thrown.bins[side])
+        np.testing.assert_allclose(ours, thrown.density[side], rtol=0, atol=0.004)
+
+
+def density_in_bins(found, side, bins):
+    (edges,) = found.grid.edges[side]
+    weight = found.classes[0].weight[found.grid.of_side(side)]
+    below = np.interp(bins, edges, np.concatenate([[0.0], np.cumsum(weight)]))
+    return np.diff(below) / np.diff(bins)
+
+
+def test_bounded_noise_against_throws_on_a_short_arm():
+    """The arm ends just beyond the limit set: throws are lost, and the class is left at a small rate."""
+    scene = ls.load("paper-designed").with_values({"arm.length": 23.6})
+    noise = Scattering(speed=Uniform(0.01), landing=Uniform(0.05))
+    found = noise_statistics(scene, noise, goal=GOAL, sensitivity=False)
+    thrown = throw_many(scene, noise, GOAL, starts_from(scene), throws=1_000_000, parts=20_000, seed=8)
+    within(found, thrown, ("time on side 0", "time beyond", "fed", "mean throws"))
+    assert 0.0 < found.numbers["escape"] < 0.01
+    assert found.numbers["lost"] == pytest.approx(1.0 - found.numbers["fed"], abs=1e-9)
+    assert found.settles["outward"] == pytest.approx(1.0, abs=1e-9)
+    assert not any(part.closed for part in found.classes)
+    # how many of them are still on the arm, counted by throwing
+    left = surviving(scene, noise, 4000, 300)
+    assert left == pytest.approx(-math.log1p(-found.numbers["escape"]), rel=0.15)
+
+
+def surviving(scene, noise, parts, throws):
+    """Rate at which parts on the limit set leave, from how many are left after so many throws."""
+    x, side = np.full(parts, 15.0), np.full(parts, 2)
+    counted = []
+    for number in range(throws):
+        params = scattering_map(scene, noise, 9)
+        x, side, code, _ = ls.maps.advance(params, x, side, 1, first=number * parts)
+        x, side = x[code >= 0], side[code >= 0]
+        if number == 30:
+            counted.append(x.size)
+    return math.log(counted[0] / x.size) / (throws - 31)
+
+
+def test_no_noise_against_the_limit_set_and_a_long_orbit():
+    found = noise_statistics("paper-designed", Scattering(), goal=GOAL, cells=2048, sensitivity=False)
+    path = ls.orbit(ls.load("paper-designed").map, 15.0, 2, 1_000_000)
+    for side in range(3):
+        assert found.numbers[f"time on side {side}"] == pytest.approx(np.mean(path.side == side), abs=4e-4)
+    # flips per throw of this scene, from a long orbit: docs of the four scenes
+    assert found.numbers["share of flip"] == pytest.approx(0.3191, abs=4e-4)
+    assert found.numbers["wrong beyond"] == 0.0
+    assert found.numbers["escape"] == 0.0
+    assert found.cut == 0.0
+    (part,) = [part for part in found.classes if part.closed]
+    assert part.cells.extents()[2][-1][1] == pytest.approx(23.383, abs=0.03)
+
+
+def test_slopes_are_those_of_secants(gaussian):
+    """The slope times the logarithm of two levels, against the difference of the numbers there."""
+    for name in ("speed", "landing"):
+        apart = math.log(1.2 / 0.8)
+        high, low = (
+            noise_statistics(
+                "paper-designed", gaussian.scatter.scaled(factor, name), goal=GOAL, sensitivity=False
+            ).numbers
+            for factor in (1.2, 0.8)
+        )
+        for number in ("time on side 0", "mean throws"):
+            slope = gaussian.sensitivity[name][number]
+            secant = (high[number] - low[number]) / apart
+            assert slope.slope == pytest.approx(secant, rel=0.15, abs=5 * slope.error), (name, number)
+    # more noise of the speed turns more parts wrongly, very steeply
+    assert gaussian.sensitivity["speed"]["wrong beyond"].slope > 5 * gaussian.numbers["wrong beyond"]
+
+
+def test_levels_begin_without_noise(gaussian):
+    levels = noise_levels("paper-designed", gaussian.scatter, factors=(0.0, 1.0), goal=GOAL, cells=512)
+    still = noise_statistics("paper-designed", Scattering(), goal=GOAL, cells=512, sensitivity=False)
+    assert levels.numbers["mean throws"][0] == pytest.approx(still.numbers["mean throws"], rel=1e-9)
+    assert levels.numbers["wrong beyond"][0] == 0.0 < levels.numbers["wrong beyond"][1]
+
+
+def test_json(gaussian):
+    text = json.dumps(gaussian.to_json(), allow_nan=False)
+    back = json.loads(text)
+    assert back["how"] == "sampled"
+    assert back["noise_cut_off"] == pytest.approx(2 * math.erfc(6 / math.sqrt(2)), rel=1e-6)
+    assert back["goal"] == {"x": 20.5, "side": 2}
+    assert set(back["numbers"]) == set(gaussian.numbers)
+    assert back["sensitivity"]["speed"]["mean throws"]["slope"] is not None
+
+
+def test_scene_with_scatter_and_a_goal_needs_no_more():
+    tree = ls.load("paper-designed").as_dict()
+    tree["world"] = {"scatter": {"speed": "0.5 %", "landing": "0.02 in"}}
+    tree["effects"] = {"spread": "gaussian"}
+    scene = ls.load(tree)
+    found = noise_statistics(scene, goal=OrientedBeyond(*GOAL), cells=256, sensitivity=False)
+    assert found.scatter == Scattering(speed=Gaussian(0.005), landing=Gaussian(0.02))
+    assert found.goal == GOAL
+    same = noise_statistics("paper-designed", found.scatter, goal=GOAL, cells=256, sensitivity=False)
+    assert same.numbers == found.numbers
+
+
+def test_maps_without_forced_branches_go_by_points():
+    """The same throw as a map with (no) effects: points of cells instead of pieces."""
+    from limitsets.thrower.effects import with_effects
+
+    scene = ls.load("paper-designed")
+    cover = ls.grid(scene.domain, cells=400, grading="uniform")
+    by_pieces = classes(transfer(scene.map, cover, landing=Gaussian(0.05)))[0]
+    by_points = classes(transfer(with_effects(scene.bare_map, {}, None), cover, landing=Gaussian(0.05)))[0]
+    assert np.abs(by_pieces.weight - by_points.weight).sum() < 2e-3
+    assert by_points.branches["flip"] == pytest.approx(by_pieces.branches["flip"], abs=2e-4)
+
+
+def test_tilt_is_speed_by_another_name():
+    """kappa goes with sin(tilt) and 1 / speed^2: small deviations of the one are those of the other."""
+    scene = ls.load("paper-designed").with_values({"gravity.tilt": "30 deg"})
+    sigma = 0.002
+    by_speed = noise_statistics(
+        scene, Scattering(speed=Gaussian(sigma)), goal=GOAL, cells=256, sensitivity=False
+    )
+    tilt = 2.0 * sigma * math.tan(math.pi / 6)  # d ln sin(t) = dt / tan(t)
+    by_tilt = noise_statistics(
+        scene, Scattering(tilt=Gaussian(tilt)), goal=GOAL, cells=256, sensitivity=False
+    )
+    for name in ("time on side 2", "mean throws", "time beyond"):
+        assert by_tilt.numbers[name] == pytest.approx(by_speed.numbers[name], rel=1e-3)
+
+
+def test_refusals():
+    scene = ls.load("paper-designed")
+    with pytest.raises(SceneError, match="spread"):
+        noise_statistics(scene, goal=GOAL)
+    for goal in ((40.0, 2), (20.0, 3), "far"):
+        with pytest.raises(AnswerError, match="goal of the noise"):
+            noise_statistics(scene, Scattering(speed=Gaussian(0.01)), goal=goal)
+    with pytest.raises(AnswerError, match="noise to throw with"):
+        scattering_map(scene, Scattering(speed=Samples([0.0, 0.01])))
+    with pytest.raises(AnswerError, match="noise to throw with"):
+        scattering_map(scene, Scattering(speed=Gaussian(0.01), landing=Uniform(0.01)))
