@@ -12,6 +12,7 @@ from limitsets.cli.certify import certify
 from limitsets.cli.margin import margin
 from limitsets.cli.plot import plot
 from limitsets.cli.recheck import recheck
+from limitsets.cli.robustness import robustness
 from limitsets.cli.scenes import scenes
 from limitsets.cli.throw import throw
 
@@ -45,5 +46,5 @@ def limitsets(
     """
 
 
-for command in (scenes, analyse, throw, plot, certify, recheck, audit, margin):
+for command in (scenes, analyse, throw, plot, certify, recheck, audit, margin, robustness):
     app.command()(command)

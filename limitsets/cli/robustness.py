@@ -18,7 +18,9 @@ __all__ = ["robustness"]
 
 HELP_QUANTITY = "A quantity, like throw.speed; repeatable. Default: all that the scene gives."
 HELP_TOLERANCE = "Of the joint margin, like throw.speed='1 %'; repeatable. Default: the scene's [tolerance]."
-HELP_SCATTER = "Noise at every throw, like throw.speed='0.5 %'; repeatable. Default: the scatter in the scene's [world]."
+HELP_SCATTER = (
+    "Noise at every throw, like throw.speed='0.5 %'; repeatable. Default: the scatter in the scene's [world]."
+)
 HELP_WITHOUT = "What not to do: margins, joint, curve, noise or audit; repeatable."
 
 
@@ -26,12 +28,15 @@ def robustness(
     scene: Scene,
     quantity: Annotated[list[str] | None, typer.Option("--quantity", metavar="Q", help=HELP_QUANTITY)] = None,
     reading: Annotated[
-        str | None, typer.Option("--reading", metavar="R", help="fixed (but unknown) or per-throw; default both.")
+        str | None,
+        typer.Option("--reading", metavar="R", help="fixed (but unknown) or per-throw; default both."),
     ] = None,
     tolerance: Annotated[
         list[str] | None, typer.Option("--tolerance", metavar="Q=DEV", help=HELP_TOLERANCE)
     ] = None,
-    scatter: Annotated[list[str] | None, typer.Option("--scatter", metavar="Q=DEV", help=HELP_SCATTER)] = None,
+    scatter: Annotated[
+        list[str] | None, typer.Option("--scatter", metavar="Q=DEV", help=HELP_SCATTER)
+    ] = None,
     law: Annotated[
         str,
         typer.Option("--law", metavar="LAW", help="Of --scatter: gaussian (standard deviations) or bounded."),
@@ -45,7 +50,9 @@ def robustness(
     without: Annotated[list[str] | None, typer.Option("--without", metavar="PART", help=HELP_WITHOUT)] = None,
     out: Annotated[
         Path | None,
-        typer.Option("--out", "-o", metavar="DIR", help="Folder of the report, ./NAME-robustness by default."),
+        typer.Option(
+            "--out", "-o", metavar="DIR", help="Folder of the report, ./NAME-robustness by default."
+        ),
     ] = None,
     json: Json = False,
 ) -> None:

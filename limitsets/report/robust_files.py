@@ -24,11 +24,19 @@ Progress = Callable[[str, int, int], None]
 
 def _drawn(found: Robustness) -> Iterator[tuple[str, Figure]]:
     """Draw what there is to draw."""
+    single = [each for each in found.margins() if each.quantity != "joint"]
+    if found.verdict == "proved" and single:
+        yield "margins", plot.tornado(single)
+    if found.joint is not None and found.joint.holds:
+        yield "joint", plot.tolerance_box(found.margins()[-1])
+    if found.curve is not None:
+        yield "curve", plot.margin_curve(found.curve)
     first = shown(found)
     if first is not None:
         name = f"{first.quantity} {READINGS[first.reading]}" if first.holds else "the scene as it is"
-        yield "counterexample", plot.counterexample(
-            found.scene, first.counterexample, violated_of(first, found.goals), name
+        yield (
+            "counterexample",
+            plot.counterexample(found.scene, first.counterexample, violated_of(first, found.goals), name),
         )
 
 

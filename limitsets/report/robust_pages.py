@@ -93,7 +93,10 @@ def tightest(found: Robustness) -> Entry | None:
     """
     rated = [(_room(entry, found), number) for number, entry in enumerate(found.singles)]
     given = [pair for pair in rated if pair[0][0] == 0]
-    room = min(given if len(given) > 1 else [((1, _share(e, found)), k) for k, e in enumerate(found.singles)], default=None)
+    room = min(
+        given if len(given) > 1 else [((1, _share(e, found)), k) for k, e in enumerate(found.singles)],
+        default=None,
+    )
     return None if room is None else found.singles[room[1]]
 
 
@@ -149,7 +152,9 @@ def _margins(found: Robustness, figures: Mapping[str, str]) -> str:
 def _why(entry: Entry) -> str:
     """Say why a bracket is open."""
     if entry.refuted is None:
-        return f"no deviation is found at which an orbit violates the goal; the proof ends with: {entry.reason}"
+        return (
+            f"no deviation is found at which an orbit violates the goal; the proof ends with: {entry.reason}"
+        )
     return f"in between nothing is known; the proof ends with: {entry.reason}"
 
 
@@ -174,10 +179,14 @@ def _limits(found: Robustness, figures: Mapping[str, str]) -> str:
         )
     lines = ["## What limits it", f"{begin}{how}.", table(heads, rows)]
     others = [
-        f"{_named(entry)}" for entry in found.entries if entry is not first and entry.holds and entry.counterexample
+        f"{_named(entry)}"
+        for entry in found.entries
+        if entry is not first and entry.holds and entry.counterexample
     ]
     if others:
-        lines.append(f"The orbits at the upper ends of the others ({', '.join(others)}) are in robustness.json.")
+        lines.append(
+            f"The orbits at the upper ends of the others ({', '.join(others)}) are in robustness.json."
+        )
     return "\n\n".join(lines) + figure_line(figures, "counterexample", "The orbit, throw by throw")
 
 
@@ -232,7 +241,9 @@ def _met(joint: Entry) -> str:
     if joint.refuted is not None and joint.refuted <= 1.0:
         low, high = bound(joint.proved), bound(joint.refuted, up=True)
         return f"The tolerance is **not met**: safe up to {low} of it, all together, and {high} of it fails."
-    return f"Whether the tolerance is met is **not known**: proved is {bound(joint.proved)} of it, all together."
+    return (
+        f"Whether the tolerance is met is **not known**: proved is {bound(joint.proved)} of it, all together."
+    )
 
 
 def _joint(found: Robustness, figures: Mapping[str, str]) -> str:

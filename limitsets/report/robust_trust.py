@@ -96,7 +96,10 @@ def _sensitivity(found: Robustness) -> str:
     rows = [
         [
             quantity,
-            *(_change(0.1 * slopes[name].slope if name in slopes else math.nan, NUMBERS[name][1]) for name in MOVING),
+            *(
+                _change(0.1 * slopes[name].slope if name in slopes else math.nan, NUMBERS[name][1])
+                for name in MOVING
+            ),
         ]
         for quantity, slopes in noise.sensitivity.items()
     ]
@@ -145,7 +148,11 @@ def _scene(found: Robustness) -> str:
 
 def checked_again(found: Robustness) -> str:
     """Give the command lines that check the proofs, and that make the page again."""
-    files = [name for entry in found.entries for name in [*entry.certificates, *([entry.against] if entry.against else [])]]
+    files = [
+        name
+        for entry in found.entries
+        for name in [*entry.certificates, *([entry.against] if entry.against else [])]
+    ]
     lines = ["## Checking it again"]
     if files:
         lines.append(
@@ -154,6 +161,10 @@ def checked_again(found: Robustness) -> str:
         )
         lines.append("\n".join(f"    limitsets recheck {name}" for name in dict.fromkeys(files)))
     elif found.entries:
-        lines.append("There are no certificates: nothing rechecks maps with effects, and none is written without a folder.")
-    lines.append(f"The page is made by `limitsets robustness {_scene(found)}`; margins in this folder are found again.")
+        lines.append(
+            "There are no certificates: nothing rechecks maps with effects, and none is written without a folder."
+        )
+    lines.append(
+        f"The page is made by `limitsets robustness {_scene(found)}`; margins in this folder are found again."
+    )
     return "\n\n".join(lines)

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from limitsets.errors import AnswerError
 from limitsets.goals import Goal, OrientedBeyond, Reaches
+from limitsets.robust.beyond import MarginsBeyond, margins_beyond
 from limitsets.robust.chance import noise_of, still
 from limitsets.robust.deviations import Measure, measure, measures
 from limitsets.robust.entries import Entry, nominal_of
@@ -18,7 +19,7 @@ from limitsets.robust.keeping import Kept
 from limitsets.robust.margins import GoalLike, Margin, asked_of, goals_of, margin
 from limitsets.robust.scattering import Scattering
 from limitsets.robust.statistics import CELLS, Levels, NoiseStatistics, noise_levels, noise_statistics
-from limitsets.robust.summary import PARTS, Robustness
+from limitsets.robust.summary import PARTS, Robustness, curve_read, curve_table
 from limitsets.scene import Scene, load
 
 if TYPE_CHECKING:
@@ -29,12 +30,15 @@ __all__ = ["robustness"]
 # Levels of the noise that the figure shows.
 FACTORS = (0.0, 0.5, 1.0, 1.5, 2.0)
 
+# Places of the curve against X, and seconds for the proof of each joint margin on it.
+PLACES, SECONDS = 9, 15.0
+
 NO_TOLERANCE = (
     "the scene has no [tolerance]; give it one, a deviation for each quantity that deviates together with others: "
     '"throw.speed" = "1 %"'
 )
 NO_NOISE = (
-    "no noise is given; add scatter = { speed = \"0.5 %\" } to [world], "
+    'no noise is given; add scatter = { speed = "0.5 %" } to [world], '
     "or pass it: --scatter throw.speed='0.5 %'"
 )
 NO_PLACE = "it is asked for goals with an x and a side, oriented_beyond or reaches"
@@ -93,12 +97,39 @@ class _Gathering:
         self.tell(label)
         entry = self.kept.find("joint", "tolerance", "")
         if entry is None:
-            told = lambda share: self.tell(label, share)  # noqa: E731 - one line, used once
-            entry = self.kept.add(
-                joint_margin(self.scene, self.goals, self.tolerance, width=width, tell=told)
+            found = joint_margin(
+                self.scene,
+                self.goals,
+                self.tolerance,
+                width=width,
+                tell=lambda share: self.tell(label, share),
             )
+            entry = self.kept.add(found)
         self.done += 1
         return entry
+
+    def curve(self, side: int) -> MarginsBeyond | None:
+        """Find margins against X; None where the part gets farther out on another side."""
+        self.tell("margins against X")
+        known, asked = self.kept.curve, self.scene
+        self.done += 1
+        if known is not None:
+            self.kept.again += 1
+            return curve_read(known, asked)
+        names = ("throw.speed", "joint") if self.tolerance else ("throw.speed",)
+
+        def told(step: str, number: int, of: int) -> None:
+            self.progress(step, self.done - 1, self.steps)
+
+        try:
+            found = margins_beyond(
+                asked, side, names, tolerance=self.tolerance, places=PLACES, seconds=SECONDS, progress=told
+            )
+        except AnswerError as error:
+            self.left_out["curve"] = str(error)
+            return None
+        self.kept.add_curve(curve_table(found))
+        return found
 
     def audit(self) -> Audit:
         """Ask which assumptions of the model the scene breaks."""
@@ -263,8 +294,10 @@ def _filled(
     sheet.done += 1
     entries = [] if "margins" in missing else sheet.singles(width, verdict)
     entries += [] if "joint" in missing else [sheet.joint(width)]
-    curve: Any = None
-    found, levels = (None, None) if "noise" in missing else sheet.chance(given, noise, place, cells)
+    curve = None if "curve" in missing or place is None else sheet.curve(place[1])
+    found, levels = None, None
+    if "noise" not in missing and noise is not None and place is not None:
+        found, levels = sheet.chance(given, noise, place, cells)
     flagged = None if "audit" in missing else sheet.audit()
     return Robustness(
         scene,

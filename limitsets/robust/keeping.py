@@ -67,21 +67,32 @@ class Kept:
         self.digests = {"single": single, "joint": digest_of(single, dict(tolerance))}
         # code of the caller's has no digest
         known = folder is not None and not any(isinstance(goal, Predicate) for goal in goals)
-        self.entries = self._read() if known else {}
+        record = self._record() if known else {}
+        self.good = {
+            word for word, text in self.digests.items() if record.get("digests", {}).get(word) == text
+        }
+        self.entries = self._entries(record)
+        self.curve: dict[str, Any] | None = record.get("curve") if "joint" in self.good else None
 
-    def _read(self) -> dict[str, Entry]:
-        """Read the entries of an earlier run that are still good; a file that is no such record counts as none."""
+    def _record(self) -> dict[str, Any]:
+        """Read what an earlier run left; a file that is no such record counts as none."""
         assert self.folder is not None
         try:
             record = json.loads((self.folder / RECORD).read_text(encoding="utf-8"))
-            entries = [Entry.read(row) for row in record["margins"]]
-            good = {word for word, digest in self.digests.items() if record["digests"][word] == digest}
+            return {word: record[word] for word in ("digests", "margins", "curve")}
         except (OSError, ValueError, KeyError, TypeError):
+            return {}
+
+    def _entries(self, record: Mapping[str, Any]) -> dict[str, Entry]:
+        """Read the entries that are still good."""
+        try:
+            entries = [Entry.read(row) for row in record.get("margins", [])]
+        except (KeyError, TypeError):
             return {}
         return {
             entry.key: entry
             for entry in entries
-            if ("joint" if entry.quantity == "joint" else "single") in good and self._complete(entry)
+            if ("joint" if entry.quantity == "joint" else "single") in self.good and self._complete(entry)
         }
 
     def _complete(self, entry: Entry) -> bool:
@@ -103,16 +114,27 @@ class Kept:
             return Entry.of(margin)
         entry = Entry.of(margin, self._files(margin))
         self.entries[entry.key] = entry
+        self._write()
+        return entry
+
+    def add_curve(self, table: dict[str, Any]) -> None:
+        """Write margins against X into the record."""
+        self.curve = table
+        if self.folder is not None:
+            self._write()
+
+    def _write(self) -> None:
+        assert self.folder is not None
         record: dict[str, Any] = {
             "complete": False,
             "digests": self.digests,
             "scene": self.scene.as_dict(),
             "margins": [each.to_json() for each in self.entries.values()],
+            "curve": self.curve,
         }
         with replaced(self.folder) as draft:
             words = json.dumps(record, indent=2, allow_nan=False)
             (draft / RECORD).write_text(words + "\n", encoding="utf-8", newline="\n")
-        return entry
 
     def _files(self, margin: Margin) -> list[str]:
         """Write the proof and the counterexample; their names, seen from the folder of the report."""

@@ -3,18 +3,23 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from limitsets.goals import Goal
-from limitsets.robust.entries import Entry
+from limitsets.robust.beyond import MarginsBeyond
+from limitsets.robust.entries import Entry, percent_of
+from limitsets.robust.margins import Margin
 from limitsets.robust.statistics import Levels, NoiseStatistics
 from limitsets.scene import Scene
 
 if TYPE_CHECKING:
     from limitsets.auditing import Audit
 
-__all__ = ["PARTS", "Robustness"]
+__all__ = ["PARTS", "Robustness", "curve_read", "curve_table"]
 
 PARTS = ("margins", "joint", "curve", "noise", "audit")
 """What an answer is put together from."""
@@ -36,8 +41,8 @@ class Robustness:
         One per quantity and reading; the last is joint, where there is a tolerance.  Proved and refuted.
     tolerance : dict of str to str
         The vector that the joint factor is on.
-    curve : object or None
-        The margin against X.  Proved and refuted.
+    curve : MarginsBeyond or None
+        Margins against X, of "beyond X only this side, and almost every orbit comes there".  Proved and refuted.
     noise : NoiseStatistics or None
         What chance does.  Computed between cells, not proved.
     levels : Levels or None
@@ -63,7 +68,7 @@ class Robustness:
     verdict: str
     entries: tuple[Entry, ...]
     tolerance: dict[str, str]
-    curve: Any
+    curve: MarginsBeyond | None
     noise: NoiseStatistics | None
     levels: Levels | None
     law: str
@@ -84,6 +89,34 @@ class Robustness:
         """The factor on the tolerance."""
         return next((entry for entry in self.entries if entry.quantity == "joint"), None)
 
+    def margins(self) -> tuple[Margin, ...]:
+        """Give the entries as margins without their proofs, as figures take them."""
+        return tuple(self._margin(entry) for entry in self.entries)
+
+    def _margin(self, entry: Entry) -> Margin:
+        joint = entry.quantity == "joint"
+        share = percent_of(entry, entry.proved)
+        # about the value in the unit of the deviation
+        nominal = None if joint or not share else 100.0 * entry.proved / share
+        return Margin(
+            entry.quantity,
+            entry.reading,
+            self.goals,
+            entry.proved,
+            entry.refuted,
+            entry.unit,
+            nominal if entry.unit != "%" else entry.nominal,
+            entry.reason,
+            entry.closed,
+            entry.seconds,
+            self.scene,
+            self.tolerance if joint else {},
+            {},
+            {},
+            (),
+            None,
+        )
+
     def to_json(self) -> dict[str, Any]:
         """Give it as plain tables for JSON: null, never nan."""
         levels = self.levels
@@ -94,7 +127,7 @@ class Robustness:
             "holds": {"proved": True, "refuted": False}.get(self.verdict),
             "margins": [entry.to_json() for entry in self.entries],
             "tolerance": self.tolerance or None,
-            "curve": None if self.curve is None else self.curve.to_json(),
+            "curve": None if self.curve is None else curve_table(self.curve),
             "noise": None if self.noise is None else self.noise.to_json() | {"law": self.law},
             "noise_levels": None
             if levels is None
@@ -110,3 +143,30 @@ class Robustness:
             "width": self.width,
             "seconds": self.seconds,
         }
+
+
+def curve_table(found: MarginsBeyond) -> dict[str, Any]:
+    """Give margins against X as a plain table; null where nothing is refuted."""
+    return {
+        "side": found.side,
+        "x": found.x.tolist(),
+        "quantities": list(found.names),
+        "units": list(found.units),
+        "proved": found.proved.tolist(),
+        "refuted": [[x if math.isfinite(x) else None for x in row] for row in found.refuted.tolist()],
+    }
+
+
+def curve_read(table: Mapping[str, Any], scene: Scene) -> MarginsBeyond:
+    """Read what `curve_table` wrote, without the proofs."""
+    refuted = [[math.nan if x is None else x for x in row] for row in table["refuted"]]
+    return MarginsBeyond(
+        scene,
+        table["side"],
+        np.array(table["x"]),
+        tuple(table["quantities"]),
+        tuple(table["units"]),
+        np.array(table["proved"]),
+        np.array(refuted, dtype=np.float64),
+        (),
+    )
