@@ -33,7 +33,7 @@ def robustness_page(found: Robustness, figures: Mapping[str, str]) -> str:
     found : Robustness
         From `limitsets.robustness`.
     figures : mapping of str to str
-        File names of the pictures by kind: "margins", "joint", "curve", "counterexample", "density", "throws", "levels".
+        File names of the pictures by kind: "margins", "joint", "curve", "counterexample", and those of the noise.
 
     Returns
     -------
@@ -295,8 +295,8 @@ def _curve(found: Robustness, figures: Mapping[str, str]) -> str:
             row += [bound(low), bound(high if math.isfinite(high) else None, up=True)]
         rows.append(row)
     text = (
-        f"Asked of each X: beyond it the part lies on side {curve.side} only, and almost every orbit comes to rest there, "
-        f"on the limit set. {_best(found)}"
+        f"Asked of each X, on the limit set: beyond it the part lies on side {curve.side} only, and almost every orbit "
+        f"comes to rest there. {_best(found)}"
     )
     return "\n\n".join([head, text, table(heads, rows)]) + figure_line(figures, "curve", "Margins against X")
 

@@ -113,15 +113,15 @@ def trusted(found: Robustness) -> str:
         lines.append(
             "**Proved:** both columns, for the scene's decimals and the model's formulas, by interval arithmetic. "
             '"Proved safe" holds for every value up to the bound, and "fixed" means the same unknown value at every '
-            'throw, "at every throw" any sequence of values. "Shown to fail" is an orbit whose every state is enclosed. '
+            'throw, "at every throw" any sequence of values. "Shown to fail" is an orbit, every state of it enclosed. '
             "Between the two columns nothing is claimed."
         )
     if found.noise is not None:
         cut = found.noise.cut
         off = f" Laws without bounds are cut off where {cut:.0e} of a throw's chance is left." if cut else ""
         lines.append(
-            f"**Computed, not proved:** the noise, as a Markov chain between {found.noise.grid.n_cells} cells. The error "
-            f"given is the change from half as many cells.{off}"
+            f"**Computed, not proved:** the noise, as a Markov chain between {found.noise.grid.n_cells} cells. The "
+            f"error given is the change from half as many cells.{off}"
         )
     effects = found.scene.effects.on()
     model = f"the minimal model with {', '.join(effects)}" if effects else "the minimal model"

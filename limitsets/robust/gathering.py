@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from limitsets.errors import AnswerError
 from limitsets.goals import Goal, OrientedBeyond, Reaches
@@ -30,8 +30,8 @@ __all__ = ["robustness"]
 # Levels of the noise that the figure shows.
 FACTORS = (0.0, 0.5, 1.0, 1.5, 2.0)
 
-# Places of the curve against X, and seconds for the proof of each joint margin on it.
-PLACES, SECONDS = 9, 15.0
+# Places of the curve against X, how close its brackets are, and seconds for the proof of each joint margin on it.
+PLACES, COARSE, SECONDS = 7, 0.1, 15.0
 
 NO_TOLERANCE = (
     "the scene has no [tolerance]; give it one, a deviation for each quantity that deviates together with others: "
@@ -116,14 +116,21 @@ class _Gathering:
         if known is not None:
             self.kept.again += 1
             return curve_read(known, asked)
-        names = ("throw.speed", "joint") if self.tolerance else ("throw.speed",)
+        names = ("joint",) if self.tolerance else ("throw.speed",)
 
         def told(step: str, number: int, of: int) -> None:
             self.progress(step, self.done - 1, self.steps)
 
         try:
             found = margins_beyond(
-                asked, side, names, tolerance=self.tolerance, places=PLACES, seconds=SECONDS, progress=told
+                asked,
+                side,
+                names,
+                places=PLACES,
+                tolerance=self.tolerance,
+                width=COARSE,
+                seconds=SECONDS,
+                progress=told,
             )
         except AnswerError as error:
             self.left_out["curve"] = str(error)
