@@ -78,6 +78,7 @@ def tornado(margins: Sequence[Margin]) -> Figure:
     axes.set_ylim(len(single) - 0.4, -0.6)
     axes.set_xscale("log")
     axes.set_xlim(low, high)
+    axes.xaxis.set_major_formatter("{x:g}")
     axes.set_xlabel("deviation to either side [% of the value]")
     axes.tick_params(axis="y", length=0)
     for border in ("top", "right", "left"):

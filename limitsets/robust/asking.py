@@ -122,7 +122,10 @@ class Question:
                     break
         except AnswerError as error:
             return Asked("impossible", _said(error), piece=piece, noise=noise)
-        return Asked("undecided", missing[0].reason, found, piece=piece, noise=noise)
+        reason = missing[0].reason
+        if not (found.component >= 0).any():
+            reason = f"{reason}: from some of them, parts may leave the arm"
+        return Asked("undecided", reason, found, piece=piece, noise=noise)
 
     def cells(self, piece: Piece | None, step: int) -> Attraction:
         """Return the cells of one refinement, whatever they prove."""
@@ -180,8 +183,9 @@ class Question:
     def _against(self, found: Attraction, goal: Goal) -> Answer:
         """Search for what refutes one goal: where throws differ, for the worst that they can do."""
         wrong = _wrong(goal)
-        if isinstance(goal, Reaches):  # refuted by where cells end
-            found = self._finer(found, found.cover.box, 2)
+        if isinstance(goal, Reaches) and not goal.every_orbit:
+            # refuted by where attracting cells end; a periodic orbit that attracts is not looked for each time
+            return prove(self._finer(found, found.cover.box, 2), self.scene, goal)
         if wrong is None or not found.cover.box.noise or goal.from_anywhere:
             return ask(found, self.scene, goal)
         answer = prove(found, self.scene, goal)

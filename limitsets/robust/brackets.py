@@ -173,12 +173,15 @@ def bracket_fixed(question: Question, measure: Measure, width: Fraction, tell: T
     ends = [way for way in ways.values() if way.end is not None]
     limits = [way.good for way in ends] if found.refuted is None else []
     goal = min(limits, default=min(way.good for way in ways.values()))
-    found.reason = next((way.reason for way in ends if way.good == goal), "")
     if found.refuted is not None:
-        goal, found.reason = found.refuted * (1 - width * Fraction(6, 10)), ""
-        nearest = min(way.good for way in ends) if ends else goal
-        goal = min(goal, nearest)
-    return _fixed_proof(question, measure, found, short(goal), tell)
+        goal = found.refuted * (1 - width * Fraction(6, 10))
+        goal = min([goal, *(way.good for way in ends)])
+    first = next((way for way in ends if way.good == goal and way.end is not None), None)
+    if first is not None and first.end is not None:
+        found.reason = f"from {measure.text(first.end)} on: {first.reason}"
+    found = _fixed_proof(question, measure, found, short(goal), tell)
+    found.reason = "" if found.closed(width) else found.reason
+    return found
 
 
 def _fixed_proof(question: Question, measure: Measure, found: Bracket, goal: Fraction, tell: Tell) -> Bracket:

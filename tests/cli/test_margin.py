@@ -1,0 +1,90 @@
+"""`limitsets margin`: words, JSON, files, exit codes."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+import limitsets as ls
+from limitsets.cli import main
+
+
+@pytest.fixture(autouse=True)
+def here(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+
+
+def run(capfd, *words):
+    code = main(words)
+    out, err = capfd.readouterr()
+    assert "Traceback" not in err
+    assert all(line.startswith("limitsets: ") for line in err.splitlines())
+    return code, out, err
+
+
+def test_a_table_in_units_that_people_use(capfd):
+    code, out, _ = run(capfd, "margin", "paper-designed", "throw.speed", "arm.surface_height", "--width", "0.1")
+    assert code == 0
+    assert "beyond x = 20 in only side 2" in out
+    rows = {line.split()[0]: line for line in out.splitlines() if line.split()[:1]}
+    low, high = (float(word) for word in rows["throw.speed"].replace("%", "").split()[-2:])
+    assert low < 0.733 < high
+    assert rows["arm.surface_height"].count(" in") == 2
+    assert not list(Path().iterdir())
+
+
+def test_json_and_files_that_recheck_accepts(capfd):
+    pytest.importorskip("flint", reason="the checker needs python-flint")
+    words = ("margin", "paper-designed", "landing.x", "--width", "0.1", "--json", "-o", "deep/down")
+    code, out, _ = run(capfd, *words)
+    assert code == 0
+    (record,) = json.loads(out)
+    assert set(record) >= {"quantity", "reading", "goal", "proved", "refuted", "counterexample", "certificate"}
+    assert (record["quantity"], record["reading"], record["unit"]) == ("landing.x", "per-throw", "in")
+    assert record["goal"] == {"oriented_beyond": {"x": "20.0 in", "side": 2}, "from_anywhere": False}
+    assert record["counterexample"][-1]["side"] != 2
+    assert record["counterexample"][-1]["between"][0] > 20.0
+    folder = Path("deep/down")
+    assert {path.name for path in folder.iterdir()} == {*record["certificate"], "margins.json", "margins.png"}
+    assert json.loads((folder / "margins.json").read_text(encoding="utf-8")) == [record]
+    for name in record["certificate"]:
+        code, _, _ = run(capfd, "recheck", str(folder / name))
+        assert code == 0
+
+
+def test_another_x_and_a_reading(capfd):
+    words = ("margin", "paper-designed", "throw.speed", "--reading", "per-throw", "--width", "0.2", "--json")
+    _, at_20, _ = run(capfd, *words)
+    code, at_21, _ = run(capfd, *words, "--x", "53.34 cm")
+    assert code == 0
+    assert json.loads(at_21)[0]["goal"]["oriented_beyond"]["x"] == "21.0 in"
+    assert json.loads(at_21)[0]["proved"] > json.loads(at_20)[0]["refuted"]
+
+
+def test_a_goal_that_fails_as_it_is_is_exit_1(capfd):
+    code, out, _ = run(capfd, "margin", "paper-initial", "throw.speed")
+    assert code == 1
+    assert "fails in the scene as it is" in out
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("no-such-scene",), "scene"),
+        (("paper-designed", "throw.sped"), "throw.speed"),
+        (("paper-designed", "part.sides[0]", "--reading", "per-throw"), "reading"),
+        (("paper-designed", "--x", "30"), "arm's length"),
+        (("paper-designed", "--x", "far"), "far"),
+        (("paper-designed", "joint"), "tolerance"),
+        (("paper-designed", "throw.speed", "--width", "2"), "width"),
+    ],
+)
+def test_bad_input_is_exit_2(capfd, words, said):
+    code, out, err = run(capfd, "margin", *words)
+    assert (code, out) == (2, "")
+    assert said in err
+
+
+def test_the_help_names_it(capfd):
+    assert "margin" in run(capfd, "--help")[1]
+    assert ls.margin.__doc__.startswith("Bracket")

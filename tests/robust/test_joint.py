@@ -1,0 +1,148 @@
+"""The joint margin: against single scenes at all corners, by plain orbits; its certificate; covers of a box."""
+
+from fractions import Fraction
+from itertools import product
+
+import numpy as np
+import pytest
+
+import limitsets as ls
+from limitsets.errors import LimitsetsError
+from limitsets.goals import OrientedBeyond, Reaches
+from limitsets.robust.joint import joint_margin
+
+pytest.importorskip("flint", reason="the checker needs python-flint")
+
+TOLERANCE = {"throw.speed": "1 %", "part.sides[0]": "1 %", "arm.surface_height": "0.02 in"}
+GOALS = (OrientedBeyond(20.0, 2), Reaches(20.0, 2))
+
+
+def scene(tolerance):
+    return ls.load(ls.load("paper-designed").as_dict() | {"tolerance": tolerance})
+
+
+def highest_off(factor, signs):
+    """Highest place off side 2 of a long orbit at one corner."""
+    base = ls.load("paper-designed")
+    speed, side, height = (s * factor for s in signs)
+    moved = base.with_values(
+        {
+            "throw.kappa": base.kappa / (1 + 0.01 * speed) ** 2,
+            "part.sides[0]": 5.75 * (1 + 0.01 * side),
+            "arm.surface_height": -0.2 + 0.02 * height,
+        }
+    )
+    path = ls.orbit(moved.map, 15.0, 2, 300_000)
+    x, at = np.asarray(path.x)[1000:], np.asarray(path.side)[1000:]
+    return float(x[at != 2].max())
+
+
+@pytest.fixture(scope="module")
+def found():
+    return joint_margin(scene(TOLERANCE), GOALS, width=0.12)
+
+
+def test_the_factor_is_that_of_the_worst_corner(found):
+    assert found.closed
+    corners = list(product((-1, 1), repeat=3))
+    assert max(highest_off(found.proved, signs) for signs in corners) < 20.0
+    assert max(highest_off(1.01 * found.refuted, signs) for signs in corners) > 20.0
+
+
+def test_its_certificates_are_confirmed_and_so_is_the_orbit_that_refutes(found, tmp_path):
+    files = found.save(tmp_path)
+    assert [file.name.split("tolerance")[1] for file in files] == [
+        "-oriented-beyond.proof.zip",
+        "-reaches.proof.zip",
+        ".refuted.zip",
+    ]
+    for file in files:
+        report = ls.recheck(file)
+        assert (report.verdict, report.reason) == ("proved", ""), file
+    assert report.statement[0].startswith("refuted: ")
+    stated = ls.recheck(files[0]).parameters["tolerance (fixed but unknown)"]
+    assert all(name in stated for name in TOLERANCE)
+
+
+def test_the_landing_place_differs_at_every_throw():
+    one = joint_margin(scene(TOLERANCE | {"landing.x": "0.02 in"}), GOALS[:1], width=0.3)
+    without = joint_margin(scene(TOLERANCE), GOALS[:1], width=0.3)
+    assert one.noise.keys() == {"landing.x"}
+    assert one.refuted < without.refuted
+    alone = joint_margin(scene({"landing.x": "0.02 in"}), GOALS[:1])
+    (landing,) = ls.margin("paper-designed", "landing.x")
+    assert 0.02 * alone.proved < landing.refuted
+    assert landing.proved < 0.02 * alone.refuted
+    assert alone.closed
+
+
+def test_what_runs_out_of_time_says_so_and_keeps_what_is_proved(tmp_path):
+    short = joint_margin(scene(TOLERANCE), GOALS[:1], width=0.001, seconds=2.0)
+    assert not short.closed
+    assert "time" in short.reason
+    if short.proved:
+        (file, _) = short.save(tmp_path)
+        assert ls.recheck(file).verdict == "proved"
+
+
+def test_by_the_public_name_and_from_the_scene():
+    (found,) = ls.margin(scene({"throw.speed": "0.5 %"}), "joint", width=0.05)
+    assert (found.quantity, found.reading, found.unit) == ("joint", "tolerance", "")
+    assert found.proved < 0.733 / 0.5 < found.refuted
+    assert found.to_json()["unit"] is None
+
+
+@pytest.mark.parametrize(
+    ("tolerance", "words"),
+    [
+        ({}, "tolerance"),
+        ({"throw.sped": "1 %"}, "throw.speed"),
+        ({"throw.speed": "1 deg/s"}, "percent"),
+        ({"throw.speed": "-1 %"}, "above 0"),
+        ({"gravity.acceleration": "1 %"}, "given by kappa"),
+    ],
+)
+def test_refusals(tolerance, words):
+    with pytest.raises(LimitsetsError, match=words):
+        joint_margin(ls.load("paper-designed"), GOALS, tolerance)
+
+
+# ---------------------------------------------------------------- covers, as the checker sees them
+
+
+def boxes_by_cutting(random, whole, count):
+    boxes = [whole]
+    while len(boxes) < count:
+        box = boxes.pop(int(random.integers(len(boxes))))
+        k = int(random.integers(len(box)))
+        lo, hi = box[k]
+        cut = lo + (hi - lo) * Fraction(int(random.integers(1, 8)), 8)
+        boxes += [[*box[:k], (lo, cut), *box[k + 1 :]], [*box[:k], (cut, hi), *box[k + 1 :]]]
+    return boxes
+
+
+@pytest.mark.parametrize("axes", [1, 2, 5, 9])
+def test_a_cover_is_seen_and_a_gap_is(axes):
+    from limitsets.proofs.recheck import covered
+
+    random = np.random.default_rng(axes)
+    whole = [(Fraction(0), Fraction(1))] * axes
+    boxes = boxes_by_cutting(random, whole, 120)
+    assert covered(whole, boxes)
+    assert covered(whole, [*boxes, *boxes_by_cutting(random, whole, 20)])
+    for gone in random.choice(120, 5, replace=False).tolist():
+        assert not covered(whole, boxes[:gone] + boxes[gone + 1 :])
+        lo, hi = boxes[gone][0]
+        smaller = [(lo, hi - (hi - lo) / 2**40), *boxes[gone][1:]]
+        assert not covered(whole, [*boxes[:gone], smaller, *boxes[gone + 1 :]])
+
+
+def test_a_pinwheel_is_covered_though_no_cut_parts_its_boxes():
+    from limitsets.proofs.recheck import covered
+
+    def box(a, b, c, d):
+        return [(Fraction(a), Fraction(b)), (Fraction(c), Fraction(d))]
+
+    wheel = [box(0, 2, 0, 1), box(2, 3, 0, 2), box(1, 3, 2, 3), box(0, 1, 1, 3), box(1, 2, 1, 2)]
+    assert covered(box(0, 3, 0, 3), wheel)
+    assert not covered(box(0, 3, 0, 3), wheel[:-1])

@@ -1,0 +1,258 @@
+"""Margins against sharp ones that are found apart: at 50 digits by the throw's formulas, and by plain orbits.
+
+paper-designed, X = 20 in.  The highest place off side 2 is that of a jog from just below r_2 and a flip after it, onto
+side 0.  Fixed but unknown, both throws have one speed; at every throw another, each the worst it can have.
+"""
+
+import math
+from functools import cache
+
+import numpy as np
+import pytest
+from mpmath import mp, mpf
+
+import limitsets as ls
+from limitsets.errors import LimitsetsError
+from limitsets.goals import AttractsAll, OrientedBeyond, Predicate, Reaches
+from limitsets.robust.deviations import given, measures
+from tests.thrower import reference
+
+X = 20
+ALL = [
+    *(f"part.sides[{k}]" for k in range(3)),
+    "part.mass.center.along",
+    "part.mass.center.above",
+    "part.mass.radius_of_gyration",
+    "arm.surface_height",
+    "arm.length",
+    "throw.speed",
+    "landing.x",
+]
+
+
+def facts_at(**changed):
+    """The designed scene at 50 digits, with other numbers."""
+    return reference.Facts({**reference.paper("designed").numbers, **changed})
+
+
+def first_flip(facts):
+    """r_2 near 20 in: the least x on side 2 that flips, by bisection."""
+    lo, hi = mpf(19), mpf("21.5")
+    assert reference.throw(facts, 2, lo).side == 2
+    assert reference.throw(facts, 2, hi).side == 0
+    while hi - lo > mpf("1e-9"):
+        middle = (lo + hi) / 2
+        lo, hi = (middle, hi) if reference.throw(facts, 2, middle).side == 2 else (lo, middle)
+    return lo
+
+
+def highest_off(first, second, landing=mpf(0)):
+    """Where a jog from just below r_2, then a flip lead, each landing so much too far."""
+    jogged = reference.throw(first, 2, first_flip(first))
+    assert (jogged.code, jogged.side) == (0, 2)
+    flipped = reference.throw(second, 2, jogged.x + landing)
+    assert flipped.side == 0
+    return flipped.x + landing
+
+
+@cache
+def sharp_speed(per_throw):
+    """Sharp margin of the speed, as a share."""
+    kappa = mpf(reference.paper("designed").numbers["kappa"])
+
+    def over(share):
+        slow = facts_at(kappa=kappa / (1 - share) ** 2)
+        fast = facts_at(kappa=kappa / (1 + share) ** 2)
+        return highest_off(slow, fast if per_throw else slow) - X
+
+    return float(mp.findroot(over, (mpf("0.003"), mpf("0.008")), solver="anderson", tol=1e-9))
+
+
+def test_sharp_margins_of_the_speed_are_those_of_the_table():
+    assert sharp_speed(False) == pytest.approx(0.00733, abs=5e-6)
+    assert sharp_speed(True) == pytest.approx(0.00397, abs=5e-6)
+
+
+@pytest.mark.parametrize("reading", ["fixed", "per-throw"])
+def test_the_speed_is_bracketed_to_a_hundredth(reading):
+    (found,) = ls.margin("paper-designed", "throw.speed", reading=reading)
+    sharp = 100 * sharp_speed(reading == "per-throw")
+    assert found.proved < sharp < found.refuted
+    assert found.refuted - found.proved <= 0.01 * found.refuted
+    assert (found.closed, found.reason, found.unit) == (True, "", "%")
+
+
+# ---------------------------------------------------------------- other quantities, by plain orbits
+
+
+def breaks_at(name, sign, sizes):
+    """First of some sizes at which a long orbit of plain floats comes beyond X off side 2."""
+    scene = ls.load("paper-designed")
+    nominal = scene.value(name)
+    for size in sizes:
+        moved = scene.with_values({name: nominal + sign * size})
+        path = ls.orbit(moved.map, 15.0, 2, 400_000)
+        x, side = np.asarray(path.x)[1000:], np.asarray(path.side)[1000:]
+        if ((x > X) & (side != 2)).any():
+            return size
+    return math.inf
+
+
+@pytest.mark.parametrize("name", ["part.mass.center.along", "part.mass.center.above", "arm.surface_height"])
+def test_lengths_are_bracketed(name):
+    (found,) = ls.margin("paper-designed", name, width=0.02)
+    assert found.unit == "in"
+    assert found.closed
+    least = min(
+        breaks_at(name, sign, np.array([0.97, 1.0, 1.02]) * found.refuted) for sign in (-1, 1)
+    )
+    assert found.proved <= least
+    assert 0.97 * found.refuted < least <= 1.02 * found.refuted
+
+
+def test_the_landing_place_agrees_with_the_throw_at_50_digits():
+    nominal = reference.paper("designed")
+    sharp = float(
+        mp.findroot(
+            lambda e: highest_off(nominal, nominal, e) - X, (mpf("0.05"), mpf("0.2")), solver="anderson", tol=1e-9
+        )
+    )
+    (found,) = ls.margin("paper-designed", "landing.x")
+    assert found.reading == "per-throw"
+    assert found.proved < sharp < found.refuted
+    assert found.closed
+
+
+def test_a_deviation_that_never_breaks_the_goal_says_what_ends_it():
+    """At 21.5 % less the part no longer rests on side 1: a_1 reaches the length of that side."""
+    (found,) = ls.margin("paper-designed", "part.sides[2]", width=0.05)
+    assert found.refuted is None
+    assert "no such part" in found.reason
+    scene = ls.load("paper-designed")
+    scene.with_values({"part.sides[2]": 6.75 * (1 - found.proved / 100)})
+    with pytest.raises(LimitsetsError):
+        scene.with_values({"part.sides[2]": 6.75 * (1 - 1.06 * found.proved / 100)})
+    (found,) = ls.margin("paper-designed", "arm.length", width=0.05)
+    assert found.refuted is None
+    assert "may leave the arm" in found.reason
+    # the limit set ends at 23.3832 in
+    assert 0.9 * (28 - 23.383152) < found.proved < 28 - 23.383152
+
+
+# ---------------------------------------------------------------- goals
+
+
+def test_several_goals_hold_together():
+    """X = 23 is reached by the limit set's 23.3832 with little to spare, which a little speed takes away."""
+    goals = [OrientedBeyond(23.0, 2), Reaches(23.0, 2)]
+    (both,) = ls.margin("paper-designed", "throw.speed", goal=goals, width=0.1)
+    (one,) = ls.margin("paper-designed", "throw.speed", goal=goals[0], width=0.1)
+    assert both.refuted < one.proved
+    slow = ls.load("paper-designed")
+    for share, reached in ((both.proved, True), (both.refuted, False)):
+        tops = []
+        for sign in (-1, 1):
+            kappa = slow.kappa / (1 + sign * share / 100) ** 2
+            path = ls.orbit(slow.with_values({"throw.kappa": kappa}).map, 15.0, 2, 400_000)
+            x = np.asarray(path.x)[1000:][np.asarray(path.side)[1000:] == 2]
+            tops.append(x.max())
+        assert (min(tops) >= 23.0) == reached
+
+
+def below_20_off_side_2(lo, hi, side):
+    return (hi <= 20.0) | (side == 2)
+
+
+@pytest.mark.parametrize("reading", ["fixed", "per-throw"])
+def test_a_function_of_the_callers_is_a_goal(tmp_path, reading):
+    goal = Predicate(below_20_off_side_2, "below 20 in off side 2", cuts=(20.0,))
+    (found,) = ls.margin("paper-designed", "throw.speed", goal=goal, reading=reading, width=0.03)
+    assert found.proved < 100 * sharp_speed(reading == "per-throw") < found.refuted
+    assert found.closed
+    with pytest.raises(LimitsetsError, match="goals that a scene can name"):
+        found.save(tmp_path)
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_plain_function_is_taken_and_a_wrong_one_refused():
+    (found,) = ls.margin("paper-designed", "arm.surface_height", goal=lambda lo, hi, side: hi < 24.0, width=0.5)
+    assert found.proved > 0
+    with pytest.raises(LimitsetsError, match="returns"):
+        ls.margin("paper-designed", "throw.speed", goal=lambda lo, hi, side: 1.0)
+
+
+def test_a_predicate_from_anywhere():
+    """From 28 in parts land beyond 25 in off side 2 (the map at the arm's end), but never beyond the arm."""
+
+    def on_the_arm(lo, hi, side):
+        return hi <= 28.0
+
+    def near(lo, hi, side):
+        return (hi <= 25.0) | (side == 2)
+
+    scene = ls.load("paper-designed")
+    (found,) = ls.margin(scene, "throw.speed", goal=Predicate(on_the_arm, from_anywhere=True), width=0.9)
+    assert found.proved > 0
+    (found,) = ls.margin(scene, "throw.speed", goal=Predicate(near, cuts=(25.0,), from_anywhere=True))
+    assert (found.proved, found.refuted) == (0.0, 0.0)
+    end = found.counterexample[-1]
+    assert end.side != 2
+    assert end.lo > 25.0
+
+
+def test_a_goal_that_fails_as_it_is_has_no_margin():
+    (found,) = ls.margin("paper-initial", "throw.speed", goal=OrientedBeyond(20.0, 2))
+    assert (found.proved, found.refuted) == (0.0, 0.0)
+    assert "as it is" in found.reason
+    assert found.counterexample[-1].lo > 20.0
+    (found,) = ls.margin("paper-designed", "landing.x", goal=AttractsAll(), width=0.5)
+    # a landing a little short of a_i leaves, however little it is
+    assert found.proved == 0.0
+    assert not found.closed
+
+
+# ---------------------------------------------------------------- lists and refusals
+
+
+def test_every_quantity_of_a_scene_is_measured():
+    scene = ls.load("paper-designed")
+    assert set(given(scene)) == set(ALL)
+    listed = [(one.quantity, one.reading, one.unit) for one in measures(scene)]
+    assert [name for name, reading, _ in listed if reading == "fixed"] == ALL[:-1]
+    assert [name for name, reading, _ in listed if reading == "per-throw"] == ["throw.speed", "landing.x"]
+    assert ("part.sides[1]", "fixed", "%") in listed
+    assert ("part.mass.center.along", "fixed", "in") in listed
+    tilted = ls.load(scene.as_dict() | {"gravity": {"tilt": "30 deg"}, "throw": {"speed": "158.02 deg/s"}})
+    assert ("gravity.tilt", "fixed", "deg") in [(m.quantity, m.reading, m.unit) for m in measures(tilted)]
+    assert ("gravity.tilt", "per-throw", "deg") in [(m.quantity, m.reading, m.unit) for m in measures(tilted)]
+    own = ls.load(scene.as_dict() | {"tolerance": {"part.mass.center.along": "1 %"}})
+    (along,) = [m for m in measures(own) if m.quantity == "part.mass.center.along"]
+    assert along.unit == "%"
+
+
+@pytest.mark.parametrize(
+    ("quantity", "options", "words"),
+    [
+        ("throw.sped", {}, "throw.speed"),
+        ("part.sides[3]", {}, "a quantity"),
+        ("part.vertices[0].x", {}, "one that the scene gives"),
+        ("throw.speed", {"reading": "always"}, "fixed or per-throw"),
+        ("part.sides[0]", {"reading": "per-throw"}, "fixed but unknown"),
+        ("landing.x", {"reading": "fixed"}, "per-throw"),
+        ("gravity.acceleration", {}, "given by kappa"),
+        ("throw.speed", {"width": 0.0}, "width"),
+        ("throw.speed", {"goal": "x > 20"}, "goal"),
+        ("throw.speed", {"goal": []}, "goal"),
+        ("joint", {}, "tolerance"),
+    ],
+)
+def test_refusals(quantity, options, words):
+    with pytest.raises(LimitsetsError, match=words):
+        ls.margin("paper-designed", quantity, **options)
+
+
+def test_a_scene_without_a_goal_is_asked_for_one():
+    tree = ls.load("paper-designed").as_dict()
+    del tree["goal"]
+    with pytest.raises(LimitsetsError, match="say what has to hold"):
+        ls.margin(ls.load(tree), "throw.speed")
