@@ -17,6 +17,7 @@ from limitsets.plot.limit_sets import limit_set
 from limitsets.plot.maps import map  # noqa: A004 - ls.plot.map is the word for it
 from limitsets.plot.margins import margin_curve, tolerance_box, tornado
 from limitsets.plot.morse_graphs import morse
+from limitsets.plot.noise import noise_arrivals, noise_density, noise_levels
 
 __all__ = [
     "audit",
@@ -27,6 +28,9 @@ __all__ = [
     "map",
     "margin_curve",
     "morse",
+    "noise_arrivals",
+    "noise_density",
+    "noise_levels",
     "tolerance_box",
     "tornado",
 ]

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
+from matplotlib.ticker import MaxNLocator
 
 from limitsets.errors import AnswerError
 from limitsets.goals import Goal, OrientedBeyond, Reaches
@@ -32,7 +33,7 @@ WANTED: dict[str, Any] = {"facecolor": "#E0F0E9", "edgecolor": "#9BC4B2", "hatch
 def counterexample(
     scene: Scene,
     orbit: Sequence[Mapping[str, Any]],
-    violated: Mapping[str, Any] | None = None,
+    violated: Goal | None = None,
     name: str = "",
 ) -> Figure:
     """Draw an orbit that violates a goal: x after each throw, the side by marker and colour.
@@ -75,7 +76,7 @@ def counterexample(
     figure, (axes,) = style.canvas(8.0, 4.2)
     axes.plot(throws, x, color=style.FAINT, lw=0.9, zorder=2)
     for side in sorted(set(sides)):
-        look = {"color": COLOURS[side % len(COLOURS)], "marker": MARKERS[side % len(MARKERS)]}
+        look: dict[str, Any] = {"color": COLOURS[side % len(COLOURS)], "marker": MARKERS[side % len(MARKERS)]}
         mine = [k for k, on in enumerate(sides) if on == side]
         axes.plot([throws[k] for k in mine], [x[k] for k in mine], ls="", ms=6.5, zorder=3, **look)
     low, high = min(x), max([*x, *([violated.x] if isinstance(violated, OrientedBeyond | Reaches) else [])])
@@ -95,7 +96,7 @@ def counterexample(
         )
     axes.set_xlabel("throws")
     axes.set_ylabel(f"x at rest [{scene.unit}]")
-    axes.xaxis.get_major_locator().set_params(integer=True)
+    axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     style.title(figure, f"{scene.name}: an orbit that violates the goal{f', {name}' if name else ''}")
     style.legend(figure, [*_sides(sides), *areas], 5)
     return figure

@@ -31,6 +31,7 @@ def _drawn(found: Robustness) -> Iterator[tuple[str, Figure]]:
         yield "joint", plot.tolerance_box(found.margins()[-1])
     if found.curve is not None:
         yield "curve", plot.margin_curve(found.curve)
+    yield from _noise(found)
     first = shown(found)
     if first is not None:
         name = f"{first.quantity} {READINGS[first.reading]}" if first.holds else "the scene as it is"
@@ -38,6 +39,16 @@ def _drawn(found: Robustness) -> Iterator[tuple[str, Figure]]:
             "counterexample",
             plot.counterexample(found.scene, first.counterexample, violated_of(first, found.goals), name),
         )
+
+
+def _noise(found: Robustness) -> Iterator[tuple[str, Figure]]:
+    """Draw the noise: of a scene in which nothing stays there is no density."""
+    if found.noise is None or found.levels is None:
+        return
+    if found.noise.classes:
+        yield "density", plot.noise_density(found.noise)
+    yield "throws", plot.noise_arrivals(found.noise)
+    yield "levels", plot.noise_levels(found.levels, {"level of the noise, as given = 1": 1.0})
 
 
 def write_robustness(found: Robustness, folder: str | Path) -> list[Path]:

@@ -14,6 +14,7 @@ from limitsets.report.tables import bound, table
 from limitsets.robust.entries import Entry, percent_of
 
 if TYPE_CHECKING:
+    from limitsets.robust.beyond import MarginsBeyond
     from limitsets.robust.summary import Robustness
 
 __all__ = ["HEADS", "answer", "lines_of", "robustness_page", "tightest"]
@@ -71,7 +72,7 @@ def answer(found: Robustness) -> str:
     if joint is not None:
         lines.append(_met(joint))
     if found.curve is not None and found.verdict != "proved":
-        lines.append(_best(found))
+        lines.append(_best(found.curve))
     return " ".join(lines)
 
 
@@ -268,14 +269,14 @@ def _joint(found: Robustness, figures: Mapping[str, str]) -> str:
     return "\n\n".join(lines) + figure_line(figures, "joint", "The box of all quantities together")
 
 
-def _best(found: Robustness) -> str:
-    x, size = found.curve.best()
-    unit, name = found.scene.unit, found.curve.names[0]
+def _best(curve: MarginsBeyond) -> str:
+    x, size = curve.best()
+    unit, name = curve.scene.unit, curve.names[0]
     if not size > 0.0:
         return "Of no X that was tried it is proved."
     return (
         f"Most room is left at **X = {x:.4g} {unit}**, of the places that were tried: {name} is proved safe up to "
-        f"{bound(size, found.curve.units[0])} there."
+        f"{bound(size, curve.units[0])} there."
     )
 
 
@@ -296,7 +297,7 @@ def _curve(found: Robustness, figures: Mapping[str, str]) -> str:
         rows.append(row)
     text = (
         f"Asked of each X, on the limit set: beyond it the part lies on side {curve.side} only, and almost every orbit "
-        f"comes to rest there. {_best(found)}"
+        f"comes to rest there. {_best(curve)}"
     )
     return "\n\n".join([head, text, table(heads, rows)]) + figure_line(figures, "curve", "Margins against X")
 

@@ -7,6 +7,7 @@ throws that lead to the goal the number T has E[T; goal] = t with (I - Q) t = h 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -107,7 +108,11 @@ class _Equations:
 
 
 def absorption(
-    chain: Transfer, goal: NDArray[np.bool_], *, other: NDArray[np.bool_] | None = None
+    chain: Transfer,
+    goal: NDArray[np.bool_],
+    *,
+    other: NDArray[np.bool_] | None = None,
+    classes: Sequence[NDArray[np.int64]] | None = None,
 ) -> Absorption:
     """Find where the chain ends, and after how many steps it is at the goal.
 
@@ -119,6 +124,9 @@ def absorption(
         Cells that absorb.
     other : ndarray of bool, shape (n_cells,), optional
         Cells that absorb too and are counted apart from the goal, as "other".
+    classes : sequence of ndarray of int, optional
+        Cells of classes that absorb, instead of the closed classes: those too that are left so rarely that the time
+        until then does not matter, and the equations could not be solved.
 
     Returns
     -------
@@ -138,7 +146,7 @@ def absorption(
     goal = np.asarray(goal, dtype=bool)
     graph = graph_of(chain)
     absorbing = goal if other is None else goal | other
-    closed, _ = closed_sets(chain, graph, absorbing)
+    closed = closed_sets(chain, graph, absorbing)[0] if classes is None else list(classes)
     open_ = ~absorbing
     for cells in closed:
         open_[cells] = False

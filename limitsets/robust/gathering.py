@@ -75,9 +75,7 @@ class _Gathering:
             self.tell(label)
             entry = self.kept.find(one.quantity, one.reading, one.unit)
             if entry is None and verdict != "proved" and found:
-                nominal, unit = nominal_of(self.scene, one.quantity)
-                words = {"quantity": one.quantity, "reading": one.reading, "unit": one.unit}
-                entry = replace(found[0], **words, nominal=nominal, nominal_unit=unit, seconds=0.0)
+                entry = _same(found[0], one, self.scene)
             found.append(entry or self.kept.add(self._single(one, width, label)))
             self.done += 1
         return found
@@ -163,6 +161,20 @@ class _Gathering:
         levels = noise_levels(scene, noise, factors=FACTORS, goal=place, cells=max(cells // 2, 1))
         self.done += 1
         return found, levels
+
+
+def _same(entry: Entry, one: Measure, scene: Scene) -> Entry:
+    """Return the margin of a quantity where the scene as it is fails or is not proved: that of any other."""
+    nominal, unit = nominal_of(scene, one.quantity)
+    return replace(
+        entry,
+        quantity=one.quantity,
+        reading=one.reading,
+        unit=one.unit,
+        nominal=nominal,
+        nominal_unit=unit,
+        seconds=0.0,
+    )
 
 
 def _place(goals: Sequence[Goal]) -> tuple[float, int] | None:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Mapping
+from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
@@ -30,9 +31,11 @@ THROWN = ("part", "arm", "throw", "gravity", "model", "effects", "world")
 
 def digest_of(*words: Any) -> str:
     """Make a word of all that a margin depends on, the version of the package among it."""
-    from limitsets import __version__
-
-    text = json.dumps([*words, __version__], sort_keys=True)
+    try:
+        package = version("limitsets")
+    except PackageNotFoundError:  # sources that are not installed
+        package = ""
+    text = json.dumps([*words, package], sort_keys=True)
     return hashlib.sha256(text.encode()).hexdigest()
 
 

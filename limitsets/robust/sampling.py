@@ -80,7 +80,8 @@ def scattering_map(scene: Scene, scatter: Scattering, seed: int = 0) -> Any:
     plain = still_map(scene)
     full = plain if hasattr(plain, "bare") else with_effects(plain, {}, None)
     law = Even() if alike == {Uniform} else Normal()
-    return full._replace(spread=Spread(law, scale["speed"], scale["landing"], float(seed)))
+    spread = Spread(law, scale["speed"], scale["landing"], float(seed))
+    return full._replace(effects=full.effects._replace(spread=spread))
 
 
 def _scale(law: Any) -> float:

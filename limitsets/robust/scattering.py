@@ -138,7 +138,7 @@ def still_map(scene: Scene) -> Any:
     if scene.effects.spread is None:
         return scene.map
     full: Any = scene.map
-    plain = full._replace(spread=None)
+    plain = full._replace(effects=full.effects._replace(spread=None))
     effects = replace(scene.effects, spread=None)
     return plain if effects.on() else scene.bare_map
 

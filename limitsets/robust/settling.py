@@ -41,6 +41,8 @@ class NoisyClass:
     ----------
     cells : CellSet
         Its cells.
+    closed : bool
+        Whether no step leaves it; an escape so rare that it underflows leaves False here.
     weight : ndarray, shape (n_cells,)
         Stationary distribution; of a class that is left the quasi-stationary one, that of what has not left yet.
     escape : float
@@ -56,6 +58,7 @@ class NoisyClass:
     """
 
     cells: CellSet
+    closed: bool
     weight: Array
     escape: float
     leads_to: dict[str, float]
@@ -63,11 +66,6 @@ class NoisyClass:
     branches: dict[str, float]
     residual: float
     steps: int
-
-    @property
-    def closed(self) -> bool:
-        """Whether nothing leaves it."""
-        return self.escape == 0.0
 
     @property
     def density(self) -> Array:
@@ -254,6 +252,7 @@ def _described(chain: Transfer, cells: Cells, closed: bool) -> NoisyClass:
     shares = shares / max(float(shares.sum()), 1e-300)
     return NoisyClass(
         CellSet.of(chain.grid, cells),
+        closed,
         weight,
         0.0 if closed else sum(leads_to.values()),
         leads_to,

@@ -20,7 +20,7 @@ from limitsets.robust import (
     transfer,
 )
 from limitsets.robust.sampling import scattering_map, throw_many
-from limitsets.robust.statistics import starts_from
+from limitsets.robust.solving import starts_from
 
 GOAL = (20.5, 2)
 

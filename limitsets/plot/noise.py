@@ -1,0 +1,199 @@
+"""Noise in pictures: where the part rests, how many throws it takes, and what more noise does."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib.ticker import MaxNLocator
+
+from limitsets.errors import AnswerError
+from limitsets.plot import style
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+    from numpy.typing import NDArray
+
+    from limitsets.robust import NoiseStatistics
+    from limitsets.robust.sampling import Thrown
+    from limitsets.robust.settling import NoisyClass
+    from limitsets.robust.statistics import Levels
+
+__all__ = ["noise_arrivals", "noise_density", "noise_levels"]
+
+BAR = "#C9DCEA"
+LINES = ("-", (0, (5, 2)), (0, (1.2, 1.6)), (0, (6, 1.5, 1.2, 1.5)))
+COLOURS = (style.JOG, style.FLIP, style.ROLL, style.GOAL)
+# Shares below this are not shown.
+LEAST = 1e-6
+
+
+def _main(found: NoiseStatistics) -> NoisyClass:
+    if not found.classes:
+        raise AnswerError(
+            "the classes of the noisy scene", "none", "one at least", "nothing stays: nothing to draw"
+        )
+    return max(found.classes, key=lambda part: len(part.cells))
+
+
+def _plain(axes: Axes) -> None:
+    for border in ("top", "right"):
+        axes.spines[border].set_visible(False)
+    axes.tick_params(labelsize=style.SMALL)
+
+
+def noise_density(found: NoiseStatistics, thrown: Thrown | None = None) -> Figure:
+    """Draw how often the part rests where, side by side, and beside it what many throws did.
+
+    Parameters
+    ----------
+    found : NoiseStatistics
+        From `limitsets.robust.noise_statistics`.
+    thrown : Thrown, optional
+        From `limitsets.robust.sampling.throw_many`.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        One panel per side.
+    """
+    part = _main(found)
+    sides = sorted(part.sides)
+    figure, panels = style.canvas(3.5 * min(len(sides), 4) + 0.6, 3.4, 1, len(sides), sharey=True)
+    for side, axes in zip(sides, panels, strict=True):
+        (edges,) = found.grid.edges[side]
+        height = part.density[found.grid.of_side(side)]
+        if thrown is not None:
+            bins, seen = thrown.bins[side], thrown.density[side]
+            axes.stairs(
+                seen, bins, fill=True, color=BAR, label=f"{thrown.throws:.0e} throws".replace("e+0", "e")
+            )
+        axes.stairs(height, edges, color=style.INK, lw=1.0, label="transfer operator")
+        some = np.flatnonzero(height > LEAST)
+        if some.size:
+            axes.set_xlim(*_widened(float(edges[some[0]]), float(edges[some[-1] + 1])))
+        axes.axvline(found.goal[0], color=style.GOAL, lw=1.0, ls=(0, (4, 2)), label=f"x = {found.goal[0]:g}")
+        axes.set_title(
+            f"side {side}: {100 * part.sides[side]:.2f} % of the rests", loc="left", fontsize=style.TEXT
+        )
+        axes.set_xlabel(f"x [{found.unit}]", fontsize=style.SMALL)
+        axes.xaxis.set_major_locator(MaxNLocator(5))
+        _plain(axes)
+    panels[0].set_ylabel(f"share of the rests per {found.unit}", fontsize=style.SMALL)
+    style.title(figure, f"{found.scene}: where the part rests under noise")
+    style.legend(figure, panels[-1].get_legend_handles_labels()[0], 3)
+    return figure
+
+
+def _widened(lo: float, hi: float) -> tuple[float, float]:
+    return lo - 0.04 * (hi - lo), hi + 0.04 * (hi - lo)
+
+
+def noise_arrivals(found: NoiseStatistics, thrown: Thrown | None = None) -> Figure:
+    """Draw how many throws it takes from random starts to the goal: shares, and what is still under way.
+
+    Parameters
+    ----------
+    found : NoiseStatistics
+        From `limitsets.robust.noise_statistics`.
+    thrown : Thrown, optional
+        From `limitsets.robust.sampling.throw_many`.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        Left the share that arrives with each throw, right the share that has not arrived.
+    """
+    fed = found.feeding
+    last = (fed.quantile(0.999) or fed.arrived.size - 1) + 2
+    number = np.arange(min(last, fed.arrived.size))
+    figure, (left, right) = style.canvas(9.6, 3.7, 1, 2)
+    if thrown is not None and thrown.arrived.size:
+        counted = np.bincount(thrown.arrived, minlength=number.size) / thrown.parts
+        left.bar(number, counted[: number.size], width=1.0, color=BAR, label=f"{thrown.parts} parts thrown")
+        still = 1.0 - np.cumsum(counted)
+        right.step(number, still[: number.size], where="post", color="#7FA9C4", lw=3.0)
+    left.stairs(
+        fed.arrived[: number.size],
+        np.arange(number.size + 1) - 0.5,
+        color=style.INK,
+        lw=1.0,
+        label="transfer operator",
+    )
+    right.step(number, fed.survivors[: number.size], where="post", color=style.INK, lw=1.0)
+    for axes in (left, right):
+        _marks(axes, found)
+        axes.set_xlabel("throws", fontsize=style.SMALL)
+        _plain(axes)
+    left.set_ylabel("share that arrives with this throw", fontsize=style.SMALL)
+    right.set_ylabel("share that has not yet arrived", fontsize=style.SMALL)
+    right.set_yscale("log")
+    right.set_ylim(5e-4, 1.2)
+    x, side = found.goal
+    words = f"throws from random starts to x > {x:g} {found.unit} on side {side}"
+    style.title(figure, f"{found.scene}: {words}")
+    style.legend(figure, left.get_legend_handles_labels()[0], 4)
+    return figure
+
+
+def _marks(axes: Axes, found: NoiseStatistics) -> None:
+    mean, most = found.feeding.mean, found.feeding.quantile(0.95)
+    if mean is not None:
+        axes.axvline(mean, color=style.FLIP, lw=1.2, label=f"mean {mean:.1f}")
+    if most is not None:
+        axes.axvline(most, color=style.GOAL, lw=1.2, ls=(0, (4, 2)), label=f"95 % after {most}")
+
+
+def noise_levels(
+    levels: Levels, at: Mapping[str, float], shown: Mapping[str, Sequence[str]] | None = None
+) -> Figure:
+    """Draw numbers against the level of the noise.
+
+    Parameters
+    ----------
+    levels : Levels
+        From `limitsets.robust.noise_levels`.
+    at : mapping of str to float
+        One entry: what the axis shows, in words, and its value at a factor of 1: ``{"speed noise [%]": 0.5}``.
+    shown : mapping of str to sequence of str, optional
+        Panels: title, and the numbers in it.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        A panel each for what is wrongly oriented, the throws to the goal and what leaves; shares below 1e-6 are left
+        out.
+    """
+    (word, unit), *_ = at.items()
+    panels_of = shown or {
+        "wrong side beyond x": ("wrong beyond", "first beyond is wrong"),
+        "throws to the goal": ("mean throws", "95 % throws"),
+        "leaves": ("escape", "lost"),
+    }
+    figure, panels = style.canvas(3.6 * len(panels_of) + 0.4, 3.6, 1, len(panels_of))
+    for axes, (title, names) in zip(panels, panels_of.items(), strict=True):
+        for name, colour, line in zip(names, COLOURS, LINES, strict=False):
+            values: NDArray[np.float64] = levels.numbers.get(name, np.full(levels.factors.size, np.nan))
+            some = values > LEAST
+            label = "escape per throw" if name == "escape" else name
+            if some.any():
+                x = levels.factors * unit
+                axes.plot(
+                    x[some], values[some], color=colour, ls=line, marker="o", ms=3.5, lw=1.4, label=label
+                )
+        axes.set_title(title, loc="left", fontsize=style.TEXT)
+        axes.set_xlabel(word, fontsize=style.SMALL)
+        axes.set_xlim(*_widened(0.0, float(levels.factors.max()) * unit))
+        if not axes.lines:
+            axes.text(0.5, 0.5, "none", transform=axes.transAxes, ha="center", color=style.FAINT)
+            axes.set_yticks([])
+        elif "throws" in title:
+            axes.set_ylim(bottom=0.0)
+        else:
+            axes.set_yscale("log")
+        if axes.lines:
+            axes.legend(fontsize=style.SMALL, frameon=False)
+        _plain(axes)
+    return figure
