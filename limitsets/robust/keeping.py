@@ -82,7 +82,8 @@ class Kept:
         assert self.folder is not None
         try:
             record = json.loads((self.folder / RECORD).read_text(encoding="utf-8"))
-            return {word: record[word] for word in ("digests", "margins", "curve")}
+            found = {"digests": dict(record["digests"]), "margins": list(record["margins"])}
+            return found | {"curve": record["curve"]}
         except (OSError, ValueError, KeyError, TypeError):
             return {}
 
