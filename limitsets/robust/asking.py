@@ -114,18 +114,27 @@ class Question:
             for step in range(finest + 1):
                 if step:
                     found = self._finer(found, box, step)
-                answers = tuple(prove(found, self.scene, goal) for goal in self.goals)
-                missing = [answer for answer in answers if answer.verdict != "proved"]
-                if not missing:
+                answers = self._each(found)
+                missing = answers[-1]
+                if missing.verdict == "proved":
                     return Asked("proved", "", found, answers, piece=piece, noise=noise)
-                if any(answer.final for answer in missing) or not (found.component >= 0).any():
+                if missing.final or not (found.component >= 0).any():
                     break
         except AnswerError as error:
             return Asked("impossible", _said(error), piece=piece, noise=noise)
-        reason = missing[0].reason
+        reason = missing.reason
         if not (found.component >= 0).any():
             reason = f"{reason}: from some of them, parts may leave the arm"
         return Asked("undecided", reason, found, piece=piece, noise=noise)
+
+    def _each(self, found: Attraction) -> tuple[Answer, ...]:
+        """Prove one goal after the other, up to the first that is not: it comes last then."""
+        answers: list[Answer] = []
+        for goal in self.goals:
+            answers.append(prove(found, self.scene, goal))
+            if answers[-1].verdict != "proved":
+                break
+        return tuple(answers)
 
     def cells(self, piece: Piece | None, step: int) -> Attraction:
         """Return the cells of one refinement, whatever they prove."""

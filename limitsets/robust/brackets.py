@@ -138,21 +138,22 @@ def _grow(
     """Prove from the scene as it is outward, in pieces; how far, the pieces, and what stops it."""
     low, pieces, reason = Fraction(0), list[Asked](), ""
     share = Fraction(2, 5)
-    step = share * wall
+    step, finest = share * wall, 1
     for _ in range(TRIALS):
         if low >= target:
             return low, pieces, ""
         step = step if measure.widest is None else min(step, measure.widest)
         high = min(target, short(low + step, up=True))
-        found = question.prove(measure.piece(measure.between(sign * low, sign * high)))
+        # finer cells only where narrower pieces with few of them do not do: failing with many is what takes time
+        found = question.prove(measure.piece(measure.between(sign * low, sign * high)), finest=finest)
         if found.verdict == "proved":
             pieces.append(found)
             low, share = high, min(share * Fraction(9, 8), Fraction(3))
-            step = share * (wall - high)
+            step, finest = share * (wall - high), max(1, finest - 1)
             tell(float(low / target))
         else:
             reason, share = found.reason, share * Fraction(2, 3)
-            step = share * (wall - low)
+            step, finest = share * (wall - low), min(3, finest + 1)
             if step < min((wall - target) / 8, target / 1000):
                 break
     return low, pieces, reason
@@ -167,9 +168,9 @@ def bracket_fixed(question: Question, measure: Measure, width: Fraction, tell: T
     found = Bracket()
     bad = [way for way in ways.values() if way.bad is not None]
     if bad:
-        first = min(bad, key=lambda way: way.bad or 0)
-        found.refuted, found.against = first.bad, first.against
-        found.sign = next(sign for sign, way in ways.items() if way is first)
+        nearest = min(bad, key=lambda way: way.bad or 0)
+        found.refuted, found.against = nearest.bad, nearest.against
+        found.sign = next(sign for sign, way in ways.items() if way is nearest)
     ends = [way for way in ways.values() if way.end is not None]
     limits = [way.good for way in ends] if found.refuted is None else []
     goal = min(limits, default=min(way.good for way in ways.values()))

@@ -13,6 +13,8 @@ have length zero.  With noise the same holds of every sequence of throws, each o
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -27,6 +29,9 @@ Mask = NDArray[np.bool_]
 
 # Throws after which it is given up.
 MOST = 4000
+
+# After so many, and each time twice as many, it is given up where at the pace since half of them it would not do.
+PACE = 512
 
 # It is given up, too, where a bound has grown so large.
 HOPELESS = 1e100
@@ -67,6 +72,7 @@ def thinned(found: Attraction, cells: Mask, wanted: Mask) -> tuple[int, str]:
     factor = (1.0 + SLACK) / steep[source]
     bound = np.where(left, 1.0, 0.0)
     goes = np.unique(first)
+    check, half = PACE, math.inf
     for throws in range(1, MOST + 1):
         if not source.size:
             return throws, ""
@@ -74,8 +80,17 @@ def thinned(found: Attraction, cells: Mask, wanted: Mask) -> tuple[int, str]:
         bound = np.bincount(count, most, minlength=left.size)
         if bound.max() < 1.0:
             return throws, ""
-        if bound.max() > HOPELESS:
+        largest = float(bound.max())
+        if largest > HOPELESS:
             break
+        if 2 * throws == check:
+            half = largest
+        if throws == check:
+            pace = math.log(half / largest) / (check / 2)
+            if math.log(largest) > pace * (MOST - throws):
+                break
+            check *= 2
+            half = largest
     return 0, f"after {throws} throws the orbits that have not arrived are not proved to thin out"
 
 
