@@ -299,6 +299,8 @@ def _curve(found: Robustness, figures: Mapping[str, str]) -> str:
         f"Asked of each X, on the limit set: beyond it the part lies on side {curve.side} only, and almost every orbit "
         f"comes to rest there. {_best(curve)}"
     )
+    rest = found.left_out.get("rest of the curve")
+    text += f" ({rest[0].upper()}{rest[1:]}.)" if rest else ""
     return "\n\n".join([head, text, table(heads, rows)]) + figure_line(figures, "curve", "Margins against X")
 
 

@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING
 
 from limitsets.errors import AnswerError
 from limitsets.goals import Goal, OrientedBeyond, Reaches
-from limitsets.robust.beyond import MarginsBeyond, margins_beyond
+from limitsets.robust.beyond import MarginsBeyond
 from limitsets.robust.chance import noise_of, still
+from limitsets.robust.against_x import curve
 from limitsets.robust.deviations import Measure, measure, measures
 from limitsets.robust.entries import Entry, nominal_of
 from limitsets.robust.joint import Tolerance, joint_margin
@@ -19,7 +20,7 @@ from limitsets.robust.keeping import Kept
 from limitsets.robust.margins import GoalLike, Margin, asked_of, goals_of, margin
 from limitsets.robust.scattering import Scattering
 from limitsets.robust.statistics import CELLS, Levels, NoiseStatistics, noise_levels, noise_statistics
-from limitsets.robust.summary import PARTS, Robustness, curve_read, curve_table
+from limitsets.robust.summary import PARTS, Robustness
 from limitsets.scene import Scene, load
 
 if TYPE_CHECKING:
@@ -29,9 +30,6 @@ __all__ = ["robustness"]
 
 # Levels of the noise that the figure shows.
 FACTORS = (0.0, 0.5, 1.0, 1.5, 2.0)
-
-# Places of the curve against X, how close its brackets are, and seconds for the proof of each joint margin on it.
-PLACES, COARSE, SECONDS = 7, 0.1, 15.0
 
 NO_TOLERANCE = (
     "the scene has no [tolerance]; give it one, a deviation for each quantity that deviates together with others: "
@@ -109,31 +107,17 @@ class _Gathering:
     def curve(self, side: int) -> MarginsBeyond | None:
         """Find margins against X; None where the part gets farther out on another side."""
         self.tell("margins against X")
-        known, asked = self.kept.curve, self.scene
-        self.done += 1
-        if known is not None:
-            self.kept.again += 1
-            return curve_read(known, asked)
-        names = ("joint",) if self.tolerance else ("throw.speed",)
-
-        def told(step: str, number: int, of: int) -> None:
-            self.progress(step, self.done - 1, self.steps)
-
         try:
-            found = margins_beyond(
-                asked,
-                side,
-                names,
-                places=PLACES,
-                tolerance=self.tolerance,
-                width=COARSE,
-                seconds=SECONDS,
-                progress=told,
+            found, left = curve(
+                self.scene, side, self.tolerance, self.kept.curve, tell=self.tell, keep=self.kept.add_curve
             )
         except AnswerError as error:
-            self.left_out["curve"] = str(error)
-            return None
-        self.kept.add_curve(curve_table(found))
+            self.left_out["curve"], found, left = str(error), None, 0
+        if left:
+            self.left_out["rest of the curve"] = (
+                f"there was no time for {left} more places; the same command goes on with them"
+            )
+        self.done += 1
         return found
 
     def audit(self) -> Audit:
@@ -313,7 +297,7 @@ def _filled(
     sheet.done += 1
     entries = [] if "margins" in missing else sheet.singles(width, verdict)
     entries += [] if "joint" in missing else [sheet.joint(width)]
-    curve = None if "curve" in missing or place is None else sheet.curve(place[1])
+    against = None if "curve" in missing or place is None else sheet.curve(place[1])
     found, levels = None, None
     if "noise" not in missing and noise is not None and place is not None:
         found, levels = sheet.chance(given, noise, place, cells)
@@ -324,7 +308,7 @@ def _filled(
         verdict,
         tuple(entries),
         sheet.tolerance,
-        curve,
+        against,
         found,
         levels,
         law,

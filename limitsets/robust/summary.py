@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from limitsets.goals import Goal
 from limitsets.robust.beyond import MarginsBeyond
+from limitsets.robust.against_x import curve_table
 from limitsets.robust.entries import Entry, percent_of
 from limitsets.robust.margins import Margin
 from limitsets.robust.statistics import Levels, NoiseStatistics
@@ -19,7 +17,7 @@ from limitsets.scene import Scene
 if TYPE_CHECKING:
     from limitsets.auditing import Audit
 
-__all__ = ["PARTS", "Robustness", "curve_read", "curve_table"]
+__all__ = ["PARTS", "Robustness"]
 
 PARTS = ("margins", "joint", "curve", "noise", "audit")
 """What an answer is put together from."""
@@ -143,30 +141,3 @@ class Robustness:
             "width": self.width,
             "seconds": self.seconds,
         }
-
-
-def curve_table(found: MarginsBeyond) -> dict[str, Any]:
-    """Give margins against X as a plain table; null where nothing is refuted."""
-    return {
-        "side": found.side,
-        "x": found.x.tolist(),
-        "quantities": list(found.names),
-        "units": list(found.units),
-        "proved": found.proved.tolist(),
-        "refuted": [[x if math.isfinite(x) else None for x in row] for row in found.refuted.tolist()],
-    }
-
-
-def curve_read(table: Mapping[str, Any], scene: Scene) -> MarginsBeyond:
-    """Read what `curve_table` wrote, without the proofs."""
-    refuted = [[math.nan if x is None else x for x in row] for row in table["refuted"]]
-    return MarginsBeyond(
-        scene,
-        table["side"],
-        np.array(table["x"]),
-        tuple(table["quantities"]),
-        tuple(table["units"]),
-        np.array(table["proved"]),
-        np.array(refuted, dtype=np.float64),
-        (),
-    )
