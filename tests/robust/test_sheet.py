@@ -35,10 +35,8 @@ def sheet(folder):
         "throw.speed",
         reading="fixed",
         tolerance={"throw.speed": "2 %"},
-        scatter=scattering_from(ls.load("paper-designed"), {"throw.speed": "0.5 %"}, "bounded"),
         width=0.1,
-        cells=64,
-        leave_out=["curve", "audit"],
+        leave_out=["curve", "noise", "audit"],
         folder=folder,
     )
 
@@ -76,19 +74,11 @@ def test_the_orbit_of_the_sheet_thrown_again_at_50_digits_violates_the_goal(shee
     assert side != 2
 
 
-def test_shares_of_the_noise_add_up(sheet):
-    """Every start is attracted, and the limit set goes beyond 20 in: every one is fed."""
-    numbers, levels = sheet.noise.numbers, sheet.levels
-    assert math.fsum(numbers[f"time on side {k}"] for k in range(3)) == pytest.approx(1.0, abs=1e-9)
-    assert numbers["fed"] == pytest.approx(1.0, abs=1e-6)
-    assert levels.factors.tolist() == [0.0, 0.5, 1.0, 1.5, 2.0]
-    assert levels.numbers["wrong beyond"][4] > levels.numbers["wrong beyond"][0]  # more noise, more mistakes
-
-
 def test_json_has_the_fixed_words_and_reads_back(sheet, folder):
     record = json.loads(json.dumps(sheet.to_json(), allow_nan=False))
     assert {"scene", "margins", "curve", "noise"} <= record.keys()
-    assert record["curve"] is None
+    assert record["curve"] is record["noise"] is None
+    assert record["left_out"].keys() == {"curve", "noise", "audit"}
     assert ls.load(record["scene"]) == ls.load("paper-designed")
     for row in record["margins"]:
         assert {
@@ -180,8 +170,9 @@ def test_a_spoilt_record_counts_as_none(tmp_path, text):
 
 
 def test_a_goal_that_fails_as_it_is_leaves_no_room():
-    """The limit set of paper-initial comes to rest beyond 20 in on side 1 too (docs/model.md)."""
     scene = with_tables("paper-initial", goal={"oriented_beyond": {"x": "20 in", "side": 2}})
+    path = ls.orbit(scene.map, 15.0, 2, 100_000)
+    assert ((path.x > 20.0) & (path.side != 2))[2000:].any()
     found = ls.robustness(scene, "throw.speed", "landing.x", leave_out=["curve", "audit"])
     assert found.verdict == "refuted"
     assert {(entry.quantity, entry.reading) for entry in found.entries} == {
