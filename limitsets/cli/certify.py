@@ -64,6 +64,7 @@ def certify(
 
 
 def deviations(option: str, words: list[str] | None) -> dict[str, str]:
+    """Read the words of a repeatable option, QUANTITY=DEVIATION each."""
     found: dict[str, str] = {}
     for word in words or []:
         name, sign, text = word.partition("=")

@@ -29,6 +29,8 @@ COLOURS = (style.JOG, style.FLIP, style.GOAL, style.ROLL, "#8A6D00", style.INK)
 FORBIDDEN: dict[str, Any] = {"facecolor": "#F6E3D9", "edgecolor": "#C9A28C", "hatch": "////", "lw": 0.0}
 WANTED: dict[str, Any] = {"facecolor": "#E0F0E9", "edgecolor": "#9BC4B2", "hatch": "...", "lw": 0.0}
 
+RING: dict[str, Any] = {"ls": "", "marker": "o", "ms": 14, "mfc": "none", "mec": style.FLIP, "mew": 1.6}
+
 
 def counterexample(
     scene: Scene,
@@ -84,21 +86,14 @@ def counterexample(
     axes.set_ylim(low - 0.12 * span, high + 0.22 * span)
     areas = _areas(axes, violated, scene.unit)
     if isinstance(violated, OrientedBeyond):
-        axes.plot(throws[-1], x[-1], "o", ms=15, mfc="none", mec=style.FLIP, mew=1.6, zorder=4)
-        axes.annotate(
-            f"on side {sides[-1]}, {x[-1] - violated.x:.2g} {scene.unit} beyond",
-            (throws[-1], x[-1]),
-            xytext=(0, -26),
-            textcoords="offset points",
-            ha="right",
-            fontsize=style.SMALL,
-            bbox={"facecolor": "white", "edgecolor": "none", "pad": 1.5},
-        )
+        axes.plot(throws[-1], x[-1], zorder=4, **RING)
+        label = f"on side {sides[-1]}, {x[-1] - violated.x:.2g} {scene.unit} beyond"
+        areas.append(Line2D([], [], label=label, **RING))
     axes.set_xlabel("throws")
     axes.set_ylabel(f"x at rest [{scene.unit}]")
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     style.title(figure, f"{scene.name}: an orbit that violates the goal{f', {name}' if name else ''}")
-    style.legend(figure, [*_sides(sides), *areas], 5)
+    style.legend(figure, [*_sides(sides), *areas], 3)
     return figure
 
 

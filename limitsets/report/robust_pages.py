@@ -144,7 +144,11 @@ def _margins(found: Robustness, figures: Mapping[str, str]) -> str:
         "How far each quantity may be off to either side, all others being as the scene says:",
         table(HEADS, lines_of(found)),
     ]
-    notes = [f"* {_named(entry)}: {_why(entry)}" for entry in found.singles if entry.holds and entry.reason]
+    notes = [
+        f"* {_named(entry)}: {_why(entry)}"
+        for entry in found.singles
+        if entry.holds and entry.reason and not entry.closed
+    ]
     if notes:
         lines += ["Where the two columns are apart, or one is empty:", "\n".join(notes)]
     return "\n\n".join(lines) + figure_line(figures, "margins", "How far each quantity may be off")
@@ -179,15 +183,9 @@ def _limits(found: Robustness, figures: Mapping[str, str]) -> str:
             f"{last['x'] - goal.x:.2g} {found.scene.unit} beyond {goal.x:g} {found.scene.unit}"
         )
     lines = ["## What limits it", f"{begin}{how}.", table(heads, rows)]
-    others = [
-        f"{_named(entry)}"
-        for entry in found.entries
-        if entry is not first and entry.holds and entry.counterexample
-    ]
-    if others:
-        lines.append(
-            f"The orbits at the upper ends of the others ({', '.join(others)}) are in robustness.json."
-        )
+    others = sum(entry is not first and bool(entry.counterexample) for entry in found.entries)
+    if others and first.holds:
+        lines.append(f"The orbits at the upper ends of the {others} other margins are in robustness.json.")
     return "\n\n".join(lines) + figure_line(figures, "counterexample", "The orbit, throw by throw")
 
 
@@ -261,10 +259,10 @@ def _joint(found: Robustness, figures: Mapping[str, str]) -> str:
         rows.append([name, how, text, bound(joint.proved * size, unit), bound(high, unit, up=True)])
     lines = [
         head,
-        f"{_met(joint)} Every quantity may be anywhere within its own deviation, whatever the others are:",
+        "Every quantity may be anywhere within its own deviation, whatever the others are:",
         table(["quantity", "deviates", "tolerance", "proved safe up to", "fails somewhere within"], rows),
     ]
-    if joint.reason:
+    if joint.reason and not joint.closed:
         lines.append(f"The two are farther apart than asked: {joint.reason}.")
     return "\n\n".join(lines) + figure_line(figures, "joint", "The box of all quantities together")
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from limitsets.report.background import figure_line
 from limitsets.report.tables import table
+from limitsets.robust.laws import Gaussian, Law, Uniform
 
 if TYPE_CHECKING:
     from limitsets.robust.summary import Robustness
@@ -30,7 +31,7 @@ NUMBERS = {
 MOVING = ("wrong beyond", "mean throws", "95 % throws", "escape")
 
 # Less than this is what rounding leaves.
-NOTHING = 1e-12
+NOTHING = 1e-9
 
 
 def _value(value: float | None, kind: str) -> str:
@@ -39,10 +40,8 @@ def _value(value: float | None, kind: str) -> str:
     if kind == "throws":
         return f"{value:.1f}"
     if value < NOTHING:
-        return "0"
-    if kind == "rate" or value < 1e-4:
-        return f"{value:.1e}"
-    return f"{100.0 * value:.3g} %" if value < 0.9995 else f"{100.0 * value:.6g} %"
+        return "0" if value == 0.0 else f"below {NOTHING:g}"
+    return f"{value:.1e}" if kind == "rate" else f"{100.0 * value:.4g} %"
 
 
 def _change(value: float, kind: str) -> str:
@@ -52,7 +51,29 @@ def _change(value: float, kind: str) -> str:
         return f"{value:+.2f}"
     if abs(value) < NOTHING:
         return "0"
-    return f"{value:+.1e}" if kind == "rate" or abs(value) < 1e-4 else f"{100.0 * value:+.2g} %"
+    return f"{value:+.1e}" if kind == "rate" else f"{100.0 * value:+.2g} %"
+
+
+def _law(name: str, law: Law, unit: str) -> str:
+    """Say a law as people give it.
+
+    Examples
+    --------
+    >>> from limitsets.robust import Gaussian
+    >>> _law("speed", Gaussian(0.005), "in")
+    'speed: normal, standard deviation 0.5 %'
+    """
+
+    def size(value: float) -> str:
+        if name == "speed":
+            return f"{100.0 * value:.4g} %"
+        return f"{math.degrees(value):.4g} deg" if name == "tilt" else f"{value:.4g} {unit}"
+
+    if isinstance(law, Gaussian):
+        return f"{name}: normal, standard deviation {size(law.sigma)}"
+    if isinstance(law, Uniform):
+        return f"{name}: anything within {size(law.bound)}, equally likely"
+    return f"{name}: {law!r}"
 
 
 def noise_of(found: Robustness, figures: Mapping[str, str]) -> str:
@@ -67,12 +88,12 @@ def noise_of(found: Robustness, figures: Mapping[str, str]) -> str:
         for words, name, kind in [*sides, *([words, name, kind] for name, (words, kind) in NUMBERS.items())]
         if name in noise.numbers
     ]
-    laws = ", ".join(f"{name}: {words}" for name, words in noise.scatter.words().items())
+    laws = "; ".join(_law(name, getattr(noise.scatter, name), noise.unit) for name in noise.scatter.given())
     lines = [
         head,
         (
-            f"Every throw scatters on its own ({laws}; {found.law}). Fed is a part at rest beyond X = {x:g} "
-            f"{noise.unit} on side {side}. Random starts lie evenly on all sides from "
+            f"Every throw scatters on its own. {laws[0].upper()}{laws[1:]} ({found.law}). Fed is a part at rest "
+            f"beyond X = {x:g} {noise.unit} on side {side}. Random starts lie evenly on all sides from "
             f"{', '.join(f'{a:.4g}' for a in noise.starts)} {noise.unit} up to X."
         ),
         table(["", "", "error, about"], rows),
@@ -165,6 +186,7 @@ def checked_again(found: Robustness) -> str:
             "There are no certificates: nothing rechecks maps with effects, and none is written without a folder."
         )
     lines.append(
-        f"The page is made by `limitsets robustness {_scene(found)}`; margins in this folder are found again."
+        f"The page is made by `limitsets robustness {_scene(found)}` and its options; with the same ones, margins "
+        "that are in this folder are found again and not computed anew."
     )
     return "\n\n".join(lines)

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING
 
 from limitsets.errors import AnswerError
 from limitsets.goals import Goal, OrientedBeyond, Reaches
+from limitsets.robust.against_x import curve
 from limitsets.robust.beyond import MarginsBeyond
 from limitsets.robust.chance import noise_of, still
-from limitsets.robust.against_x import curve
 from limitsets.robust.deviations import Measure, measure, measures
 from limitsets.robust.entries import Entry, nominal_of
 from limitsets.robust.joint import Tolerance, joint_margin

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from limitsets.goals import Goal
-from limitsets.robust.beyond import MarginsBeyond
 from limitsets.robust.against_x import curve_table
+from limitsets.robust.beyond import MarginsBeyond
 from limitsets.robust.entries import Entry, percent_of
 from limitsets.robust.margins import Margin
 from limitsets.robust.statistics import Levels, NoiseStatistics

@@ -31,7 +31,8 @@ def test_states_and_the_forbidden_place():
     (area,) = axes.patches
     assert area.get_gid() == "forbidden"
     assert area.get_y() == 20.0
-    assert [text.get_text() for text in axes.texts] == ["on side 0, 0.25 in beyond"]
+    words = [text.get_text() for text in axes.figure.legends[0].get_texts()]
+    assert words[-1] == "on side 0, 0.25 in beyond"
 
 
 def test_what_is_to_be_reached_is_shown_even_far_off():
