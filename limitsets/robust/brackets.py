@@ -23,6 +23,9 @@ Tell = Callable[[float], None]
 # Steps outward at most, each `FACTOR` times as far; halvings of a bracket; trials of pieces in one direction.
 STEPS, FACTOR, HALVINGS, TRIALS = 24, 3, 40, 200
 
+# From this share of the way to where the goal breaks, pieces are tried with the finest cells.
+NEAR = Fraction(3, 4)
+
 # What is smaller than this share of a small deviation counts as none.
 NONE = Fraction(1, 1000)
 
@@ -138,22 +141,23 @@ def _grow(
     """Prove from the scene as it is outward, in pieces; how far, the pieces, and what stops it."""
     low, pieces, reason = Fraction(0), list[Asked](), ""
     share = Fraction(2, 5)
-    step, finest = share * wall, 1
+    step = share * wall
     for _ in range(TRIALS):
         if low >= target:
             return low, pieces, ""
         step = step if measure.widest is None else min(step, measure.widest)
         high = min(target, short(low + step, up=True))
-        # finer cells only where narrower pieces with few of them do not do: failing with many is what takes time
+        # far from the wall narrower pieces do as well as finer cells, and to fail with these is what takes time
+        finest = 3 if low > NEAR * wall else 1
         found = question.prove(measure.piece(measure.between(sign * low, sign * high)), finest=finest)
         if found.verdict == "proved":
             pieces.append(found)
             low, share = high, min(share * Fraction(9, 8), Fraction(3))
-            step, finest = share * (wall - high), max(1, finest - 1)
+            step = share * (wall - high)
             tell(float(low / target))
         else:
             reason, share = found.reason, share * Fraction(2, 3)
-            step, finest = share * (wall - low), min(3, finest + 1)
+            step = share * (wall - low)
             if step < min((wall - target) / 8, target / 1000):
                 break
     return low, pieces, reason

@@ -178,6 +178,8 @@ class _Cutting:
         """Guess what is to spare on a part, and where to cut it."""
         low, high = (np.array([float(x) for x in end]) * float(self.factor) for end in (part.low, part.high))
         half, effects = 0.5 * (high - low), self.effects
+        if not half.size:
+            return _Guess(1.0, 1.0, 0, Fraction(0))
         if not effects.spare.size:
             k = int(np.argmax(half))
             return _Guess(1.0, 1.0, k, (part.low[k] + part.high[k]) / 2)

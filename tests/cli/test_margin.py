@@ -23,7 +23,9 @@ def run(capfd, *words):
 
 
 def test_a_table_in_units_that_people_use(capfd):
-    code, out, _ = run(capfd, "margin", "paper-designed", "throw.speed", "arm.surface_height", "--width", "0.1")
+    code, out, _ = run(
+        capfd, "margin", "paper-designed", "throw.speed", "arm.surface_height", "--width", "0.1"
+    )
     assert code == 0
     assert "beyond x = 20 in only side 2" in out
     rows = {line.split()[0]: line for line in out.splitlines() if line.split()[:1]}
@@ -39,7 +41,15 @@ def test_json_and_files_that_recheck_accepts(capfd):
     code, out, _ = run(capfd, *words)
     assert code == 0
     (record,) = json.loads(out)
-    assert set(record) >= {"quantity", "reading", "goal", "proved", "refuted", "counterexample", "certificate"}
+    assert set(record) >= {
+        "quantity",
+        "reading",
+        "goal",
+        "proved",
+        "refuted",
+        "counterexample",
+        "certificate",
+    }
     assert (record["quantity"], record["reading"], record["unit"]) == ("landing.x", "per-throw", "in")
     assert record["goal"] == {"oriented_beyond": {"x": "20.0 in", "side": 2}, "from_anywhere": False}
     assert record["counterexample"][-1]["side"] != 2

@@ -6,9 +6,9 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 import limitsets as ls
 from limitsets.errors import LimitsetsError
+from limitsets.goals import OrientedBeyond
 from limitsets.robust.beyond import margins_beyond
 from limitsets.robust.joint import joint_margin
-from limitsets.goals import OrientedBeyond
 
 
 def named(axes, gid):

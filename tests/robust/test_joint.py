@@ -39,7 +39,7 @@ def highest_off(factor, signs):
 
 @pytest.fixture(scope="module")
 def found():
-    return joint_margin(scene(TOLERANCE), GOALS, width=0.12)
+    return joint_margin(scene(TOLERANCE), GOALS, width=0.35)
 
 
 def test_the_factor_is_that_of_the_worst_corner(found):
@@ -65,10 +65,10 @@ def test_its_certificates_are_confirmed_and_so_is_the_orbit_that_refutes(found, 
 
 
 def test_the_landing_place_differs_at_every_throw():
-    one = joint_margin(scene(TOLERANCE | {"landing.x": "0.02 in"}), GOALS[:1], width=0.3)
-    without = joint_margin(scene(TOLERANCE), GOALS[:1], width=0.3)
+    one = joint_margin(scene({"throw.speed": "1 %", "landing.x": "0.05 in"}), GOALS[:1], width=0.1)
     assert one.noise.keys() == {"landing.x"}
-    assert one.refuted < without.refuted
+    assert one.closed
+    assert one.refuted < 0.733
     alone = joint_margin(scene({"landing.x": "0.02 in"}), GOALS[:1])
     (landing,) = ls.margin("paper-designed", "landing.x")
     assert 0.02 * alone.proved < landing.refuted

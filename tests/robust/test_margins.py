@@ -103,9 +103,7 @@ def test_lengths_are_bracketed(name):
     (found,) = ls.margin("paper-designed", name, width=0.02)
     assert found.unit == "in"
     assert found.closed
-    least = min(
-        breaks_at(name, sign, np.array([0.97, 1.0, 1.02]) * found.refuted) for sign in (-1, 1)
-    )
+    least = min(breaks_at(name, sign, np.array([0.97, 1.0, 1.02]) * found.refuted) for sign in (-1, 1))
     assert found.proved <= least
     assert 0.97 * found.refuted < least <= 1.02 * found.refuted
 
@@ -114,7 +112,10 @@ def test_the_landing_place_agrees_with_the_throw_at_50_digits():
     nominal = reference.paper("designed")
     sharp = float(
         mp.findroot(
-            lambda e: highest_off(nominal, nominal, e) - X, (mpf("0.05"), mpf("0.2")), solver="anderson", tol=1e-9
+            lambda e: highest_off(nominal, nominal, e) - X,
+            (mpf("0.05"), mpf("0.2")),
+            solver="anderson",
+            tol=1e-9,
         )
     )
     (found,) = ls.margin("paper-designed", "landing.x")
@@ -131,7 +132,7 @@ def test_a_deviation_that_never_breaks_the_goal_says_what_ends_it():
     scene = ls.load("paper-designed")
     scene.with_values({"part.sides[2]": 6.75 * (1 - found.proved / 100)})
     with pytest.raises(LimitsetsError):
-        scene.with_values({"part.sides[2]": 6.75 * (1 - 1.06 * found.proved / 100)})
+        scene.with_values({"part.sides[2]": 6.75 * (1 - 1.1 * found.proved / 100)})
     (found,) = ls.margin("paper-designed", "arm.length", width=0.05)
     assert found.refuted is None
     assert "may leave the arm" in found.reason
@@ -143,10 +144,10 @@ def test_a_deviation_that_never_breaks_the_goal_says_what_ends_it():
 
 
 def test_several_goals_hold_together():
-    """X = 23 is reached by the limit set's 23.3832 with little to spare, which a little speed takes away."""
-    goals = [OrientedBeyond(23.0, 2), Reaches(23.0, 2)]
-    (both,) = ls.margin("paper-designed", "throw.speed", goal=goals, width=0.1)
-    (one,) = ls.margin("paper-designed", "throw.speed", goal=goals[0], width=0.1)
+    """X = 22.5 is reached by the limit set's 23.3832 with less to spare than it is beyond the threshold of 19.753."""
+    goals = [OrientedBeyond(22.5, 2), Reaches(22.5, 2)]
+    (both,) = ls.margin("paper-designed", "throw.speed", goal=goals, width=0.2)
+    (one,) = ls.margin("paper-designed", "throw.speed", goal=goals[0], width=0.2)
     assert both.refuted < one.proved
     slow = ls.load("paper-designed")
     for share, reached in ((both.proved, True), (both.refuted, False)):
@@ -156,7 +157,7 @@ def test_several_goals_hold_together():
             path = ls.orbit(slow.with_values({"throw.kappa": kappa}).map, 15.0, 2, 400_000)
             x = np.asarray(path.x)[1000:][np.asarray(path.side)[1000:] == 2]
             tops.append(x.max())
-        assert (min(tops) >= 23.0) == reached
+        assert (min(tops) >= 22.5) == reached
 
 
 def below_20_off_side_2(lo, hi, side):
@@ -175,7 +176,9 @@ def test_a_function_of_the_callers_is_a_goal(tmp_path, reading):
 
 
 def test_a_plain_function_is_taken_and_a_wrong_one_refused():
-    (found,) = ls.margin("paper-designed", "arm.surface_height", goal=lambda lo, hi, side: hi < 24.0, width=0.5)
+    (found,) = ls.margin(
+        "paper-designed", "arm.surface_height", goal=lambda lo, hi, side: hi < 24.0, width=0.5
+    )
     assert found.proved > 0
     with pytest.raises(LimitsetsError, match="returns"):
         ls.margin("paper-designed", "throw.speed", goal=lambda lo, hi, side: 1.0)
@@ -234,7 +237,7 @@ def test_every_quantity_of_a_scene_is_measured():
     ("quantity", "options", "words"),
     [
         ("throw.sped", {}, "throw.speed"),
-        ("part.sides[3]", {}, "a quantity"),
+        ("part.sides[3]", {}, "one that the scene gives"),
         ("part.vertices[0].x", {}, "one that the scene gives"),
         ("throw.speed", {"reading": "always"}, "fixed or per-throw"),
         ("part.sides[0]", {"reading": "per-throw"}, "fixed but unknown"),
