@@ -45,7 +45,7 @@ class Sensitivity:
     slope : float
         Derivative with respect to the logarithm of the level: about 100 times the change for 1 % more noise.
     error : float
-        How far central differences over two steps disagree.
+        How far central differences over two steps disagree, and how far those on half as many cells, added up.
     """
 
     slope: float
@@ -200,15 +200,18 @@ def errors_of(asked: Asked, noise: Scattering, numbers: dict[str, float]) -> dic
 
 
 def slopes_of(asked: Asked, noise: Scattering, name: str) -> dict[str, Sensitivity]:
-    """Take central differences over two steps, and extrapolate."""
-    wide: dict[str, float] = {}
-    narrow: dict[str, float] = {}
-    for step, slope in ((STEP, wide), (0.5 * STEP, narrow)):
-        above = solve(asked, noise.scaled(1.0 + step, name)).numbers
-        below = solve(asked, noise.scaled(1.0 - step, name)).numbers
-        slope.update({key: (above[key] - below[key]) / (2.0 * step) for key in above if key in below})
-    return {
-        key: Sensitivity((4.0 * value - wide[key]) / 3.0, abs(value - wide[key]))
-        for key, value in narrow.items()
-        if key in wide
-    }
+    """Take central differences over two steps and extrapolate; once more on half as many cells, for the error."""
+    wide = _differences(asked, noise, name, STEP)
+    narrow = _differences(asked, noise, name, 0.5 * STEP)
+    coarse = _differences(replace(asked, cells=max(asked.cells // 2, 1)), noise, name, 0.5 * STEP)
+    found = {}
+    for key, value in narrow.items():
+        unsure = abs(value - wide.get(key, math.nan)) + abs(value - coarse.get(key, math.nan))
+        found[key] = Sensitivity((4.0 * value - wide.get(key, math.nan)) / 3.0, unsure)
+    return found
+
+
+def _differences(asked: Asked, noise: Scattering, name: str, step: float) -> dict[str, float]:
+    above = solve(asked, noise.scaled(1.0 + step, name)).numbers
+    below = solve(asked, noise.scaled(1.0 - step, name)).numbers
+    return {key: (above[key] - below[key]) / (2.0 * step) for key in above if key in below}

@@ -187,7 +187,7 @@ def noise_statistics(
     offset : float, optional
         How far beyond a_i random starts begin; by default a twentieth of the arm [scene's length unit].
     sensitivity : bool
-        Compute the derivatives with respect to the noise of each quantity: four more solutions for each.
+        Compute the derivatives with respect to the noise of each quantity: six more solutions for each.
     progress : callable, optional
         Told (stage, done, all).
 
@@ -213,7 +213,7 @@ def noise_statistics(
     asked, read = asked_of(scene, goal, cells, strata, offset)
     noise = scattering_of(read) if scatter is None else scatter
     names = noise.given() if sensitivity else ()
-    stages = 3 + 4 * len(names)
+    stages = 3 + 6 * len(names)
     tell = progress or (lambda stage, done, total: None)
     tell("noise", 0, stages)
     found = solve(asked, noise)
@@ -221,7 +221,7 @@ def noise_statistics(
     errors = errors_of(asked, noise, found.numbers)
     slopes = {}
     for number, name in enumerate(names):
-        tell("noise", 3 + 4 * number, stages)
+        tell("noise", 3 + 6 * number, stages)
         slopes[name] = slopes_of(asked, noise, name)
     tell("noise", stages, stages)
     return NoiseStatistics(

@@ -32,11 +32,11 @@ NUMBERS = (
 
 
 def compared(
-    name: str, scene: Any, noise: Scattering, throws: int, seed: int
+    scene: Any, noise: Scattering, throws: int, parts: int, seed: int, *, slopes: bool = False
 ) -> tuple[dict[str, Any], Any, Any]:
     """Solve one case both ways: numbers, the statistics, the throws."""
-    found = noise_statistics(scene, noise, goal=GOAL, sensitivity=name == "noise")
-    thrown = throw_many(scene, noise, GOAL, starts_from(scene), throws=throws, seed=seed)
+    found = noise_statistics(scene, noise, goal=GOAL, sensitivity=slopes)
+    thrown = throw_many(scene, noise, GOAL, starts_from(scene), throws=throws, parts=parts, seed=seed)
     rows = {
         number: {
             "operator": found.numbers[number],
@@ -48,11 +48,11 @@ def compared(
         if number in thrown.numbers
     }
     escape = {"operator": found.numbers["escape"], "its error": found.errors["escape"]}
-    slopes = {
+    derivatives = {
         quantity: {number: table[number].slope for number in NUMBERS}
         for quantity, table in found.sensitivity.items()
     }
-    return {"numbers": rows, "escape": escape, "slopes": slopes}, found, thrown
+    return {"numbers": rows, "escape": escape, "slopes": derivatives}, found, thrown
 
 
 def table(cases: dict[str, dict[str, Any]]) -> str:
@@ -72,16 +72,18 @@ def table(cases: dict[str, dict[str, Any]]) -> str:
     return "\n".join(lines)
 
 
-def main(seed: int = 0, out: Path = HERE, throws: int = 4_000_000) -> dict[str, Any]:
+def main(
+    seed: int = 0, out: Path = HERE, throws: int = 4_000_000, parts: int = 20_000, slopes: bool = True
+) -> dict[str, Any]:
     """Run the study, write the figures into `out`, return the numbers."""
     scene = ls.load(SCENE)
     short = scene.with_values({"arm.length": SHORT})
     out.mkdir(parents=True, exist_ok=True)
     cases = {}
-    cases["no noise"], _, _ = compared("no noise", scene, Scattering(), throws, seed)
-    cases["noise"], found, thrown = compared("noise", scene, NOISE, throws, seed)
-    cases["twice the noise"], _, _ = compared("twice the noise", scene, NOISE.scaled(2.0), throws, seed)
-    cases["short arm"], _, _ = compared("short arm", short, NOISE, throws, seed)
+    cases["no noise"], _, _ = compared(scene, Scattering(), throws, parts, seed)
+    cases["noise"], found, thrown = compared(scene, NOISE, throws, parts, seed, slopes=slopes)
+    cases["twice the noise"], _, _ = compared(scene, NOISE.scaled(2.0), throws, parts, seed)
+    cases["short arm"], _, _ = compared(short, NOISE, throws, parts, seed)
     ls.plot.noise_density(found, thrown).savefig(out / "density.png", dpi=130)
     ls.plot.noise_arrivals(found, thrown).savefig(out / "arrivals.png", dpi=130)
     levels = {}
