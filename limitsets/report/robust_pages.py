@@ -268,13 +268,23 @@ def _joint(found: Robustness, figures: Mapping[str, str]) -> str:
 
 
 def _best(curve: MarginsBeyond) -> str:
-    x, size = curve.best()
+    best, size = curve.best()
     unit, name = curve.scene.unit, curve.names[0]
     if not size > 0.0:
         return "Of no X that was tried it is proved."
+    others = [
+        f"{x:.4g}"
+        for x, high in zip(curve.x.tolist(), curve.refuted[:, 0].tolist(), strict=True)
+        if x != best and not high <= size
+    ]
+    doubt = (
+        f" Whether there is more at {', '.join(others)} is not shown: those brackets reach higher."
+        if others
+        else ""
+    )
     return (
-        f"Most room is left at **X = {x:.4g} {unit}**, of the places that were tried: {name} is proved safe up to "
-        f"{bound(size, curve.units[0])} there."
+        f"Most room is proved at **X = {best:.4g} {unit}**, of the places that were tried: {name} is safe up to "
+        f"{bound(size, curve.units[0])} there.{doubt}"
     )
 
 

@@ -49,6 +49,8 @@ def bound(value: float | None, unit: str = "", *, up: bool = False) -> str:
     """
     if value is None:
         return "-"
+    if value == 0:
+        return f"0 {unit}".rstrip()
     context = Context(prec=4, rounding=ROUND_CEILING if up else ROUND_FLOOR)
     return f"{context.create_decimal(Decimal(repr(value))):f} {unit}".rstrip()
 
