@@ -7,13 +7,15 @@ digits).  A tolerance of the speed alone makes the joint factor that margin over
 import json
 import math
 
+import numpy as np
 import pytest
 from mpmath import mpf
 
 import limitsets as ls
 from limitsets.errors import LimitsetsError
 from limitsets.goals import OrientedBeyond
-from limitsets.robust import gathering
+from limitsets.robust import against_x, gathering
+from limitsets.robust.beyond import MarginsBeyond
 from limitsets.robust.chance import noise_of, scattering_from, still
 from limitsets.robust.entries import Entry, percent_of
 from limitsets.robust.keeping import Kept
@@ -245,3 +247,31 @@ def test_percents_are_of_the_value_whatever_the_units(sheet):
     assert percent_of(replace(row, nominal=0.0), 0.254) is None
     assert percent_of(replace(row, unit="%"), 0.7) == 0.7
     assert percent_of(row, None) is None
+
+
+def tent_of(scene, side, names, *, x, **_):
+    """A margin that rises to 1 at 21.5 in and falls again."""
+    proved = np.array([[1.0 - abs(x[0] - 21.5)]])
+    return MarginsBeyond(scene, side, np.array(x), tuple(names), ("%",), proved, 1.1 * proved, ())
+
+
+def test_margins_against_x_begin_in_the_middle_and_go_on_where_they_stopped(monkeypatch):
+    scene, asked, kept_so_far = ls.load("paper-designed"), [], []
+
+    def told(step, _):
+        asked.append(float(step.rsplit(" ", 1)[1]))
+
+    def ask(known, seconds):
+        return against_x.curve(scene, 2, {}, known, seconds=seconds, tell=told, keep=kept_so_far.append)
+
+    monkeypatch.setattr(against_x, "margins_beyond", tent_of)
+    first, left = ask(None, -1.0)
+    # the limit set ends at 19.753 on other sides, at 23.383 on side 2 (tests/test_paper.py)
+    assert first.x.tolist() == pytest.approx([(19.753 + 23.383) / 2], abs=0.01)
+    assert left == against_x.PLACES - 1
+    whole, left = ask(json.loads(json.dumps(kept_so_far[-1])), 100.0)
+    assert left == 0
+    assert len(asked) == against_x.PLACES  # the middle is not asked again
+    assert whole.x.tolist() == pytest.approx(np.linspace(19.753, 23.383, 9)[1:-1].tolist(), abs=0.01)
+    assert whole.proved[:, 0] == pytest.approx(1.0 - np.abs(whole.x - 21.5))
+    assert whole.best()[0] == first.x[0]
