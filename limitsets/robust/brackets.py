@@ -23,6 +23,9 @@ Tell = Callable[[float], None]
 # Steps outward at most, each `FACTOR` times as far; halvings of a bracket; trials of pieces in one direction.
 STEPS, FACTOR, HALVINGS, TRIALS = 24, 3, 40, 200
 
+# What to do about a bracket that does not close.
+NARROWER = "; it would need finer cells than are tried here: ask for a wider bracket, or another x"
+
 # From this share of the way to where the goal breaks, pieces are tried with the finest cells.
 NEAR = Fraction(3, 4)
 
@@ -199,7 +202,7 @@ def _fixed_proof(question: Question, measure: Measure, found: Bracket, goal: Fra
         far, pieces, reason = _grow(question, measure, sign, goal, wall if near else 3 * wall, tell)
         found.pieces += pieces
         if far < goal:
-            goal, found.reason = far, reason
+            goal, found.reason = far, reason + NARROWER
             if not far:
                 break
     found.proved = goal

@@ -220,7 +220,11 @@ class _Cutting:
             over = time.perf_counter() > end or len(self.proved) + len(waiting) >= MOST_PIECES
             narrow = not count or part.high[k] - part.low[k] <= NARROWEST
             if over or narrow:
-                why = "it ran out of time: give it more seconds" if over else (found.reason if found else "")
+                why = (
+                    "the box of all quantities ran out of time: give it more seconds, or ask for a wider bracket"
+                    if over
+                    else (found.reason if found else "")
+                )
                 failed.append((part.near, why))
                 continue
             for piece in part.cut(k, guess.at, number):

@@ -46,7 +46,7 @@ def first_flip(facts):
     return lo
 
 
-def highest_off(first, second, landing=mpf(0)):
+def highest_off(first, second, landing=0):
     """Where a jog from just below r_2, then a flip lead, each landing so much too far."""
     jogged = reference.throw(first, 2, first_flip(first))
     assert (jogged.code, jogged.side) == (0, 2)
@@ -125,14 +125,14 @@ def test_the_landing_place_agrees_with_the_throw_at_50_digits():
 
 
 def test_a_deviation_that_never_breaks_the_goal_says_what_ends_it():
-    """At 21.5 % less the part no longer rests on side 1: a_1 reaches the length of that side."""
+    """With a side 2 that is 21.5 % longer the part no longer rests on side 1: a_1 reaches its length."""
     (found,) = ls.margin("paper-designed", "part.sides[2]", width=0.05)
     assert found.refuted is None
     assert "no such part" in found.reason
     scene = ls.load("paper-designed")
-    scene.with_values({"part.sides[2]": 6.75 * (1 - found.proved / 100)})
+    scene.with_values({"part.sides[2]": 6.75 * (1 + found.proved / 100)})
     with pytest.raises(LimitsetsError):
-        scene.with_values({"part.sides[2]": 6.75 * (1 - 1.1 * found.proved / 100)})
+        scene.with_values({"part.sides[2]": 6.75 * (1 + 1.06 * found.proved / 100)})
     (found,) = ls.margin("paper-designed", "arm.length", width=0.05)
     assert found.refuted is None
     assert "may leave the arm" in found.reason
