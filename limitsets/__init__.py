@@ -28,6 +28,7 @@ if TYPE_CHECKING:  # each from the file that holds it: most rooms have a file of
     from limitsets.maps import critical_points, orbit, register
     from limitsets.proofs.certify import certify
     from limitsets.proofs.confirm import recheck
+    from limitsets.robust.gathering import robustness
     from limitsets.robust.margins import margin
     from limitsets.scene import dump, load, scenes
     from limitsets.sets.attractors import attractors
@@ -61,6 +62,7 @@ _ROOMS = {
     "plot": "plot",
     "recheck": "proofs.confirm",
     "register": "maps",
+    "robustness": "robust.gathering",
     "scenes": "scene",
     "transitions": "graph.transitions",
 }
@@ -87,6 +89,7 @@ __all__ = [
     "plot",
     "recheck",
     "register",
+    "robustness",
     "scenes",
     "transitions",
 ]

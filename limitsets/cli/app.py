@@ -13,6 +13,7 @@ from limitsets.cli.design import design
 from limitsets.cli.margin import margin
 from limitsets.cli.plot import plot
 from limitsets.cli.recheck import recheck
+from limitsets.cli.robustness import robustness
 from limitsets.cli.scenes import scenes
 from limitsets.cli.throw import throw
 
@@ -46,5 +47,5 @@ def limitsets(
     """
 
 
-for command in (scenes, analyse, throw, plot, certify, recheck, audit, margin, design):
+for command in (scenes, analyse, throw, plot, certify, recheck, audit, margin, robustness, design):
     app.command()(command)

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from limitsets.proofs import Claim, Proof
     from limitsets.proofs.asked import State
 
-__all__ = ["certify"]
+__all__ = ["certify", "deviations"]
 
 # States of a counterexample that are printed: the start, and the last of them.
 LAST = 8
@@ -43,7 +43,7 @@ def certify(
     """Prove where the throws lead, and write a certificate that `limitsets recheck` verifies."""
     import json as json_words
 
-    fixed, varying = _deviations("--tolerance", tolerance), _deviations("--noise", noise)
+    fixed, varying = deviations("--tolerance", tolerance), deviations("--noise", noise)
     with progress() as tell:
         from limitsets.scene import load
 
@@ -63,7 +63,8 @@ def certify(
     raise typer.Exit(0 if proof.proved else 1)
 
 
-def _deviations(option: str, words: list[str] | None) -> dict[str, str]:
+def deviations(option: str, words: list[str] | None) -> dict[str, str]:
+    """Read the words of a repeatable option, QUANTITY=DEVIATION each."""
     found: dict[str, str] = {}
     for word in words or []:
         name, sign, text = word.partition("=")

@@ -11,6 +11,7 @@ whoever imports that file last.
 
 from limitsets.plot.audits import audit
 from limitsets.plot.basin import basins
+from limitsets.plot.counterexamples import counterexample
 from limitsets.plot.designs import design
 from limitsets.plot.flights import flight
 from limitsets.plot.fronts import robust_design
@@ -23,6 +24,7 @@ from limitsets.plot.noise import noise_arrivals, noise_density, noise_levels
 __all__ = [
     "audit",
     "basins",
+    "counterexample",
     "design",
     "flight",
     "limit_set",

@@ -7,8 +7,9 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 from limitsets.analysis import overlap
-from limitsets.goals import AttractsAll, FlipOrder, OrientedBeyond, Reaches
+from limitsets.goals import OrientedBeyond, Reaches
 from limitsets.report.background import everything, figure_line, scene_of, steps, trust
+from limitsets.report.questions import order_of, question_of
 from limitsets.report.tables import bands, intervals, percent, table
 from limitsets.report.tables import count as count_of
 
@@ -54,10 +55,6 @@ def page(analysis: Analysis, figures: Mapping[str, str]) -> str:
     return "\n\n".join(part for part in parts if part) + "\n"
 
 
-def _order(order: tuple[int, ...]) -> str:
-    return " → ".join(map(str, [*order, order[0]]))
-
-
 def _summary(analysis: Analysis) -> str:
     basins, count = analysis.basins, len(analysis.attractors)
     if count == 0:
@@ -71,7 +68,7 @@ def _summary(analysis: Analysis) -> str:
     orders = {attractor.flip_order for attractor in analysis.attractors}
     if len(orders) == 1 and (order := orders.pop()) is not None:
         lines.append(
-            f"Its sides come up in the order {_order(order)}."
+            f"Its sides come up in the order {order_of(order)}."
             if len(order) > 1
             else f"It stays on side {order[0]}."
         )
@@ -142,20 +139,8 @@ def _goal(analysis: Analysis) -> str:
     if asked is None:
         return ""
     goal = asked.goal
-    where = " (asked of every throw from every start)" if goal.from_anywhere else ""
-    if isinstance(goal, OrientedBeyond):
-        question = f"every part at rest beyond x = {goal.x:g} {unit} lies on side {goal.side}"
-    elif isinstance(goal, Reaches):
-        which = "every" if goal.every_orbit else "almost every"
-        question = f"{which} orbit reaches x = {goal.x:g} {unit} on side {goal.side}"
-    elif isinstance(goal, AttractsAll):
-        question = "one limit set takes every start"
-    elif isinstance(goal, FlipOrder):
-        question = f"the sides follow each other as {_order(goal.order)}"
-    else:
-        question = "no throw carries the part off the arm or into the joint"
     verdict = {True: "It holds", False: "It does not hold", None: "This analysis cannot tell"}[asked.holds]
-    lines = ["## The goal", f"Asked: {question}{where}. **{verdict}** ({asked.how}: no proof)."]
+    lines = ["## The goal", f"Asked: {question_of(goal, unit)}. **{verdict}** ({asked.how}: no proof)."]
     if isinstance(goal, OrientedBeyond) and asked.threshold is not None:
         lines.append(f"The sentence is true from x = {asked.threshold:.3f} {unit} on.")
         reach = max((hi for parts in everything(analysis).values() for _, hi in parts), default=-math.inf)

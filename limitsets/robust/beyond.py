@@ -20,7 +20,7 @@ from limitsets.robust.joint import joint_margin
 from limitsets.robust.margins import Margin, asked_of, margin
 from limitsets.scene import Scene, load
 
-__all__ = ["MarginsBeyond", "margins_beyond"]
+__all__ = ["MarginsBeyond", "margins_beyond", "places_beyond"]
 
 Progress = Callable[[str, int, int], None]
 
@@ -110,7 +110,7 @@ def margins_beyond(
     [0.7, 3.4]
     """
     asked = scene if isinstance(scene, Scene) else load(scene)
-    at = np.sort(np.asarray(_places(asked, side, places) if x is None else x, dtype=float))
+    at = np.sort(np.asarray(places_beyond(asked, side, places) if x is None else x, dtype=float))
     rows: list[tuple[Margin, ...]] = []
     for number, place in enumerate(at.tolist()):
         if progress is not None:
@@ -139,7 +139,8 @@ def _one(
     return found
 
 
-def _places(scene: Scene, side: int, places: int) -> NDArray[np.float64]:
+def places_beyond(scene: Scene, side: int, places: int) -> NDArray[np.float64]:
+    """Return places between the farthest that the limit set gets on other sides and on this one, as many as asked."""
     extents = asked_of(scene, (OrientedBeyond(0.0, side),)).cells(None, 2).cells.extents()
     highest = {s: max(hi for _, hi in parts) for s, parts in extents.items() if parts}
     others = max((top for s, top in highest.items() if s != side), default=0.0)

@@ -1,0 +1,108 @@
+"""`limitsets robustness`: a sheet of tolerances, what is proved safe and what fails, and what noise does."""
+
+from __future__ import annotations
+
+import json as json_words
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from limitsets.cli.certify import deviations
+from limitsets.cli.output import Json, Scene, progress, table
+
+if TYPE_CHECKING:
+    from limitsets.robust.summary import Robustness
+
+__all__ = ["robustness"]
+
+HELP_QUANTITY = "A quantity, like throw.speed; repeatable. Default: all that the scene gives."
+HELP_TOLERANCE = "Of the joint margin, like throw.speed='1 %'; repeatable. Default: the scene's [tolerance]."
+HELP_SCATTER = (
+    "Noise at every throw, like throw.speed='0.5 %'; repeatable. Default: the scatter in the scene's [world]."
+)
+HELP_WITHOUT = "What not to do: margins, joint, curve, noise or audit; repeatable."
+
+
+def robustness(
+    scene: Scene,
+    quantity: Annotated[list[str] | None, typer.Option("--quantity", metavar="Q", help=HELP_QUANTITY)] = None,
+    reading: Annotated[
+        str | None,
+        typer.Option("--reading", metavar="R", help="fixed (but unknown) or per-throw; default both."),
+    ] = None,
+    tolerance: Annotated[
+        list[str] | None, typer.Option("--tolerance", metavar="Q=DEV", help=HELP_TOLERANCE)
+    ] = None,
+    scatter: Annotated[
+        list[str] | None, typer.Option("--scatter", metavar="Q=DEV", help=HELP_SCATTER)
+    ] = None,
+    law: Annotated[
+        str,
+        typer.Option("--law", metavar="LAW", help="Of --scatter: gaussian (standard deviations) or bounded."),
+    ] = "gaussian",
+    width: Annotated[
+        float, typer.Option("--width", metavar="W", help="How close brackets have to be, as a share.")
+    ] = 0.01,
+    cells: Annotated[
+        int, typer.Option("--cells", min=8, max=100_000, metavar="N", help="Cells per side, for the noise.")
+    ] = 1024,
+    without: Annotated[list[str] | None, typer.Option("--without", metavar="PART", help=HELP_WITHOUT)] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            "--out", "-o", metavar="DIR", help="Folder of the report, ./NAME-robustness by default."
+        ),
+    ] = None,
+    json: Json = False,
+) -> None:
+    """Say how far each quantity may drift before the goal fails, and write report.md, figures and certificates."""
+    with progress() as tell:
+        from limitsets.scene import load
+
+        chosen = load(scene)
+        folder = out if out is not None else Path(f"{chosen.name}-robustness")
+        from limitsets.report.writing import require_place
+
+        require_place(folder)
+        from limitsets.robust.chance import scattering_from
+        from limitsets.robust.gathering import robustness as run
+
+        noise = deviations("--scatter", scatter)
+        vector = deviations("--tolerance", tolerance)
+        found = run(
+            chosen,
+            *(quantity or ()),
+            reading=reading,
+            tolerance=vector or None,
+            scatter=scattering_from(chosen, noise, law) if noise else None,
+            width=width,
+            cells=cells,
+            leave_out=without or (),
+            folder=folder,
+            progress=tell,
+        )
+        from limitsets.report import write_robustness
+
+        tell("files", len(found.entries), len(found.entries) + 1)
+        files = write_robustness(found, folder)
+    if json:
+        print(json_words.dumps(found.to_json(), indent=2, allow_nan=False))
+    else:
+        _text(found, files)
+    raise typer.Exit(0 if found.verdict == "proved" else 1)
+
+
+def _text(found: Robustness, files: list[Any]) -> None:
+    from limitsets.report.robust_pages import HEADS, answer, lines_of
+
+    typer.echo(answer(found).replace("**", ""))
+    if found.singles:
+        table(HEADS, lines_of(found))
+    for part in ("joint", "curve", "noise"):
+        reason = found.left_out.get(part)
+        if reason and reason != "it was not asked for":
+            typer.echo(f"no {part}: {reason}")
+    if found.again:
+        typer.echo(f"found by an earlier run: {found.again} of {len(found.entries)} margins")
+    typer.echo(f"report: {files[0]}")

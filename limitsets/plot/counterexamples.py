@@ -1,0 +1,125 @@
+"""An orbit that violates a goal, throw by throw: where the part comes to rest, on which side, and where it must not."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+from matplotlib.ticker import MaxNLocator
+
+from limitsets.errors import AnswerError
+from limitsets.goals import Goal, OrientedBeyond, Reaches
+from limitsets.plot import style
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from limitsets.scene import Scene
+
+__all__ = ["counterexample"]
+
+# States that are drawn: the last of them.
+LAST = 40
+
+MARKERS = ("o", "s", "^", "D", "v", "P", "X", "h")
+COLOURS = (style.JOG, style.FLIP, style.GOAL, style.ROLL, "#8A6D00", style.INK)
+FORBIDDEN: dict[str, Any] = {"facecolor": "#F6E3D9", "edgecolor": "#C9A28C", "hatch": "////", "lw": 0.0}
+WANTED: dict[str, Any] = {"facecolor": "#E0F0E9", "edgecolor": "#9BC4B2", "hatch": "...", "lw": 0.0}
+
+RING: dict[str, Any] = {"ls": "", "marker": "o", "ms": 14, "mfc": "none", "mec": style.FLIP, "mew": 1.6}
+
+
+def counterexample(
+    scene: Scene,
+    orbit: Sequence[Mapping[str, Any]],
+    violated: Goal | None = None,
+    name: str = "",
+) -> Figure:
+    """Draw an orbit that violates a goal: x after each throw, the side by marker and colour.
+
+    Parameters
+    ----------
+    scene : Scene
+        The scene.
+    orbit : sequence of mapping
+        States with "x" and "side", as `limitsets.robust.entries.Entry` and the JSON of a proof have them.
+    violated : Goal, optional
+        What it violates.
+    name : str
+        What deviates, for the title.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+
+    Raises
+    ------
+    AnswerError
+        No states.
+
+    Examples
+    --------
+    >>> import limitsets as ls
+    >>> orbit = [{"x": 17.3, "side": 2}, {"x": 20.1, "side": 0}]
+    >>> scene = ls.load("paper-designed")
+    >>> figure = counterexample(scene, orbit, scene.goal)
+    >>> [patch.get_gid() for patch in figure.axes[0].patches]
+    ['forbidden']
+    """
+    if not orbit:
+        raise AnswerError("the orbit", "empty", "states with x and side", "draw one that refutes something")
+    first = max(len(orbit) - LAST, 0)
+    x = [float(state["x"]) for state in orbit[first:]]
+    sides = [int(state["side"]) for state in orbit[first:]]
+    throws = range(first, first + len(x))
+    figure, (axes,) = style.canvas(8.0, 4.2)
+    axes.plot(throws, x, color=style.FAINT, lw=0.9, zorder=2)
+    for side in sorted(set(sides)):
+        look: dict[str, Any] = {"color": COLOURS[side % len(COLOURS)], "marker": MARKERS[side % len(MARKERS)]}
+        mine = [k for k, on in enumerate(sides) if on == side]
+        axes.plot([throws[k] for k in mine], [x[k] for k in mine], ls="", ms=6.5, zorder=3, **look)
+    low, high = min(x), max([*x, *([violated.x] if isinstance(violated, OrientedBeyond | Reaches) else [])])
+    span = max(high - low, 1e-3 * scene.arm_length)
+    axes.set_ylim(low - 0.12 * span, high + 0.22 * span)
+    areas = _areas(axes, violated, scene.unit)
+    if isinstance(violated, OrientedBeyond):
+        axes.plot(throws[-1], x[-1], zorder=4, **RING)
+        label = f"on side {sides[-1]}, {x[-1] - violated.x:.2g} {scene.unit} beyond"
+        areas.append(Line2D([], [], label=label, **RING))
+    axes.set_xlabel("throws")
+    axes.set_ylabel(f"x at rest [{scene.unit}]")
+    axes.xaxis.set_major_locator(MaxNLocator(integer=True))
+    style.title(figure, f"{scene.name}: an orbit that violates the goal{f', {name}' if name else ''}")
+    style.legend(figure, [*_sides(sides), *areas], 3)
+    return figure
+
+
+def _areas(axes: Axes, violated: Goal | None, unit: str) -> list[Any]:
+    """Shade where only one side is allowed, or where the part should come."""
+    if not isinstance(violated, OrientedBeyond | Reaches):
+        return []
+    at, side, top = violated.x, violated.side, axes.get_ylim()[1]
+    forbids = isinstance(violated, OrientedBeyond)
+    look = FORBIDDEN if forbids else WANTED
+    axes.axhspan(at, top, gid="forbidden" if forbids else "wanted", zorder=0, **look)
+    axes.axhline(at, color=style.INK, lw=1.0, zorder=1)
+    words = f"only side {side} allowed" if forbids else f"to be reached on side {side}"
+    return [Patch(label=f"beyond {at:.6g} {unit}: {words}", **look)]
+
+
+def _sides(sides: Sequence[int]) -> list[Any]:
+    return [
+        Line2D(
+            [],
+            [],
+            ls="",
+            ms=6.5,
+            color=COLOURS[side % len(COLOURS)],
+            marker=MARKERS[side % len(MARKERS)],
+            label=f"on side {side}",
+        )
+        for side in sorted(set(sides))
+    ]

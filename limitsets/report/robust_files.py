@@ -1,0 +1,74 @@
+"""Write the sheet of tolerances: page, JSON and pictures, all of them or none; certificates are there already."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from limitsets import plot
+from limitsets.files import replaced
+from limitsets.report.robust_pages import READINGS, robustness_page, shown, violated_of
+from limitsets.report.writing import DPI, refusal
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from limitsets.robust.summary import Robustness
+
+__all__ = ["write_robustness"]
+
+Progress = Callable[[str, int, int], None]
+
+
+def _drawn(found: Robustness) -> Iterator[tuple[str, Figure]]:
+    """Draw what there is to draw."""
+    single = [each for each in found.margins() if each.quantity != "joint"]
+    if found.verdict == "proved" and single:
+        yield "margins", plot.tornado(single)
+    if found.joint is not None and found.joint.holds:
+        yield "joint", plot.tolerance_box(found.margins()[-1])
+    if found.curve is not None:
+        yield "curve", plot.margin_curve(found.curve)
+    yield from _noise(found)
+    first = shown(found)
+    if first is not None:
+        name = f"{first.quantity} {READINGS[first.reading]}" if first.holds else "the scene as it is"
+        yield (
+            "counterexample",
+            plot.counterexample(found.scene, first.counterexample, violated_of(first, found.goals), name),
+        )
+
+
+def _noise(found: Robustness) -> Iterator[tuple[str, Figure]]:
+    """Draw the noise: of a scene in which nothing stays there is no density."""
+    if found.noise is None or found.levels is None:
+        return
+    if found.noise.classes:
+        yield "density", plot.noise_density(found.noise)
+    yield "throws", plot.noise_arrivals(found.noise)
+    yield "levels", plot.noise_levels(found.levels, {"level of the noise, as given = 1": 1.0})
+
+
+def write_robustness(found: Robustness, folder: str | Path) -> list[Path]:
+    """Write report.md, robustness.json and the figures into a folder, all of them or none.
+
+    Raises
+    ------
+    LimitsetsError
+        The folder cannot be written.
+    """
+    figures: dict[str, str] = {}
+    try:
+        with replaced(folder) as draft:
+            for kind, figure in _drawn(found):
+                figures[kind] = f"{kind}.png"
+                figure.savefig(draft / figures[kind], dpi=DPI)
+            record = json.dumps(found.to_json(), indent=2, allow_nan=False)
+            (draft / "robustness.json").write_text(record + "\n", encoding="utf-8", newline="\n")
+            page = robustness_page(found, figures)
+            (draft / "report.md").write_text(page, encoding="utf-8", newline="\n")
+    except OSError as error:
+        raise refusal(folder, f"it could not be: {error.strerror or error}") from None
+    return [Path(folder) / name for name in ["report.md", "robustness.json", *figures.values()]]
