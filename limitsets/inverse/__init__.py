@@ -2,8 +2,8 @@
 
 `critical_jacobian` differentiates by the implicit function theorem, on dual numbers (`dual`, `seeded`, `decision`);
 `design` finds roots with it (`unknowns`, `trials`, `solving`, `nearest`).  `robust_design` looks for a large margin by
-floats (`trap`, `sharp`, `sound`, `lead`, `search`), counts throws (`feeding`, `front`), and has `limitsets.robust` prove
-what it ends with.  Nothing here is compiled or proved.
+floats (`trap`, `sharp`, `sound`, `lead`, `search`), counts throws (`feeding`, `front`), and has `limitsets.robust`
+prove what it ends with.  Nothing here is compiled or proved.
 """
 
 from limitsets.inverse.along import limit_sets_along

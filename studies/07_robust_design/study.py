@@ -1,4 +1,4 @@
-"""The study of robust design: how large can the proved joint margin of a feeder in the paper's triangle be?
+"""The study of robust design: how large the proved joint margin of a feeder in the paper's triangle can be.
 
 Run it as ``python studies/07_robust_design/study.py [--evaluations N] [--seconds S] [--out FOLDER]``.
 """

@@ -1,0 +1,50 @@
+"""`limitsets design --robust`: search without proof, its files, and what it refuses."""
+
+import json
+
+import pytest
+
+import limitsets as ls
+from tests.cli.command import run
+
+
+def test_a_search_writes_scene_answer_and_figure(here, capfd):
+    code, out, _ = run(
+        capfd,
+        "design",
+        "paper-designed",
+        "--robust",
+        "--evaluations",
+        "20",
+        "--seconds",
+        "0",
+        "--out",
+        "found",
+        "--json",
+    )
+    assert code == 0
+    record = json.loads(out)
+    assert record["margin"] is None
+    assert {path.name for path in (here / "found").iterdir()} == {
+        "paper-designed-robust.toml",
+        "design.json",
+        "front.png",
+    }
+    again = ls.load(here / "found" / "paper-designed-robust.toml")
+    assert again.value("throw.kappa") == record["values"]["throw.kappa"]
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        ((), "give one of them"),
+        (("--robust", "--critical-points", "10,10,20", "--vary", "throw.speed"), "give one of them"),
+        (("--robust", "--bounds", "arm.length=20 in"), "QUANTITY=LOWEST:HIGHEST"),
+        (("--robust", "--bounds", "arm.length=20 in:"), "give both"),
+        (("--robust", "--vary", "arm.legnth"), "arm.length"),
+    ],
+)
+def test_what_it_refuses(here, capfd, words, says):
+    code, _, err = run(capfd, "design", "paper-designed", *words)
+    assert code == 2
+    assert says in err

@@ -1,0 +1,206 @@
+"""Robust design: the search's numbers against the table of limit sets, orbits, closed forms, and plane geometry."""
+
+import json
+import math
+
+import numpy as np
+import pytest
+
+import limitsets as ls
+from limitsets.errors import LimitsetsError
+from limitsets.inverse import robust_design
+from limitsets.inverse.front import unbeaten
+from limitsets.inverse.lead import lead_of, lead_weight
+from limitsets.inverse.search import bounds_of
+from limitsets.inverse.sharp import Box, sharp
+from limitsets.inverse.trap import trap
+from limitsets.maps import advance
+from tests.studies.test_studies import load_study
+
+SPEED = {"throw.speed": "1 %"}
+
+
+@pytest.fixture(scope="module")
+def small():
+    """A search of few designs, not proved."""
+    return robust_design("paper-designed", evaluations=60, orders=False, prove=0.0, seed=3)
+
+
+# Ends of the limit sets, from the decimal scenes at 40 digits.
+@pytest.mark.parametrize(
+    ("name", "hi"),
+    [
+        ("paper-designed", (19.75268801485, 17.439819281769, 23.383151921158)),
+        ("paper-initial-small-angle", (20.421069168761, 20.390334647524, 20.393068935673)),
+        ("paper-designed-small-angle", (12.88421238353, 10.343418249967, 20.640934683962)),
+    ],
+)
+def test_what_keeps_the_part_ends_where_the_limit_set_does(name, hi):
+    """Of scenes whose limit sets have no gap."""
+    found = trap(ls.load(name).map, 12.0, 2)
+    assert found.hi == pytest.approx(hi, abs=1e-6)
+
+
+def test_landings_off_by_e_are_never_thrown_out_of_what_keeps_the_part():
+    scene, e, rng = ls.load("paper-designed"), 0.03, np.random.default_rng(5)
+    found = trap(scene.map, 12.0, 2, landing=e)
+    x, side = rng.uniform(9.5, 20.0, 4000), np.full(4000, 2)
+    highest = np.full(3, -np.inf)
+    for _ in range(400):
+        x, side, code, _ = advance(scene.map, x, side, 1)
+        assert (code >= 0).all()
+        x = x + e * rng.choice((-1.0, 1.0), x.size)
+        assert (found.lo[side] - 1e-9 <= x).all()
+        assert (x <= found.hi[side] + 1e-9).all()
+        np.maximum.at(highest, side, x)
+    # and they come near its ends
+    assert (found.hi - highest < 3 * e).all()
+
+
+def test_the_margin_of_the_speed_is_that_of_the_table():
+    """At X = 20 in: 0.733 %, where the threshold of a slower throw passes 20."""
+    scene = ls.load("paper-designed")
+    box = Box.of(scene, SPEED)
+    for factor, beyond in ((0.732, False), (0.734, True)):
+        corner = box.at(scene, factor, (-1,))
+        assert (trap(corner.map, 12.0, 2).threshold(2) > 20.0) == beyond
+
+
+def test_the_best_margin_of_the_speed_is_where_both_ends_meet():
+    scene = ls.load("paper-designed")
+    box = Box.of(scene, SPEED)
+    found = sharp(scene, box, 2, steps=16)
+    ends = []
+    for sign in (-1, 1):
+        kept = trap(box.at(scene, found.margin, (sign,)).map, 12.0, 2)
+        ends.append((kept.threshold(2), float(kept.hi[2])))
+    assert max(end[0] for end in ends) <= found.x <= min(end[1] for end in ends)
+    ends = []
+    for sign in (-1, 1):
+        kept = trap(box.at(scene, 1.03 * found.margin, (sign,)).map, 12.0, 2)
+        ends.append((kept.threshold(2), float(kept.hi[2])))
+    assert max(end[0] for end in ends) > min(end[1] for end in ends)
+
+
+@pytest.mark.parametrize(("name", "rho"), [("paper-initial", 1.14), ("paper-designed", 1.01)])
+def test_a_lead_weight_of_65_percent_has_the_radius_of_gyration_of_the_table(name, rho):
+    scene = ls.load(name)
+    found = lead_weight(scene.vertices, scene.centre, rho)
+    assert found.share == pytest.approx(0.65, abs=0.01)
+
+
+def test_plate_and_lead_weight_are_the_part_again():
+    scene = ls.load("paper-designed")
+    found = lead_of(scene)
+    corners = scene.vertices
+    x, y = corners.T
+    cross = x * np.roll(y, -1) - np.roll(x, -1) * y
+    area = 0.5 * cross.sum()
+    g = np.array([((x + np.roll(x, -1)) * cross).sum(), ((y + np.roll(y, -1)) * cross).sum()]) / (6 * area)
+    # a triangle: its second moment about the centroid is that of three equal masses on the middles of its sides
+    middles = 0.5 * (corners + np.roll(corners, -1, axis=0))
+    own = (((middles - g) ** 2).sum(axis=1)).mean()
+    p, f = np.array([found.x, found.y]), found.share
+    centre = (1 - f) * g + f * p
+    assert centre == pytest.approx(scene.centre, abs=1e-12)
+    rho2 = (1 - f) * (own + ((g - centre) ** 2).sum()) + f * ((p - centre) ** 2).sum()
+    assert math.sqrt(rho2) == pytest.approx(scene.radius_of_gyration, abs=1e-12)
+
+
+def test_what_is_unbeaten_is_beaten_by_none():
+    rng = np.random.default_rng(0)
+    margin, throws = rng.random(200).round(2), rng.integers(5, 60, 200).astype(float)
+    kept = unbeaten(margin, throws)
+
+    def beaten(k):
+        better = (margin >= margin[k]) & (throws <= throws[k])
+        return (better & ((margin > margin[k]) | (throws < throws[k]))).any()
+
+    assert {(margin[k], throws[k]) for k in kept} == {
+        (margin[k], throws[k]) for k in range(200) if not beaten(k)
+    }
+
+
+def test_no_part_rests_in_a_box_larger_than_plane_geometry_allows():
+    """The study's bound, by formulas of its own, against the package's refusal of parts that tip over."""
+    study, scene = load_study("07_robust_design"), ls.load("paper-designed")
+    box = Box.of(
+        scene,
+        {f"part.sides[{k}]": "1 %" for k in range(3)}
+        | {f"part.mass.center.{word}": "0.01 in" for word in ("along", "above")},
+    )
+    largest = study.largest_at_rest((5.75, 3.6, 6.75), 4.2255778, 0.7082490)
+    signs = list(np.ndindex(2, 2, 2, 2, 2))
+    rests = [
+        all(box.at(scene, share * largest, [2 * s - 1 for s in corner]) is not None for corner in signs)
+        for share in (0.999, 1.001)
+    ]
+    assert rests == [True, False]
+
+
+def test_a_small_search_finds_scenes_that_hold_throughout_their_box(small):
+    """Thrown: scenes drawn from 0.9 of the box, landings off at random; nothing rests wrongly, and all get there."""
+    rng, scene = np.random.default_rng(1), small.scene
+    assert small.sampled.margin > 0
+    box = Box.of(scene, small.tolerance)
+    factor = 0.9 * small.sampled.margin
+    for _ in range(12):
+        corner = box.at(scene, factor, rng.choice((-1.0, 1.0), len(box.sizes)))
+        x = np.full(200, small.x - 1e-3)
+        side = np.full(200, small.side)
+        arrived = np.zeros(200, dtype=bool)
+        for throw in range(3000):
+            x, side, code, _ = advance(corner.map, x, side, 1)
+            assert (code >= 0).all()
+            x = x + factor * box.landing * rng.uniform(-1, 1, x.size)
+            if throw > 500:
+                assert not ((x > small.x) & (side != small.side)).any()
+                arrived |= (x >= small.x) & (side == small.side)
+        assert arrived.all()
+
+
+def test_a_small_search_says_how_it_was_found(small):
+    record = small.to_json()
+    json.dumps(record, allow_nan=False)
+    assert record["margin"] is None
+    assert record["values"].keys() >= {"part.sides[0]", "throw.kappa", "part.mass.center.along"}
+    assert small.lead.inside >= 0.0
+    assert small.scene.goal == ls.load(small.scene.as_dict()).goal
+    assert [option.candidate.found.margin for option in small.front] == sorted(
+        (option.candidate.found.margin for option in small.front), reverse=True
+    )
+
+
+def test_the_same_seed_gives_the_same_design():
+    once, again = (
+        robust_design("paper-designed", evaluations=12, orders=False, prove=0.0, seed=8) for _ in range(2)
+    )
+    assert once.scene == again.scene
+
+
+def test_the_figure_of_the_front(small, tmp_path):
+    path = tmp_path / "front.png"
+    ls.plot.robust_design(small, wanted=18.4, bound=14.7).savefig(path)
+    assert path.stat().st_size > 10_000
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"side": 3}, "0 to 2"),
+        ({"vary": ["arm.length"]}, "give bounds"),
+        ({"vary": {"part.mass.center.along": (0.1, 0.2)}}, "none that feeds"),
+    ],
+)
+def test_what_cannot_be_designed_is_refused(options, words):
+    with pytest.raises(LimitsetsError, match=words):
+        robust_design("paper-designed", evaluations=5, orders=False, prove=0.0, **options)
+
+
+def test_the_usual_bounds_are_in_the_scenes_unit():
+    inches, cm = ls.load("paper-designed"), None
+    tree = inches.as_dict()
+    tree["arm"]["length"] = f"{28 * 2.54} cm"
+    cm = ls.load(tree)
+    for name, (lo, hi) in bounds_of(inches, None).items():
+        assert bounds_of(cm, None)[name] == pytest.approx((2.54 * lo, 2.54 * hi), rel=1e-12)
