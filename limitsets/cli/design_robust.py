@@ -54,7 +54,7 @@ def run_robust(
         print(json_words.dumps(found.to_json(), indent=2, allow_nan=False))
     else:
         _text(found, files)
-    return 0 if seconds == 0.0 or (found.margin is not None and found.margin.proved > 0.0) else 1
+    return 0 if seconds == 0.0 or all(one.proved > 0.0 for one in found.margins) else 1
 
 
 def _varied(
@@ -111,20 +111,17 @@ def _text(found: RobustDesign, files: list[Path]) -> None:
         for name in (*sides, *found.varied)
     ]
     table(["", "before", f"design [{unit}]"], rows)
-    for label, margin, sampled, feeding in (
-        ("before", found.before_margin, found.before_sampled, found.before_feeding),
-        ("design", found.margin, found.sampled, found.feeding),
+    for label, margins, sampled, feeding in (
+        ("before", found.before_margins, found.before_sampled, found.before_feeding),
+        ("design", found.margins, found.sampled, found.feeding),
     ):
         if sampled is None:
             typer.echo(f"{label}: fed at no X in spite of any deviation")
             continue
-        said = "not proved" if margin is None else f"proved up to {margin.proved:.4g}"
-        fails = (
-            "" if margin is None or margin.refuted is None else f", shown to fail from {margin.refuted:.4g}"
-        )
-        typer.echo(
-            f"{label}: X = {sampled.x:.4g} {unit}, joint margin {said}{fails} (by floats {sampled.margin:.4g})"
-        )
+        typer.echo(f"{label}: X = {sampled.x:.4g} {unit}, joint margin by floats {sampled.margin:.4g}")
+        for one in margins:
+            fails = "" if one.refuted is None else f", shown to fail from {one.refuted:.4g}"
+            typer.echo(f"  {one.goals[0].kind}: proved up to {one.proved:.4g}{fails}")
         if feeding is not None:
             typer.echo(
                 f"  throws to feed (sampled): mean {feeding.mean:.3g}, 95 % after {feeding.quantile_95:.3g}"

@@ -70,8 +70,8 @@ class RobustDesign:
         What the margin multiplies.
     sampled : Sharp
         Its margin by floats, and the effect of each quantity.
-    margin : Margin or None
-        Proved and refuted; None where no proof was asked for.
+    margins : tuple of Margin
+        Proved and refuted, one for each of `goals`; empty where no proof was asked for.
     lead : Lead
         The point mass that makes it of a plate.
     feeding : Feeding
@@ -84,7 +84,7 @@ class RobustDesign:
         Where the search began.
     before_sampled : Sharp or None
         The margin there, at the best X there, by floats.
-    before_margin : Margin or None
+    before_margins : tuple of Margin
         The same, proved and refuted.
     before_feeding : Feeding or None
         Throws to feed there, sampled.
@@ -101,14 +101,14 @@ class RobustDesign:
     varied: tuple[str, ...]
     tolerance: dict[str, str]
     sampled: Sharp
-    margin: Margin | None
+    margins: tuple[Margin, ...]
     lead: Lead
     feeding: Feeding
     front: tuple[Option, ...]
     history: tuple[Candidate, ...]
     before: Scene
     before_sampled: Sharp | None
-    before_margin: Margin | None
+    before_margins: tuple[Margin, ...]
     before_feeding: Feeding | None
     evaluations: int
     seconds: float
@@ -167,7 +167,7 @@ def _searched(
     drawn = []
     for number, search in enumerate(searches):
         tell("orders of the sides", number, len(searches))
-        unknowns, ratings = search.drawn(rng, DRAWN)
+        unknowns, ratings = search.drawn(rng, max(POPULATION, min(DRAWN, evaluations)))
         best = np.argsort(-ratings)[:POPULATION]
         drawn.append((float(ratings[best[0]]), number, unknowns[best]))
     drawn.sort(key=lambda row: -row[0])
@@ -245,7 +245,7 @@ def robust_design(
     seed : int
         Of the search; the same seed, the same answer.
     prove : float
-        Seconds for the proof of each of the two margins; 0 for none.
+        Seconds for the proofs of the design, and as many for those of the scene before; 0 for none.
     progress : callable, optional
         Called with what is done, how much of it, and of how much.
 
@@ -282,16 +282,13 @@ def robust_design(
     seconds = time.perf_counter() - begin
     known = before is not None and before.margin > 0.0
     fed = throws_to_feed(start, before.x, on, seed=seed) if before is not None and known else None
-    margin, own = None, None
+    margins: tuple[Margin, ...] = ()
+    own: tuple[Margin, ...] = ()
     if prove > 0.0:
-        margin = joint_margin(
-            design, fed_at(x, on), texts, seconds=prove, tell=_telling(tell, "margin of the design")
-        )
+        margins = _proved(design, fed_at(x, on), texts, prove, tell, "the design")
         if before is not None and known:
             goals = fed_at(round(before.x, DECIMALS_OF_X), on)
-            own = joint_margin(
-                start, goals, texts, seconds=prove, tell=_telling(tell, "margin of the scene before")
-            )
+            own = _proved(start, goals, texts, prove, tell, "the scene before")
     return RobustDesign(
         scene=design,
         goals=fed_at(x, on),
@@ -300,22 +297,33 @@ def robust_design(
         varied=tuple(search.bounds),
         tolerance=texts,
         sampled=found,
-        margin=margin,
+        margins=margins,
         lead=lead_of(design),
         feeding=throws_to_feed(design, x, on, seed=seed),
         front=front,
         history=history,
         before=start,
         before_sampled=before,
-        before_margin=own,
+        before_margins=own,
         before_feeding=fed,
         evaluations=sum(each.evaluations for each in searches),
         seconds=seconds,
     )
 
 
-def _telling(tell: Tell, what: str) -> Any:
-    return lambda share: tell(what, math.floor(100 * share), 100)
+def _proved(
+    scene: Scene, goals: Sequence[Goal], texts: Mapping[str, str], seconds: float, tell: Tell, whose: str
+) -> tuple[Margin, ...]:
+    """Bracket the joint margin of each goal by itself: one may be proved much farther than the other."""
+    found = []
+    for goal in goals:
+        what = f"margin of {whose}, {goal.kind}"
+
+        def told(share: float, what: str = what) -> None:
+            tell(what, math.floor(100 * share), 100)
+
+        found.append(joint_margin(scene, (goal,), texts, seconds=seconds / len(goals), tell=told))
+    return tuple(found)
 
 
 def _side(scene: Scene, side: int | None) -> int:

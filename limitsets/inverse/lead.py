@@ -63,8 +63,9 @@ def lead_weight(
     Examples
     --------
     >>> square = np.array([(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)])
-    >>> lead_weight(square, (0.4, 0.0), (1 / 3 + 0.16) ** 0.5)  # half of the mass 0.8 off: r^2 = 2/3
-    Lead(share=0.5, x=0.8, y=0.0, inside=0.19999999999999996)
+    >>> found = lead_weight(square, (0.4, 0.0), (1 / 3 + 0.16) ** 0.5)  # half of the mass 0.8 off: r^2 = 2/3
+    >>> round(found.share, 12), round(found.x, 12), round(found.inside, 12)
+    (0.5, 0.8, 0.2)
     """
     plate = plate_with_points(vertices, 1.0)
     g, own = plate.centre, plate.radius_of_gyration**2

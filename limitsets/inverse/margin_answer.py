@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,15 +14,19 @@ if TYPE_CHECKING:
     from limitsets.inverse.sharp import Sharp
     from limitsets.robust import Margin
 
-__all__ = ["ratio", "save", "to_json"]
+__all__ = ["both", "ratio", "save", "to_json"]
+
+
+def both(margins: Sequence[Margin]) -> tuple[float | None, float | None]:
+    """Give the factor to which all goals are proved, and that at which one is refuted; None where not known."""
+    refuted = [one.refuted for one in margins if one.refuted is not None]
+    return min((one.proved for one in margins), default=None), min(refuted, default=None)
 
 
 def ratio(found: RobustDesign) -> float | None:
     """Give what is proved of the design over what is refuted of the scene before: so often larger at least."""
-    mine, before = found.margin, found.before_margin
-    if mine is None or before is None or not before.refuted:
-        return None
-    return mine.proved / before.refuted
+    proved, refuted = both(found.margins)[0], both(found.before_margins)[1]
+    return None if proved is None or not refuted else proved / refuted
 
 
 def _sampled(found: Sharp | None) -> dict[str, Any] | None:
@@ -34,10 +39,6 @@ def _sampled(found: Sharp | None) -> dict[str, Any] | None:
         "reach": found.reach,
         "effects": {name: list(pair) for name, pair in found.effects.items()},
     }
-
-
-def _proved(found: Margin | None) -> dict[str, Any] | None:
-    return None if found is None else found.to_json()
 
 
 def _quantities(scene: Scene, names: tuple[str, ...]) -> dict[str, float]:
@@ -59,9 +60,9 @@ def to_json(found: RobustDesign) -> dict[str, Any]:
         "values": _quantities(found.scene, names),
         "before": _quantities(found.before, names),
         "sampled": _sampled(found.sampled),
-        "margin": _proved(found.margin),
+        "margins": [one.to_json() for one in found.margins],
         "before_sampled": _sampled(found.before_sampled),
-        "before_margin": _proved(found.before_margin),
+        "before_margins": [one.to_json() for one in found.before_margins],
         "ratio": ratio(found),
         "lead": {"share": lead.share, "x": lead.x, "y": lead.y, "inside": lead.inside},
         "throws": found.feeding.to_json(),
@@ -80,5 +81,5 @@ def save(found: RobustDesign, folder: Path) -> tuple[Path, ...]:
     answer.write_text(
         json.dumps(to_json(found), indent=2, allow_nan=False) + "\n", encoding="utf-8", newline="\n"
     )
-    certificates = () if found.margin is None else found.margin.save(folder)
+    certificates = [path for one in found.margins for path in one.save(folder)]
     return (scene, answer, *certificates)

@@ -22,6 +22,7 @@ from limitsets.inverse.sharp import Box, Sharp, Signs, failing, sharp
 from limitsets.inverse.sound import assumptions_kept
 from limitsets.inverse.trap import least_room
 from limitsets.scene import Scene
+from limitsets.scene.quantities import find
 
 __all__ = ["VARY", "Candidate", "Search"]
 
@@ -38,8 +39,6 @@ VARY: dict[str, tuple[str, str]] = {
 POPULATION, GENERATIONS, MOST_HARD = 24, 4, 24
 # A lead weight is at most this share of the part: the rest is the plate.
 MOST_LEAD = 0.9
-# How finely the margin of the last, best design is sought.
-FINE = 16
 
 Tell = Callable[[str, int, int], None]
 Array = NDArray[np.float64]
@@ -191,6 +190,7 @@ def bounds_of(
     size = float(scene.sides.length.mean())
     found = {}
     for name in names:
+        find(name)
         if name not in VARY:
             raise AnswerError("the bounds", name, "a lower and an upper one", "give bounds for this quantity")
         lo, hi = (float(text) for text in VARY[name])

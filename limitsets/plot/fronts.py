@@ -9,6 +9,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from limitsets.errors import AnswerError
+from limitsets.inverse.margin_answer import both
 from limitsets.plot import style
 
 if TYPE_CHECKING:
@@ -71,17 +72,18 @@ def _front(axes: Axes, found: RobustDesign) -> None:
         Line2D([], [], color=AFTER, marker="o", ms=4.0, lw=0.8, label="designs that none beats, sampled")
     ]
     points = [
-        (found.before_margin, found.before_sampled, found.before_feeding, BEFORE, "s", "the scene before"),
-        (found.margin, found.sampled, found.feeding, style.FLIP, "D", "the design"),
+        (found.before_margins, found.before_sampled, found.before_feeding, BEFORE, "s", "the scene before"),
+        (found.margins, found.sampled, found.feeding, style.FLIP, "D", "the design"),
     ]
-    for margin, sampled, feeding, colour, marker, label in points:
+    for margins_of, sampled, feeding, colour, marker, label in points:
         if sampled is None or feeding is None:
             continue
         axes.plot(sampled.margin, feeding.mean, color=colour, marker=marker, ms=7.0, ls="none")
         said = label
-        if margin is not None:
-            axes.plot([margin.proved, sampled.margin], [feeding.mean] * 2, color=colour, lw=2.5, alpha=0.5)
-            said += f", proved {margin.proved:.2f}"
+        proved, _ = both(margins_of)
+        if proved is not None:
+            axes.plot([proved, sampled.margin], [feeding.mean] * 2, color=colour, lw=2.5, alpha=0.5)
+            said += f", proved {proved:.2f}"
         handles.append(Line2D([], [], color=colour, marker=marker, ms=7.0, lw=2.5, label=said))
     axes.set_xlabel("joint margin, as a factor of the tolerance")
     axes.set_ylabel("throws to feed from random starts")

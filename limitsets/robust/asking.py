@@ -94,7 +94,11 @@ class Question:
         return parameter_box(self.scene, tree=None if piece is None else piece.tree(), noise=dict(noise))
 
     def prove(
-        self, piece: Piece | None = None, noise: Mapping[str, str] | None = None, finest: int = 3
+        self,
+        piece: Piece | None = None,
+        noise: Mapping[str, str] | None = None,
+        finest: int = 3,
+        bases: int = len(BASES),
     ) -> Asked:
         """Prove the goals, with finer and finer cells; or say what is missing.
 
@@ -106,11 +110,13 @@ class Question:
             What differs at every throw.
         finest : int
             Refinements, up to 3.
+        bases : int
+            Numbers of cells to begin with that are tried where nothing attracts, up to 3.
         """
         noise = dict(noise or {})
         try:
             box = self.box(piece, noise)
-            found = self._coarse(box)
+            found = self._coarse(box, bases)
             for step in range(finest + 1):
                 if step:
                     found = self._finer(found, box, step)
@@ -145,8 +151,8 @@ class Question:
         wanted = [float(x) for goal in self.goals for x in borders(goal)]
         return dict.fromkeys(range(sides), wanted)
 
-    def _coarse(self, box: ParameterBox) -> Attraction:
-        for cells in BASES:
+    def _coarse(self, box: ParameterBox, bases: int = len(BASES)) -> Attraction:
+        for cells in BASES[:bases]:
             found = attraction(cover(box, cells, self._cuts(box.lo.a.size), PIECES[0]))
             if (found.component >= 0).any():
                 break

@@ -76,18 +76,13 @@ def main(evaluations: int = 1200, seconds: float = 240.0, out: Path = HERE) -> d
     bound, orders = bound_of_rest()
     found = robust_design("paper-designed", evaluations=evaluations, prove=seconds)
     before = found.before_sampled
-    wanted = (
-        None
-        if before is None
-        else WANTED * (found.before_margin.proved if found.before_margin is not None else before.margin)
-    )
+    wanted = None if before is None else WANTED * before.margin
     ls.plot.robust_design(found, wanted=wanted, bound=bound).savefig(out / "front.png", dpi=110)
     answer = found.to_json()
     kept = ("x", "values", "before", "ratio", "lead", "throws", "before_throws", "evaluations", "timings")
     short = {word: answer[word] for word in kept}
-    for word in ("margin", "before_margin"):
-        one = answer[word]
-        short[word] = None if one is None else {key: one[key] for key in ("proved", "refuted", "reason")}
+    for word in ("margins", "before_margins"):
+        short[word] = [{key: one[key] for key in ("proved", "refuted", "reason")} for one in answer[word]]
     for word in ("sampled", "before_sampled"):
         short[word] = answer[word]
     short["bound_of_rest"] = {"largest": bound, "by_order": orders}

@@ -1,6 +1,7 @@
 """`limitsets design --robust`: search without proof, its files, and what it refuses."""
 
 import json
+from pathlib import Path
 
 import pytest
 
@@ -24,13 +25,13 @@ def test_a_search_writes_scene_answer_and_figure(here, capfd):
     )
     assert code == 0
     record = json.loads(out)
-    assert record["margin"] is None
-    assert {path.name for path in (here / "found").iterdir()} == {
+    assert record["margins"] == []
+    assert {path.name for path in Path("found").iterdir()} == {
         "paper-designed-robust.toml",
         "design.json",
         "front.png",
     }
-    again = ls.load(here / "found" / "paper-designed-robust.toml")
+    again = ls.load(Path("found") / "paper-designed-robust.toml")
     assert again.value("throw.kappa") == record["values"]["throw.kappa"]
 
 
