@@ -19,6 +19,7 @@ from limitsets.proofs.asked import State
 from limitsets.robust.asking import Asked, Question
 from limitsets.robust.brackets import Bracket, bracket_fixed, bracket_per_throw
 from limitsets.robust.deviations import Measure, measure, measures
+from limitsets.proofs.simulated import scattered
 from limitsets.scene import Scene, load
 
 __all__ = ["Margin", "asked_of", "goals_of", "margin"]
@@ -134,7 +135,20 @@ def goals_of(scene: Scene, goal: GoalLike | Sequence[GoalLike] | None) -> tuple[
 
 
 def asked_of(scene: Scene, goals: tuple[Goal, ...]) -> Question:
-    """Put a question to a scene; its own goal is left out, so that a certificate says what was asked."""
+    """Put a question to a scene; its own goal is left out, so that a certificate says what was asked.
+
+    Raises
+    ------
+    AnswerError
+        The scene scatters its throws: a margin is that of the quantities asked about, and of nothing else.
+    """
+    if scattered(scene):
+        raise AnswerError(
+            "the scene's effect spread",
+            "bounded",
+            "a scene whose throws are all alike",
+            "leave spread out of [effects]; reading per-throw asks about noise",
+        )
     tree = scene.as_dict()
     tree.pop("goal", None)
     return Question(load(tree), goals)
