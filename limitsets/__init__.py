@@ -28,8 +28,8 @@ if TYPE_CHECKING:  # each from the file that holds it: most rooms have a file of
     from limitsets.maps import critical_points, orbit, register
     from limitsets.proofs.certify import certify
     from limitsets.proofs.confirm import recheck
-    from limitsets.robust.gathering import robustness
-    from limitsets.robust.margins import margin
+    from limitsets.robust.margins.finding import margin
+    from limitsets.robust.sheet.gathering import robustness
     from limitsets.scene import dump, load, scenes
     from limitsets.sets.attractors import attractors
     from limitsets.sets.basins import basins
@@ -56,13 +56,13 @@ _ROOMS = {
     "limit_set": "sets.limit_set",
     "load": "scene",
     "maps": "maps",
-    "margin": "robust.margins",
+    "margin": "robust.margins.finding",
     "morse_graph": "graph",
     "orbit": "maps",
     "plot": "plot",
     "recheck": "proofs.confirm",
     "register": "maps",
-    "robustness": "robust.gathering",
+    "robustness": "robust.sheet.gathering",
     "scenes": "scene",
     "transitions": "graph.transitions",
 }

@@ -61,7 +61,7 @@ def _varied(
     scene: Scene, names: Sequence[str], bounds: Mapping[str, Ends]
 ) -> dict[str, tuple[float, float]] | None:
     """Give the bounds of what is varied: those given, else the usual ones."""
-    from limitsets.inverse.search import bounds_of
+    from limitsets.inverse.margin.search import bounds_of
 
     if not names and not bounds:
         return None

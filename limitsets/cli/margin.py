@@ -12,7 +12,7 @@ from limitsets.cli.output import Json, Scene, progress, table
 from limitsets.errors import LimitsetsError
 
 if TYPE_CHECKING:
-    from limitsets.robust.margins import Margin
+    from limitsets.robust.margins.finding import Margin
 
 __all__ = ["margin"]
 
@@ -43,7 +43,7 @@ def margin(
 ) -> None:
     """Bracket how much each quantity may deviate before the goal fails: proved below, refuted above."""
     with progress() as tell:
-        from limitsets.robust.margins import margin as run
+        from limitsets.robust.margins.finding import margin as run
         from limitsets.scene import load
 
         chosen = load(scene)

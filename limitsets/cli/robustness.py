@@ -12,7 +12,7 @@ from limitsets.cli.certify import deviations
 from limitsets.cli.output import Json, Scene, progress, table
 
 if TYPE_CHECKING:
-    from limitsets.robust.summary import Robustness
+    from limitsets.robust.sheet.summary import Robustness
 
 __all__ = ["robustness"]
 
@@ -65,8 +65,8 @@ def robustness(
         from limitsets.report.writing import require_place
 
         require_place(folder)
-        from limitsets.robust.chance import scattering_from
-        from limitsets.robust.gathering import robustness as run
+        from limitsets.robust.sheet.chance import scattering_from
+        from limitsets.robust.sheet.gathering import robustness as run
 
         noise = deviations("--scatter", scatter)
         vector = deviations("--tolerance", tolerance)

@@ -45,7 +45,7 @@ def counterexample(
     scene : Scene
         The scene.
     orbit : sequence of mapping
-        States with "x" and "side", as `limitsets.robust.entries.Entry` and the JSON of a proof have them.
+        States with "x" and "side", as `limitsets.robust.sheet.entries.Entry` and the JSON of a proof have them.
     violated : Goal, optional
         What it violates.
     name : str

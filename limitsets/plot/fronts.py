@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from limitsets.errors import AnswerError
-from limitsets.inverse.margin_answer import both
+from limitsets.inverse.margin.answer import both
 from limitsets.plot import style
 
 if TYPE_CHECKING:

@@ -16,8 +16,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from limitsets.robust.beyond import MarginsBeyond
-    from limitsets.robust.margins import Margin
+    from limitsets.robust.margins.beyond import MarginsBeyond
+    from limitsets.robust.margins.finding import Margin
 
 __all__ = ["margin_curve", "tolerance_box", "tornado"]
 
@@ -115,7 +115,7 @@ def margin_curve(found: MarginsBeyond) -> Figure:
     Parameters
     ----------
     found : MarginsBeyond
-        From `limitsets.robust.beyond.margins_beyond`.
+        From `limitsets.robust.margins.beyond.margins_beyond`.
 
     Returns
     -------

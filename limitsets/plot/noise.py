@@ -17,9 +17,9 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from limitsets.robust import NoiseStatistics
-    from limitsets.robust.sampling import Thrown
-    from limitsets.robust.settling import NoisyClass
-    from limitsets.robust.statistics import Levels
+    from limitsets.robust.noise.sampling import Thrown
+    from limitsets.robust.noise.settling import NoisyClass
+    from limitsets.robust.noise.statistics import Levels
 
 __all__ = ["noise_arrivals", "noise_density", "noise_levels"]
 
@@ -52,7 +52,7 @@ def noise_density(found: NoiseStatistics, thrown: Thrown | None = None) -> Figur
     found : NoiseStatistics
         From `limitsets.robust.noise_statistics`.
     thrown : Thrown, optional
-        From `limitsets.robust.sampling.throw_many`.
+        From `limitsets.robust.noise.sampling.throw_many`.
 
     Returns
     -------
@@ -99,7 +99,7 @@ def noise_arrivals(found: NoiseStatistics, thrown: Thrown | None = None) -> Figu
     found : NoiseStatistics
         From `limitsets.robust.noise_statistics`.
     thrown : Thrown, optional
-        From `limitsets.robust.sampling.throw_many`.
+        From `limitsets.robust.noise.sampling.throw_many`.
 
     Returns
     -------

@@ -15,7 +15,7 @@ from limitsets.report.writing import DPI, refusal
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from limitsets.robust.summary import Robustness
+    from limitsets.robust.sheet.summary import Robustness
 
 __all__ = ["write_robustness"]
 

@@ -11,11 +11,11 @@ from limitsets.report.background import figure_line, scene_of
 from limitsets.report.questions import question_of
 from limitsets.report.robust_trust import checked_again, noise_of, trusted
 from limitsets.report.tables import bound, table
-from limitsets.robust.entries import Entry, percent_of
+from limitsets.robust.sheet.entries import Entry, percent_of
 
 if TYPE_CHECKING:
-    from limitsets.robust.beyond import MarginsBeyond
-    from limitsets.robust.summary import Robustness
+    from limitsets.robust.margins.beyond import MarginsBeyond
+    from limitsets.robust.sheet.summary import Robustness
 
 __all__ = ["HEADS", "answer", "lines_of", "robustness_page", "tightest"]
 

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING
 
 from limitsets.report.background import figure_line
 from limitsets.report.tables import table
-from limitsets.robust.laws import Gaussian, Law, Uniform
+from limitsets.robust.noise.laws import Gaussian, Law, Uniform
 
 if TYPE_CHECKING:
-    from limitsets.robust.summary import Robustness
+    from limitsets.robust.sheet.summary import Robustness
 
 __all__ = ["checked_again", "noise_of", "trusted"]
 

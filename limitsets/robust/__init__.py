@@ -7,16 +7,16 @@ is computed, never proved, and every answer says so.
 
 from __future__ import annotations
 
-from limitsets.robust.absorbing import absorption as absorption
-from limitsets.robust.laws import Gaussian as Gaussian
-from limitsets.robust.laws import Given as Given
-from limitsets.robust.laws import Samples as Samples
-from limitsets.robust.laws import Uniform as Uniform
-from limitsets.robust.margins import Margin as Margin
-from limitsets.robust.margins import margin as margin
-from limitsets.robust.scattering import Scattering as Scattering
-from limitsets.robust.settling import classes as classes
-from limitsets.robust.statistics import NoiseStatistics as NoiseStatistics
-from limitsets.robust.statistics import noise_levels as noise_levels
-from limitsets.robust.statistics import noise_statistics as noise_statistics
-from limitsets.robust.ulam import transfer as transfer
+from limitsets.robust.margins.finding import Margin as Margin
+from limitsets.robust.margins.finding import margin as margin
+from limitsets.robust.noise.absorbing import absorption as absorption
+from limitsets.robust.noise.laws import Gaussian as Gaussian
+from limitsets.robust.noise.laws import Given as Given
+from limitsets.robust.noise.laws import Samples as Samples
+from limitsets.robust.noise.laws import Uniform as Uniform
+from limitsets.robust.noise.scattering import Scattering as Scattering
+from limitsets.robust.noise.settling import classes as classes
+from limitsets.robust.noise.statistics import NoiseStatistics as NoiseStatistics
+from limitsets.robust.noise.statistics import noise_levels as noise_levels
+from limitsets.robust.noise.statistics import noise_statistics as noise_statistics
+from limitsets.robust.noise.ulam import transfer as transfer

@@ -14,8 +14,8 @@ from typing import Any
 
 import limitsets as ls
 from limitsets.goals import OrientedBeyond
-from limitsets.robust.beyond import margins_beyond
-from limitsets.robust.joint import joint_margin
+from limitsets.robust.margins.beyond import margins_beyond
+from limitsets.robust.margins.joint import joint_margin
 
 HERE = Path(__file__).resolve().parent
 

@@ -9,11 +9,11 @@ import pytest
 import limitsets as ls
 from limitsets.errors import LimitsetsError
 from limitsets.inverse import robust_design
-from limitsets.inverse.front import unbeaten
-from limitsets.inverse.lead import lead_of, lead_weight
-from limitsets.inverse.search import Search, bounds_of
-from limitsets.inverse.sharp import Box, sharp
-from limitsets.inverse.trap import trap
+from limitsets.inverse.margin.front import unbeaten
+from limitsets.inverse.margin.lead import lead_of, lead_weight
+from limitsets.inverse.margin.search import Search, bounds_of
+from limitsets.inverse.margin.sharp import Box, sharp
+from limitsets.inverse.margin.trap import trap
 from limitsets.maps import advance
 from tests.studies.test_studies import load_study
 

@@ -7,8 +7,8 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 import limitsets as ls
 from limitsets.errors import LimitsetsError
 from limitsets.goals import OrientedBeyond
-from limitsets.robust.beyond import margins_beyond
-from limitsets.robust.joint import joint_margin
+from limitsets.robust.margins.beyond import margins_beyond
+from limitsets.robust.margins.joint import joint_margin
 
 
 def named(axes, gid):

@@ -6,9 +6,9 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 import limitsets as ls
 from limitsets.robust import Gaussian, Scattering, noise_statistics
-from limitsets.robust.sampling import throw_many
-from limitsets.robust.solving import starts_from
-from limitsets.robust.statistics import Levels
+from limitsets.robust.noise.sampling import throw_many
+from limitsets.robust.noise.solving import starts_from
+from limitsets.robust.noise.statistics import Levels
 
 NOISE = Scattering(speed=Gaussian(0.005), landing=Gaussian(0.02))
 GOAL = (20.5, 2)

@@ -8,7 +8,7 @@ import pytest
 import limitsets as ls
 from limitsets.errors import GridError
 from limitsets.robust import Samples, absorption, classes, transfer
-from limitsets.robust.arrivals import feeding, random_starts, with_border
+from limitsets.robust.noise.arrivals import feeding, random_starts, with_border
 
 
 class Still(NamedTuple):

@@ -8,8 +8,8 @@ from scipy import integrate, stats
 
 from limitsets.errors import MapError, SceneError
 from limitsets.robust import Gaussian, Given, Samples, Scattering, Uniform
-from limitsets.robust.laws import Law, regrouped, transformed
-from limitsets.robust.scattering import kappa_strata, scattering_of
+from limitsets.robust.noise.laws import Law, regrouped, transformed
+from limitsets.robust.noise.scattering import kappa_strata, scattering_of
 from limitsets.scene import load
 
 

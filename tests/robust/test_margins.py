@@ -14,7 +14,7 @@ from mpmath import mp, mpf
 import limitsets as ls
 from limitsets.errors import LimitsetsError
 from limitsets.goals import AttractsAll, OrientedBeyond, Predicate, Reaches
-from limitsets.robust.deviations import given, measures
+from limitsets.robust.margins.deviations import given, measures
 from tests.thrower import reference
 
 X = 20

@@ -15,10 +15,10 @@ import limitsets as ls
 from limitsets.errors import LimitsetsError
 from limitsets.goals import OrientedBeyond
 from limitsets.robust import against_x, gathering
-from limitsets.robust.beyond import MarginsBeyond
-from limitsets.robust.chance import noise_of, scattering_from, still
-from limitsets.robust.entries import Entry, percent_of
-from limitsets.robust.keeping import Kept
+from limitsets.robust.margins.beyond import MarginsBeyond
+from limitsets.robust.sheet.chance import noise_of, scattering_from, still
+from limitsets.robust.sheet.entries import Entry, percent_of
+from limitsets.robust.sheet.keeping import Kept
 from tests.thrower import reference
 
 SHARP = 0.733

@@ -9,8 +9,8 @@ from scipy import stats
 import limitsets as ls
 from limitsets.errors import AnswerError
 from limitsets.robust import Gaussian, Samples, Scattering, Uniform, classes, transfer
-from limitsets.robust.scattering import kappa_strata, still_map, thrown
-from limitsets.robust.sheets import Boxes, Sheets, laid
+from limitsets.robust.noise.scattering import kappa_strata, still_map, thrown
+from limitsets.robust.noise.sheets import Boxes, Sheets, laid
 from limitsets.sets import invariant_measures
 
 LINE = [(0.0, 1.0)]
@@ -218,7 +218,7 @@ def test_what_lands_beyond_may_be_brought_back():
 def test_implicit_and_written_out_give_the_same_classes(monkeypatch):
     cover = ls.grid(LINE, cells=200)
     written = classes(transfer(ls.maps.Logistic(3.6), cover, landing=Gaussian(0.01)))
-    monkeypatch.setattr("limitsets.robust.ulam.WRITTEN_OUT", 0)
+    monkeypatch.setattr("limitsets.robust.noise.ulam.WRITTEN_OUT", 0)
     chain = transfer(ls.maps.Logistic(3.6), cover, landing=Gaussian(0.01))
     assert not chain.written_out
     implicit = classes(chain)

@@ -1,0 +1,313 @@
+"""Design: the quantities of a scene for which its critical points are where they are wanted."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from limitsets.errors import AnswerError
+from limitsets.inverse.critical.derivatives import CriticalJacobian, condition_of, require_minimal
+from limitsets.inverse.critical.nearest import KEPT, nearest_to_start, nearest_to_targets
+from limitsets.inverse.critical.seeded import present, with_present
+from limitsets.inverse.critical.solving import REACHED, Outcome, continued, restarted, solved, staged
+from limitsets.inverse.critical.trials import Search, Trial
+from limitsets.inverse.critical.unknowns import Bounds, Unknowns, unknowns_of
+from limitsets.scene import Scene, load
+from limitsets.scene.quantities import base_unit, find
+from limitsets.scene.units import convert, parse
+
+__all__ = ["Design", "design"]
+
+Progress = Callable[[str, int, int], None]
+
+# Standard deviations of other starts by turns, in the solver's numbers: shares, or sizes of the part.
+SPREADS = (0.15, 0.3)
+
+
+@dataclass(frozen=True, eq=False)
+class Design:
+    """A scene with the critical points that were wanted, or as near to them as was found; nothing is proved.
+
+    Attributes
+    ----------
+    scene : Scene
+        The scene found; its numbers as written give these critical points.
+    start : Scene
+        The scene that the search started from.
+    targets : tuple of float or None
+        What was wanted, per side; None was free [scene's unit].
+    reached : bool
+        Whether every target is hit to 1e-9.
+    residual : tuple of float or None
+        Critical point minus target, per side; None where it was free [scene's unit].
+    before, jacobian : CriticalJacobian
+        Critical points and derivatives of `start` and of `scene`.
+    evaluations : int
+        How often critical points were computed, with their derivatives, in all.
+    path : tuple of Scene
+        Scenes on the way, from `start` to `scene`: of Newton's steps, or of the continuation's stages.
+    how : str
+        How it was found.
+    message : str
+        One sentence: reached, or how near and what stands in the way.
+    """
+
+    scene: Scene
+    start: Scene
+    targets: tuple[float | None, ...]
+    reached: bool
+    residual: tuple[float | None, ...]
+    before: CriticalJacobian
+    jacobian: CriticalJacobian
+    evaluations: int
+    path: tuple[Scene, ...]
+    how: str
+    message: str
+
+    @property
+    def condition(self) -> float | None:
+        """Condition number of the derivatives of the targeted critical points (`CriticalJacobian.scaled`)."""
+        sides = [side for side, target in enumerate(self.targets) if target is not None]
+        return condition_of(self.jacobian.scaled[sides])
+
+    def quantities(self) -> dict[str, tuple[float, float, str]]:
+        """Give what was varied: value before, value found, unit."""
+        found = {}
+        for name in self.jacobian.names:
+            unit = base_unit(find(name).dimension, self.start.unit)
+            pair = present(self.start, name), present(self.scene, name)
+            if name == "throw.speed" and self.start.gravity is None:
+                pair, unit = (1.0, float(np.sqrt(self.start.kappa / self.scene.kappa))), "of its own value"
+            found[name] = (*pair, unit)
+        return found
+
+    def to_json(self) -> dict[str, Any]:
+        """Give it as plain tables for JSON."""
+        return {
+            "scene": self.scene.as_dict(),
+            "reached": self.reached,
+            "message": self.message,
+            "how": self.how,
+            "evaluations": self.evaluations,
+            "targets": list(self.targets),
+            "residual": list(self.residual),
+            "quantities": [
+                {"quantity": name, "before": before, "after": after, "unit": unit}
+                for name, (before, after, unit) in self.quantities().items()
+            ],
+            "before": self.before.to_json(),
+            "after": self.jacobian.to_json(),
+            "condition": self.condition,
+            "path": [scene.as_dict() for scene in self.path],
+        }
+
+
+def design(
+    scene: Scene | str,
+    *,
+    critical_points: Sequence[float | str | None],
+    vary: Sequence[str],
+    bounds: Bounds | None = None,
+    starts: int = 8,
+    stages: int | None = None,
+    seed: int = 0,
+    progress: Progress | None = None,
+) -> Design:
+    """Find quantities of a scene for which its first critical points are where they are wanted.
+
+    Newton's method in a trust region within bounds, with exact derivatives; where that fails from the scene as it is,
+    the targets are moved there step by step (continuation), then other starts are drawn.  With more quantities than
+    targets the answer is the one nearest to the scene (in shares, and sizes of the part); with fewer, least squares.
+
+    Parameters
+    ----------
+    scene : Scene or str
+        Where to start, or what `limitsets.load` takes.
+    critical_points : sequence of float, str or None
+        Per side the first critical point wanted, in the scene's unit or as text with a unit; None leaves it free.
+    vary : sequence of str
+        Quantities to vary (`limitsets.scene.NAMES`); any number of them.
+    bounds : mapping of str to (lo, hi), optional
+        Bounds of some of them; None for no bound.  That every side rests is always asked.
+    starts : int
+        How many other starts are drawn at most.
+    stages : int, optional
+        Move the targets in so many equal steps and keep every one in the path.
+    seed : int
+        Of the starts drawn.
+    progress : callable, optional
+        Told ``(step, done, of)`` on the way.
+
+    Returns
+    -------
+    Design
+
+    Raises
+    ------
+    AnswerError
+        Targets or quantities that cannot be meant, bounds out of order, or a scene with effects.
+    SceneError
+        A quantity that this scene does not give.
+
+    Notes
+    -----
+    Source: the paper's section on design; docs/design.md.  That a target is not reached is what was found,
+    not a proof that there is no such scene.
+
+    Examples
+    --------
+    >>> import limitsets as ls
+    >>> centre_and_speed = ["part.mass.center.along", "part.mass.center.above", "throw.speed"]
+    >>> found = ls.design("paper-initial", critical_points=[10, 10, 20], vary=centre_and_speed)
+    >>> found.reached, [round(value[1], 4) for value in found.quantities().values()]
+    (True, [4.2256, 0.7082, 2.758])
+    """
+    chosen = scene if isinstance(scene, Scene) else load(scene)
+    require_minimal(chosen)
+    targets = _targets(chosen, critical_points)
+    unknowns = unknowns_of(chosen, _names(vary), bounds)
+    with_present(
+        chosen, dict(zip(unknowns.names, unknowns.start.tolist(), strict=True))
+    )  # refuses what cannot be set
+    search = Search(chosen, unknowns, targets, progress)
+    outcome, how = _searched(search, unknowns, starts, stages, seed)
+    return _answer(search, targets, outcome, how)
+
+
+def _names(vary: Sequence[str]) -> list[str]:
+    names = [vary] if isinstance(vary, str) else list(vary)
+    if not names or len(set(names)) != len(names):
+        raise AnswerError(
+            "the quantities to vary", ", ".join(map(str, names)), "one or more, each once", "name them"
+        )
+    return names
+
+
+def _targets(scene: Scene, wanted: Sequence[float | str | None]) -> tuple[float | None, ...]:
+    count = len(scene.sides)
+    given = [wanted] if isinstance(wanted, str) else list(wanted)
+    if len(given) != count or all(each is None for each in given):
+        raise AnswerError(
+            "the critical points wanted",
+            ", ".join(map(str, given)),
+            f"{count}, one for each side, None for a free one, and not all free",
+            "give one per side",
+        )
+    targets = [
+        convert(parse(each, "length"), scene.unit) if isinstance(each, str) else each for each in given
+    ]
+    for side, target in enumerate(targets):
+        if target is not None and not 0.0 < target <= scene.arm_length:
+            raise AnswerError(
+                f"the critical point wanted on side {side}",
+                target,
+                f"a place on the arm, up to {scene.arm_length:g} {scene.unit}",
+                "correct it, or lengthen the arm",
+            )
+    return tuple(None if target is None else float(target) for target in targets)
+
+
+def _searched(
+    search: Search, unknowns: Unknowns, starts: int, count: int | None, seed: int
+) -> tuple[Outcome, str]:
+    """Try one way after the other until the targets are reached; else come as near as possible."""
+    own = unknowns.seen(unknowns.start)
+    search.require_effect(search.at(own))
+    center = unknowns.inside(own)
+    first = search.at(center)
+    found, how = Outcome(first, [] if first is None else [first], False), ""
+    if first is not None and count is not None:
+        found, how = staged(search, first, count), f"continuation in {count} stages"
+    elif first is not None:
+        found, how = solved(search, center, search.wanted), "Newton's method from the scene"
+        if not found.reached and search.wanted.size <= center.size:
+            found, how = continued(search, first, 0.25), "continuation in the targets"
+    random, tries = np.random.default_rng(seed), starts if count is None or first is None else 0
+    for number in range(tries):
+        if found.reached:
+            break
+        search.step, search.of = "other starts", (number, starts)
+        found, how = (
+            restarted(search, center, SPREADS[number % 2], random),
+            f"start {number + 1} of {starts} drawn",
+        )
+    if not found.reached:
+        best = search.best()
+        if best is None:
+            return Outcome(None, [], False), "no scene was found that has the critical points wanted"
+        near = nearest_to_targets(search, best)
+        reached = search.cost(near) <= REACHED
+        return Outcome(near, [*found.path[:1], near], reached), "least squares"
+    if search.wanted.size < center.size and found.trial is not None:
+        near = nearest_to_start(search, found.trial, own)
+        found = Outcome(near, [*(each for each in found.path if each is not found.trial), near], True)
+        how += ", then the nearest to the scene"
+    return found, how
+
+
+def _answer(search: Search, targets: tuple[float | None, ...], outcome: Outcome, how: str) -> Design:
+    before = search.trials[0].found
+    after = before if outcome.trial is None else outcome.trial.found
+    residual = tuple(
+        None if target is None or not np.isfinite(x) else float(x - target)
+        for target, x in zip(targets, after.x.tolist(), strict=True)
+    )
+    found = _named(after.scene, search.scene) if outcome.trial is not None else search.scene
+    scenes = [trial.found.scene for trial in outcome.path]
+    return Design(
+        scene=found,
+        start=search.scene,
+        targets=targets,
+        reached=outcome.reached,
+        residual=residual,
+        before=before,
+        jacobian=after,
+        evaluations=search.evaluations,
+        path=(search.scene, *scenes[1:]) if scenes else (search.scene,),
+        how=how,
+        message=_message(search, outcome, residual),
+    )
+
+
+def _named(found: Scene, start: Scene) -> Scene:
+    """Give the scene found a name of its own: files are named after it."""
+    name = start.name if start.name.endswith("-design") else f"{start.name}-design"
+    return load(found.as_dict() | {"name": name})
+
+
+def _message(search: Search, outcome: Outcome, residual: tuple[float | None, ...]) -> str:
+    unit = search.scene.unit
+    if outcome.reached:
+        return f"reached: every critical point wanted is within {REACHED:g} {unit} of its place"
+    if outcome.trial is None:
+        return "not reached: no scene tried has all the critical points wanted; start from another scene"
+    worst = max(abs(value) for value in residual if value is not None)
+    rms = float(np.sqrt(np.mean([value**2 for value in residual if value is not None])))
+    text = f"not reached: the nearest found misses by {worst:.3g} {unit} at most, {rms:.3g} {unit} rms"
+    varied, wanted = search.unknowns.start.size, search.wanted.size
+    if wanted > varied:
+        text += f"; {varied} varied for {wanted} wanted: least squares"
+    return text + "".join(f"; {reason}" for reason in _in_the_way(search, outcome.trial))
+
+
+def _in_the_way(search: Search, trial: Trial) -> list[str]:
+    """Say which bounds and which edges of the part hold the search."""
+    unknowns, found = search.unknowns, []
+    for row, side in enumerate(search.sides):
+        if not trial.slope[row].any():
+            found.append(f"the critical point of side {side} does not depend on what is varied")
+    for k, name in enumerate(unknowns.names):
+        for end, word in ((unknowns.lo[k], "lower"), (unknowns.hi[k], "upper")):
+            if np.isfinite(end) and abs(trial.at[k] - end) < 1e-6:
+                found.append(f"{name} is at its {word} bound")
+    size = float(np.ptp(search.scene.vertices, axis=0).max())
+    words = ("the left end", "the right end", "the level")
+    for k, slack in enumerate(trial.found.slack.tolist()):
+        if slack < 2.0 * KEPT * size:
+            found.append(
+                f"the centre of mass is at {words[k % 3]} of side {k // 3}: beyond it the part tips over"
+            )
+    return found

@@ -1,0 +1,1 @@
+"""Scenes with a large margin: a search by floats, whose result `limitsets.robust` proves."""

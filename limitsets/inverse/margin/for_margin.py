@@ -1,0 +1,335 @@
+"""Robust design: the part for which the proved joint margin is large, and what it costs in throws.
+
+The goal is both that whatever rests beyond X lies on the side, and that almost every orbit comes to rest there: an X
+that nothing reaches does not count.  Search by floats (`search`), round to what can be made, have it proved
+(`limitsets.robust`).
+"""
+
+from __future__ import annotations
+
+import copy
+import math
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import permutations
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from limitsets.errors import AnswerError
+from limitsets.goals import Goal, OrientedBeyond, Reaches
+from limitsets.inverse.margin.feeding import Feeding, throws_to_feed
+from limitsets.inverse.margin.front import Option, front_of
+from limitsets.inverse.margin.lead import Lead, lead_of
+from limitsets.inverse.margin.search import POPULATION, Candidate, Search, Tell, bounds_of
+from limitsets.inverse.margin.sharp import Box, Sharp, failing, sharp
+from limitsets.robust import Margin
+from limitsets.robust.margins.joint import joint_margin
+from limitsets.scene import Scene, load
+
+__all__ = ["TOLERANCE", "RobustDesign", "fed_at", "robust_design"]
+
+TOLERANCE = {
+    "throw.speed": "1 %",
+    "part.sides": "1 %",
+    "part.mass.radius_of_gyration": "1 %",
+    "part.mass.center.along": "0.01 in",
+    "part.mass.center.above": "0.01 in",
+    "arm.surface_height": "0.01 in",
+    "landing.x": "0.01 in",
+}
+"""The tolerance of a scene that gives none; part.sides stands for every side."""
+
+# Decimals to which a design is rounded, X more coarsely: a workshop has no more.
+DECIMALS, DECIMALS_OF_X = 4, 3
+# Designs drawn for each order of the sides, and how many orders go on.
+DRAWN, ORDERS_KEPT = 120, 2
+# Seconds for the proof of a box.
+SECONDS = 240.0
+# Finer steps for the designs at the end.
+FINE = 14
+
+
+@dataclass(frozen=True, eq=False)
+class RobustDesign:
+    """A design for a large margin.
+
+    Attributes
+    ----------
+    scene : Scene
+        The design, with [goal] (the first of `goals`) and [tolerance].
+    goals : tuple of Goal
+        What has to hold, all of it.
+    x, side : float, int
+        Where parts are fed [scene's unit].
+    varied : tuple of str
+        What was varied.
+    tolerance : dict of str to str
+        What the margin multiplies.
+    sampled : Sharp
+        Its margin by floats, and the effect of each quantity.
+    margins : tuple of Margin
+        Proved and refuted, one for each of `goals`; empty where no proof was asked for.
+    lead : Lead
+        The point mass that makes it of a plate.
+    feeding : Feeding
+        Throws to feed, sampled.
+    front : tuple of Option
+        Designs that no other one beats both in margin and in throws, by floats; the surest first.
+    history : tuple of Candidate
+        Every design tried that feeds at all.
+    before : Scene
+        Where the search began.
+    before_sampled : Sharp or None
+        The margin there, at the best X there, by floats.
+    before_margins : tuple of Margin
+        The same, proved and refuted.
+    before_feeding : Feeding or None
+        Throws to feed there, sampled.
+    evaluations : int
+        Designs looked at.
+    seconds : float
+        Time of the search, without proofs.
+    """
+
+    scene: Scene
+    goals: tuple[Goal, ...]
+    x: float
+    side: int
+    varied: tuple[str, ...]
+    tolerance: dict[str, str]
+    sampled: Sharp
+    margins: tuple[Margin, ...]
+    lead: Lead
+    feeding: Feeding
+    front: tuple[Option, ...]
+    history: tuple[Candidate, ...]
+    before: Scene
+    before_sampled: Sharp | None
+    before_margins: tuple[Margin, ...]
+    before_feeding: Feeding | None
+    evaluations: int
+    seconds: float
+
+    def to_json(self) -> dict[str, Any]:
+        """Give it as plain tables for JSON (`limitsets.inverse.margin.answer`)."""
+        from limitsets.inverse.margin.answer import to_json
+
+        return to_json(self)
+
+    def save(self, folder: str | Path) -> tuple[Path, ...]:
+        """Write the scene, the answer as JSON, and what `limitsets.recheck` checks of the margin."""
+        from limitsets.inverse.margin.answer import save
+
+        return save(self, Path(folder))
+
+
+def fed_at(x: float, side: int) -> tuple[Goal, Goal]:
+    """Give both goals of feeding at x: nothing else gets there, and the part does."""
+    return OrientedBeyond(x, side), Reaches(x, side)
+
+
+def tolerance_of(scene: Scene, tolerance: Mapping[str, str] | None) -> dict[str, str]:
+    """Give a tolerance by quantity: the one asked for, the scene's, or `TOLERANCE`."""
+    texts = dict(tolerance or scene.text.get("tolerance") or TOLERANCE)
+    share = texts.pop("part.sides", None)
+    if share is not None and "sides" in scene.text["part"]:
+        texts |= {f"part.sides[{k}]": share for k in range(len(scene.sides))}
+    return texts
+
+
+def orders_of(scene: Scene) -> list[Scene]:
+    """Give a triangle's other orders of sides, the scene's own first; mirrored parts are among them."""
+    sides = scene.text["part"].get("sides")
+    if sides is None or len(sides) != 3:
+        return [scene]
+    found = []
+    for order in permutations(range(3)):
+        tree = scene.as_dict()
+        tree["part"]["sides"] = [sides[k] for k in order]
+        # the old centre of mass need not lie in it: the search begins elsewhere
+        left, right = (float(scene.sides.length[order[k]]) for k in (2, 0))
+        centre = tree["part"].get("mass", {}).get("center")
+        if order != (0, 1, 2) and isinstance(centre, dict):
+            centre["along"] = f"{0.6 * left:.4f} {scene.unit}"
+            centre["above"] = f"{0.15 * min(left, right):.4f} {scene.unit}"
+        found.append(load(tree))
+    return found
+
+
+def _searched(
+    searches: Sequence[Search], evaluations: int, seed: int, tell: Tell
+) -> tuple[Search, list[list[float]]]:
+    """Draw in every order, go on in the best, and give the best search with the unknowns of its best design."""
+    rng = np.random.default_rng(seed)
+    drawn = []
+    for number, search in enumerate(searches):
+        tell("orders of the sides", number, len(searches))
+        unknowns, ratings = search.drawn(rng, max(POPULATION, min(DRAWN, evaluations)))
+        best = np.argsort(-ratings)[:POPULATION]
+        drawn.append((float(ratings[best[0]]), number, unknowns[best]))
+    drawn.sort(key=lambda row: -row[0])
+    first = []
+    for _, number, population in drawn[:ORDERS_KEPT]:
+        share = evaluations // (2 * min(ORDERS_KEPT, len(drawn)))
+        population, ratings = searches[number].improved(population, share, seed, tell)
+        first.append((float(ratings[0]), number, population))
+    _, number, population = max(first, key=lambda row: row[0])
+    population, _ = searches[number].improved(population, evaluations // 2, seed + 1000, tell)
+    return searches[number], population.tolist()
+
+
+def _rounded(scene: Scene, search: Search) -> Scene:
+    """Write what was varied with few decimals."""
+    unit = scene.unit
+    return scene.with_values({name: f"{scene.value(name):.{DECIMALS}f} {unit}" for name in search.bounds})
+
+
+def _best_x(scene: Scene, box: Box, side: int, search: Search | None) -> Sharp | None:
+    """Find the margin on all corners: corners at which it fails are put first, and it is sought anew."""
+    hard = [] if search is None else list(search.hard)
+    for _ in range(6):
+        found = sharp(scene, box, side, hard=hard, steps=FINE)
+        if found is None or not found.margin > 0.0:
+            return found
+        new = [signs for signs in failing(scene, box, side, found, 0.99 * found.margin) if signs not in hard]
+        if not new:
+            return found
+        hard = new + hard
+    return found
+
+
+def _with_purpose(scene: Scene, x: float, side: int, tolerance: Mapping[str, str], name: str) -> Scene:
+    tree = copy.deepcopy(scene.as_dict())
+    tree["name"] = name
+    tree["goal"] = {"oriented_beyond": {"x": f"{x:.{DECIMALS_OF_X}f} {scene.unit}", "side": side}}
+    tree["tolerance"] = {name: text for name, text in tolerance.items() if name != "landing.x"}
+    return load(tree)
+
+
+def robust_design(
+    scene: Scene | str | Path,
+    *,
+    side: int | None = None,
+    vary: Mapping[str, tuple[float, float]] | Sequence[str] | None = None,
+    tolerance: Mapping[str, str] | None = None,
+    orders: bool = True,
+    everywhere: bool = True,
+    evaluations: int = 1200,
+    seed: int = 0,
+    prove: float = SECONDS,
+    progress: Tell | None = None,
+) -> RobustDesign:
+    """Choose a part, a throw and an arm for which parts are fed in spite of large deviations.
+
+    Parameters
+    ----------
+    scene : Scene, str or Path
+        Where to begin: what is not varied is kept, in the minimal model.
+    side : int, optional
+        The side on which parts are to be fed; default that of the scene's goal, else the last.
+    vary : mapping of str to (float, float), or sequence of str, optional
+        Quantities, with bounds in the scene's units or without; default centre of mass, radius of gyration, kappa and
+        the surface's height.
+    tolerance : mapping of str to str, optional
+        What the margin multiplies, ``{"throw.speed": "1 %", "landing.x": "0.01 in"}``; default the scene's, or
+        `TOLERANCE`.  landing.x is noise at every throw, all else fixed but unknown.
+    orders : bool
+        Whether a triangle's sides may be put in another order.
+    everywhere : bool
+        Whether no start on the arm may be lost, in the scene as it is.  The goals ask about the limit set only.
+    evaluations : int
+        Designs to look at, besides those drawn at first.
+    seed : int
+        Of the search; the same seed, the same answer.
+    prove : float
+        Seconds for the proofs of the design, and as many for those of the scene before; 0 for none.
+    progress : callable, optional
+        Called with what is done, how much of it, and of how much.
+
+    Returns
+    -------
+    RobustDesign
+
+    Raises
+    ------
+    AnswerError
+        A scene with effects, a side that it does not have, or no design that feeds at all.
+    """
+    start = scene if isinstance(scene, Scene) else load(scene)
+    on = _side(start, side)
+    tell: Tell = progress if progress is not None else lambda what, done, of: None
+    texts, begin = tolerance_of(start, tolerance), time.perf_counter()
+    box = Box.of(start, texts)
+    searches = [
+        Search(one, box, on, bounds_of(one, vary), number, everywhere=everywhere)
+        for number, one in enumerate(orders_of(start) if orders else [start])
+    ]
+    search, population = _searched(searches, evaluations, seed, tell)
+    best = search.scene_of(population[0])
+    found = None if best is None else _best_x(_rounded(best, search), box, on, search)
+    if best is None or found is None or not found.margin > 0.0:
+        raise AnswerError(
+            "the design", "none that feeds", "one at least", "widen the bounds, or look at more designs"
+        )
+    x = round(found.x, DECIMALS_OF_X)
+    design = _with_purpose(_rounded(best, search), x, on, texts, f"{start.name}-robust")
+    before = _best_x(start, box, on, None)
+    history = tuple(candidate for each in searches for candidate in each.history)
+    front = front_of([each.scene for each in searches], history, on, seed, tell)
+    seconds = time.perf_counter() - begin
+    known = before is not None and before.margin > 0.0
+    fed = throws_to_feed(start, before.x, on, seed=seed) if before is not None and known else None
+    margins: tuple[Margin, ...] = ()
+    own: tuple[Margin, ...] = ()
+    if prove > 0.0:
+        margins = _proved(design, fed_at(x, on), texts, prove, tell, "the design")
+        if before is not None and known:
+            goals = fed_at(round(before.x, DECIMALS_OF_X), on)
+            own = _proved(start, goals, texts, prove, tell, "the scene before")
+    return RobustDesign(
+        scene=design,
+        goals=fed_at(x, on),
+        x=x,
+        side=on,
+        varied=tuple(search.bounds),
+        tolerance=texts,
+        sampled=found,
+        margins=margins,
+        lead=lead_of(design),
+        feeding=throws_to_feed(design, x, on, seed=seed),
+        front=front,
+        history=history,
+        before=start,
+        before_sampled=before,
+        before_margins=own,
+        before_feeding=fed,
+        evaluations=sum(each.evaluations for each in searches),
+        seconds=seconds,
+    )
+
+
+def _proved(
+    scene: Scene, goals: Sequence[Goal], texts: Mapping[str, str], seconds: float, tell: Tell, whose: str
+) -> tuple[Margin, ...]:
+    """Bracket the joint margin of each goal by itself: one may be proved much farther than the other."""
+    found = []
+    for goal in goals:
+        what = f"margin of {whose}, {goal.kind}"
+
+        def told(share: float, what: str = what) -> None:
+            tell(what, math.floor(100 * share), 100)
+
+        found.append(joint_margin(scene, (goal,), texts, seconds=seconds / len(goals), tell=told))
+    return tuple(found)
+
+
+def _side(scene: Scene, side: int | None) -> int:
+    if scene.effects.on():
+        raise AnswerError("the scene", "with effects on", "the minimal model", "switch its effects off")
+    asked = side if side is not None else getattr(scene.goal, "side", len(scene.sides) - 1)
+    if not 0 <= asked < len(scene.sides):
+        raise AnswerError("the side", asked, f"0 to {len(scene.sides) - 1}", "name a side of this part")
+    return int(asked)

@@ -1,0 +1,114 @@
+"""What a margin costs: designs that no other one beats both in margin and in throws to feed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from limitsets.inverse.margin.feeding import Feeding, throws_to_feed
+from limitsets.inverse.margin.search import Candidate
+from limitsets.scene import Scene
+
+__all__ = ["Option", "front_of", "unbeaten"]
+
+# Candidates whose throws are counted: the surest of each class of margins, and classes.
+CLASSES, PER_CLASS = 30, 6
+
+
+@dataclass(frozen=True, eq=False)
+class Option:
+    """A design and its throws to feed.
+
+    Attributes
+    ----------
+    candidate : Candidate
+        The design, with its margin by floats.
+    feeding : Feeding
+        Throws to feed at its own best X, sampled.
+    """
+
+    candidate: Candidate
+    feeding: Feeding
+
+    def to_json(self) -> dict[str, Any]:
+        """Give it as a plain table for JSON."""
+        found = self.candidate.found
+        return {
+            "values": self.candidate.values,
+            "order": self.candidate.order,
+            "margin": found.margin,
+            "x": found.x,
+            "throws": self.feeding.to_json(),
+        }
+
+
+def unbeaten(margin: Sequence[float], throws: Sequence[float]) -> list[int]:
+    """Give the numbers of those that no other beats in both: more margin with no more throws, or fewer with no less.
+
+    Examples
+    --------
+    >>> unbeaten([3.0, 2.0, 1.0, 2.5], [30.0, 20.0, 25.0, 30.0])
+    [0, 1]
+    """
+    order = sorted(range(len(margin)), key=lambda k: (-margin[k], throws[k]))
+    found: list[int] = []
+    for k in order:
+        if not found or throws[k] < throws[found[-1]]:
+            found.append(k)
+    return found
+
+
+def front_of(
+    scenes: Sequence[Scene],
+    history: Sequence[Candidate],
+    side: int,
+    seed: int,
+    tell: Callable[[str, int, int], None],
+) -> tuple[Option, ...]:
+    """Count the throws of designs of every margin, and keep those that nothing beats.
+
+    Parameters
+    ----------
+    scenes : sequence of Scene
+        Where the searches began, by order.
+    history : sequence of Candidate
+        Designs tried.
+    side : int
+        The side wanted.
+    seed : int
+        Of the random starts.
+    tell : callable
+        Progress.
+
+    Returns
+    -------
+    tuple of Option
+        The surest first.
+    """
+    known = [each for each in history if each.found.margin > 0.0 and np.isfinite(each.found.x)]
+    if not known:
+        return ()
+    margins = np.array([each.found.margin for each in known])
+    which = np.minimum((CLASSES * margins / margins.max()).astype(int), CLASSES - 1)
+    chosen = []
+    for number in range(CLASSES):
+        mine = np.flatnonzero(which == number)
+        # a lower X against the reach is reached sooner: of each class those, besides the surest
+        early = [known[k].found.x / known[k].found.reach for k in mine]
+        chosen += [int(k) for k in mine[np.argsort(early)[:PER_CLASS]]]
+    chosen += [int(k) for k in np.argsort(-margins)[:PER_CLASS]]
+    options = []
+    for number, k in enumerate(dict.fromkeys(chosen)):
+        tell("throws to feed", number, len(chosen))
+        one = known[k]
+        scene = scenes[one.order].with_values(dict(one.values))
+        feeding = throws_to_feed(scene, one.found.x, side, seed=seed)
+        if feeding.fed and not feeding.lost:
+            options.append(Option(one, feeding))
+    kept = unbeaten(
+        [each.candidate.found.margin for each in options], [each.feeding.mean for each in options]
+    )
+    return tuple(options[k] for k in kept)

@@ -1,0 +1,204 @@
+"""Choose the part so that the margin is large: a global search by floats.
+
+The search knows one number, the joint margin by floats (`sharp`); what it ends with is for `limitsets.robust` to prove.
+scipy's differential evolution moves a population of designs; in between, the best one is tried on all corners of the
+tolerance, and those at which it fails are kept as hard ones for all.  An answer depends on the seed and the number of
+evaluations, never on the clock.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from limitsets.errors import AnswerError, SceneError
+from limitsets.inverse.margin.lead import lead_of
+from limitsets.inverse.margin.sharp import Box, Sharp, Signs, failing, sharp
+from limitsets.inverse.margin.sound import assumptions_kept
+from limitsets.inverse.margin.trap import least_room
+from limitsets.scene import Scene
+from limitsets.scene.quantities import find
+
+__all__ = ["VARY", "Candidate", "Search"]
+
+VARY: dict[str, tuple[str, str]] = {
+    "part.mass.center.along": ("0.05", "0.95"),
+    "part.mass.center.above": ("0.05", "0.6"),
+    "part.mass.radius_of_gyration": ("0.12", "0.4"),
+    "throw.kappa": ("2.2", "8"),
+    "arm.surface_height": ("-0.2", "-0.005"),
+}
+"""What is varied unless something else is asked for, and between what, in mean side lengths (along: of its side)."""
+
+# Designs in the population, generations between two looks at all corners, and corners kept as hard.
+POPULATION, GENERATIONS, MOST_HARD = 24, 4, 24
+# A lead weight is at most this share of the part: the rest is the plate.
+MOST_LEAD = 0.9
+
+Tell = Callable[[str, int, int], None]
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Candidate:
+    """A design that was tried, and is fed somewhere.
+
+    Attributes
+    ----------
+    values : dict of str to float
+        What was varied [scene's units].
+    found : Sharp
+        Its margin by floats.
+    order : int
+        Which of the scenes that the search began with: another order of the sides.
+    """
+
+    values: dict[str, float]
+    found: Sharp
+    order: int
+
+
+@dataclass(eq=False)
+class Search:
+    """The search in one scene.
+
+    Attributes
+    ----------
+    scene : Scene
+        Where it begins: what is not varied stays.
+    box : Box
+        The tolerance.
+    side : int
+        The side on which parts are to be fed.
+    bounds : dict of str to (float, float)
+        What is varied, and between what [scene's units].
+    order : int
+        A number for it, for the record.
+    lead : bool
+        Whether the part has to be a uniform plate with one point mass on it.
+    everywhere : bool
+        Whether no start on the arm may be lost, in the scene as it is.
+    """
+
+    scene: Scene
+    box: Box
+    side: int
+    bounds: Mapping[str, tuple[float, float]]
+    order: int = 0
+    lead: bool = True
+    everywhere: bool = True
+    hard: list[Signs] = field(default_factory=list)
+    history: list[Candidate] = field(default_factory=list)
+    evaluations: int = 0
+
+    def scene_of(self, unknowns: Sequence[float]) -> Scene | None:
+        """Give the scene of scaled unknowns; None where there is none."""
+        values: dict[str, float | str] = {}
+        for value, (name, (lo, hi)) in zip(unknowns, self.bounds.items(), strict=True):
+            values[name] = _scaled(float(value), lo, hi)
+        try:
+            return self.scene.with_values(values)
+        except SceneError:
+            return None
+
+    def rate(self, unknowns: Sequence[float], above: float = 0.0) -> float:
+        """Rate a design: its margin, or below 0 how far it is from being one."""
+        self.evaluations += 1
+        scene = self.scene_of(unknowns)
+        if scene is None:
+            return -30.0
+        if self.lead:
+            weight = lead_of(scene)
+            lacking = max(weight.share - MOST_LEAD, -weight.inside / float(scene.sides.length.mean()))
+            if not lacking <= 0.0:
+                return -20.0 - min(lacking, 9.0)
+        found = sharp(scene, self.box, self.side, hard=self.hard, above=above)
+        if found is None:
+            return -10.0
+        if found.margin > 0.0:
+            lacking = assumptions_kept(scene, found.kept)
+            if self.everywhere:
+                lacking = min(lacking, least_room(scene.bare_map) / scene.arm_length)
+            if lacking < 0.0:
+                return max(lacking, -9.0)
+            self.history.append(Candidate(self._values(scene), found, self.order))
+        return found.margin
+
+    def _values(self, scene: Scene) -> dict[str, float]:
+        return {name: scene.value(name) for name in self.bounds}
+
+    def drawn(self, rng: np.random.Generator, count: int) -> tuple[Array, Array]:
+        """Draw designs evenly, and rate them."""
+        unknowns = rng.random((count, len(self.bounds)))
+        return unknowns, np.array([self.rate(row) for row in unknowns])
+
+    def harden(self, unknowns: Sequence[float]) -> None:
+        """Try a design on all corners at nearly its margin, and keep those at which it fails."""
+        scene = self.scene_of(unknowns)
+        found = None if scene is None else sharp(scene, self.box, self.side, hard=self.hard)
+        if scene is None or found is None or not found.margin > 0.0:
+            return
+        wrong = failing(scene, self.box, self.side, found, 0.97 * found.margin)
+        new = [signs for signs in wrong if signs not in self.hard]
+        self.hard[:] = (new[: MOST_HARD // 3] + self.hard)[:MOST_HARD]
+
+    def improved(self, population: Array, evaluations: int, seed: int, tell: Tell) -> tuple[Array, Array]:
+        """Move a population for so many evaluations; the population and its ratings, the best first."""
+        from scipy.optimize import differential_evolution
+
+        end, step = self.evaluations + evaluations, 0
+        begin = self.evaluations
+        while self.evaluations < end:
+            found = differential_evolution(
+                lambda unknowns: -self.rate(unknowns),
+                [(0.0, 1.0)] * len(self.bounds),
+                maxiter=GENERATIONS,
+                init=population,
+                polish=False,
+                tol=0.0,
+                seed=seed + step,
+                mutation=(0.4, 0.9),
+                recombination=0.9,
+            )
+            step += 1
+            order = np.argsort(found.population_energies)
+            population, ratings = found.population[order], -found.population_energies[order]
+            self.harden(population[0])
+            tell("designs", self.evaluations - begin, evaluations)
+        return population, ratings
+
+
+def _scaled(share: float, lo: float, hi: float) -> float:
+    """Between two bounds: evenly in the logarithm where both have a sign, else evenly."""
+    if lo * hi > 0.0:
+        return math.copysign(math.exp(math.log(abs(lo)) + share * math.log(hi / lo)), lo)
+    return lo + share * (hi - lo)
+
+
+def bounds_of(
+    scene: Scene, vary: Mapping[str, tuple[float, float]] | Sequence[str] | None
+) -> dict[str, tuple[float, float]]:
+    """Give the bounds of what is varied [scene's units]."""
+    if isinstance(vary, Mapping):
+        return {name: (float(lo), float(hi)) for name, (lo, hi) in vary.items()}
+    names = list(VARY) if vary is None else list(vary)
+    size = float(scene.sides.length.mean())
+    found = {}
+    for name in names:
+        find(name)
+        if name not in VARY:
+            raise AnswerError("the bounds", name, "a lower and an upper one", "give bounds for this quantity")
+        lo, hi = (float(text) for text in VARY[name])
+        own = float(scene.sides.length[_side_of_centre(scene)]) if name.endswith("along") else size
+        found[name] = (lo * own, hi * own)
+    return found
+
+
+def _side_of_centre(scene: Scene) -> int:
+    centre: Any = scene.text["part"].get("mass", {}).get("center", {})
+    return int(centre.get("side", 0)) if isinstance(centre, Mapping) else 0

@@ -1,0 +1,281 @@
+"""The joint margin by floats: how far a whole vector of tolerances may be stretched before a part is fed wrongly.
+
+Fed at X on a side means: whatever rests beyond X lies on the side, and parts come to rest there at X or beyond.  With
+every quantity off by s tolerances the highest place T(s) on another side has risen, the farthest place R(s) on the
+side has come down, and some X serves every scene in the box as long as T(s) <= R(s).  Both are nearly linear: their
+worst corners are found by differences.  Where an itinerary changes they jump; corners that turned out bad before
+("hard" ones) are tried first.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+from numpy.typing import NDArray
+
+from limitsets.errors import SceneError
+from limitsets.inverse.margin.trap import Trap, trap
+from limitsets.scene import Scene
+from limitsets.scene.facts import Deviation
+from limitsets.scene.quantities import deviation
+
+__all__ = ["Box", "Sharp", "corners", "failing", "sharp"]
+
+Array = NDArray[np.float64]
+Signs = tuple[int, ...]
+
+# Steps towards the margin between two factors; corners that are tried where a box has more.
+STEPS, MOST_CORNERS = 5, 512
+
+
+@dataclass(frozen=True, eq=False)
+class Box:
+    """A tolerance: deviations by quantity, fixed but unknown, and of each landing.
+
+    Attributes
+    ----------
+    sizes : dict of str to Deviation
+        What is fixed but unknown.
+    landing : float
+        How far a landing may be off, at every throw [scene's unit].
+    """
+
+    sizes: dict[str, Deviation]
+    landing: float
+
+    @classmethod
+    def of(cls, scene: Scene, texts: Mapping[str, str]) -> Box:
+        """Read it from texts by quantity."""
+        found = {name: deviation(text, name, scene.unit, key=name) for name, text in texts.items()}
+        off = found.pop("landing.x", None)
+        return cls(found, 0.0 if off is None else off.value)
+
+    def at(self, scene: Scene, factor: float, signs: Sequence[float]) -> Scene | None:
+        """Give the scene at a corner of the box stretched by a factor; None where there is no such part."""
+        values: dict[str, float | str] = {}
+        for (name, size), sign in zip(self.sizes.items(), signs, strict=True):
+            if name == "throw.speed" and "kappa" in scene.text["throw"]:
+                share = factor * sign * size.value
+                if not share > -1.0:
+                    return None
+                values["throw.kappa"] = scene.kappa / (1.0 + share) ** 2
+            else:
+                value = scene.value(name)
+                values[name] = value + factor * sign * size.of(value)
+        try:
+            return scene.with_values(values)
+        except SceneError:
+            return None
+
+
+@dataclass(frozen=True, eq=False)
+class Sharp:
+    """A joint margin by floats.
+
+    Attributes
+    ----------
+    margin : float
+        Factor on the tolerance up to which parts are fed at `x`; 0 or below where they are not even as it is.
+    x : float
+        The X that lasts longest [scene's unit].
+    threshold, reach : float
+        Of the scene as it is: X may lie between them [scene's unit].
+    kept : Trap
+        Where the part is kept, the scene as it is.
+    effects : dict of str to (float, float)
+        By how much one tolerance of each quantity raises the threshold and lowers the reach, at worst.
+    """
+
+    margin: float
+    x: float
+    threshold: float
+    reach: float
+    kept: Trap
+    effects: dict[str, tuple[float, float]]
+
+
+def corners(count: int) -> list[Signs]:
+    """All corners of a box of so many quantities; of a large one some, always the same.
+
+    Examples
+    --------
+    >>> corners(1)
+    [(-1,), (1,)]
+    """
+    if 2**count <= MOST_CORNERS:
+        return list(product((-1, 1), repeat=count))
+    drawn = np.random.default_rng(0).choice((-1, 1), (MOST_CORNERS, count))
+    return [tuple(row) for row in drawn.tolist()]
+
+
+def _kept(scene: Scene | None, start: tuple[float, int], landing: float) -> Trap | None:
+    if scene is None or not (scene.sides.a[start[1]] < start[0] < scene.arm_length):
+        return None
+    return trap(scene.bare_map, *start, landing=landing)
+
+
+def _ways(scene: Scene, found: Trap, side: int) -> Array:
+    """Numbers that must not rise: the threshold, minus the reach, and what keeps the part from the joint."""
+    near = np.nan_to_num(found.lo - scene.sides.a)
+    creep = np.where(np.isfinite(found.creep), found.creep, 0.0)
+    return np.concatenate([[found.threshold(side), -found.hi[side]], -near, -creep])
+
+
+class _Fed:
+    """One scene, asked at several factors."""
+
+    def __init__(self, scene: Scene, box: Box, side: int, start: tuple[float, int]) -> None:
+        self.scene, self.box, self.side, self.start = scene, box, side, start
+
+    def spare(self, factor: float, signs: Signs) -> tuple[float, float]:
+        """Threshold and reach at a corner; inf and -inf where the part is not kept."""
+        landing = factor * self.box.landing
+        corner = self.box.at(self.scene, factor, signs)
+        # over a surface at the joint's height nothing is proved: jogs there move a part neither out nor in
+        if corner is None or not corner.surface_height * self.scene.surface_height > 0.0:
+            return math.inf, -math.inf
+        found = _kept(corner, self.start, landing)
+        if found is None or not np.isfinite(found.hi[self.side]):
+            return math.inf, -math.inf
+        # the farthest place that landings always off inward still lead to
+        return found.threshold(self.side), float(found.hi[self.side]) - 2.0 * landing
+
+    def all(self, factor: float, asked: list[Signs]) -> tuple[float, float, Signs | None]:
+        """Threshold and reach over corners, and the corner at which they cross, which moves to the front."""
+        highest, least = -math.inf, math.inf
+        for k, signs in enumerate(asked):
+            threshold, reach = self.spare(factor, signs)
+            highest, least = max(highest, threshold), min(least, reach)
+            if highest > least:
+                asked.insert(0, asked.pop(k))
+                return highest, least, signs
+        return highest, least, None
+
+
+def sharp(
+    scene: Scene,
+    box: Box,
+    side: int,
+    *,
+    start: tuple[float, int] | None = None,
+    hard: list[Signs] | None = None,
+    above: float = 0.0,
+    steps: int = STEPS,
+) -> Sharp | None:
+    """Find the joint margin and the best X by floats.
+
+    Parameters
+    ----------
+    scene : Scene
+        The scene, in the minimal model.
+    box : Box
+        The tolerance that s multiplies.
+    side : int
+        The side on which parts are to be fed.
+    start : (float, int), optional
+        Where an orbit starts that leads to the limit set; default: a third up the arm, on the side.
+    hard : list of tuple of int, optional
+        Corners that are tried first, besides those that differences point at.
+    above : float
+        Margins below this are of no interest: they are bounded only.
+    steps : int
+        How finely the margin is sought.
+
+    Returns
+    -------
+    Sharp or None
+        None where the part leaves the arm or never lies on the side.
+
+    Examples
+    --------
+    >>> import limitsets as ls
+    >>> from limitsets.inverse.margin.sharp import Box, sharp
+    >>> scene = ls.load("paper-designed")
+    >>> found = sharp(scene, Box.of(scene, {"throw.speed": "1 %"}), 2)
+    >>> round(found.threshold, 3), round(found.reach, 3), round(found.x, 1)
+    (19.753, 23.383, 21.5)
+    """
+    begin = start if start is not None else (scene.arm_length / 3.0, side)
+    nominal = _kept(scene, begin, 0.0)
+    if nominal is None or not np.isfinite(nominal.hi[side]) or not math.isfinite(nominal.threshold(side)):
+        return None
+    threshold, reach = nominal.threshold(side), float(nominal.hi[side])
+    if threshold >= reach:
+        return Sharp((reach - threshold) / reach, math.nan, threshold, reach, nominal, {})
+    bare = Sharp(0.0, math.nan, threshold, reach, nominal, {})
+    fed = _Fed(scene, box, side, _start(bare, side))
+    ways = _ways(scene, nominal, side)
+    falls = np.zeros((len(box.sizes), ways.size))
+    for k in range(len(box.sizes)):
+        sizes = [float(j == k) for j in range(len(box.sizes))]
+        corner = box.at(scene, 1.0, sizes)
+        found = _kept(corner, fed.start, 0.0)
+        if corner is None or found is None:
+            return bare
+        falls[k] = _ways(corner, found, side) - ways
+    effects = {name: (float(abs(falls[k, 0])), float(abs(falls[k, 1]))) for k, name in enumerate(box.sizes)}
+    cost = float(np.abs(falls[:, :2]).sum()) + 3.0 * box.landing
+    linear = (reach - threshold) / cost if cost > 0.0 else math.inf
+    if linear <= above:
+        return Sharp(linear, math.nan, threshold, reach, nominal, effects)
+    asked = list(hard or [])
+    asked += [tuple(int(s) for s in np.where(row < 0.0, -1, 1)) for row in falls.T]
+    margin, x = _sought(fed, list(dict.fromkeys(asked)), min(linear, 1e3), above, reach - threshold, steps)
+    return Sharp(margin, x, threshold, reach, nominal, effects)
+
+
+def failing(scene: Scene, box: Box, side: int, found: Sharp, factor: float) -> list[Signs]:
+    """Give the corners of the box, stretched by a factor, at which parts are not fed at `found.x`.
+
+    Examples
+    --------
+    >>> import limitsets as ls
+    >>> from limitsets.inverse.margin.sharp import Box, failing, sharp
+    >>> scene = ls.load("paper-designed")
+    >>> box = Box.of(scene, {"throw.speed": "1 %"})
+    >>> [failing(scene, box, 2, sharp(scene, box, 2), factor) for factor in (3.0, 9.0)]
+    [[], [(-1,), (1,)]]
+    """
+    fed = _Fed(scene, box, side, _start(found, side))
+    wrong = []
+    for signs in corners(len(box.sizes)):
+        threshold, reach = fed.spare(factor, signs)
+        if not threshold <= found.x <= reach:
+            wrong.append(signs)
+    return wrong
+
+
+def _start(found: Sharp, side: int) -> tuple[float, int]:
+    """Give a place in the limit set, near its end: from farther in an orbit may be lost that never comes back there."""
+    return found.reach - 0.02 * (found.reach - found.threshold), side
+
+
+def _sought(
+    fed: _Fed, asked: list[Signs], top: float, above: float, spare: float, steps: int
+) -> tuple[float, float]:
+    """Close in on the margin between 0 (or `above`) and a little over its linear estimate."""
+    good, bad, x = 0.0, 1.05 * top, math.nan
+    factor = above if above > 0.0 else 0.98 * top
+    for _ in range(steps):
+        highest, least, failed = fed.all(factor, asked)
+        if failed is None:
+            good, x = factor, 0.5 * (highest + least)
+            # T and R close in on each other about evenly
+            ahead = factor * spare / max(spare - (least - highest), 1e-9)
+            factor = min(
+                max(0.998 * ahead, 0.9 * good + 0.1 * bad), 0.5 * (good + bad) if ahead > bad else bad
+            )
+        else:
+            bad = factor
+            if factor == above:
+                return 0.97 * above, math.nan
+            crossed = math.isfinite(highest - least)
+            ahead = factor * spare / (spare - (least - highest)) if crossed else 0.0
+            factor = max(0.998 * ahead, 0.5 * (good + bad)) if crossed else 0.5 * (good + bad)
+        if bad - good < 0.005 * bad:
+            break
+    return good, x

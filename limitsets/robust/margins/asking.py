@@ -1,0 +1,230 @@
+"""One question: whether goals hold for all of a box of scenes, and every sequence of throws with some noise.
+
+Cells are made fine where it pays: first some hundreds of them a side, then borders spread evenly over what attracts.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from limitsets.errors import AnswerError
+from limitsets.goals import Goal, OrientedBeyond, Predicate, Reaches
+from limitsets.proofs.asked import Answer, ask, borders, prove
+from limitsets.proofs.attraction import Attraction, attraction
+from limitsets.proofs.cover import cover
+from limitsets.proofs.parameters import ParameterBox, parameter_box
+from limitsets.proofs.tolerance import Piece
+from limitsets.robust.margins.worst import worst_orbit
+from limitsets.scene import Scene
+
+__all__ = ["Asked", "Question"]
+
+# Cells per side to begin with, then borders over all that attracts, and pieces of a parameter where a cell is open to
+# both decisions; more cells to begin with where nothing attracts.
+BASE, FINE, PIECES = 512, (0, 4000, 16_000, 32_000), (8, 32, 128, 512)
+BASES = (512, 2048, 8192)
+
+# For goals about every start: cells per side, as no part of the arm matters more than the others.
+LADDER = (512, 2048, 8192, 32_768)
+
+
+@dataclass(frozen=True, eq=False)
+class Asked:
+    """What became of the goals on one box.
+
+    Attributes
+    ----------
+    verdict : str
+        "proved" (all goals), "refuted" (one of them), "undecided", or "impossible" (no such scene, or no part of it).
+    reason : str
+        Why it is not proved.
+    found : Attraction or None
+        The cells that prove it.
+    answers : tuple of Answer
+        One per goal, where all are proved.
+    refuted : Goal or None
+        The goal that is refuted.
+    counterexample : tuple of State
+        The orbit that does it.
+    piece : Piece or None
+        The scenes it was asked of; None for the scene as it is.
+    noise : dict of str to str
+        The noise.
+    within : dict of str to str
+        Deviations that those of a single scene do not exceed, by quantity.
+    """
+
+    verdict: str
+    reason: str = ""
+    found: Attraction | None = None
+    answers: tuple[Answer, ...] = ()
+    refuted: Goal | None = None
+    counterexample: tuple[Any, ...] = ()
+    piece: Piece | None = None
+    noise: Mapping[str, str] = field(default_factory=dict)
+    within: Mapping[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, eq=False)
+class Question:
+    """Some goals of a scene: all have to hold.
+
+    Attributes
+    ----------
+    scene : Scene
+        The scene.
+    goals : tuple of Goal
+        What is asked.
+    """
+
+    scene: Scene
+    goals: tuple[Goal, ...]
+
+    @property
+    def anywhere(self) -> bool:
+        """Whether some goal is about every start on the arm."""
+        return any(goal.from_anywhere or goal.kind == "attracts_all" for goal in self.goals)
+
+    def box(self, piece: Piece | None, noise: Mapping[str, str]) -> ParameterBox:
+        """Enclose the parameters."""
+        return parameter_box(self.scene, tree=None if piece is None else piece.tree(), noise=dict(noise))
+
+    def prove(
+        self,
+        piece: Piece | None = None,
+        noise: Mapping[str, str] | None = None,
+        finest: int = 3,
+        bases: int = len(BASES),
+    ) -> Asked:
+        """Prove the goals, with finer and finer cells; or say what is missing.
+
+        Parameters
+        ----------
+        piece : Piece, optional
+            Scenes, all at once: as if the quantities differed at every throw.
+        noise : mapping of str to str, optional
+            What differs at every throw.
+        finest : int
+            Refinements, up to 3.
+        bases : int
+            Numbers of cells to begin with that are tried where nothing attracts, up to 3.
+        """
+        noise = dict(noise or {})
+        try:
+            box = self.box(piece, noise)
+            found = self._coarse(box, bases)
+            for step in range(finest + 1):
+                if step:
+                    found = self._finer(found, box, step)
+                answers = self._each(found)
+                missing = answers[-1]
+                if missing.verdict == "proved":
+                    return Asked("proved", "", found, answers, piece=piece, noise=noise)
+                if missing.final or not (found.component >= 0).any():
+                    break
+        except AnswerError as error:
+            return Asked("impossible", _said(error), piece=piece, noise=noise)
+        reason = missing.reason
+        if not (found.component >= 0).any():
+            reason = f"{reason}: from some of them, parts may leave the arm"
+        return Asked("undecided", reason, found, piece=piece, noise=noise)
+
+    def _each(self, found: Attraction) -> tuple[Answer, ...]:
+        """Prove one goal after the other, up to the first that is not: it comes last then."""
+        answers: list[Answer] = []
+        for goal in self.goals:
+            answers.append(prove(found, self.scene, goal))
+            if answers[-1].verdict != "proved":
+                break
+        return tuple(answers)
+
+    def cells(self, piece: Piece | None, step: int) -> Attraction:
+        """Return the cells of one refinement, whatever they prove."""
+        box = self.box(piece, {})
+        return self._finer(self._coarse(box), box, step)
+
+    def _cuts(self, sides: int) -> dict[int, list[float]]:
+        wanted = [float(x) for goal in self.goals for x in borders(goal)]
+        return dict.fromkeys(range(sides), wanted)
+
+    def _coarse(self, box: ParameterBox, bases: int = len(BASES)) -> Attraction:
+        for cells in BASES[:bases]:
+            found = attraction(cover(box, cells, self._cuts(box.lo.a.size), PIECES[0]))
+            if (found.component >= 0).any():
+                break
+        return found
+
+    def _finer(self, found: Attraction, box: ParameterBox, step: int) -> Attraction:
+        """Cut what attracts into more cells; or everything, where a goal is about every start."""
+        cuts = self._cuts(box.lo.a.size)
+        if self.anywhere:
+            return attraction(cover(box, LADDER[step], cuts, PIECES[step]))
+        extents = found.cells.extents()
+        total = sum(hi - lo for parts in extents.values() for lo, hi in parts)
+        for side, parts in extents.items():
+            for lo, hi in parts:
+                count = max(2, round(FINE[step] * (hi - lo) / total))
+                cuts[side] = [*cuts[side], *np.linspace(lo, hi, count).tolist()]
+        return attraction(cover(box, BASE, cuts, PIECES[step]))
+
+    def refute(self, piece: Piece | None = None, noise: Mapping[str, str] | None = None) -> Asked:
+        """Search for an orbit of one scene that violates one of the goals.
+
+        Parameters
+        ----------
+        piece : Piece, optional
+            The scene, each quantity known but for the last digits.
+        noise : mapping of str to str, optional
+            What differs at every throw, chosen by the search.
+        """
+        noise = dict(noise or {})
+        reason = "no orbit is found that violates it"
+        try:
+            box = self.box(piece, noise)
+            found = self._coarse(box)
+        except AnswerError as error:
+            return Asked("impossible", _said(error), piece=piece, noise=noise)
+        for goal in self.goals:
+            answer = self._against(found, goal)
+            if answer.verdict == "refuted":
+                return Asked("refuted", answer.reason, found, (), goal, answer.counterexample, piece, noise)
+            reason = answer.reason or reason
+        return Asked("undecided", reason, found, piece=piece, noise=noise)
+
+    def _against(self, found: Attraction, goal: Goal) -> Answer:
+        """Search for what refutes one goal: where throws differ, for the worst that they can do."""
+        wrong = _wrong(goal)
+        if isinstance(goal, Reaches) and not goal.every_orbit:
+            # refuted by where attracting cells end; a periodic orbit that attracts is not looked for each time
+            return prove(self._finer(found, found.cover.box, 2), self.scene, goal)
+        if wrong is None or not found.cover.box.noise or goal.from_anywhere:
+            return ask(found, self.scene, goal)
+        answer = prove(found, self.scene, goal)
+        orbit = worst_orbit(found, wrong) if (found.component >= 0).any() else ()
+        return answer._replace(verdict="refuted" if orbit else answer.verdict, counterexample=orbit)
+
+
+def _said(error: AnswerError) -> str:
+    """Say why there is no such scene."""
+    value = f"{error.value:.6g}" if isinstance(error.value, float) else error.value
+    return f"there is no such part or throw: {error.thing} is {value}; it has to be {error.allowed}"
+
+
+def _wrong(goal: Goal) -> Callable[[Any, Any], Any] | None:
+    """From places and sides to whether each violates the goal; None for goals that no single place violates."""
+    if isinstance(goal, OrientedBeyond):
+        return lambda x, side: (x > goal.x) & (side != goal.side)
+    if isinstance(goal, Predicate):
+
+        def wrong(x: Any, side: Any) -> Any:
+            bad = np.zeros(x.shape, dtype=bool)
+            for s in np.unique(side).tolist():
+                bad[side == s] = ~goal.holds(x[side == s], x[side == s], s)
+            return bad
+
+        return wrong
+    return None

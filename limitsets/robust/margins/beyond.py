@@ -1,0 +1,152 @@
+"""Margins as functions of X, for "beyond X only one side": where to let the arm end.
+
+Farther out more is to spare before a part on another side gets there, until the wanted side hardly gets there itself.
+So two goals are asked of every X: beyond it only that side, and almost every orbit comes to rest on that side beyond
+it.  Somewhere between the two the margin is largest.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from limitsets.errors import AnswerError
+from limitsets.goals import Goal, OrientedBeyond, Reaches
+from limitsets.robust.margins.finding import Margin, asked_of, margin
+from limitsets.robust.margins.joint import joint_margin
+from limitsets.scene import Scene, load
+
+__all__ = ["MarginsBeyond", "margins_beyond", "places_beyond"]
+
+Progress = Callable[[str, int, int], None]
+
+
+@dataclass(frozen=True, eq=False)
+class MarginsBeyond:
+    """Brackets of margins at several X.
+
+    Attributes
+    ----------
+    scene : Scene
+        The scene.
+    side : int
+        The side wanted.
+    x : ndarray, shape (n,)
+        Places, ascending [scene's length unit].
+    names : tuple of str
+        Quantity and reading of each margin.
+    units : tuple of str
+        Their units.
+    proved, refuted : ndarray, shape (n, names)
+        The brackets; refuted is nan where nothing is.
+    margins : tuple of tuple of Margin
+        The same with their proofs, by place.
+    """
+
+    scene: Scene
+    side: int
+    x: NDArray[np.float64]
+    names: tuple[str, ...]
+    units: tuple[str, ...]
+    proved: NDArray[np.float64]
+    refuted: NDArray[np.float64]
+    margins: tuple[tuple[Margin, ...], ...]
+
+    def best(self, name: str | None = None) -> tuple[float, float]:
+        """Return the place with the largest proved margin, and that margin; of the first quantity by default."""
+        k = 0 if name is None else self.names.index(name)
+        at = int(np.argmax(self.proved[:, k]))
+        return float(self.x[at]), float(self.proved[at, k])
+
+
+def margins_beyond(
+    scene: Scene | str | Path,
+    side: int,
+    quantities: Sequence[str] = ("throw.speed",),
+    *,
+    x: Sequence[float] | None = None,
+    places: int = 9,
+    tolerance: Mapping[str, str] | None = None,
+    width: float = 0.05,
+    seconds: float = 30.0,
+    progress: Progress | None = None,
+) -> MarginsBeyond:
+    """Bracket margins of "beyond X only this side, and almost every orbit comes there" at several X.
+
+    Parameters
+    ----------
+    scene : Scene, str or Path
+        A scene, or what `limitsets.load` takes.
+    side : int
+        The side wanted.
+    quantities : sequence of str
+        Each fixed but unknown, landing.x at every throw; "joint" for the tolerance.
+    x : sequence of float, optional
+        Places; default `places` of them between the farthest that the limit set gets on other sides and on this one.
+    places : int
+        How many.
+    tolerance : mapping of str to str, optional
+        For "joint"; default the scene's.
+    width : float
+        Of the brackets.
+    seconds : float
+        For each proof of "joint".
+    progress : callable, optional
+        Called with what is done, how much of it, and of how much.
+
+    Raises
+    ------
+    AnswerError
+        The limit set gets farther on another side than on this one.
+
+    Examples
+    --------
+    >>> found = margins_beyond("paper-designed", 2, x=[20.0, 21.0])
+    >>> found.proved[:, 0].round(1).tolist()
+    [0.7, 3.4]
+    """
+    asked = scene if isinstance(scene, Scene) else load(scene)
+    at = np.sort(np.asarray(places_beyond(asked, side, places) if x is None else x, dtype=float))
+    rows: list[tuple[Margin, ...]] = []
+    for number, place in enumerate(at.tolist()):
+        if progress is not None:
+            progress(f"margins beyond x = {place:.4g}", number, at.size)
+        goals: tuple[Goal, ...] = (OrientedBeyond(place, side), Reaches(place, side))
+        rows.append(tuple(_one(asked, name, goals, tolerance, width, seconds) for name in quantities))
+    names = tuple(one.quantity for one in rows[0])
+    proved = np.array([[one.proved for one in row] for row in rows])
+    refuted = np.array([[np.nan if one.refuted is None else one.refuted for one in row] for row in rows])
+    return MarginsBeyond(
+        asked, side, at, names, tuple(one.unit for one in rows[0]), proved, refuted, tuple(rows)
+    )
+
+
+def _one(
+    scene: Scene,
+    name: str,
+    goals: tuple[Goal, ...],
+    tolerance: Mapping[str, str] | None,
+    width: float,
+    seconds: float,
+) -> Margin:
+    if name == "joint":
+        return joint_margin(scene, goals, tolerance, width=width, seconds=seconds)
+    (found,) = margin(scene, name, goal=goals, width=width)
+    return found
+
+
+def places_beyond(scene: Scene, side: int, places: int) -> NDArray[np.float64]:
+    """Return places between the farthest that the limit set gets on other sides and on this one, as many as asked."""
+    extents = asked_of(scene, (OrientedBeyond(0.0, side),)).cells(None, 2).cells.extents()
+    highest = {s: max(hi for _, hi in parts) for s, parts in extents.items() if parts}
+    others = max((top for s, top in highest.items() if s != side), default=0.0)
+    own = highest.get(side, -np.inf)
+    if not others < own:
+        raise AnswerError(
+            "the side", side, "one that the limit set gets farther out on than on any other", "name another"
+        )
+    return np.linspace(others, own, places + 2)[1:-1]

@@ -1,0 +1,278 @@
+"""Margins: how much a quantity may deviate before a goal fails, as a bracket that is proved and refuted.
+
+`proved` is the largest symmetric deviation for which a certificate can be written; `refuted` the smallest for which an
+orbit is proved to violate the goal.  Floats propose both, nothing is believed of them.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+from limitsets.errors import AnswerError
+from limitsets.goals import Goal, Predicate
+from limitsets.proofs.asked import State
+from limitsets.proofs.simulated import scattered
+from limitsets.robust.margins.asking import Asked, Question
+from limitsets.robust.margins.brackets import Bracket, bracket_fixed, bracket_per_throw
+from limitsets.robust.margins.deviations import Measure, measure, measures
+from limitsets.scene import Scene, load
+
+__all__ = ["Margin", "asked_of", "goals_of", "margin"]
+
+Progress = Callable[[str, int, int], None]
+GoalLike = Goal | Callable[..., Any]
+
+
+@dataclass(frozen=True, eq=False)
+class Margin:
+    """How much one quantity of a scene, or all of its tolerance, may deviate.
+
+    Attributes
+    ----------
+    quantity : str
+        Its name; "joint" for all of the tolerance together.
+    reading : str
+        "fixed" (but unknown), "per-throw" (another one at every throw), or "tolerance" for joint.
+    goals : tuple of Goal
+        What has to hold: all of them.
+    proved : float
+        The goals are proved for every deviation up to this; 0 if for none.
+    refuted : float or None
+        At this deviation an orbit violates a goal; None if no such deviation is found.
+    unit : str
+        Of both: "%" of the value, a length or an angle; "" for joint, a factor on the tolerance.
+    nominal : float or None
+        The value about which it deviates; of a length or angle in its `unit`.
+    reason : str
+        Why there is no upper end, or why the two are farther apart than asked; empty if they are not.
+    closed : bool
+        Whether they are as close as was asked.
+    seconds : float
+        Time it took.
+    scene : Scene
+        The scene.
+    tolerance : dict of str to str
+        Of joint: the deviations of which `proved` and `refuted` are factors; empty otherwise.
+    deviations, noise : dict of str to str
+        What may be fixed but unknown and what differs at every throw, as it is proved, as `limitsets.certify` takes it.
+    pieces : tuple of Asked
+        What proves it.
+    against : Asked or None
+        What refutes it.
+    """
+
+    quantity: str
+    reading: str
+    goals: tuple[Goal, ...]
+    proved: float
+    refuted: float | None
+    unit: str
+    nominal: float | None
+    reason: str
+    closed: bool
+    seconds: float
+    scene: Scene
+    tolerance: dict[str, str]
+    deviations: dict[str, str]
+    noise: dict[str, str]
+    pieces: tuple[Asked, ...] = field(repr=False)
+    against: Asked | None = field(repr=False)
+
+    @property
+    def counterexample(self) -> tuple[State, ...]:
+        """The orbit that violates a goal, every state enclosed; empty if there is none."""
+        return () if self.against is None else self.against.counterexample
+
+    def to_json(self) -> dict[str, Any]:
+        """Give it as a plain table for JSON."""
+        from limitsets.robust.margins.answer import to_json
+
+        return to_json(self)
+
+    def save(self, folder: str | Path) -> tuple[Path, ...]:
+        """Write what `limitsets.recheck` checks: a certificate for each goal, and the orbit that refutes one.
+
+        Parameters
+        ----------
+        folder : str or Path
+            Where; it is made.
+
+        Raises
+        ------
+        AnswerError
+            Effects are on, which no recheck knows, or a goal is a function of the caller's.
+        """
+        from limitsets.robust.margins.answer import save
+
+        return save(self, Path(folder))
+
+
+def goals_of(scene: Scene, goal: GoalLike | Sequence[GoalLike] | None) -> tuple[Goal, ...]:
+    """Read what is asked: the scene's goal, another, several, or a function of the caller's."""
+    if goal is None:
+        if scene.goal is None:
+            raise AnswerError("the goal", None, "a scene with [goal], or goal=", "say what has to hold")
+        return (scene.goal,)
+    several = list(goal) if isinstance(goal, Sequence) else [goal]
+    found: list[Goal] = []
+    for one in several:
+        if hasattr(one, "kind"):
+            found.append(one)  # type: ignore[arg-type]
+        elif callable(one):
+            found.append(Predicate(one, getattr(one, "__name__", "the predicate")))
+        else:
+            raise AnswerError(
+                "the goal", one, "a goal of limitsets.goals, or a function", "see limitsets.goals.Predicate"
+            )
+    if not found:
+        raise AnswerError("the goal", "no goals", "one at least", "name one")
+    return tuple(found)
+
+
+def asked_of(scene: Scene, goals: tuple[Goal, ...]) -> Question:
+    """Put a question to a scene; its own goal is left out, so that a certificate says what was asked.
+
+    Raises
+    ------
+    AnswerError
+        The scene scatters its throws: a margin is that of the quantities asked about, and of nothing else.
+    """
+    if scattered(scene):
+        raise AnswerError(
+            "the scene's effect spread",
+            "bounded",
+            "a scene whose throws are all alike",
+            "leave spread out of [effects]; reading per-throw asks about noise",
+        )
+    tree = scene.as_dict()
+    tree.pop("goal", None)
+    return Question(load(tree), goals)
+
+
+def margin(
+    scene: Scene | str | Path,
+    *quantities: str,
+    reading: str | None = None,
+    goal: GoalLike | Sequence[GoalLike] | None = None,
+    width: float = 0.01,
+    progress: Progress | None = None,
+) -> tuple[Margin, ...]:
+    """Bracket how much quantities may deviate before a goal fails.
+
+    Parameters
+    ----------
+    scene : Scene, str or Path
+        A scene, or what `limitsets.load` takes.
+    *quantities : str
+        Names of quantities; "joint" for all of the scene's tolerance at once.  Default: all that the scene gives, in
+        both readings, and joint if there is a tolerance.
+    reading : str, optional
+        "fixed" but unknown, or "per-throw": another value at every throw, of throw.speed, gravity.tilt and landing.x.
+        Default: "fixed", and "per-throw" of landing.x.
+    goal : Goal, callable, or a sequence of them, optional
+        What has to hold, all of it; default the scene's goal.  A function is taken as `limitsets.goals.Predicate`.
+    width : float
+        How close the two ends of a bracket have to be, as a share of the upper one.
+    progress : callable, optional
+        Called with what is done, how much of it, and of how much.
+
+    Returns
+    -------
+    tuple of Margin
+        One per quantity and reading.
+
+    Raises
+    ------
+    AnswerError
+        No goal, a quantity or a reading that the scene does not have.
+
+    Examples
+    --------
+    >>> import limitsets as ls
+    >>> (speed,) = ls.margin("paper-designed", "throw.speed")
+    >>> speed.proved < 0.733 < speed.refuted, speed.unit
+    (True, '%')
+    """
+    from limitsets.robust.margins.joint import joint_margin
+
+    asked = scene if isinstance(scene, Scene) else load(scene)
+    if not 1e-4 <= width < 1:
+        raise AnswerError("the width", width, "from 0.0001 to below 1", "0.01 is a hundredth")
+    goals = goals_of(asked, goal)
+    question = asked_of(asked, goals)
+    names: tuple[str, ...] = tuple(dict.fromkeys(quantities))
+    todo: list[Measure | str] = []
+    if names:
+        todo = [name if name == "joint" else measure(question.scene, name, reading) for name in names]
+    else:
+        todo = [*measures(question.scene, reading)]
+        todo += ["joint"] if asked.tolerance and reading is None else []
+    found = []
+    for number, one in enumerate(todo):
+        label = one if isinstance(one, str) else f"{one.quantity} {one.reading}"
+
+        def tell(share: float, label: str = label, number: int = number) -> None:
+            if progress is not None:
+                progress(f"margin of {label}, {100 * share:.0f} %", number, len(todo))
+
+        tell(0.0)
+        if isinstance(one, str):
+            found.append(joint_margin(asked, goals, width=width, tell=tell))
+        else:
+            found.append(_single(question, one, Fraction(repr(width)), tell))
+    return tuple(found)
+
+
+def _single(question: Question, one: Measure, width: Fraction, tell: Callable[[float], None]) -> Margin:
+    begin = time.perf_counter()
+    nominal = question.prove()
+    if nominal.verdict != "proved":
+        found = _of_none(question, nominal)
+    else:
+        search = bracket_fixed if one.reading == "fixed" else bracket_per_throw
+        found = search(question, one, width, tell)
+    return Margin(
+        one.quantity,
+        one.reading,
+        question.goals,
+        float(found.proved),
+        None if found.refuted is None else float(found.refuted),
+        one.unit,
+        None if one.quantity == "landing.x" else _nominal(question.scene, one),
+        found.reason,
+        found.closed(width),
+        time.perf_counter() - begin,
+        question.scene,
+        {},
+        *_texts(one, found.proved),
+        tuple(found.pieces),
+        found.against,
+    )
+
+
+def _texts(one: Measure, size: Fraction) -> tuple[dict[str, str], dict[str, str]]:
+    """Say what is fixed but unknown, and what differs at every throw."""
+    if not size:
+        return {}, {}
+    said = {one.quantity: one.text(size)}
+    return (said, {}) if one.reading == "fixed" else ({}, said)
+
+
+def _nominal(scene: Scene, one: Measure) -> float | None:
+    if one.key != one.quantity:
+        return None
+    return float(one.nominal)
+
+
+def _of_none(question: Question, nominal: Asked) -> Bracket:
+    """Answer for a scene that does not have the goal as it is: no deviation is small enough."""
+    against = question.refute()
+    if against.verdict == "refuted":
+        reason = f"the goal fails in the scene as it is: {against.reason}"
+        return Bracket(Fraction(0), Fraction(0), [], against, reason)
+    return Bracket(reason=f"the goal is not proved of the scene as it is: {nominal.reason}")

@@ -1,0 +1,217 @@
+"""The chain of a scene at one level of the noise, solved: all numbers, their errors, and their slopes in that level."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from limitsets.cells import grid
+from limitsets.errors import AnswerError
+from limitsets.goals import OrientedBeyond, Reaches
+from limitsets.robust.noise.absorbing import Absorption, absorption
+from limitsets.robust.noise.arrivals import Feeding, feeding, random_starts, with_border
+from limitsets.robust.noise.casting import uses_pieces
+from limitsets.robust.noise.cutting import Cutter
+from limitsets.robust.noise.laws import Strata
+from limitsets.robust.noise.scattering import Scattering, kappa_strata, still_map, thrown
+from limitsets.robust.noise.settling import NoisyClass, classes
+from limitsets.robust.noise.ulam import STRATA, Transfer, transfer
+
+if TYPE_CHECKING:
+    from limitsets.scene import Scene
+
+__all__ = ["Asked", "Sensitivity", "Solved", "asked_of", "errors_of", "slopes_of", "solve", "starts_from"]
+
+# Random starts begin this share of the arm beyond a_i: nearer to it the number of throws has no bound.
+BEYOND_FOOT = 0.05
+# Relative change of the noise for derivatives, and half of it.
+STEP = 0.1
+WIDER = 1.25
+# Escapes per throw below which a class counts as one that parts settle in.
+KEPT = 1e-6
+
+
+@dataclass(frozen=True)
+class Sensitivity:
+    """Change of a number with the level of the noise of one quantity.
+
+    Attributes
+    ----------
+    slope : float
+        Derivative with respect to the logarithm of the level: about 100 times the change for 1 % more noise.
+    error : float
+        How far central differences over two steps disagree, and how far those on half as many cells, added up.
+    """
+
+    slope: float
+    error: float
+
+
+@dataclass(frozen=True, eq=False)
+class Asked:
+    """What is asked, of one grid and level of noise."""
+
+    scene: Scene
+    goal: tuple[float, int]
+    starts: NDArray[np.float64]
+    cells: int
+    strata: int
+    cutters: dict[
+        tuple[float, float], Cutter
+    ]  # by range of the factor on kappa: found once, used at every solution
+
+    def cutter(self, factors: Strata) -> Cutter | None:
+        """Where the sides are cut; None for a map without pieces."""
+        params = still_map(self.scene)
+        if not uses_pieces(params):
+            return None
+        key = (float(factors.mean.min()), float(factors.mean.max()))
+        for (lo, hi), known in self.cutters.items():
+            if lo <= key[0] and key[1] <= hi:
+                return known
+        # A little wider than asked, for the same law cut otherwise or scaled up for a derivative.
+        lo, hi = (1.0 + (end - 1.0) * WIDER for end in key)
+        values = np.linspace(lo, hi, 2 * STRATA if hi > lo else 1)
+        self.cutters[lo, hi] = Cutter(thrown(params), self.scene.domain, values)
+        return self.cutters[lo, hi]
+
+
+@dataclass(frozen=True, eq=False)
+class Solved:
+    """The operator and all that was read off it; fields as in `NoiseStatistics`."""
+
+    chain: Transfer
+    classes: tuple[NoisyClass, ...]
+    settles: dict[str, float]
+    ends: Absorption
+    feeding: Feeding
+    numbers: dict[str, float]
+
+
+def solve(asked: Asked, scatter: Scattering) -> Solved:
+    """Everything at one level of the noise, without errors and derivatives."""
+    scene, (x, side) = asked.scene, asked.goal
+    # Uniform: noise makes grading towards the joint needless, and cells are wanted where the part is.
+    cover = with_border(grid(scene.domain, cells=asked.cells, grading="uniform"), x)
+    factors = kappa_strata(scatter, scene, asked.strata)
+    chain = transfer(
+        thrown(still_map(scene)),
+        cover,
+        parameter=factors,
+        landing=scatter.landing,
+        strata=asked.strata,
+        cutter=asked.cutter(factors),
+    )
+    beyond = np.concatenate([cover.centres(k) > x for k in range(cover.sides)])
+    goal = beyond & (cover.side_of(np.arange(cover.n_cells)) == side)
+    starts = random_starts(cover, asked.starts, x)
+    parts = classes(chain)
+    kept = [np.flatnonzero(part.cells.mask) for part in parts if part.escape < KEPT]
+    settling = absorption(chain, np.zeros(cover.n_cells, dtype=bool), classes=kept)
+    settles = {name: float(starts @ found) for name, found in settling.probability.items() if name != "goal"}
+    ends = absorption(chain, goal)
+    fed = feeding(chain, ends, starts)
+    first = absorption(chain, goal, other=beyond & ~goal).probability["other"]
+    numbers = {**_long_run(chain, parts, settles, beyond, goal), **_from_starts(chain, fed)}
+    numbers["first beyond is wrong"] = float(starts @ first)
+    return Solved(chain, parts, settles, ends, fed, numbers)
+
+
+def _main(parts: Sequence[NoisyClass], settles: dict[str, float]) -> NoisyClass | None:
+    # Classes come with those first that are not left, or least: they bear the numbers in `settles`.
+    kept = sum(part.escape < KEPT for part in parts)
+    if kept:
+        return parts[max(range(kept), key=lambda number: settles[f"class {number}"])]
+    return min(parts, key=lambda part: part.escape, default=None)
+
+
+def _long_run(
+    chain: Transfer,
+    parts: Sequence[NoisyClass],
+    settles: dict[str, float],
+    beyond: NDArray[np.bool_],
+    goal: NDArray[np.bool_],
+) -> dict[str, float]:
+    main = _main(parts, settles)
+    if main is None:
+        return {}
+    far, wrong = float(main.weight[beyond].sum()), float(main.weight[beyond & ~goal].sum())
+    numbers = {f"time on side {side}": share for side, share in main.sides.items()}
+    numbers |= {f"share of {name}": share for name, share in main.branches.items()}
+    numbers |= {"time beyond": far, "wrong beyond": wrong / far if far > 0.0 else math.nan}
+    numbers["escape"] = main.escape
+    return numbers
+
+
+def _from_starts(chain: Transfer, fed: Feeding) -> dict[str, float]:
+    return {
+        "fed": fed.share,
+        "mean throws": math.nan if fed.mean is None else fed.mean,
+        "95 % throws": fed.crossing(0.95),
+        "lost": sum(fed.ends[name] for name in chain.exits),
+    }
+
+
+def starts_from(scene: Scene, offset: float | None = None) -> NDArray[np.float64]:
+    """Where random starts begin on each side: `offset` beyond a_i, a twentieth of the arm unless given [unit]."""
+    return scene.sides.a + (BEYOND_FOOT * scene.arm_length if offset is None else offset)
+
+
+def _goal_of(scene: Scene, goal: Any) -> tuple[float, int]:
+    asked = scene.goal if goal is None else goal
+    if isinstance(asked, OrientedBeyond | Reaches):
+        asked = (asked.x, asked.side)
+    if (
+        isinstance(asked, tuple)
+        and len(asked) == 2
+        and 0.0 < float(asked[0]) < scene.arm_length
+        and int(asked[1]) in range(len(scene.sides))
+    ):
+        return float(asked[0]), int(asked[1])
+    allowed = "(x, side) on the arm, OrientedBeyond or Reaches"
+    raise AnswerError("the goal of the noise", asked, allowed, "pass goal=(20.0, 2)")
+
+
+def asked_of(
+    scene: Scene | str, goal: Any, cells: int, strata: int, offset: float | None
+) -> tuple[Asked, Scene]:
+    """Read what is asked: the question, and the scene it is about."""
+    from limitsets.scene import load
+
+    read = load(scene) if isinstance(scene, str) else scene
+    return Asked(read, _goal_of(read, goal), starts_from(read, offset), cells, strata, {}), read
+
+
+def errors_of(asked: Asked, noise: Scattering, numbers: dict[str, float]) -> dict[str, float]:
+    """How much the numbers change from half as many cells, and from half as many strata, added up."""
+    total = dict.fromkeys(numbers, 0.0)
+    for coarse in (
+        replace(asked, cells=max(asked.cells // 2, 1)),
+        replace(asked, strata=max(asked.strata // 2, 1)),
+    ):
+        check = solve(coarse, noise).numbers
+        total = {key: total[key] + abs(value - check.get(key, math.nan)) for key, value in numbers.items()}
+    return total
+
+
+def slopes_of(asked: Asked, noise: Scattering, name: str) -> dict[str, Sensitivity]:
+    """Take central differences over two steps and extrapolate; once more on half as many cells, for the error."""
+    wide = _differences(asked, noise, name, STEP)
+    narrow = _differences(asked, noise, name, 0.5 * STEP)
+    coarse = _differences(replace(asked, cells=max(asked.cells // 2, 1)), noise, name, 0.5 * STEP)
+    found = {}
+    for key, value in narrow.items():
+        unsure = abs(value - wide.get(key, math.nan)) + abs(value - coarse.get(key, math.nan))
+        found[key] = Sensitivity((4.0 * value - wide.get(key, math.nan)) / 3.0, unsure)
+    return found
+
+
+def _differences(asked: Asked, noise: Scattering, name: str, step: float) -> dict[str, float]:
+    above = solve(asked, noise.scaled(1.0 + step, name)).numbers
+    below = solve(asked, noise.scaled(1.0 - step, name)).numbers
+    return {key: (above[key] - below[key]) / (2.0 * step) for key in above if key in below}

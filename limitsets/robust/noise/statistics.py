@@ -1,0 +1,268 @@
+"""What noise makes of a scene: where it settles, how a goal is reached, and what more or less noise changes."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from limitsets.cells import Grid
+from limitsets.robust.noise.absorbing import Absorption
+from limitsets.robust.noise.arrivals import Feeding
+from limitsets.robust.noise.scattering import Scattering, scattering_of
+from limitsets.robust.noise.settling import NoisyClass
+from limitsets.robust.noise.solving import Sensitivity, asked_of, errors_of, slopes_of, solve
+from limitsets.robust.noise.ulam import STRATA
+
+if TYPE_CHECKING:
+    from limitsets.scene import Scene
+
+__all__ = ["Levels", "NoiseStatistics", "noise_levels", "noise_statistics"]
+
+CELLS = 1024
+
+Progress = Callable[[str, int, int], None]
+
+
+@dataclass(frozen=True, eq=False)
+class NoiseStatistics:
+    """Answers about a noisy scene from the transfer operator; approximations between cells, not proved.
+
+    Attributes
+    ----------
+    scene : str
+        Name of the scene.
+    unit : str
+        Unit of lengths.
+    scatter : Scattering
+        The noise.
+    goal : (float, int)
+        A part at rest at x or beyond, on this side, is fed [unit].
+    starts : ndarray, shape (n_sides,)
+        Random starts lie from here to x of the goal, equally likely per length on all sides [unit].
+    grid : Grid
+        The cells.
+    strata : int
+        Into how many pieces each law was cut.
+    cut : float
+        Probability of noise beyond where laws without bounds were cut off, per throw.
+    classes : tuple of NoisyClass
+        Closed classes, then those left at a small rate.
+    settles : dict of str to float
+        Without a goal: share of the random starts that end in each class left at less than 1e-6 per throw ("class 0"
+        is `classes[0]`), and by each way out.
+    ends : Absorption
+        With the goal: where each cell ends, and after how many throws.
+    feeding : Feeding
+        Throws from random starts to the goal.
+    numbers : dict of str to float
+        The answers in numbers, nan where there is none; see the notes.
+    errors : dict of str to float
+        How much each changes from half as many cells and from half as many strata: an estimate of the error, on the
+        safe side as long as it falls with their width.
+    sensitivity : dict of str to dict of str to Sensitivity
+        By quantity, then by number.
+    how : str
+        "sampled".
+
+    Notes
+    -----
+    Of the class that most random starts settle in (or, where they stay in none, of the one left most slowly):
+    "time on side k", "share of" each branch, "time beyond" (share of rests beyond x of the goal, on any side),
+    "wrong beyond" (of these, the share on another side), "escape" (per throw).  Of random starts: "fed" (share that
+    comes to the goal), "mean throws" of those, "95 % throws" of all, "first beyond is wrong" (the first rest beyond
+    x is on another side), "lost" (leave the arm without having been fed).
+    """
+
+    scene: str
+    unit: str
+    scatter: Scattering
+    goal: tuple[float, int]
+    starts: NDArray[np.float64]
+    grid: Grid
+    strata: int
+    cut: float
+    classes: tuple[NoisyClass, ...]
+    settles: dict[str, float]
+    ends: Absorption
+    feeding: Feeding
+    numbers: dict[str, float]
+    errors: dict[str, float]
+    sensitivity: dict[str, dict[str, Sensitivity]]
+    how: str = "sampled"
+
+    def to_json(self) -> dict[str, Any]:
+        """Give the answers as JSON takes them: null, never nan."""
+        return {
+            "scene": self.scene,
+            "unit": self.unit,
+            "how": self.how,
+            "scatter": self.scatter.words(),
+            "noise_cut_off": self.cut,
+            "goal": {"x": self.goal[0], "side": self.goal[1]},
+            "starts_from": self.starts.tolist(),
+            "cells": self.grid.n_cells,
+            "strata": self.strata,
+            "classes": [_class_as_json(part) for part in self.classes],
+            "settles": {name: _number(value) for name, value in self.settles.items()},
+            "ends": {name: _number(value) for name, value in self.feeding.ends.items()},
+            "arrived": self.feeding.arrived.tolist(),
+            "numbers": {
+                name: {"value": _number(value), "error": _number(self.errors.get(name))}
+                for name, value in self.numbers.items()
+            },
+            "sensitivity": {
+                quantity: {
+                    name: {"slope": _number(found.slope), "error": _number(found.error)}
+                    for name, found in rows.items()
+                }
+                for quantity, rows in self.sensitivity.items()
+            },
+        }
+
+
+@dataclass(frozen=True, eq=False)
+class Levels:
+    """Numbers of `NoiseStatistics` at several levels of the noise.
+
+    Attributes
+    ----------
+    factors : ndarray, shape (n,)
+        Factor on all deviations.
+    numbers : dict of str to ndarray, shape (n,)
+        By name.
+    """
+
+    factors: NDArray[np.float64]
+    numbers: dict[str, NDArray[np.float64]]
+
+
+def _number(value: float | None) -> float | None:
+    return None if value is None or not math.isfinite(value) else float(value)
+
+
+def _class_as_json(part: NoisyClass) -> dict[str, Any]:
+    return {
+        "closed": part.closed,
+        "extents": {
+            str(side): [list(pair) for pair in pairs] for side, pairs in part.cells.extents().items()
+        },
+        "escape": part.escape,
+        "leads_to": part.leads_to,
+        "sides": {str(side): share for side, share in part.sides.items()},
+        "branches": part.branches,
+        "residual": part.residual,
+    }
+
+
+def noise_statistics(
+    scene: Scene | str,
+    scatter: Scattering | None = None,
+    *,
+    goal: Any = None,
+    cells: int = CELLS,
+    strata: int = STRATA,
+    offset: float | None = None,
+    sensitivity: bool = True,
+    progress: Progress | None = None,
+) -> NoiseStatistics:
+    """Find what noise makes of a scene, by the transfer operator.
+
+    Parameters
+    ----------
+    scene : Scene or str
+        A scene, or the name of one.
+    scatter : Scattering, optional
+        The noise; by default that of the scene, `[world] scatter` with `[effects] spread`.
+    goal : (float, int), OrientedBeyond or Reaches, optional
+        x and side of the rests that count as fed; by default those of the scene's goal.
+    cells : int
+        Cells per side.
+    strata : int
+        Into how many pieces each law is cut.
+    offset : float, optional
+        How far beyond a_i random starts begin; by default a twentieth of the arm [scene's length unit].
+    sensitivity : bool
+        Compute the derivatives with respect to the noise of each quantity: six more solutions for each.
+    progress : callable, optional
+        Told (stage, done, all).
+
+    Returns
+    -------
+    NoiseStatistics
+
+    Raises
+    ------
+    AnswerError
+        For a goal that is none on this arm.
+    SceneError
+        For a scene without noise where none is passed, or noise that it cannot have.
+
+    Examples
+    --------
+    >>> from limitsets.robust import Gaussian, Scattering, noise_statistics
+    >>> noise = Scattering(speed=Gaussian(0.01), landing=Gaussian(0.05))
+    >>> found = noise_statistics("paper-designed", noise, goal=(20.5, 2), cells=512, sensitivity=False)
+    >>> round(found.numbers["mean throws"], 1), round(float(found.feeding.survivors[40]), 2)
+    (23.2, 0.2)
+    """
+    asked, read = asked_of(scene, goal, cells, strata, offset)
+    noise = scattering_of(read) if scatter is None else scatter
+    names = noise.given() if sensitivity else ()
+    stages = 3 + 6 * len(names)
+    tell = progress or (lambda stage, done, total: None)
+    tell("noise", 0, stages)
+    found = solve(asked, noise)
+    tell("noise", 1, stages)
+    errors = errors_of(asked, noise, found.numbers)
+    slopes = {}
+    for number, name in enumerate(names):
+        tell("noise", 3 + 6 * number, stages)
+        slopes[name] = slopes_of(asked, noise, name)
+    tell("noise", stages, stages)
+    return NoiseStatistics(
+        read.name,
+        read.unit,
+        noise,
+        asked.goal,
+        asked.starts,
+        found.chain.grid,
+        strata,
+        found.chain.cut,
+        found.classes,
+        found.settles,
+        found.ends,
+        found.feeding,
+        found.numbers,
+        errors,
+        slopes,
+    )
+
+
+def noise_levels(
+    scene: Scene | str,
+    scatter: Scattering | None = None,
+    *,
+    factors: Sequence[float] = (0.0, 0.5, 1.0, 1.5, 2.0),
+    goal: Any = None,
+    cells: int = CELLS,
+    strata: int = STRATA,
+    offset: float | None = None,
+) -> Levels:
+    """Find the numbers of `noise_statistics` at several levels of the noise; parameters as there.
+
+    Parameters
+    ----------
+    factors : sequence of float
+        Factors on all deviations; 0 is the throw without noise.
+    """
+    asked, read = asked_of(scene, goal, cells, strata, offset)
+    noise = scattering_of(read) if scatter is None else scatter
+    rows = [solve(asked, noise.scaled(float(factor))).numbers for factor in factors]
+    names = {name: None for row in rows for name in row}
+    table = {name: np.array([row.get(name, math.nan) for row in rows]) for name in names}
+    return Levels(np.array(factors, dtype=np.float64), table)

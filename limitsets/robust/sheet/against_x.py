@@ -1,0 +1,115 @@
+"""Margins against X, place by place: the middle first, as many as there is time for, each kept as it is found."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+
+from limitsets.robust.margins.beyond import MarginsBeyond, margins_beyond, places_beyond
+from limitsets.scene import Scene
+
+__all__ = ["SECONDS", "curve", "curve_read", "curve_table"]
+
+# Places; how close their brackets are; seconds for the proof of one joint margin, and after which no place is begun.
+PLACES, COARSE, EACH, SECONDS = 7, 0.1, 15.0, 150.0
+
+
+def curve_table(found: MarginsBeyond) -> dict[str, Any]:
+    """Give margins against X as a plain table; null where nothing is refuted."""
+    return {
+        "side": found.side,
+        "x": found.x.tolist(),
+        "quantities": list(found.names),
+        "units": list(found.units),
+        "proved": found.proved.tolist(),
+        "refuted": [[x if math.isfinite(x) else None for x in row] for row in found.refuted.tolist()],
+    }
+
+
+def curve_read(table: Mapping[str, Any], scene: Scene) -> MarginsBeyond:
+    """Read what `curve_table` wrote, without the proofs."""
+    refuted = [[math.nan if x is None else x for x in row] for row in table["refuted"]]
+    return MarginsBeyond(
+        scene,
+        table["side"],
+        np.array(table["x"]),
+        tuple(table["quantities"]),
+        tuple(table["units"]),
+        np.array(table["proved"]),
+        np.array(refuted, dtype=np.float64),
+        (),
+    )
+
+
+def _joined(one: MarginsBeyond | None, other: MarginsBeyond) -> MarginsBeyond:
+    """Put the places of both together, ascending, without the proofs."""
+    if one is None:
+        return other
+    x = np.concatenate([one.x, other.x])
+    order = np.argsort(x)
+    proved, refuted = (
+        np.concatenate(pair)[order] for pair in ((one.proved, other.proved), (one.refuted, other.refuted))
+    )
+    return MarginsBeyond(one.scene, one.side, x[order], one.names, one.units, proved, refuted, ())
+
+
+def curve(
+    scene: Scene,
+    side: int,
+    tolerance: Mapping[str, str],
+    known: Mapping[str, Any] | None,
+    *,
+    seconds: float = SECONDS,
+    tell: Callable[[str, float], None],
+    keep: Callable[[dict[str, Any]], None],
+) -> tuple[MarginsBeyond, int]:
+    """Bracket margins of "beyond X only this side, and almost every orbit comes there" at some X.
+
+    Parameters
+    ----------
+    scene : Scene
+        The scene.
+    side : int
+        The side wanted.
+    tolerance : mapping of str to str
+        Of the joint margin; if it is empty, the margin is that of throw.speed.
+    known : mapping or None
+        What an earlier run kept.
+    seconds : float
+        After which no further place is begun; the middle one always is.
+    tell, keep : callable
+        Called with what is done and its share, and with what is found so far.
+
+    Returns
+    -------
+    MarginsBeyond
+        Without the proofs.
+    int
+        Places that there was no time for.
+
+    Raises
+    ------
+    AnswerError
+        The limit set gets farther on another side than on this one.
+    """
+    begin = time.perf_counter()
+    names = ("joint",) if tolerance else ("throw.speed",)
+    places = places_beyond(scene, side, PLACES)
+    places = places[np.argsort(np.abs(places - places.mean()), kind="stable")]
+    found = None if known is None or known["side"] != side else curve_read(known, scene)
+    done = set() if found is None else {round(x, 9) for x in found.x.tolist()}
+    for number, x in enumerate(places.tolist()):
+        if round(x, 9) in done:
+            continue
+        if found is not None and time.perf_counter() - begin > seconds:
+            return found, len(places) - found.x.size
+        tell(f"margin beyond x = {x:.4g}", number / PLACES)
+        one = margins_beyond(scene, side, names, x=[x], tolerance=tolerance, width=COARSE, seconds=EACH)
+        found = _joined(found, one)
+        keep(curve_table(found))
+    assert found is not None
+    return found, 0

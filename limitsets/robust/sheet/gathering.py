@@ -1,0 +1,321 @@
+"""Ask everything that a sheet of tolerances says, one question after the other."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from limitsets.errors import AnswerError
+from limitsets.goals import Goal, OrientedBeyond, Reaches
+from limitsets.robust.margins.beyond import MarginsBeyond
+from limitsets.robust.margins.deviations import Measure, measure, measures
+from limitsets.robust.margins.finding import GoalLike, Margin, asked_of, goals_of, margin
+from limitsets.robust.margins.joint import Tolerance, joint_margin
+from limitsets.robust.noise.scattering import Scattering
+from limitsets.robust.noise.statistics import CELLS, Levels, NoiseStatistics, noise_levels, noise_statistics
+from limitsets.robust.sheet.against_x import curve
+from limitsets.robust.sheet.chance import noise_of, still
+from limitsets.robust.sheet.entries import Entry, nominal_of
+from limitsets.robust.sheet.keeping import Kept
+from limitsets.robust.sheet.summary import PARTS, Robustness
+from limitsets.scene import Scene, load
+
+if TYPE_CHECKING:
+    from limitsets.auditing import Audit
+
+__all__ = ["robustness"]
+
+# Levels of the noise that the figure shows.
+FACTORS = (0.0, 0.5, 1.0, 1.5, 2.0)
+
+NO_TOLERANCE = (
+    "the scene has no [tolerance]; give it one, a deviation for each quantity that deviates together with others: "
+    '"throw.speed" = "1 %"'
+)
+NO_NOISE = (
+    'no noise is given; add scatter = { speed = "0.5 %" } to [world], '
+    "or pass it: --scatter throw.speed='0.5 %'"
+)
+NO_PLACE = "it is asked for goals with an x and a side, oriented_beyond or reaches"
+
+Progress = Callable[[str, int, int], None]
+
+
+class _Gathering:
+    """One sheet while it is put together."""
+
+    def __init__(
+        self,
+        scene: Scene,
+        goals: tuple[Goal, ...],
+        todo: Sequence[Measure],
+        tolerance: dict[str, str],
+        kept: Kept,
+        progress: Progress,
+    ) -> None:
+        self.scene, self.goals, self.todo, self.tolerance = scene, goals, todo, tolerance
+        self.kept, self.progress = kept, progress
+        self.left_out: dict[str, str] = {}
+        self.done, self.steps = 0, 1
+
+    def tell(self, step: str, share: float = 0.0) -> None:
+        """Say what is being done."""
+        self.progress(step if not share else f"{step}, {100 * share:.0f} %", self.done, self.steps)
+
+    def singles(self, width: float, verdict: str) -> list[Entry]:
+        """Find the margins of single quantities."""
+        found: list[Entry] = []
+        for one in self.todo:
+            label = f"margin of {one.quantity}, {one.reading}"
+            self.tell(label)
+            entry = self.kept.find(one.quantity, one.reading, one.unit)
+            if entry is None and verdict != "proved" and found:
+                entry = _same(found[0], one, self.scene)
+            found.append(entry or self.kept.add(self._single(one, width, label)))
+            self.done += 1
+        return found
+
+    def _single(self, one: Measure, width: float, label: str) -> Margin:
+        def told(step: str, _: int, __: int) -> None:
+            self.progress(step, self.done, self.steps)
+
+        (found,) = margin(
+            self.scene, one.quantity, reading=one.reading, goal=self.goals, width=width, progress=told
+        )
+        return found
+
+    def joint(self, width: float) -> Entry:
+        """Find the factor on the tolerance."""
+        label = "margin of all together"
+        self.tell(label)
+        entry = self.kept.find("joint", "tolerance", "")
+        if entry is None:
+            found = joint_margin(
+                self.scene,
+                self.goals,
+                self.tolerance,
+                width=width,
+                tell=lambda share: self.tell(label, share),
+            )
+            entry = self.kept.add(found)
+        self.done += 1
+        return entry
+
+    def curve(self, side: int) -> MarginsBeyond | None:
+        """Find margins against X; None where the part gets farther out on another side."""
+        self.tell("margins against X")
+        try:
+            found, left = curve(
+                self.scene, side, self.tolerance, self.kept.curve, tell=self.tell, keep=self.kept.add_curve
+            )
+        except AnswerError as error:
+            self.left_out["curve"], found, left = str(error), None, 0
+        if left:
+            self.left_out["rest of the curve"] = (
+                f"there was no time for {left} more places; the same command goes on with them"
+            )
+        self.done += 1
+        return found
+
+    def audit(self) -> Audit:
+        """Ask which assumptions of the model the scene breaks."""
+        from limitsets.auditing import audit
+
+        self.tell("assumptions")
+        self.done += 1
+        return audit(self.scene)
+
+    def chance(
+        self, scene: Scene, noise: Scattering, place: tuple[float, int], cells: int
+    ) -> tuple[NoiseStatistics, Levels]:
+        """Find what noise does, at its level and at others."""
+        self.tell("noise")
+        found = noise_statistics(
+            scene,
+            noise,
+            goal=place,
+            cells=cells,
+            progress=lambda _, done, of: self.tell("noise", done / of),
+        )
+        self.done += 1
+        self.tell("noise at other levels")
+        levels = noise_levels(scene, noise, factors=FACTORS, goal=place, cells=max(cells // 2, 1))
+        self.done += 1
+        return found, levels
+
+
+def _same(entry: Entry, one: Measure, scene: Scene) -> Entry:
+    """Return the margin of a quantity where the scene as it is fails or is not proved: that of any other."""
+    nominal, unit = nominal_of(scene, one.quantity)
+    return replace(
+        entry,
+        quantity=one.quantity,
+        reading=one.reading,
+        unit=one.unit,
+        nominal=nominal,
+        nominal_unit=unit,
+        seconds=0.0,
+    )
+
+
+def _place(goals: Sequence[Goal]) -> tuple[float, int] | None:
+    """Return x and side of the rests that count as fed."""
+    return next(((goal.x, goal.side) for goal in goals if isinstance(goal, OrientedBeyond | Reaches)), None)
+
+
+def _goals(scene: Scene, goal: GoalLike | Sequence[GoalLike] | None) -> tuple[Goal, ...]:
+    if goal is None and scene.goal is None:
+        x, last = 0.7 * scene.arm_length, len(scene.sides) - 1
+        example = f'oriented_beyond = {{ x = "{x:.4g} {scene.unit}", side = {last} }}'
+        raise AnswerError(
+            "the goal",
+            None,
+            "a scene with [goal]",
+            f"say what has to hold: add [goal] with, for instance, {example}",
+            key="goal",
+            file=scene.file,
+        )
+    return goals_of(scene, goal)
+
+
+def _todo(scene: Scene, quantities: Sequence[str], reading: str | None) -> list[Measure]:
+    """List what is asked of single quantities; refuse what the scene does not give."""
+    every = measures(scene, reading)
+    chosen: list[Measure] = []
+    for name in dict.fromkeys(quantities):
+        least = measure(scene, name, reading)
+        chosen += [one for one in every if one.quantity == name] or [least]
+    return chosen or list(every)
+
+
+def robustness(
+    scene: Scene | str | Path,
+    *quantities: str,
+    goal: GoalLike | Sequence[GoalLike] | None = None,
+    reading: str | None = None,
+    tolerance: Mapping[str, str] | None = None,
+    scatter: Scattering | None = None,
+    width: float = 0.01,
+    cells: int = CELLS,
+    leave_out: Sequence[str] = (),
+    folder: str | Path | None = None,
+    progress: Progress | None = None,
+) -> Robustness:
+    """Say how far a scene may drift before its goal fails, and what noise does to it.
+
+    Parameters
+    ----------
+    scene : Scene, str or Path
+        A scene, or what `limitsets.load` takes.
+    *quantities : str
+        Names of quantities; default all that the scene gives.
+    goal : Goal, callable, or a sequence of them, optional
+        What has to hold, all of it; default the scene's goal.
+    reading : str, optional
+        "fixed" or "per-throw"; default both, of each quantity those that it has.
+    tolerance : mapping of str to str, optional
+        Deviations that the joint margin is a factor on, ``{"throw.speed": "1 %"}``; default the scene's.
+    scatter : Scattering, optional
+        Noise at every throw with its laws; default that of the scene's world, normal unless the scene says "bounded".
+    width : float
+        How close the two ends of a bracket have to be, as a share of the upper one.
+    cells : int
+        Cells per side for the noise.
+    leave_out : sequence of str
+        Which of "margins", "joint", "curve", "noise" and "audit" not to do.
+    folder : str or Path, optional
+        Margins are written there as they are found, with their certificates, and found again by the next run.
+    progress : callable, optional
+        Called with what is done, how much of it, and of how much.
+
+    Returns
+    -------
+    Robustness
+        Margins are proved and refuted, statistics of noise computed, an audit as it says.
+
+    Raises
+    ------
+    AnswerError
+        No goal, a scene of which nothing can be proved, a quantity that it does not give.
+
+    Examples
+    --------
+    >>> import limitsets as ls
+    >>> found = ls.robustness("paper-designed", "throw.speed", reading="fixed", leave_out=["curve", "audit"])
+    >>> found.entries[0].proved < 0.733 < found.entries[0].refuted, found.entries[0].unit
+    (True, '%')
+    """
+    begin = time.perf_counter()
+    for part in leave_out:
+        if part not in PARTS:
+            raise AnswerError("what to leave out", part, ", ".join(PARTS), "correct the word")
+    given = scene if isinstance(scene, Scene) else load(scene)
+    goals, asked = _goals(given, goal), still(given)
+    question = asked_of(asked, goals)
+    question.box(None, {})  # refuses a scene of which nothing can be proved
+    todo = _todo(question.scene, quantities, reading)
+    vector = dict(tolerance if tolerance is not None else given.text.get("tolerance", {}))
+    if vector:
+        Tolerance.of(question.scene, vector)  # refuses what the scene does not give
+    noise, law = noise_of(given, scatter)
+    kept = Kept(None if folder is None else Path(folder), asked, goals, vector, width)
+    sheet = _Gathering(asked, goals, todo, vector, kept, progress or (lambda step, done, of: None))
+    return _filled(sheet, given, noise, law, width, cells, frozenset(leave_out), begin)
+
+
+def _filled(
+    sheet: _Gathering,
+    given: Scene,
+    noise: Scattering | None,
+    law: str,
+    width: float,
+    cells: int,
+    leave_out: frozenset[str],
+    begin: float,
+) -> Robustness:
+    """Ask part by part; of those that there is nothing of, say why."""
+    scene, goals, place = sheet.scene, sheet.goals, _place(sheet.goals)
+    missing = sheet.left_out
+    missing |= {part: "it was not asked for" for part in PARTS if part in leave_out}
+    if not sheet.tolerance:
+        missing.setdefault("joint", NO_TOLERANCE)
+    if noise is None:
+        missing.setdefault("noise", NO_NOISE)
+    if place is None:
+        missing |= {part: NO_PLACE for part in ("curve", "noise") if part not in leave_out}
+    sheet.steps = (len(sheet.todo) if "margins" not in missing else 0) + 1
+    sheet.steps += sum(part not in missing for part in ("joint", "curve", "audit")) + 2 * (
+        "noise" not in missing
+    )
+    sheet.tell("the goal in the scene as it is")
+    question = asked_of(scene, goals)
+    verdict = question.prove().verdict
+    verdict = verdict if verdict == "proved" else question.refute().verdict
+    sheet.done += 1
+    entries = [] if "margins" in missing else sheet.singles(width, verdict)
+    entries += [] if "joint" in missing else [sheet.joint(width)]
+    against = None if "curve" in missing or place is None else sheet.curve(place[1])
+    found, levels = None, None
+    if "noise" not in missing and noise is not None and place is not None:
+        found, levels = sheet.chance(given, noise, place, cells)
+    flagged = None if "audit" in missing else sheet.audit()
+    return Robustness(
+        scene,
+        goals,
+        verdict,
+        tuple(entries),
+        sheet.tolerance,
+        against,
+        found,
+        levels,
+        law,
+        flagged,
+        missing,
+        width,
+        sheet.kept.digests,
+        sheet.kept.again,
+        time.perf_counter() - begin,
+    )

@@ -1,0 +1,143 @@
+"""The robustness of a scene as one answer: margins, where X is best, noise, and what there is nothing of."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from limitsets.goals import Goal
+from limitsets.robust.margins.beyond import MarginsBeyond
+from limitsets.robust.margins.finding import Margin
+from limitsets.robust.noise.statistics import Levels, NoiseStatistics
+from limitsets.robust.sheet.against_x import curve_table
+from limitsets.robust.sheet.entries import Entry, percent_of
+from limitsets.scene import Scene
+
+if TYPE_CHECKING:
+    from limitsets.auditing import Audit
+
+__all__ = ["PARTS", "Robustness"]
+
+PARTS = ("margins", "joint", "curve", "noise", "audit")
+"""What an answer is put together from."""
+
+
+@dataclass(frozen=True, eq=False)
+class Robustness:
+    """How far a scene may drift, and what chance does to it.
+
+    Attributes
+    ----------
+    scene : Scene
+        The scene that was asked, its scatter left out.
+    goals : tuple of Goal
+        What has to hold, all of it.
+    verdict : str
+        Of the goals in the scene as it is: "proved", "refuted" or "undecided".
+    entries : tuple of Entry
+        One per quantity and reading; the last is joint, where there is a tolerance.  Proved and refuted.
+    tolerance : dict of str to str
+        The vector that the joint factor is on.
+    curve : MarginsBeyond or None
+        Margins against X, of "beyond X only this side, and almost every orbit comes there".  Proved and refuted.
+    noise : NoiseStatistics or None
+        What chance does.  Computed between cells, not proved.
+    levels : Levels or None
+        Its numbers at other levels of the noise.
+    law : str
+        How the law of the noise was come by.
+    audit : Audit or None
+        Assumptions of the model that the scene breaks.
+    left_out : dict of str to str
+        Which of `PARTS` there is nothing of, and why.
+    width : float
+        How close brackets had to be.
+    digests : dict of str to str
+        Of all that margins depend on, single ones and the joint one.
+    again : int
+        How many margins were found by an earlier run.
+    seconds : float
+        Time it took.
+    """
+
+    scene: Scene
+    goals: tuple[Goal, ...]
+    verdict: str
+    entries: tuple[Entry, ...]
+    tolerance: dict[str, str]
+    curve: MarginsBeyond | None
+    noise: NoiseStatistics | None
+    levels: Levels | None
+    law: str
+    audit: Audit | None
+    left_out: dict[str, str]
+    width: float
+    digests: dict[str, str]
+    again: int
+    seconds: float
+
+    @property
+    def singles(self) -> tuple[Entry, ...]:
+        """The margins of single quantities."""
+        return tuple(entry for entry in self.entries if entry.quantity != "joint")
+
+    @property
+    def joint(self) -> Entry | None:
+        """The factor on the tolerance."""
+        return next((entry for entry in self.entries if entry.quantity == "joint"), None)
+
+    def margins(self) -> tuple[Margin, ...]:
+        """Give the entries as margins without their proofs, as figures take them."""
+        return tuple(self._margin(entry) for entry in self.entries)
+
+    def _margin(self, entry: Entry) -> Margin:
+        joint = entry.quantity == "joint"
+        share = percent_of(entry, entry.proved)
+        # about the value in the unit of the deviation
+        nominal = None if joint or not share else 100.0 * entry.proved / share
+        return Margin(
+            entry.quantity,
+            entry.reading,
+            self.goals,
+            entry.proved,
+            entry.refuted,
+            entry.unit,
+            nominal if entry.unit != "%" else entry.nominal,
+            entry.reason,
+            entry.closed,
+            entry.seconds,
+            self.scene,
+            self.tolerance if joint else {},
+            {},
+            {},
+            (),
+            None,
+        )
+
+    def to_json(self) -> dict[str, Any]:
+        """Give it as plain tables for JSON: null, never nan."""
+        levels = self.levels
+        return {
+            "complete": True,
+            "digests": self.digests,
+            "scene": self.scene.as_dict(),
+            "holds": {"proved": True, "refuted": False}.get(self.verdict),
+            "margins": [entry.to_json() for entry in self.entries],
+            "tolerance": self.tolerance or None,
+            "curve": None if self.curve is None else curve_table(self.curve),
+            "noise": None if self.noise is None else self.noise.to_json() | {"law": self.law},
+            "noise_levels": None
+            if levels is None
+            else {
+                "factors": levels.factors.tolist(),
+                "numbers": {
+                    name: [float(value) if math.isfinite(value) else None for value in row]
+                    for name, row in levels.numbers.items()
+                },
+            },
+            "assumptions": None if self.audit is None else self.audit.to_json(),
+            "left_out": self.left_out,
+            "width": self.width,
+            "seconds": self.seconds,
+        }
