@@ -10,7 +10,8 @@ import pytest
 
 import limitsets as ls
 from limitsets.errors import AnswerError, LimitsetsError, SceneError
-from limitsets.inverse import critical_jacobian, limit_sets_along, trials
+from limitsets.inverse import critical_jacobian, limit_sets_along
+from limitsets.inverse.critical import trials
 
 PLACE = Path(__file__).with_name("exact.py")
 spec = importlib.util.spec_from_file_location("exact_critical_points_of_designs", PLACE)

@@ -14,8 +14,8 @@ from mpmath import mpf
 import limitsets as ls
 from limitsets.errors import LimitsetsError
 from limitsets.goals import OrientedBeyond
-from limitsets.robust import against_x, gathering
 from limitsets.robust.margins.beyond import MarginsBeyond
+from limitsets.robust.sheet import against_x, gathering
 from limitsets.robust.sheet.chance import noise_of, scattering_from, still
 from limitsets.robust.sheet.entries import Entry, percent_of
 from limitsets.robust.sheet.keeping import Kept
