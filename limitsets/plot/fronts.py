@@ -5,15 +5,15 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from matplotlib.ticker import ScalarFormatter
 
 from limitsets.errors import AnswerError
-from limitsets.inverse.margin.answer import both
 from limitsets.plot import style
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
     from limitsets.inverse import RobustDesign
 
@@ -47,9 +47,8 @@ def robust_design(found: RobustDesign, *, wanted: float | None = None, bound: fl
     """
     if not found.front:
         raise AnswerError("the front", "empty", "one design at least", "look at more designs")
-    figure = Figure(figsize=(11.5, 5.4), layout="constrained")
-    left, right = figure.subplots(1, 2, width_ratios=[1.35, 1.0])
-    _front(left, found)
+    figure, (left, right) = style.canvas(11.5, 5.4, columns=2, width_ratios=[1.6, 1.0])
+    handles = _front(left, found)
     for value, text, line in ((wanted, "wanted", "--"), (bound, "no part rests beyond", ":")):
         if value is not None:
             left.axvline(value, color=style.INK, ls=line, lw=1.0)
@@ -58,11 +57,12 @@ def robust_design(found: RobustDesign, *, wanted: float | None = None, bound: fl
                 xytext=(-4, 0), textcoords="offset points", fontsize=9,
             )  # fmt: skip
     _costs(right, found)
-    figure.suptitle(f"{found.before.name}: what the margin costs")
+    style.legend(figure, handles, 3)
+    style.title(figure, f"{found.before.name}: what the margin costs")
     return figure
 
 
-def _front(axes: Axes, found: RobustDesign) -> None:
+def _front(axes: Axes, found: RobustDesign) -> list[Line2D]:
     margins = [option.candidate.found.margin for option in found.front]
     means = np.array([option.feeding.mean for option in found.front])
     late = np.array([option.feeding.quantile_95 for option in found.front])
@@ -80,16 +80,17 @@ def _front(axes: Axes, found: RobustDesign) -> None:
             continue
         axes.plot(sampled.margin, feeding.mean, color=colour, marker=marker, ms=7.0, ls="none")
         said = label
-        proved, _ = both(margins_of)
-        if proved is not None:
-            axes.plot([proved, sampled.margin], [feeding.mean] * 2, color=colour, lw=2.5, alpha=0.5)
-            said += f", proved {proved:.2f}"
+        for one in margins_of:
+            axes.plot([one.proved, sampled.margin], [feeding.mean] * 2, color=colour, lw=2.0, alpha=0.4)
+            said += f"\n{one.goals[0].kind.replace('_', ' ')}: proved to {one.proved:.2f}"
         handles.append(Line2D([], [], color=colour, marker=marker, ms=7.0, lw=2.5, label=said))
     axes.set_xlabel("joint margin, as a factor of the tolerance")
     axes.set_ylabel("throws to feed from random starts")
-    axes.set_ylim(bottom=0.0)
-    axes.set_title("mean, and 95 % (upper end of each line)", loc="left", fontsize=10)
-    axes.legend(handles=handles, loc="upper center", bbox_to_anchor=(0.5, -0.16), ncols=3, fontsize=9)
+    axes.set_yscale("log")
+    axes.yaxis.set_major_formatter(ScalarFormatter())
+    axes.yaxis.set_minor_formatter(ScalarFormatter())
+    axes.set_title("throws: mean, and 95 % at the end of each line", loc="left", fontsize=10)
+    return handles
 
 
 def _costs(axes: Axes, found: RobustDesign) -> None:

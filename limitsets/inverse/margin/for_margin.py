@@ -24,7 +24,7 @@ from limitsets.inverse.margin.feeding import Feeding, throws_to_feed
 from limitsets.inverse.margin.front import Option, front_of
 from limitsets.inverse.margin.lead import Lead, lead_of
 from limitsets.inverse.margin.search import POPULATION, Candidate, Search, Tell, bounds_of
-from limitsets.inverse.margin.sharp import Box, Sharp, failing, sharp
+from limitsets.inverse.margin.sharp import Box, Sharp, on_all_corners
 from limitsets.robust import Margin
 from limitsets.robust.margins.joint import joint_margin
 from limitsets.scene import Scene, load
@@ -48,8 +48,6 @@ DECIMALS, DECIMALS_OF_X = 4, 3
 DRAWN, ORDERS_KEPT = 120, 2
 # Seconds for the proof of a box.
 SECONDS = 240.0
-# Finer steps for the designs at the end.
-FINE = 14
 
 
 @dataclass(frozen=True, eq=False)
@@ -187,20 +185,6 @@ def _rounded(scene: Scene, search: Search) -> Scene:
     return scene.with_values({name: f"{scene.value(name):.{DECIMALS}f} {unit}" for name in search.bounds})
 
 
-def _best_x(scene: Scene, box: Box, side: int, search: Search | None) -> Sharp | None:
-    """Find the margin on all corners: corners at which it fails are put first, and it is sought anew."""
-    hard = [] if search is None else list(search.hard)
-    for _ in range(6):
-        found = sharp(scene, box, side, hard=hard, steps=FINE)
-        if found is None or not found.margin > 0.0:
-            return found
-        new = [signs for signs in failing(scene, box, side, found, 0.99 * found.margin) if signs not in hard]
-        if not new:
-            return found
-        hard = new + hard
-    return found
-
-
 def _with_purpose(scene: Scene, x: float, side: int, tolerance: Mapping[str, str], name: str) -> Scene:
     tree = copy.deepcopy(scene.as_dict())
     tree["name"] = name
@@ -269,16 +253,16 @@ def robust_design(
     ]
     search, population = _searched(searches, evaluations, seed, tell)
     best = search.scene_of(population[0])
-    found = None if best is None else _best_x(_rounded(best, search), box, on, search)
+    found = None if best is None else on_all_corners(_rounded(best, search), box, on, search.hard)
     if best is None or found is None or not found.margin > 0.0:
         raise AnswerError(
             "the design", "none that feeds", "one at least", "widen the bounds, or look at more designs"
         )
     x = round(found.x, DECIMALS_OF_X)
     design = _with_purpose(_rounded(best, search), x, on, texts, f"{start.name}-robust")
-    before = _best_x(start, box, on, None)
+    before = on_all_corners(start, box, on)
     history = tuple(candidate for each in searches for candidate in each.history)
-    front = front_of([each.scene for each in searches], history, on, seed, tell)
+    front = front_of(searches, history, on, seed, tell)
     seconds = time.perf_counter() - begin
     known = before is not None and before.margin > 0.0
     fed = throws_to_feed(start, before.x, on, seed=seed) if before is not None and known else None

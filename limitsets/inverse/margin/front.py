@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from limitsets.inverse.margin.feeding import Feeding, throws_to_feed
-from limitsets.inverse.margin.search import Candidate
-from limitsets.scene import Scene
+from limitsets.inverse.margin.search import Candidate, Search
+from limitsets.inverse.margin.sharp import on_all_corners
 
 __all__ = ["Option", "front_of", "unbeaten"]
 
@@ -62,7 +62,7 @@ def unbeaten(margin: Sequence[float], throws: Sequence[float]) -> list[int]:
 
 
 def front_of(
-    scenes: Sequence[Scene],
+    searches: Sequence[Search],
     history: Sequence[Candidate],
     side: int,
     seed: int,
@@ -72,8 +72,8 @@ def front_of(
 
     Parameters
     ----------
-    scenes : sequence of Scene
-        Where the searches began, by order.
+    searches : sequence of Search
+        By order.
     history : sequence of Candidate
         Designs tried.
     side : int
@@ -103,12 +103,30 @@ def front_of(
     options = []
     for number, k in enumerate(dict.fromkeys(chosen)):
         tell("throws to feed", number, len(chosen))
-        one = known[k]
-        scene = scenes[one.order].with_values(dict(one.values))
-        feeding = throws_to_feed(scene, one.found.x, side, seed=seed)
-        if feeding.fed and not feeding.lost:
-            options.append(Option(one, feeding))
+        option = _option(known[k], searches[known[k].order], side, seed)
+        if option is not None:
+            options.append(option)
+    sure: list[Option] = []
+    front = _best(options)
+    for number, option in enumerate(front):
+        # the search knew some corners only; what stands is what holds on all of them
+        tell("designs on all corners", number, len(front))
+        one, search = option.candidate, searches[option.candidate.order]
+        found = on_all_corners(search.scene.with_values(dict(one.values)), search.box, side, search.hard)
+        if found is not None and found.margin > 0.0:
+            again = _option(replace(one, found=found), search, side, seed)
+            sure += [] if again is None else [again]
+    return tuple(_best(sure))
+
+
+def _option(one: Candidate, search: Search, side: int, seed: int) -> Option | None:
+    """Count the throws of a design at its best X; None if not every start is fed."""
+    feeding = throws_to_feed(search.scene.with_values(dict(one.values)), one.found.x, side, seed=seed)
+    return Option(one, feeding) if feeding.fed == feeding.starts else None
+
+
+def _best(options: Sequence[Option]) -> list[Option]:
     kept = unbeaten(
         [each.candidate.found.margin for each in options], [each.feeding.mean for each in options]
     )
-    return tuple(options[k] for k in kept)
+    return [options[k] for k in kept]

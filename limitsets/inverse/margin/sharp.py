@@ -23,13 +23,15 @@ from limitsets.scene import Scene
 from limitsets.scene.facts import Deviation
 from limitsets.scene.quantities import deviation
 
-__all__ = ["Box", "Sharp", "corners", "failing", "sharp"]
+__all__ = ["Box", "Sharp", "corners", "failing", "on_all_corners", "sharp"]
 
 Array = NDArray[np.float64]
 Signs = tuple[int, ...]
 
 # Steps towards the margin between two factors; corners that are tried where a box has more.
 STEPS, MOST_CORNERS = 5, 512
+# Steps for designs that are looked at on all corners, and how often corners that fail are put first.
+FINE, TURNS = 14, 6
 
 
 @dataclass(frozen=True, eq=False)
@@ -247,6 +249,29 @@ def failing(scene: Scene, box: Box, side: int, found: Sharp, factor: float) -> l
         if not threshold <= found.x <= reach:
             wrong.append(signs)
     return wrong
+
+
+def on_all_corners(scene: Scene, box: Box, side: int, hard: Sequence[Signs] = ()) -> Sharp | None:
+    """Find the margin on all corners: those at which it fails are put first, and it is sought anew.
+
+    Parameters
+    ----------
+    scene, box, side
+        As for `sharp`.
+    hard : sequence of tuple of int
+        Corners to begin with.
+    """
+    first = list(hard)
+    for _ in range(TURNS):
+        found = sharp(scene, box, side, hard=first, steps=FINE)
+        if found is None or not found.margin > 0.0:
+            return found
+        wrong = failing(scene, box, side, found, 0.99 * found.margin)
+        new = [signs for signs in wrong if signs not in first]
+        if not new:
+            return found
+        first = new + first
+    return found
 
 
 def _start(found: Sharp, side: int) -> tuple[float, int]:

@@ -33,7 +33,7 @@ __all__ = ["joint_margin"]
 SECONDS, MOST_PIECES = 150.0, 4000
 
 # Parts of the bracket's lower end that are proved in turn.
-STAGES = (Fraction(1, 4), Fraction(1, 2), Fraction(3, 4), Fraction(1))
+STAGES = tuple(Fraction(n, 32) for n in (1, 2, 4, 8, 16, 24, 32))
 
 # What a piece costs, proved as a whole, against what was measured one quantity at a time; learned on the way.
 COST, LEAST_COST, MOST_COST = 1.0, 0.7, 3.0

@@ -1,0 +1,68 @@
+"""The study of robust design: what it recorded, checked by other means."""
+
+import json
+
+import pytest
+
+import limitsets as ls
+from limitsets.inverse.margin.sharp import Box, failing, sharp
+from tests.studies.test_studies import STUDIES, load_study
+
+
+@pytest.fixture(scope="module")
+def recorded():
+    return json.loads((STUDIES / "07_robust_design" / "expected.json").read_text(encoding="utf-8"))
+
+
+def design_of(recorded):
+    return ls.load("paper-designed").with_values(recorded["values"])
+
+
+def test_the_bound_is_a_part_that_rests_and_no_nudge_does_better(recorded):
+    study = load_study("07_robust_design")
+    bound = recorded["bound_of_rest"]
+    assert bound["largest"] == max(bound["by_order"].values())
+    # three lengths that form no triangle any more: 6.75 (1 + s %) = 9.35 (1 - s %)
+    assert bound["largest"] < 100 * (9.35 - 6.75) / (9.35 + 6.75)
+    # a raster of centres of mass, one order of the sides
+    best = max(
+        study.largest_at_rest(study.SIDES, 0.25 * i, 0.1 * j) for i in range(1, 27) for j in range(1, 20)
+    )
+    assert best <= bound["by_order"]["5.75, 3.6, 6.75"] + 1e-3
+    assert best > 0.9 * bound["by_order"]["5.75, 3.6, 6.75"]
+
+
+def test_five_times_the_margin_is_out_of_reach(recorded):
+    before = recorded["before_sampled"]["margin"]
+    assert recorded["bound_of_rest"]["largest"] < 5 * before
+
+
+def test_the_design_holds_on_every_corner_of_its_box(recorded):
+    scene = design_of(recorded)
+    box = Box.of(scene, load_study("07_robust_design").TOLERANCE)
+    found = sharp(scene, box, 2)
+    kept = recorded["sampled"]
+    assert found.threshold == pytest.approx(kept["threshold"], abs=1e-9)
+    at = type(found)(kept["margin"], recorded["x"], found.threshold, found.reach, found.kept, found.effects)
+    assert failing(scene, box, 2, at, 0.98 * kept["margin"]) == []
+
+
+def test_what_is_proved_is_below_what_is_refuted(recorded):
+    for word in ("margins", "before_margins"):
+        for one in recorded[word]:
+            assert one["proved"] > 0
+            assert one["refuted"] is None or one["proved"] < one["refuted"]
+    # what an orbit refutes agrees with the search by floats, which knows nothing of proofs
+    refuted = [one["refuted"] for one in recorded["before_margins"] if one["refuted"] is not None]
+    assert min(refuted) == pytest.approx(recorded["before_sampled"]["margin"], rel=0.03)
+
+
+def test_the_readme_says_what_was_found(recorded):
+    text = (STUDIES / "07_robust_design" / "README.md").read_text(encoding="utf-8")
+    for number in (
+        recorded["bound_of_rest"]["largest"],
+        recorded["sampled"]["margin"],
+        recorded["before_sampled"]["margin"],
+        *(one["proved"] for word in ("margins", "before_margins") for one in recorded[word]),
+    ):
+        assert f"{number:.2f}" in text
