@@ -165,6 +165,12 @@ def test_a_small_search_says_how_it_was_found(small):
     assert record["margins"] == []
     assert record["values"].keys() >= {"part.sides[0]", "throw.kappa", "part.mass.center.along"}
     assert small.lead.inside >= 0.0
+    # nothing on the front is worse than the design in both
+    assert all(
+        option.candidate.found.margin >= small.sampled.margin or option.feeding.mean <= small.feeding.mean
+        for option in small.front
+    )
+    assert small.front[0].candidate.found.margin >= small.sampled.margin
     assert small.scene.goal == ls.load(small.scene.as_dict()).goal
     assert [option.candidate.found.margin for option in small.front] == sorted(
         (option.candidate.found.margin for option in small.front), reverse=True

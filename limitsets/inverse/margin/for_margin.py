@@ -21,7 +21,7 @@ import numpy as np
 from limitsets.errors import AnswerError
 from limitsets.goals import Goal, OrientedBeyond, Reaches
 from limitsets.inverse.margin.feeding import Feeding, throws_to_feed
-from limitsets.inverse.margin.front import Option, front_of
+from limitsets.inverse.margin.front import Option, best_of, front_of
 from limitsets.inverse.margin.lead import Lead, lead_of
 from limitsets.inverse.margin.search import POPULATION, Candidate, Search, Tell, bounds_of
 from limitsets.inverse.margin.sharp import Box, Sharp, on_all_corners
@@ -262,7 +262,10 @@ def robust_design(
     design = _with_purpose(_rounded(best, search), x, on, texts, f"{start.name}-robust")
     before = on_all_corners(start, box, on)
     history = tuple(candidate for each in searches for candidate in each.history)
-    front = front_of(searches, history, on, seed, tell)
+    feeding = throws_to_feed(design, x, on, seed=seed)
+    values = {name: design.value(name) for name in search.bounds}
+    own_option = Option(Candidate(values, found, search.order), feeding)
+    front = tuple(best_of([own_option, *front_of(searches, history, on, seed, tell)]))
     seconds = time.perf_counter() - begin
     known = before is not None and before.margin > 0.0
     fed = throws_to_feed(start, before.x, on, seed=seed) if before is not None and known else None
@@ -283,7 +286,7 @@ def robust_design(
         sampled=found,
         margins=margins,
         lead=lead_of(design),
-        feeding=throws_to_feed(design, x, on, seed=seed),
+        feeding=feeding,
         front=front,
         history=history,
         before=start,

@@ -12,7 +12,7 @@ from limitsets.inverse.margin.feeding import Feeding, throws_to_feed
 from limitsets.inverse.margin.search import Candidate, Search
 from limitsets.inverse.margin.sharp import on_all_corners
 
-__all__ = ["Option", "front_of", "unbeaten"]
+__all__ = ["Option", "best_of", "front_of", "unbeaten"]
 
 # Candidates whose throws are counted: the surest of each class of margins, and classes.
 CLASSES, PER_CLASS = 30, 6
@@ -107,7 +107,7 @@ def front_of(
         if option is not None:
             options.append(option)
     sure: list[Option] = []
-    front = _best(options)
+    front = best_of(options)
     for number, option in enumerate(front):
         # the search knew some corners only; what stands is what holds on all of them
         tell("designs on all corners", number, len(front))
@@ -116,7 +116,7 @@ def front_of(
         if found is not None and found.margin > 0.0:
             again = _option(replace(one, found=found), search, side, seed)
             sure += [] if again is None else [again]
-    return tuple(_best(sure))
+    return tuple(best_of(sure))
 
 
 def _option(one: Candidate, search: Search, side: int, seed: int) -> Option | None:
@@ -125,7 +125,8 @@ def _option(one: Candidate, search: Search, side: int, seed: int) -> Option | No
     return Option(one, feeding) if feeding.fed == feeding.starts else None
 
 
-def _best(options: Sequence[Option]) -> list[Option]:
+def best_of(options: Sequence[Option]) -> list[Option]:
+    """Keep the options that no other beats in both, the surest first."""
     kept = unbeaten(
         [each.candidate.found.margin for each in options], [each.feeding.mean for each in options]
     )
