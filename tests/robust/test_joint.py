@@ -77,12 +77,13 @@ def test_the_landing_place_differs_at_every_throw():
 
 
 def test_what_runs_out_of_time_says_so_and_keeps_what_is_proved(tmp_path):
-    short = joint_margin(scene(TOLERANCE), GOALS[:1], width=0.001, seconds=2.0)
+    # without any time each stage is tried once, as a whole: the same on every machine
+    short = joint_margin(scene(TOLERANCE), GOALS[:1], seconds=0.0)
     assert not short.closed
     assert "time" in short.reason
-    if short.proved:
-        (file, _) = short.save(tmp_path)
-        assert ls.recheck(file).verdict == "proved"
+    assert short.proved > 0.0
+    (file, _) = short.save(tmp_path)
+    assert ls.recheck(file).verdict == "proved"
 
 
 def test_by_the_public_name_and_from_the_scene():

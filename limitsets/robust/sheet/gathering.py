@@ -13,7 +13,8 @@ from limitsets.goals import Goal, OrientedBeyond, Reaches
 from limitsets.robust.margins.beyond import MarginsBeyond
 from limitsets.robust.margins.deviations import Measure, measure, measures
 from limitsets.robust.margins.finding import GoalLike, Margin, asked_of, goals_of, margin
-from limitsets.robust.margins.joint import Tolerance, joint_margin
+from limitsets.robust.margins.joint import joint_margin
+from limitsets.robust.margins.vector import Tolerance
 from limitsets.robust.noise.scattering import Scattering
 from limitsets.robust.noise.statistics import CELLS, Levels, NoiseStatistics, noise_levels, noise_statistics
 from limitsets.robust.sheet.against_x import curve

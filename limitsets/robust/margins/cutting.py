@@ -1,0 +1,178 @@
+"""Proof of goals over a box of scenes, cut where it pays.
+
+Proved as a whole a piece counts as noise, which costs about as much again as its deviation does, so pieces have to be
+narrow near the worst corner, in the quantities that matter there, and nowhere else.
+"""
+
+from __future__ import annotations
+
+import heapq
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from fractions import Fraction
+from typing import NamedTuple
+
+import numpy as np
+
+from limitsets.robust.margins.asking import Asked, Question
+from limitsets.robust.margins.effect import Effects
+from limitsets.robust.margins.vector import Parts, Tolerance
+
+__all__ = ["Cutting", "Tell"]
+
+# Pieces after which the proof of the box ends with what it has.
+MOST_PIECES = 4000
+
+# What a piece costs, proved as a whole, against what was measured one quantity at a time; learned on the way.
+COST, LEAST_COST, MOST_COST = 1.0, 0.7, 3.0
+
+# Share of what was to spare at first, below which cells have to be finer: the steps of `Question.prove`.
+FINER = (0.06, 0.015)
+
+# A part is worth a try from this share of what its worst corner has to spare.
+WORTH = 0.15
+
+# A piece narrower than this share of the box is not cut again.
+NARROWEST = Fraction(1, 4096)
+
+Tell = Callable[[float], None]
+
+
+@dataclass(order=True)
+class _Part:
+    """A box of parts of the whole deviation, by how near to the scene as it is it comes."""
+
+    near: Fraction
+    number: int
+    low: Parts = field(compare=False)
+    high: Parts = field(compare=False)
+
+    def cut(self, k: int, at: Fraction, number: int) -> list[_Part]:
+        """Cut along one quantity."""
+        parts = []
+        for low, high in (
+            (self.low, (*self.high[:k], at, *self.high[k + 1 :])),
+            ((*self.low[:k], at, *self.low[k + 1 :]), self.high),
+        ):
+            number += 1
+            parts.append(_Part(_nearness(low, high), number, low, high))
+        return parts
+
+
+def _nearness(low: Parts, high: Parts) -> Fraction:
+    """Least factor of the whole box at which a part begins to count."""
+    return max(max(lo, -hi, Fraction(0)) for lo, hi in zip(low, high, strict=True))
+
+
+class _Guess(NamedTuple):
+    """What is to spare on a part, proved as a whole, and at its worst corner alone; the quantity to cut, and where."""
+
+    left: float
+    at_corner: float
+    k: int
+    at: Fraction
+
+
+class Cutting:
+    """Proof of a box, piece by piece."""
+
+    def __init__(self, question: Question, tolerance: Tolerance, factor: Fraction, effects: Effects) -> None:
+        self.question, self.tolerance, self.factor, self.effects = question, tolerance, factor, effects
+        self.cost, self.noise = COST, tolerance.noise(factor)
+        self.proved: list[tuple[_Part, Asked]] = []
+        self.tried = 0
+
+    def judge(self, part: _Part) -> _Guess:
+        """Guess what is to spare on a part, and where to cut it."""
+        low, high = (np.array([float(x) for x in end]) * float(self.factor) for end in (part.low, part.high))
+        half, effects = 0.5 * (high - low), self.effects
+        if not half.size:
+            return _Guess(1.0, 1.0, 0, Fraction(0))
+        if not effects.spare.size:
+            k = int(np.argmax(half))
+            return _Guess(1.0, 1.0, k, (part.low[k] + part.high[k]) / 2)
+        costs, fall = self.cost * effects.cost, np.abs(effects.fall)
+        at_corner = effects.spare - effects.fall @ (0.5 * (low + high)) - fall @ half
+        left = at_corner - np.maximum(costs - fall, 0.0) @ half
+        worst = int(np.argmin(left))
+        k = int(np.argmax(costs[worst] * half))
+        # the part on the good side is to be as long as it may be
+        wanted = WORTH * at_corner[worst] - left[worst]
+        share = 2.0 * wanted / max((fall + costs)[worst, k] * 2.0 * half[k], 1e-300)
+        share = share if 0.1 < share < 0.6 else 0.5
+        steps = max(1, min(15, round(16 * share)))
+        width = (part.high[k] - part.low[k]) * Fraction(steps, 16)
+        at = part.high[k] - width if effects.fall[worst, k] > 0.0 else part.low[k] + width
+        return _Guess(float(left[worst]), float(at_corner[worst]), k, at)
+
+    def run(self, seconds: float, tell: Tell) -> tuple[Fraction, str]:
+        """Prove parts, nearest first; up to which part of the factor all are proved, and what stops it."""
+        count = len(self.tolerance.measures)
+        whole = (Fraction(-1),) * count, (Fraction(1),) * count
+        waiting, number, end = [_Part(Fraction(0), 0, *whole)], 0, time.perf_counter() + seconds
+        failed: list[tuple[Fraction, str]] = []
+        while waiting:
+            part = heapq.heappop(waiting)
+            if failed and part.near >= min(near for near, _ in failed):
+                continue
+            guess = self.judge(part)
+            found = self._try(part, guess.left) if guess.left > WORTH * guess.at_corner or not count else None
+            if found is not None and found.verdict == "proved":
+                self.proved.append((part, found))
+                self.cost = max(LEAST_COST, self.cost * 0.99)
+                tell(self.done(waiting))
+                continue
+            if found is not None and self.effects.spare.size:
+                self.cost = min(MOST_COST, self.cost * 1.03)
+            why = self._stop(part, guess, found, waiting, time.perf_counter() > end)
+            if why:
+                failed.append((part.near, why))
+                continue
+            for piece in part.cut(guess.k, guess.at, number):
+                heapq.heappush(waiting, piece)
+            number += 2
+        return min(failed, default=(Fraction(1), ""))
+
+    def _stop(self, part: _Part, guess: _Guess, found: Asked | None, waiting: list[_Part], late: bool) -> str:
+        """Say why a part is given up; empty if it is to be cut."""
+        if late:
+            return (
+                "the box of all quantities ran out of time: give it more seconds, or ask for a wider bracket"
+            )
+        if len(self.proved) + len(waiting) >= MOST_PIECES:
+            return f"the box of all quantities is in {MOST_PIECES} pieces: ask for a wider bracket"
+        if part.low and part.high[guess.k] - part.low[guess.k] > NARROWEST:
+            return ""
+        return (
+            found.reason if found else ""
+        ) or "a piece of the box of all quantities is too narrow to be cut"
+
+    def within(self, share: Fraction) -> list[Asked]:
+        """Return what proves a share of the box: parts that reach beyond are cut back, their cells serve for less."""
+        kept = []
+        for part, found in self.proved:
+            low = tuple(max(x, -share) for x in part.low)
+            high = tuple(min(x, share) for x in part.high)
+            if any(a >= b for a, b in zip(low, high, strict=True)) or found.found is None:
+                continue
+            piece = self.tolerance.piece(low, high, self.factor)
+            if piece is not None:
+                cover = found.found.cover
+                box = replace(cover.box, scene=piece.tree())
+                found = replace(found, found=replace(found.found, cover=replace(cover, box=box)), piece=piece)
+            kept.append(found)
+        return kept
+
+    def done(self, waiting: list[_Part]) -> float:
+        """Share of the pieces known so far."""
+        return len(self.proved) / (len(self.proved) + len(waiting))
+
+    def _try(self, part: _Part, left: float) -> Asked:
+        self.tried += 1
+        finest = 3
+        if self.effects.spare.size:
+            finest = 1 + sum(left < share * float(self.effects.spare.min()) for share in FINER)
+        # where nothing attracts the piece is cut: that helps more than finer cells
+        piece = self.tolerance.piece(part.low, part.high, self.factor)
+        return self.question.prove(piece, self.noise, finest, bases=1)
