@@ -468,8 +468,9 @@ def weakest_of(claims: Sequence[Claim]) -> Claim:
             for side in section["near_joint"]
         }
     for count in ("throws", "jogs"):
-        if count in section:
-            section[count] = max(other[count] for other in sections)
+        counts = [other[count] for other in sections if count in other]
+        if counts:
+            section[count] = max(counts)
     if "least_slope" in section:
         section["least_slope"] = min((other["least_slope"] for other in sections), key=float.fromhex)
     return Claim(claims[0].claim, "proved", "", section)

@@ -14,7 +14,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from typing import Any
 
+from limitsets.proofs.intervals import Intervals
 from limitsets.proofs.rational import Span, square_root
 
 __all__ = ["Slope", "about", "middle", "root"]
@@ -79,7 +81,7 @@ def _each(one: Sequence[Span], two: Sequence[Span]) -> tuple[Span, ...]:
     return tuple(a + b for a, b in zip(one, two, strict=True))
 
 
-def root(x: Slope | Span) -> Slope | Span:
+def root(x: Slope | Span | Intervals) -> Any:
     """Square root.
 
     Raises
@@ -87,9 +89,11 @@ def root(x: Slope | Span) -> Slope | Span:
     ZeroDivisionError
         It may be 0, where it has no derivative.
     """
+    if isinstance(x, Intervals):
+        return x.square_root()
     if isinstance(x, Span):
         return square_root(x)
-    found = square_root(x.value)
+    found = root(x.value)
     return Slope(found, tuple(d / (2 * found) for d in x.by))
 
 

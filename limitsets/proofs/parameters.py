@@ -27,7 +27,7 @@ from limitsets.scene.units import exact_factor, parse
 from limitsets.thrower import Throw
 from limitsets.thrower.motion import FullThrow, Outline
 
-__all__ = ["VARYING", "ParameterBox", "parameter_box"]
+__all__ = ["VARYING", "ParameterBox", "body_at", "lengths_of", "parameter_box"]
 
 NARROWER = "lower the tolerance or noise"
 
@@ -85,18 +85,17 @@ def _pattern(name: str) -> str:
     return re.sub(r"\[[0-9]+\]", "[i]", name)
 
 
-def _wide(node: Any, name: str) -> Iterator[str]:
-    """Name the quantities of a tree that are pairs of texts."""
+def _lengths(node: Any, name: str) -> Iterator[str]:
+    """Name the lengths in a part's text: leaves, or pairs of texts."""
     if isinstance(node, dict):
         for word, inner in node.items():
-            yield from _wide(inner, f"{name}.{word}")
+            yield from _lengths(inner, f"{name}.{word}")
+    elif NAMES.get(_pattern(name)) == "length":
+        yield name
     elif isinstance(node, list):
         corner = name.startswith("part.vertices[")
-        if _pattern(name) in NAMES:
-            yield name
-            return
         for k, inner in enumerate(node):
-            yield from _wide(inner, f"{name}.{'xy'[k]}" if corner else f"{name}[{k}]")
+            yield from _lengths(inner, f"{name}.{'xy'[k]}" if corner else f"{name}[{k}]")
 
 
 class _Reader:
@@ -230,7 +229,7 @@ class _Reader:
     def narrow_body(self) -> tuple[list[tuple[Any, ...]], Span]:
         """As `body`, but narrower where several of its numbers are known to a tolerance only."""
         plain, radius = self.body()
-        names = [name for name in _wide(self.tree["part"], "part") if NAMES[_pattern(name)] == "length"]
+        names = [name for name in _lengths(self.tree["part"], "part") if isinstance(_at(self.tree, name), list)]
         if not names:
             return plain, radius
         box = [self.span(name) for name in names]
@@ -257,6 +256,19 @@ class _Reader:
             p.append([along - side[0] for along, _, _ in at])
             q.append([above - side[1] for _, above, _ in at])
         return [side[4] for side in sides], p, q
+
+
+def lengths_of(scene: Scene, tree: Mapping[str, Any]) -> dict[str, Span]:
+    """Name the lengths of the part, and say what is known of each, in the scene's unit."""
+    reader = _Reader(scene, tree)
+    return {name: reader.span(name) for name in _lengths(tree["part"], "part")}
+
+
+def body_at(
+    scene: Scene, tree: Mapping[str, Any], lengths: Mapping[str, Any]
+) -> tuple[list[tuple[Any, ...]], Any]:
+    """Return (a, d, length) of every side and the radius of gyration for given lengths, in whatever arithmetic they are."""
+    return _Reader(scene, tree, lengths).body()
 
 
 def _require_rest(sides: Sequence[tuple[Any, ...]], kappa: Span, radius: Span) -> None:

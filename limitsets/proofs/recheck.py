@@ -504,6 +504,15 @@ class Rising:
         root = self.x.sqrt()
         return Rising(root, [d / (2 * root) for d in self.by])
 
+    def sin_cos(self) -> "tuple[Rising, Rising]":
+        """Take sine and cosine."""
+        sin, cos = self.x.sin_cos()
+        return Rising(sin, [cos * d for d in self.by]), Rising(cos, [-sin * d for d in self.by])
+
+    def __abs__(self) -> "Rising":  # of use in x |x| only, where the sign of 0 does not matter
+        sign = ONE if self.x > 0 else -ONE if self.x < 0 else ONE.union(-ONE)
+        return Rising(abs(self.x), [sign * d for d in self.by])
+
     def __gt__(self, other: Any) -> bool:
         return bool(self.x > (other.x if isinstance(other, Rising) else other))
 
@@ -2212,6 +2221,8 @@ def read_claims(
             if name == "goal":
                 keys = GOALS.get(table(section, "section of goal", keys, GOAL_KEYS)["kind"], keys)
             more = "from_anywhere" if name == "goal" else ""
+            if more and section.get("kind") == "oriented_beyond":
+                more += " throws"
             known[name] = read_section(name, table(section, f"section of {name}", keys, more), n_sides)
     return known, unknown
 
@@ -2276,6 +2287,9 @@ def read_goal(section: dict[str, Any], n_sides: int) -> dict[str, Any]:
         x = quantity(section["x"], "length", "goal.x")
         require(x.lo == x.hi, "goal.x is not one number")
         goal |= {"x": x, "text": section["x"], "side": whole(section["side"], 0, n_sides, "side")}
+    if kind == "oriented_beyond":
+        goal["throws"] = whole(section.get("throws", 0), 0, 3, "throws")
+        require(goal["throws"] in (0, 2) and not (anywhere and goal["throws"]), "goal.throws is neither 0 nor 2")
     if kind == "reaches":
         require(isinstance(section["every_orbit"], bool), "goal.every_orbit is neither true nor false")
         goal |= {
@@ -2293,7 +2307,8 @@ def statement_of_goal(goal: dict[str, Any], noisy: bool) -> str:
     start = "every start a_i < x <= arm.length on every side i"
     place = start if goal["anywhere"] else "every start in the attracting cells"
     if goal["kind"] == "oriented_beyond":
-        where = f"after a throw from {start}" if goal["anywhere"] else "in the attracting cells"
+        cells = "after two throws with the same parameters in" if goal["throws"] else "in"
+        where = f"after a throw from {start}" if goal["anywhere"] else f"{cells} the attracting cells"
         return f"goal: {where}, x > {plain(goal['text'])} implies side {goal['side']}"
     if goal["kind"] == "reaches":
         there = f"comes to rest on side {goal['side']} at x >= {plain(goal['text'])}"
@@ -2370,8 +2385,10 @@ def check_oriented(c: Cells, scene: Scene, goal: dict[str, Any]) -> str:
         x = math.nextafter(x, -math.inf)  # the largest float that is not above
     wrong = (c.side != goal["side"]) & (c.upper() > x)
     if not goal["anywhere"]:
-        what = f"an attracting cell of another side reaches beyond x = {float(beyond)!r}"
-        return first_bad(c, [(~((c.component >= 0) & wrong), what)])
+        wrong &= c.component >= 0
+        if goal["throws"] and wrong.any():
+            return check_two_throws(c, scene, wrong, x)
+        return first_bad(c, [(~wrong, f"an attracting cell of another side reaches beyond x = {float(beyond)!r}")])
     for array, what in ((c.jog, "jog"), (c.flip, "flip")):
         q = np.flatnonzero(array[:, 0] >= 0)
         good = np.ones(len(wrong), dtype=bool)
@@ -2383,6 +2400,175 @@ def check_oriented(c: Cells, scene: Scene, goal: dict[str, Any]) -> str:
         edge = float(edges[0])
         if i != goal["side"] and not near_landing(scene.sides[i], scene.k_lo, scene.k_hi, edge) <= x:
             return f"side {i}, near the joint: a throw may end beyond x = {float(beyond)!r}"
+    return ""
+
+
+# ----------------------------------------------------------------------- two throws with the same parameters
+
+# A throw with the impact angle p begins at x = P(p), where f = 0, and jogs to P(p) + D(p): nothing is to be solved.
+# Two throws are angles p and r with x'(p) + e = P(r), e the noise of the landing place.  For weights v, w >= 0 and any u
+#     x'' <= G = x'' + v m(p) + w m(r) + u (x' + e - P(r)),
+# m signed so that it is not negative where the branch is taken.  G at a point, and its derivatives over a box around
+# it, bound G there: where it rises or falls for sure only that end of the box counts.
+
+P, R, E, KAPPA, HEIGHT, MORE = range(6)  # the variables: two angles, where it lands, kappa, h, lengths of the part
+ANGLE_PIECES, MOST_PAIRS = 12, 20_000  # pieces of each angle to begin with, and boxes, for one kind of two throws
+
+
+def read_lengths(part: object, unit: Fraction) -> list[tuple[int, str, Arb]]:
+    """List what is known of the lengths of the part that are intervals, in the order in which they are read."""
+    found: dict[int, tuple[int, str, Arb]] = {}
+
+    def look(value: object, where: str) -> Arb:
+        q = quantity(value, "length", where)
+        if q.lo < q.hi:
+            found.setdefault(id(value), (id(value), where, span(q.lo / unit, q.hi / unit)))
+        return span(q.lo / unit, q.hi / unit)
+
+    read_part(part, unit, look)
+    return list(found.values())
+
+
+def by_angle(scene: Scene, rest: Any, rho: Any, kappa: Any, h: Any, p: Any) -> tuple[Any, Any, Any]:
+    """Compute P, R'(jog) and what decides (flip where it is positive), of a throw with the angle p."""
+    a, d = rest[0], rest[1]
+    s = scene.sides[0]
+    ell2 = a**2 + d**2
+    ell = ell2.sqrt()
+    if s.exact:
+        sin, cos = p.sin_cos()
+        x = HALF * kappa * p + (a * sin - d * (ONE - cos)) / p
+        jog = x - h * p + a * (ONE - cos) - d * (p - sin)
+        X, H = a * cos - d * sin, a * sin + d * cos
+        spin = rho**2 + X * (x - kappa * p) + H * (h + d)
+        V = kappa * (X * abs(X) / (ell + H))
+    else:
+        x = a + HALF * (kappa - d if "2" in scene.raw["model"]["flight"] else kappa) * p
+        jog = x - h * p
+        spin = rho**2 - a * x + 2 * a**2 + d**2 + d * h
+        V = kappa * (a**2 / (ell + d)) - 2 * a * (x - a)
+    turned = spin * abs(spin) if s.signed else spin * spin
+    return x, jog, turned / (2 * (rho**2 + ell2)) - V
+
+
+class Two(NamedTuple):
+    """Two throws: the side they begin on, and their branches (0 jog, 1 flip)."""
+
+    side: int
+    first: int
+    second: int
+
+
+def two_throws(scene: Scene, kind: Two, lengths: list[int], v: list[Any]) -> list[Any]:
+    """Compute x'', what decides in both throws, signed, and x' + e - P(r)."""
+    known = dict(zip(lengths, v[MORE:], strict=True))
+    unit = LENGTHS[scene.unit]
+
+    def length(value: object, where: str) -> Any:
+        q = quantity(value, "length", where)
+        return known.get(id(value), span(q.lo / unit, q.hi / unit))
+
+    rests, rho = read_part(scene.raw["part"], unit, length)
+    begin, then = rests[kind.side], rests[(kind.side + kind.first) % len(rests)]
+    x, mid, m = by_angle(scene, begin, rho, v[KAPPA], v[HEIGHT], v[P])
+    start, end, n = by_angle(scene, then, rho, v[KAPPA], v[HEIGHT], v[R])
+    mid = mid - begin[3] if kind.first else mid
+    end = end - then[3] if kind.second else end
+    return [end, m if kind.first else -m, n if kind.second else -n, mid + v[E] - start]
+
+
+def weigh(at: Array, slopes: Array) -> list[float]:
+    """Propose weights in floats: a corner of least |...|, where three derivatives or weights are nothing."""
+    lines = np.concatenate([slopes, [[0, 0], [1, 0], [0, 1], [0, 0]]], axis=1)
+    three = np.array([t for t in itertools.combinations(range(lines.shape[1]), 3) if t[0] <= R])
+    matrix = np.moveaxis(lines[1:, three], 0, 2)
+    good = abs(np.linalg.det(matrix)) > 1e-300
+    found = np.linalg.solve(matrix[good], -lines[0, three[good]][:, :, None])[:, :, 0]
+    found = np.concatenate([[[0.0, 0.0, 0.0]], found[(found[:, :2] >= 0).all(axis=1)]])
+    cost = at[0] + found @ at[1:] + abs(slopes[0] + found @ slopes[1:]).sum(axis=1)
+    return [float(w) for w in found[int(np.nanargmin(cost))]]
+
+
+def pair_stays(scene: Scene, kind: Two, lengths: list[int], box: list[Pair], x: Arb) -> int:
+    """Prove a box of angles and parameters: -1, or the variable along which it is to be halved."""
+    n = len(box)
+    ends = [(arb(lo), arb(hi)) for lo, hi in box]
+    middle = [arb(lo + (hi - lo) / 2) for lo, hi in box]
+    rising = [Rising(lo.union(hi), [ONE if j == k else ZERO for j in range(n)]) for k, (lo, hi) in enumerate(ends)]
+    steep = [term.by for term in two_throws(scene, kind, lengths, rising)]
+    centre = two_throws(scene, kind, lengths, middle)
+    off = [lo.union(hi) - mid for (lo, hi), mid in zip(ends, middle, strict=True)]
+    over = [
+        c + sum((d * o for d, o in zip(by, off, strict=True)), ZERO) for c, by in zip(centre, steep, strict=True)
+    ]
+    landing = scene.sides[0].landing
+    if over[0] + landing <= x or over[1] < 0 or over[2] < 0 or over[3] > 0 or over[3] < 0:
+        return -1
+    half = [float((hi - lo).mid()) / 2 for lo, hi in ends]
+    floats = np.array([[float(d.mid()) * h for d, h in zip(by, half, strict=True)] for by in steep])
+    at = np.array([float(c.mid()) for c in centre])
+    if not (np.isfinite(floats).all() and np.isfinite(at).all()):
+        return int(np.argmax(half))
+    weights = [ONE, *(arb(w) for w in weigh(at, floats))]
+    if not (weights[1] >= 0 and weights[2] >= 0):
+        return int(np.argmax(half))
+    slopes = [sum((w * by[k] for w, by in zip(weights, steep, strict=True)), ZERO) for k in range(n)]
+    point = [hi if d >= 0 else lo if d <= 0 else mid for d, (lo, hi), mid in zip(slopes, ends, middle, strict=True)]
+    value = sum((w * t for w, t in zip(weights, two_throws(scene, kind, lengths, point), strict=True)), landing)
+    loose = [ZERO if d >= 0 or d <= 0 else abs(d) * abs(o) for d, o in zip(slopes, off, strict=True)]
+    if value + sum(loose, ZERO) <= x:
+        return -1
+    sizes = [float(abs(d).upper()) if d.contains(0) else float(d.rad()) for d in slopes]
+    return int(np.argmax([size * h for size, h in zip(sizes, half, strict=True)]))
+
+
+def kinds_of_two(c: Cells, bad: Array) -> Iterator[tuple[Two, list[Pair]]]:
+    """Two throws from attracting cells that may end in the bad ones, and the ranges of both angles."""
+    inside = c.component >= 0
+    ways = (c.jog, c.flip)
+    for second, first in itertools.product((0, 1), (0, 1)):
+        then = inside & (ways[second][:, 0] >= 0)
+        q = np.flatnonzero(then)
+        then[q] = range_max(bad.astype(np.int64), *ways[second][q].T) > 0
+        begin = inside & (ways[first][:, 0] >= 0)
+        q = np.flatnonzero(begin)
+        begin[q] = range_max(then.astype(np.int64), *ways[first][q].T) > 0
+        for side in range(len(c.edges)):
+            own = np.flatnonzero(begin & (c.side == side))
+            if len(own):
+                next_side = (side + first) % len(c.edges)
+                at = np.flatnonzero(then & (c.side == next_side))
+                ranges = [(float(c.phi[some, 0].min()), float(c.phi[some, 1].max())) for some in (own, at)]
+                yield Two(side, first, second), ranges
+
+
+def check_two_throws(c: Cells, scene: Scene, bad: Array, x: float) -> str:
+    """Check that second throws from attracting cells, parameters kept, end beyond x in no bad cell; "" or what fails."""
+    names = scene.noise if isinstance(scene.noise, dict) else {}
+    if set(names) - {"landing.x"}:
+        return "with noise of the throw no two throws have the same parameters"
+    unit = LENGTHS[scene.unit]
+    known = read_lengths(scene.raw["part"], unit)
+    h = quantity(scene.raw["arm"]["surface_height"], "length", "arm.surface_height")
+    landing = scene.sides[0].landing
+    balls = [(-landing).union(landing), scene.k_lo.union(scene.k_hi), span(h.lo / unit, h.hi / unit)]
+    balls += [ball for _, _, ball in known]
+    fixed = [(below(ball), above(ball)) for ball in balls]
+    for kind, ranges in kinds_of_two(c, bad):
+        cuts = [np.linspace(*ends, ANGLE_PIECES + 1).tolist() for ends in ranges]
+        pairs = itertools.product(*(itertools.pairwise(each) for each in cuts))
+        stack, looked = [[*pair, *fixed] for pair in pairs], 0
+        while stack:
+            box = stack.pop()
+            looked += 1
+            k = pair_stays(scene, kind, [one for one, _, _ in known], box, arb(x))
+            if k < 0:
+                continue
+            lo, hi = box[k]
+            cut = lo + (hi - lo) / 2
+            if looked + len(stack) > MOST_PAIRS or not lo < cut < hi:
+                return f"two throws with the same parameters may end beyond x = {x!r} on another side"
+            stack += [[*box[:k], (lo, cut), *box[k + 1 :]], [*box[:k], (cut, hi), *box[k + 1 :]]]
     return ""
 
 

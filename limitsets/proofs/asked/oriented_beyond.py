@@ -14,6 +14,7 @@ from limitsets.proofs.asked.search import from_attracting
 from limitsets.proofs.asked.starts import one_throw
 from limitsets.proofs.attraction import Attraction
 from limitsets.proofs.certificate import everywhere
+from limitsets.proofs.chains import stays_below
 from limitsets.scene import Scene
 
 __all__ = ["KIND"]
@@ -31,20 +32,25 @@ def _exceptions(found: Attraction, goal: OrientedBeyond) -> NDArray[np.bool_]:
 def _prove(found: Attraction, scene: Scene, goal: OrientedBeyond) -> Answer:
     missing = common(found, anywhere=goal.from_anywhere)
     bad = _exceptions(found, goal)
+    more: dict[str, Any] = {"from_anywhere": True} if goal.from_anywhere else {}
     if goal.from_anywhere:
         reason = _thrown_there(found, goal, bad)
         # above the joint no cells are near enough: say that, not that a throw from there may land anywhere
         reason = missing if found.cover.points else reason or missing
     else:
         bad &= found.component >= 0
-        reason = (
-            f"{int(bad.sum())} attracting cells reach beyond x = {goal.x:g} on other sides than {goal.side}"
-        )
-        reason = missing or (reason if bad.any() else "")
+        reason = missing or _beyond(found, goal, bad)
+        if reason and not missing and not stays_below(found, scene, bad, below(goal.x)):
+            reason, more = "", {"throws": 2}
     if reason:
         return undecided(reason)
-    section = {"kind": goal.kind, "x": f"{goal.x!r} {scene.unit}", "side": goal.side}
-    return Answer("proved", "", section | ({"from_anywhere": True} if goal.from_anywhere else {}))
+    return Answer("proved", "", {"kind": goal.kind, "x": f"{goal.x!r} {scene.unit}", "side": goal.side} | more)
+
+
+def _beyond(found: Attraction, goal: OrientedBeyond, bad: NDArray[np.bool_]) -> str:
+    """Say that attracting cells lie beyond x on other sides; empty if none does."""
+    count = int((bad & (found.component >= 0)).sum())
+    return f"{count} attracting cells reach beyond x = {goal.x:g} on other sides than {goal.side}" if count else ""
 
 
 def _ask(found: Attraction, scene: Scene, goal: OrientedBeyond) -> Answer:
@@ -85,6 +91,8 @@ def _sentence(section: Mapping[str, Any]) -> str:
     beyond = f"at rest beyond x = {section['x']} lies on side {section['side']}."
     if section.get("from_anywhere"):
         return f"After a throw from anywhere on the arm, every part {beyond}"
+    if section.get("throws"):
+        return f"After two throws with the same parameters in the attracting cells, every part {beyond}"
     return f"In the attracting cells, every part {beyond}"
 
 
