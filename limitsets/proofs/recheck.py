@@ -792,10 +792,18 @@ def flight(x: Arb, kappa: Arb, at: Angle) -> Arb:
     return (x - HALF * kappa * at.p) * at.p + at.g
 
 
+def sine_cosine(phi: Arb) -> tuple[Arb, Arb]:
+    """Enclose both over a wide ball, by the mean value theorem: Arb's own are as wide as the angle."""
+    sin, cos = phi.sin_cos()
+    middle = phi.mid()
+    at, off = middle.sin_cos(), phi - middle
+    return at[0] + cos * off, at[1] - sin * off
+
+
 def over_angles(s: Side, phi: Arb, R: Arb, kappa: Arb) -> tuple[int, Arb, Arb]:
     """Over a box: the decision (0 jog, 1 flip, 2 not settled), D'(phi), and df/dphi."""
     if s.exact:
-        sin, cos = phi.sin_cos()
+        sin, cos = sine_cosine(phi)
         H = s.a * sin + s.d * cos
         X = s.a * cos - s.d * sin
         fall = R - kappa * phi
@@ -860,6 +868,10 @@ def positive_until(s: Side, x: Arb, kappa: Arb, end: Angle) -> bool:
     return False
 
 
+# Brackets this far beyond a guess: where a and d are wide their balls' radii, which have 30 bits, hide anything less.
+SLACKS = (2.0**-40, 2.0**-26)
+
+
 def guess_root(floats: tuple[float, float, float], exact: bool, x: float, kappa: float, p: float) -> float:
     """Newton in floats from p; believed by nobody."""
     a, d, small = floats
@@ -879,21 +891,23 @@ def guess_root(floats: tuple[float, float, float], exact: bool, x: float, kappa:
 
 def root_above(s: Side, x: Arb, kappa: Arb, at: Angle) -> Angle:
     """Find an angle that the impact at x comes before, for this kappa and larger ones: `at` or a proved better one."""
-    p = guess_root(s.late, s.exact, float(x.mid()), float(kappa.mid()), float(at.p.mid())) * (1 + 2.0**-40)
-    if 0 < p < at.p:
-        better = at_angle(s, arb(p))
-        if flight(x, kappa, better) < 0:
-            return better
+    p = guess_root(s.late, s.exact, float(x.mid()), float(kappa.mid()), float(at.p.mid()))
+    for slack in SLACKS:
+        if 0 < p * (1 + slack) < at.p:
+            better = at_angle(s, arb(p * (1 + slack)))
+            if flight(x, kappa, better) < 0:
+                return better
     return at
 
 
 def root_below(s: Side, x: Arb, kappa: Arb, at: Angle, start: Arb) -> Angle:
     """Find an angle that the impact at x comes after, for this kappa and smaller ones: `at` or a proved better one."""
-    p = guess_root(s.early, s.exact, float(x.mid()), float(kappa.mid()), float(start.mid())) * (1 - 2.0**-40)
-    if at.p < p < FULL_TURN:
-        better = at_angle(s, arb(p))
-        if positive_until(s, x, kappa, better):
-            return better
+    p = guess_root(s.early, s.exact, float(x.mid()), float(kappa.mid()), float(start.mid()))
+    for slack in SLACKS:
+        if at.p < p * (1 - slack) < FULL_TURN:
+            better = at_angle(s, arb(p * (1 - slack)))
+            if positive_until(s, x, kappa, better):
+                return better
     return at
 
 

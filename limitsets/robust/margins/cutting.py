@@ -117,7 +117,9 @@ class Cutting:
             if failed and part.near >= min(near for near, _ in failed):
                 continue
             guess = self.judge(part)
-            found = self._try(part, guess.left) if guess.left > WORTH * guess.at_corner or not count else None
+            # the whole box is worth a try whatever is guessed: two throws with the same parameters may settle it
+            worth = part.number == 0 or guess.left > WORTH * guess.at_corner
+            found = self._try(part, guess.left) if worth else None
             if found is not None and found.verdict == "proved":
                 self.proved.append((part, found))
                 self.cost = max(LEAST_COST, self.cost * 0.99)
