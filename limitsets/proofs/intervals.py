@@ -49,8 +49,12 @@ class Intervals:
         """Return one interval."""
         return cls(np.array([lo], dtype=float), np.array([lo if hi is None else hi], dtype=float))
 
-    def __getitem__(self, chosen: object) -> Intervals:
-        return Intervals(self.lo[chosen], self.hi[chosen])  # type: ignore[index]  # any numpy index
+    def __getitem__(self, chosen: NDArray[np.int64]) -> Intervals:
+        return Intervals(self.lo[chosen], self.hi[chosen])
+
+    def rows(self, count: int) -> Intervals:
+        """Return so many, where one stands for all."""
+        return Intervals(np.broadcast_to(self.lo, (count,)), np.broadcast_to(self.hi, (count,)))
 
     def __float__(self) -> float:
         """Return a middle: formulas are put in order by it."""

@@ -14,17 +14,20 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Any
+from typing import Any, TypeAlias
 
 from limitsets.proofs.intervals import Intervals
 from limitsets.proofs.rational import Span, square_root
 
 __all__ = ["Slope", "about", "middle", "root"]
 
+Number: TypeAlias = Any
+"""A `Span`, or `Intervals` of many boxes."""
+
 
 @dataclass(frozen=True)
 class Slope:
-    """A span, and the spans of its derivatives.
+    """A span, and the spans of its derivatives; or arrays of intervals.
 
     Examples
     --------
@@ -33,8 +36,8 @@ class Slope:
     Span(lo=Fraction(2, 1), hi=Fraction(4, 1))
     """
 
-    value: Span
-    by: tuple[Span, ...]
+    value: Number
+    by: tuple[Number, ...]
 
     def __float__(self) -> float:
         return float(self.value)
@@ -42,20 +45,20 @@ class Slope:
     def __neg__(self) -> Slope:
         return Slope(-self.value, tuple(-d for d in self.by))
 
-    def __add__(self, other: Slope | Span | int) -> Slope:
+    def __add__(self, other: Slope | Number) -> Slope:
         if isinstance(other, Slope):
             return Slope(self.value + other.value, _each(self.by, other.by))
         return Slope(self.value + other, self.by)
 
     __radd__ = __add__
 
-    def __sub__(self, other: Slope | Span | int) -> Slope:
+    def __sub__(self, other: Slope | Number) -> Slope:
         return self + (-other)
 
-    def __rsub__(self, other: Span | int) -> Slope:
-        return -self + other
+    def __rsub__(self, other: Number) -> Slope:
+        return Slope(other - self.value, tuple(-d for d in self.by))
 
-    def __mul__(self, other: Slope | Span | int) -> Slope:
+    def __mul__(self, other: Slope | Number) -> Slope:
         if other is self:
             return Slope(self.value * self.value, tuple(2 * (self.value * d) for d in self.by))
         if isinstance(other, Slope):
@@ -65,23 +68,23 @@ class Slope:
 
     __rmul__ = __mul__
 
-    def __truediv__(self, other: Slope | Span | int) -> Slope:
+    def __truediv__(self, other: Slope | Number) -> Slope:
         if not isinstance(other, Slope):
             return Slope(self.value / other, tuple(d / other for d in self.by))
         ratio = self.value / other.value
         by = (one - ratio * two for one, two in zip(self.by, other.by, strict=True))
         return Slope(ratio, tuple(d / other.value for d in by))
 
-    def __rtruediv__(self, other: Span | int) -> Slope:
+    def __rtruediv__(self, other: Number) -> Slope:
         ratio = other / self.value
         return Slope(ratio, tuple(-(ratio * d) / self.value for d in self.by))
 
 
-def _each(one: Sequence[Span], two: Sequence[Span]) -> tuple[Span, ...]:
+def _each(one: Sequence[Number], two: Sequence[Number]) -> tuple[Number, ...]:
     return tuple(a + b for a, b in zip(one, two, strict=True))
 
 
-def root(x: Slope | Span | Intervals) -> Any:
+def root(x: Slope | Number) -> Any:
     """Square root.
 
     Raises

@@ -229,7 +229,9 @@ class _Reader:
     def narrow_body(self) -> tuple[list[tuple[Any, ...]], Span]:
         """As `body`, but narrower where several of its numbers are known to a tolerance only."""
         plain, radius = self.body()
-        names = [name for name in _lengths(self.tree["part"], "part") if isinstance(_at(self.tree, name), list)]
+        names = [
+            name for name in _lengths(self.tree["part"], "part") if isinstance(_at(self.tree, name), list)
+        ]
         if not names:
             return plain, radius
         box = [self.span(name) for name in names]
@@ -267,7 +269,7 @@ def lengths_of(scene: Scene, tree: Mapping[str, Any]) -> dict[str, Span]:
 def body_at(
     scene: Scene, tree: Mapping[str, Any], lengths: Mapping[str, Any]
 ) -> tuple[list[tuple[Any, ...]], Any]:
-    """Return (a, d, length) of every side and the radius of gyration for given lengths, in whatever arithmetic they are."""
+    """Return (a, d, length) of every side and the radius of gyration, in whatever arithmetic the lengths are given."""
     return _Reader(scene, tree, lengths).body()
 
 

@@ -2303,7 +2303,9 @@ def read_goal(section: dict[str, Any], n_sides: int) -> dict[str, Any]:
         goal |= {"x": x, "text": section["x"], "side": whole(section["side"], 0, n_sides, "side")}
     if kind == "oriented_beyond":
         goal["throws"] = whole(section.get("throws", 0), 0, 3, "throws")
-        require(goal["throws"] in (0, 2) and not (anywhere and goal["throws"]), "goal.throws is neither 0 nor 2")
+        require(
+            goal["throws"] in (0, 2) and not (anywhere and goal["throws"]), "goal.throws is neither 0 nor 2"
+        )
     if kind == "reaches":
         require(isinstance(section["every_orbit"], bool), "goal.every_orbit is neither true nor false")
         goal |= {
@@ -2402,7 +2404,9 @@ def check_oriented(c: Cells, scene: Scene, goal: dict[str, Any]) -> str:
         wrong &= c.component >= 0
         if goal["throws"] and wrong.any():
             return check_two_throws(c, scene, wrong, x)
-        return first_bad(c, [(~wrong, f"an attracting cell of another side reaches beyond x = {float(beyond)!r}")])
+        return first_bad(
+            c, [(~wrong, f"an attracting cell of another side reaches beyond x = {float(beyond)!r}")]
+        )
     for array, what in ((c.jog, "jog"), (c.flip, "flip")):
         q = np.flatnonzero(array[:, 0] >= 0)
         good = np.ones(len(wrong), dtype=bool)
@@ -2420,13 +2424,18 @@ def check_oriented(c: Cells, scene: Scene, goal: dict[str, Any]) -> str:
 # ----------------------------------------------------------------------- two throws with the same parameters
 
 # A throw with the impact angle p begins at x = P(p), where f = 0, and jogs to P(p) + D(p): nothing is to be solved.
-# Two throws are angles p and r with x'(p) + e = P(r), e the noise of the landing place.  For weights v, w >= 0 and any u
+# Two throws are angles p and r with x'(p) + e = P(r), e the noise of the landing.  For weights v, w >= 0 and any u
 #     x'' <= G = x'' + v m(p) + w m(r) + u (x' + e - P(r)),
 # m signed so that it is not negative where the branch is taken.  G at a point, and its derivatives over a box around
 # it, bound G there: where it rises or falls for sure only that end of the box counts.
 
-P, R, E, KAPPA, HEIGHT, MORE = range(6)  # the variables: two angles, where it lands, kappa, h, lengths of the part
-ANGLE_PIECES, MOST_PAIRS = 12, 20_000  # pieces of each angle to begin with, and boxes, for one kind of two throws
+P, R, E, KAPPA, HEIGHT, MORE = range(
+    6
+)  # the variables: two angles, where it lands, kappa, h, lengths of the part
+ANGLE_PIECES, MOST_PAIRS = (
+    12,
+    20_000,
+)  # pieces of each angle to begin with, and boxes, for one kind of two throws
 
 
 def read_lengths(part: object, unit: Fraction) -> list[tuple[int, str, Arb]]:
@@ -2484,7 +2493,7 @@ def two_throws(scene: Scene, kind: Two, lengths: list[int], v: list[Any]) -> lis
 
     rests, rho = read_part(scene.raw["part"], unit, length)
     begin, then = rests[kind.side], rests[(kind.side + kind.first) % len(rests)]
-    x, mid, m = by_angle(scene, begin, rho, v[KAPPA], v[HEIGHT], v[P])
+    _, mid, m = by_angle(scene, begin, rho, v[KAPPA], v[HEIGHT], v[P])
     start, end, n = by_angle(scene, then, rho, v[KAPPA], v[HEIGHT], v[R])
     mid = mid - begin[3] if kind.first else mid
     end = end - then[3] if kind.second else end
@@ -2508,12 +2517,15 @@ def pair_stays(scene: Scene, kind: Two, lengths: list[int], box: list[Pair], x: 
     n = len(box)
     ends = [(arb(lo), arb(hi)) for lo, hi in box]
     middle = [arb(lo + (hi - lo) / 2) for lo, hi in box]
-    rising = [Rising(lo.union(hi), [ONE if j == k else ZERO for j in range(n)]) for k, (lo, hi) in enumerate(ends)]
+    rising = [
+        Rising(lo.union(hi), [ONE if j == k else ZERO for j in range(n)]) for k, (lo, hi) in enumerate(ends)
+    ]
     steep = [term.by for term in two_throws(scene, kind, lengths, rising)]
     centre = two_throws(scene, kind, lengths, middle)
     off = [lo.union(hi) - mid for (lo, hi), mid in zip(ends, middle, strict=True)]
     over = [
-        c + sum((d * o for d, o in zip(by, off, strict=True)), ZERO) for c, by in zip(centre, steep, strict=True)
+        c + sum((d * o for d, o in zip(by, off, strict=True)), ZERO)
+        for c, by in zip(centre, steep, strict=True)
     ]
     landing = scene.sides[0].landing
     if over[0] + landing <= x or over[1] < 0 or over[2] < 0 or over[3] > 0 or over[3] < 0:
@@ -2527,8 +2539,12 @@ def pair_stays(scene: Scene, kind: Two, lengths: list[int], box: list[Pair], x: 
     if not (weights[1] >= 0 and weights[2] >= 0):
         return int(np.argmax(half))
     slopes = [sum((w * by[k] for w, by in zip(weights, steep, strict=True)), ZERO) for k in range(n)]
-    point = [hi if d >= 0 else lo if d <= 0 else mid for d, (lo, hi), mid in zip(slopes, ends, middle, strict=True)]
-    value = sum((w * t for w, t in zip(weights, two_throws(scene, kind, lengths, point), strict=True)), landing)
+    point = [
+        hi if d >= 0 else lo if d <= 0 else mid for d, (lo, hi), mid in zip(slopes, ends, middle, strict=True)
+    ]
+    value = sum(
+        (w * t for w, t in zip(weights, two_throws(scene, kind, lengths, point), strict=True)), landing
+    )
     loose = [ZERO if d >= 0 or d <= 0 else abs(d) * abs(o) for d, o in zip(slopes, off, strict=True)]
     if value + sum(loose, ZERO) <= x:
         return -1
@@ -2557,7 +2573,7 @@ def kinds_of_two(c: Cells, bad: Array) -> Iterator[tuple[Two, list[Pair]]]:
 
 
 def check_two_throws(c: Cells, scene: Scene, bad: Array, x: float) -> str:
-    """Check that second throws from attracting cells, parameters kept, end beyond x in no bad cell; "" or what fails."""
+    """Check that second throws, parameters kept, end beyond x in no attracting cell called bad; "" or what fails."""
     names = scene.noise if isinstance(scene.noise, dict) else {}
     if set(names) - {"landing.x"}:
         return "with noise of the throw no two throws have the same parameters"

@@ -40,17 +40,23 @@ def _prove(found: Attraction, scene: Scene, goal: OrientedBeyond) -> Answer:
     else:
         bad &= found.component >= 0
         reason = missing or _beyond(found, goal, bad)
-        if reason and not missing and not stays_below(found, scene, bad, below(goal.x)):
+        if reason and not missing and stays_below(found, scene, bad, below(goal.x)):
             reason, more = "", {"throws": 2}
     if reason:
         return undecided(reason)
-    return Answer("proved", "", {"kind": goal.kind, "x": f"{goal.x!r} {scene.unit}", "side": goal.side} | more)
+    return Answer(
+        "proved", "", {"kind": goal.kind, "x": f"{goal.x!r} {scene.unit}", "side": goal.side} | more
+    )
 
 
 def _beyond(found: Attraction, goal: OrientedBeyond, bad: NDArray[np.bool_]) -> str:
     """Say that attracting cells lie beyond x on other sides; empty if none does."""
     count = int((bad & (found.component >= 0)).sum())
-    return f"{count} attracting cells reach beyond x = {goal.x:g} on other sides than {goal.side}" if count else ""
+    return (
+        f"{count} attracting cells reach beyond x = {goal.x:g} on other sides than {goal.side}"
+        if count
+        else ""
+    )
 
 
 def _ask(found: Attraction, scene: Scene, goal: OrientedBeyond) -> Answer:

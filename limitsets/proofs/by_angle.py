@@ -1,0 +1,127 @@
+"""Throws told by their impact angle p instead of their start x: then nothing has to be solved.
+
+    x = P(p) = kappa p / 2 + (a sin p - d (1 - cos p)) / p,    x' = P(p) + D(p), less the shift of a flip,
+
+with the displacement D of a jog: docs/model.md.  The formulas take numbers of any arithmetic with ``+ - * /``, here
+arrays of intervals, bare or with their derivatives by some variables (`mean_value.Slope`).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from limitsets.jit import proof_kernel
+from limitsets.proofs.intervals import Intervals
+from limitsets.proofs.mean_value import Slope, root
+from limitsets.thrower import Energy, Exact, SmallAngle2
+from limitsets.thrower.turn_box import turn_box
+
+__all__ = ["FLIP", "JOG", "Angle", "Formulas", "Numbers", "OneSide", "angle", "variable"]
+
+JOG, FLIP = 0, 1
+
+
+class OneSide(NamedTuple):
+    """What a throw from one side depends on: a, d, and by how much less a flip moves than a jog."""
+
+    a: Any
+    d: Any
+    shift: Any
+
+
+class Numbers(NamedTuple):
+    """What throws depend on: their sides, the radius of gyration, kappa, height of the arm's surface."""
+
+    sides: list[OneSide]
+    rho: Any
+    kappa: Any
+    h: Any
+
+
+class Angle(NamedTuple):
+    """An angle p, sin p, 1 - cos p and p - sin p."""
+
+    p: Any
+    s: Any
+    v: Any
+    w: Any
+
+
+@proof_kernel(entry=True)
+def _turns(lo: Any, hi: Any, out: Any) -> None:
+    for k in range(lo.size):
+        for row, found in enumerate(turn_box(lo[k], hi[k])):
+            out[2 * row, k], out[2 * row + 1, k] = found
+
+
+def variable(value: Intervals, number: int, count: int) -> Slope:
+    """Return the variable of a number, among so many."""
+    one, none = Intervals.of(1.0), Intervals.of(0.0)
+    return Slope(value, tuple(one if k == number else none for k in range(count)))
+
+
+def angle(p: Any) -> Angle:
+    """Evaluate what depends on an angle alone, with derivatives if it has any."""
+    bare = p.value if isinstance(p, Slope) else p
+    out = np.empty((6, bare.lo.size))
+    _turns(np.ascontiguousarray(bare.lo), np.ascontiguousarray(bare.hi), out)
+    s, v, w = (Intervals(out[2 * k], out[2 * k + 1]) for k in range(3))
+    if not isinstance(p, Slope):
+        return Angle(p, s, v, w)
+    c = 1.0 - v
+    return Angle(p, *(Slope(f, tuple(of * by for by in p.by)) for f, of in ((s, c), (v, s), (w, v))))
+
+
+def _signed_square(x: Any) -> Any:
+    """x |x|."""
+    if not isinstance(x, Slope):
+        return x * x.absolute()
+    size = x.value.absolute()
+    return Slope(x.value * size, tuple(2.0 * (size * rise) for rise in x.by))
+
+
+@dataclass(frozen=True)
+class Formulas:
+    """The formulas of one model.
+
+    Attributes
+    ----------
+    flight, flip : NamedTuple
+        The models, as a `Throw` has them.
+    """
+
+    flight: Any
+    flip: Any
+
+    def start(self, n: Numbers, part: OneSide, at: Angle) -> Any:
+        """Where the throw begins."""
+        if isinstance(self.flight, Exact):
+            return n.kappa * at.p * 0.5 + (part.a * at.s - part.d * at.v) / at.p
+        pull = n.kappa - part.d if isinstance(self.flight, SmallAngle2) else n.kappa
+        return part.a + pull * at.p * 0.5
+
+    def end(self, n: Numbers, part: OneSide, at: Angle, x: Any, branch: int) -> Any:
+        """Where it ends, on a branch."""
+        jog = x - n.h * at.p
+        if isinstance(self.flight, Exact):
+            jog = jog + (part.a * at.v - part.d * at.w)
+        return jog - part.shift if branch == FLIP else jog
+
+    def margin(self, n: Numbers, part: OneSide, at: Angle, x: Any) -> Any:
+        """Evaluate what decides: above 0 where it flips."""
+        a, d = part.a, part.d
+        ell = root(a * a + d * d)
+        if isinstance(self.flight, Exact):
+            c = 1.0 - at.v
+            right, above = a * c - d * at.s, a * at.s + d * c
+            spin = n.rho * n.rho + right * (x - n.kappa * at.p) + above * (n.h + d)
+            barrier = n.kappa * (_signed_square(right) / (ell + above))
+        else:
+            reach = x - a
+            spin = n.rho * n.rho + a * a + d * d + d * n.h - a * reach
+            barrier = n.kappa * (a * a / (ell + d)) - 2.0 * (a * reach)
+        turned = spin * spin if isinstance(self.flip, Energy) else _signed_square(spin)
+        return turned / (2.0 * (n.rho * n.rho + a * a + d * d)) - barrier
