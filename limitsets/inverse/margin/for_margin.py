@@ -28,6 +28,7 @@ from limitsets.inverse.margin.sharp import Box, Sharp, on_all_corners
 from limitsets.robust import Margin
 from limitsets.robust.margins.joint import joint_margin
 from limitsets.scene import Scene, load
+from limitsets.scene.quantities import base_unit, find
 
 __all__ = ["TOLERANCE", "RobustDesign", "fed_at", "robust_design"]
 
@@ -181,8 +182,10 @@ def _searched(
 
 def _rounded(scene: Scene, search: Search) -> Scene:
     """Write what was varied with few decimals."""
-    unit = scene.unit
-    return scene.with_values({name: f"{scene.value(name):.{DECIMALS}f} {unit}" for name in search.bounds})
+    units = {name: base_unit(find(name).dimension, scene.unit) for name in search.bounds}
+    return scene.with_values(
+        {name: f"{scene.value(name):.{DECIMALS}f} {unit}".rstrip() for name, unit in units.items()}
+    )
 
 
 def _with_purpose(scene: Scene, x: float, side: int, tolerance: Mapping[str, str], name: str) -> Scene:
