@@ -122,7 +122,7 @@ def goals_of(scene: Scene, goal: GoalLike | Sequence[GoalLike] | None) -> tuple[
     found: list[Goal] = []
     for one in several:
         if hasattr(one, "kind"):
-            found.append(one)  # type: ignore[arg-type]
+            found.append(one)  # type: ignore[arg-type]  # a kind is what makes it a goal
         elif callable(one):
             found.append(Predicate(one, getattr(one, "__name__", "the predicate")))
         else:
