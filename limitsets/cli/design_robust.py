@@ -71,16 +71,12 @@ def _varied(
 
 
 def _ends(scene: Scene, name: str, ends: Ends) -> tuple[float, float]:
-    from limitsets.scene.quantities import base_unit, find
-    from limitsets.scene.units import convert, parse
+    from limitsets.scene.quantities import in_units
 
-    dimension, numbers = find(name).dimension, []
-    for end in ends:
-        if end is None:
-            raise LimitsetsError("the bounds", name, "a lower and an upper one", "give both", key="--bounds")
-        unit = base_unit(dimension, scene.unit)
-        numbers.append(convert(parse(end, dimension), unit) if isinstance(end, str) else end)
-    return numbers[0], numbers[1]
+    lo, hi = ends
+    if lo is None or hi is None:
+        raise LimitsetsError("the bounds", name, "a lower and an upper one", "give both", key="--bounds")
+    return in_units(scene, name, lo, key="--bounds"), in_units(scene, name, hi, key="--bounds")
 
 
 def _written(found: RobustDesign, out: Path) -> list[Path]:
