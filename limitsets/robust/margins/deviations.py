@@ -16,7 +16,7 @@ from limitsets.proofs.rational import Span
 from limitsets.proofs.tolerance import Piece
 from limitsets.scene import Scene
 from limitsets.scene.quantities import find, text_at, texts
-from limitsets.scene.units import exact_factor, parse
+from limitsets.scene.units import Quantity, exact_factor, parse
 
 __all__ = ["READINGS", "Measure", "decimal", "given", "measure", "measures", "short"]
 
@@ -99,9 +99,14 @@ class Measure:
         return "throw.kappa" if by_kappa else self.quantity
 
     @property
+    def given(self) -> Quantity:
+        """The value of `key` as the scene gives it."""
+        return parse(_text_at(self.scene, self.key), find(self.key).dimension)
+
+    @property
     def nominal(self) -> Fraction:
         """The value of `key`, in the unit in which the scene gives it."""
-        return Fraction(parse(_text_at(self.scene, self.key), find(self.key).dimension).number)
+        return Fraction(self.given.number)
 
     @property
     def least(self) -> Fraction:
@@ -126,8 +131,7 @@ class Measure:
             return None
         if self.relative:
             return 100 * _WIDEST
-        own = parse(_text_at(self.scene, self.key), find(self.key).dimension).unit
-        return max(abs(self.nominal) * exact_factor(own, self.unit) * _WIDEST, self.least)
+        return max(abs(self.nominal) * exact_factor(self.given.unit, self.unit) * _WIDEST, self.least)
 
     def text(self, size: Fraction) -> str:
         """Write a size with its unit, as `limitsets.certify` takes it."""
@@ -139,8 +143,7 @@ class Measure:
             return self.nominal / (1 + size / 100) ** 2
         if self.relative:
             return self.nominal * (1 + size / 100)
-        own = parse(_text_at(self.scene, self.key), find(self.key).dimension).unit
-        return self.nominal + size * exact_factor(self.unit, own)
+        return self.nominal + size * exact_factor(self.unit, self.given.unit)
 
     def between(self, one: Fraction, other: Fraction) -> Span:
         """Return the values at all deviations between two."""
