@@ -8,10 +8,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
 from limitsets.goals import OrientedBeyond
 from limitsets.proofs.asked import State
+from limitsets.proofs.asked.oriented_beyond import section_of
 from limitsets.proofs.attraction import Attraction
 from limitsets.proofs.certificate import write
 from limitsets.scene import Scene
@@ -51,9 +51,8 @@ def write_refutation(
         The nominal scene.
     """
     box = found.cover.box
-    asked: dict[str, Any] = {"kind": goal.kind, "x": f"{goal.x!r} {scene.unit}", "side": goal.side}
     section = {
-        "goal": asked | ({"from_anywhere": True} if goal.from_anywhere else {}),
+        "goal": section_of(goal, scene),
         "start": {"x": float(states[0].lo).hex(), "side": states[0].side},
         "throws": [
             {
