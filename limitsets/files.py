@@ -1,15 +1,28 @@
-"""Files that are replaced whole: a crash or Ctrl-C while they are written leaves the old ones as they were."""
+"""Files that are replaced whole: a crash or Ctrl-C leaves the old ones as they were.  And the one form of our JSON."""
 
 from __future__ import annotations
 
 import errno
+import json
 import shutil
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
-__all__ = ["replaced"]
+__all__ = ["as_json", "replaced"]
+
+
+def as_json(record: Any) -> str:
+    r"""Write an answer as JSON, as all of them are: indented, its numbers finite, with a line break at the end.
+
+    Examples
+    --------
+    >>> as_json([])
+    '[]\n'
+    """
+    return json.dumps(record, indent=2, allow_nan=False) + "\n"
 
 
 @contextmanager

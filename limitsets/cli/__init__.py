@@ -2,7 +2,7 @@
 
 Commands import their rooms when they run, so `limitsets --help` loads none of them.  Answers go to stdout, everything
 else to stderr.  Exit codes: 0 done, 2 bad input or a place that cannot be written, 130 interrupted; 1 is kept for
-claims that are not proved.
+what was asked for and is not proved or not found.
 """
 
 from limitsets.cli.run import main

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json as json_words
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -10,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from limitsets.cli.output import Json, Scene, progress, table
+from limitsets.files import as_json
 
 if TYPE_CHECKING:
     from limitsets.analysis import Analysis, Plan
@@ -54,7 +54,7 @@ def analyse(
         analysis = run(chosen, cells, error=error, progress=tell, announce=_announce)
         files = write(analysis, folder, progress=tell)
     if json:
-        print(json_words.dumps(analysis.to_json(), indent=2, allow_nan=False))
+        print(as_json(analysis.to_json()), end="")
     else:
         _text(analysis)
         typer.echo(f"report: {files[0]}")

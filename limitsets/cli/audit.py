@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import json as json_words
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from limitsets.cli.output import Json, Scene, progress, table
+from limitsets.files import as_json
 
 __all__ = ["audit"]
 
@@ -41,7 +41,7 @@ def audit(
             tell("files", 1, 2)
             files = write_audit(found, out)
     if json:
-        print(json_words.dumps(found.to_json(), indent=2, allow_nan=False))
+        print(as_json(found.to_json()), end="")
         return
     from limitsets.report.audits import HEADS, lines_of, summary
 

@@ -8,14 +8,15 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from limitsets.cli.arguments import deviations
 from limitsets.cli.output import Json, Scene, progress, saved, table
-from limitsets.errors import LimitsetsError
+from limitsets.files import as_json
 
 if TYPE_CHECKING:
     from limitsets.proofs import Claim, Proof
     from limitsets.proofs.asked import State
 
-__all__ = ["certify", "deviations"]
+__all__ = ["certify"]
 
 # States of a counterexample that are printed: the start, and the last of them.
 LAST = 8
@@ -24,7 +25,9 @@ HELP_CLAIM = (
     "What to prove: attracts-all, invariant, trapping, end-points, cycles, expanding or goal; repeatable."
 )
 HELP_TOLERANCE = "A quantity that is fixed but unknown, like throw.speed='0.7 %'; repeatable."
-HELP_NOISE = "What differs at every throw: throw.speed, gravity.tilt or landing.x, like throw.speed='0.3 %'; repeatable"
+HELP_NOISE = (
+    "What differs at every throw: throw.speed, gravity.tilt, landing.x, like throw.speed='0.3 %'; repeatable."
+)
 
 
 def certify(
@@ -40,9 +43,10 @@ def certify(
     ] = None,
     json: Json = False,
 ) -> None:
-    """Prove where the throws lead, and write a certificate that `limitsets recheck` verifies."""
-    import json as json_words
+    """Prove where the throws lead, and write a certificate that `limitsets recheck` verifies.
 
+    Exit 1 where a claim is not proved.
+    """
     fixed, varying = deviations("--tolerance", tolerance), deviations("--noise", noise)
     with progress() as tell:
         from limitsets.scene import load
@@ -57,23 +61,10 @@ def certify(
             if written:
                 proof.save(draft)
     if json:
-        print(json_words.dumps(proof.to_json(), indent=2, allow_nan=False))
+        print(as_json(proof.to_json()), end="")
     else:
         _text(proof, file if written else None)
     raise typer.Exit(0 if proof.proved else 1)
-
-
-def deviations(option: str, words: list[str] | None) -> dict[str, str]:
-    """Read the words of a repeatable option, QUANTITY=DEVIATION each."""
-    found: dict[str, str] = {}
-    for word in words or []:
-        name, sign, text = word.partition("=")
-        name = name.strip()
-        if not sign or name in found:
-            remedy = "name each quantity once" if sign else "put a sign of equality between them"
-            raise LimitsetsError(option.lstrip("-"), word, "QUANTITY=DEVIATION", remedy, key=option)
-        found[name] = text.strip()
-    return found
 
 
 def _text(proof: Proof, file: Path | None) -> None:

@@ -2,32 +2,33 @@
 
 from __future__ import annotations
 
-import json as json_words
-import re
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from limitsets.cli.arguments import ends_of, number
 from limitsets.cli.output import Json, Scene, progress, saved, table
 from limitsets.errors import LimitsetsError
+from limitsets.files import as_json
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from limitsets.inverse import Design
+    from limitsets.scene import Scene as SceneOf
 
-__all__ = ["design"]
+__all__ = ["design", "save_scene", "show_scene"]
 
-DPI = 150
 FREE = "free"
-_BARE = re.compile(r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]{1,3})?")
 
 HELP_POINTS = "First critical point wanted on each side, like 10,10,20 or '25 cm',free,free."
 HELP_ROBUST = (
     "Make the proved joint margin of [tolerance] large: only one side beyond X, and almost every orbit there."
 )
 HELP_VARY = "Quantities to vary, like part.mass.center.along,throw.speed; repeatable."
+HELP_STARTS = "With --critical-points: other starts to draw at most."
+HELP_STAGES = "With --critical-points: move them there in N steps, all of them shown."
 HELP_EVALUATIONS = "With --robust: designs to look at."
 HELP_BOUNDS = (
     "Bounds of one of them, like part.mass.center.along='4 in':'5 in'; either may be left out; repeatable."
@@ -50,12 +51,23 @@ def design(
         typer.Option("--seconds", min=0.0, metavar="S", help="With --robust: for the proof of each margin."),
     ] = 240.0,
     starts: Annotated[
-        int, typer.Option("--starts", min=0, max=10_000, metavar="N", help="Other starts to draw at most.")
+        int,
+        typer.Option(
+            "--starts",
+            min=0,
+            max=10_000,
+            metavar="N",
+            help=HELP_STARTS,
+        ),
     ] = 8,
     stages: Annotated[
         int | None,
         typer.Option(
-            "--stages", min=1, max=1000, metavar="N", help="Move the targets in N steps, all of them shown."
+            "--stages",
+            min=1,
+            max=1000,
+            metavar="N",
+            help=HELP_STAGES,
         ),
     ] = None,
     out: Annotated[
@@ -84,9 +96,7 @@ def design(
     if critical_points is None:
         from limitsets.cli.design_robust import run_robust
 
-        raise typer.Exit(
-            run_robust(scene, names, _bounds(bounds or []), evaluations, seconds, out, json=json)
-        )
+        raise typer.Exit(run_robust(scene, names, ends_of(bounds), evaluations, seconds, out, json=json))
     with progress() as tell:
         from limitsets.inverse import design as run
         from limitsets.scene import load
@@ -100,76 +110,60 @@ def design(
             chosen,
             critical_points=_points(critical_points),
             vary=names,
-            bounds=_bounds(bounds or []),
+            bounds=ends_of(bounds),
             starts=starts,
             stages=stages,
             progress=tell,
         )
         files = [] if out is None else _written(found, out, tell)
     if json:
-        print(json_words.dumps(found.to_json(), indent=2, allow_nan=False))
+        print(as_json(found.to_json()), end="")
     else:
         _text(found, files)
     raise typer.Exit(0 if found.reached else 1)
 
 
 def _points(words: str) -> list[float | str | None]:
-    return [None if word.strip() == FREE else _number(word) for word in words.split(",")]
-
-
-def _number(word: str) -> float | str:
-    """Read a bare number in the scene's unit; text with a unit is read further on."""
-    return float(word) if _BARE.fullmatch(word.strip()) else word.strip()
-
-
-def _bounds(words: list[str]) -> dict[str, tuple[float | str | None, float | str | None]]:
-    found: dict[str, tuple[float | str | None, float | str | None]] = {}
-    for word in words:
-        name, sign, text = word.partition("=")
-        lo, colon, hi = text.partition(":")
-        if not (sign and colon) or name.strip() in found:
-            remedy = (
-                "name each quantity once"
-                if sign and colon
-                else "put = after the quantity, : between the bounds"
-            )
-            raise LimitsetsError("the bounds", word, "QUANTITY=LOWEST:HIGHEST", remedy, key="--bounds")
-        ends = [_number(end.strip("'\" ")) if end.strip("'\" ") else None for end in (lo, hi)]
-        found[name.strip()] = (ends[0], ends[1])
-    return found
+    return [None if word.strip() == FREE else number(word) for word in words.split(",")]
 
 
 def _written(found: Design, out: Path, tell: Callable[[str, int, int], None]) -> list[Path]:
     """Write the scene, or a folder with the scene, the answer as JSON and the figure of the way there."""
-    from limitsets.files import replaced
-    from limitsets.report.writing import refusal
     from limitsets.scene import dump
 
-    text = dump(found.scene)
     if out.suffix == ".toml":
-        with saved(out) as draft:
-            draft.write_text(text, encoding="utf-8", newline="\n")
-        return [out]
+        return save_scene(found.scene, out)
     from limitsets import plot
     from limitsets.inverse import limit_sets_along
+    from limitsets.report.writing import DPI, filled
 
     drawn = plot.design(found, limit_sets_along(found, tell))
     names = [f"{found.scene.name}.toml", "design.json", "design.png"]
-    try:
-        with replaced(out) as folder:
-            (folder / names[0]).write_text(text, encoding="utf-8", newline="\n")
-            record = json_words.dumps(found.to_json(), indent=2, allow_nan=False)
-            (folder / names[1]).write_text(record + "\n", encoding="utf-8", newline="\n")
-            drawn.savefig(folder / names[2], dpi=DPI)
-    except OSError as error:
-        raise refusal(out, error.strerror or str(error)) from None
+    with filled(out) as folder:
+        (folder / names[0]).write_text(dump(found.scene), encoding="utf-8", newline="\n")
+        (folder / names[1]).write_text(as_json(found.to_json()), encoding="utf-8", newline="\n")
+        drawn.savefig(folder / names[2], dpi=DPI)
     return [out / name for name in names]
+
+
+def save_scene(scene: SceneOf, file: Path) -> list[Path]:
+    """Write the scene alone."""
+    from limitsets.scene import dump
+
+    with saved(file) as draft:
+        draft.write_text(dump(scene), encoding="utf-8", newline="\n")
+    return [file]
+
+
+def show_scene(scene: SceneOf, files: list[Path]) -> None:
+    """Say where the scene is, or print it where it is in no file."""
+    from limitsets.scene import dump
+
+    typer.echo(f"scene: {files[0]}" if files else "\n" + dump(scene).rstrip("\n"))
 
 
 def _text(found: Design, files: list[Path]) -> None:
     """Print what changed, how well it is reached, and the scene."""
-    from limitsets.scene import dump
-
     unit = found.start.unit
     rows = [
         [name, f"{before:.9g}", f"{after:.9g}", unit_of]
@@ -191,8 +185,4 @@ def _text(found: Design, files: list[Path]) -> None:
     for side, reason in enumerate(found.jacobian.reasons):
         if reason is not None:
             typer.echo(f"no derivative on side {side}: {reason}")
-    if files:
-        typer.echo(f"scene: {files[0]}")
-    else:
-        typer.echo("")
-        typer.echo(dump(found.scene).rstrip("\n"))
+    show_scene(found.scene, files)

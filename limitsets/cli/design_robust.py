@@ -2,25 +2,24 @@
 
 from __future__ import annotations
 
-import json as json_words
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import typer
 
+from limitsets.cli.design import save_scene, show_scene
 from limitsets.cli.output import progress, table
 from limitsets.errors import LimitsetsError
+from limitsets.files import as_json
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
+    from limitsets.cli.arguments import Ends
     from limitsets.inverse import RobustDesign
     from limitsets.scene import Scene
 
 __all__ = ["run_robust"]
-
-DPI = 150
-Ends = tuple[float | str | None, float | str | None]
 
 
 def run_robust(
@@ -40,7 +39,7 @@ def run_robust(
         from limitsets.scene import load
 
         scene = load(name)
-        if out is not None:
+        if out is not None and out.suffix != ".toml":
             require_place(out)
         found = robust_design(
             scene,
@@ -51,7 +50,7 @@ def run_robust(
         )
         files = [] if out is None else _written(found, out)
     if json:
-        print(json_words.dumps(found.to_json(), indent=2, allow_nan=False))
+        print(as_json(found.to_json()), end="")
     else:
         _text(found, files)
     return 0 if seconds == 0.0 or all(one.proved > 0.0 for one in found.margins) else 1
@@ -71,39 +70,31 @@ def _varied(
 
 
 def _ends(scene: Scene, name: str, ends: Ends) -> tuple[float, float]:
-    from limitsets.scene.quantities import base_unit, find
-    from limitsets.scene.units import convert, parse
+    from limitsets.scene.quantities import in_units
 
-    dimension, numbers = find(name).dimension, []
-    for end in ends:
-        if end is None:
-            raise LimitsetsError("the bounds", name, "a lower and an upper one", "give both", key="--bounds")
-        unit = base_unit(dimension, scene.unit)
-        numbers.append(convert(parse(end, dimension), unit) if isinstance(end, str) else end)
-    return numbers[0], numbers[1]
+    lo, hi = ends
+    if lo is None or hi is None:
+        raise LimitsetsError("the bounds", name, "a lower and an upper one", "give both", key="--bounds")
+    return in_units(scene, name, lo, key="--bounds"), in_units(scene, name, hi, key="--bounds")
 
 
 def _written(found: RobustDesign, out: Path) -> list[Path]:
-    """Write a folder: scene, answer, certificates, figure."""
+    """Write the scene, or a folder: scene, answer, certificates, figure."""
+    if out.suffix == ".toml":
+        return save_scene(found.scene, out)
     from limitsets import plot
-    from limitsets.files import replaced
-    from limitsets.report.writing import refusal
+    from limitsets.report.writing import DPI, filled
 
-    try:
-        with replaced(out) as folder:
-            names = [path.name for path in found.save(folder)]
-            if found.front:
-                plot.robust_design(found).savefig(folder / "front.png", dpi=DPI)
-                names.append("front.png")
-    except OSError as error:
-        raise refusal(out, error.strerror or str(error)) from None
+    with filled(out) as folder:
+        names = [path.name for path in found.save(folder)]
+        if found.front:
+            plot.robust_design(found).savefig(folder / "front.png", dpi=DPI)
+            names.append("front.png")
     return [out / name for name in names]
 
 
 def _text(found: RobustDesign, files: list[Path]) -> None:
-    """Print what changed, both margins, the throws, and the lead weight."""
-    from limitsets.scene import dump
-
+    """Print what changed, both margins, the throws, the lead weight, and the scene."""
     unit = found.scene.unit
     sides = [f"part.sides[{k}]" for k in range(3) if "sides" in found.scene.text["part"]]
     rows = [
@@ -131,8 +122,4 @@ def _text(found: RobustDesign, files: list[Path]) -> None:
         f"lead weight: {100 * lead.share:.1f} % of the mass at x = {lead.x:.4g}, y = {lead.y:.4g} {unit}"
         " in the frame of the vertices"
     )
-    if files:
-        typer.echo(f"written: {', '.join(str(path) for path in files)}")
-    else:
-        typer.echo("")
-        typer.echo(dump(found.scene).rstrip("\n"))
+    show_scene(found.scene, files)

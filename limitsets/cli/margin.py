@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-import json as json_words
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from limitsets.cli.arguments import place
 from limitsets.cli.output import Json, Scene, progress, table
 from limitsets.errors import LimitsetsError
+from limitsets.files import as_json
 
 if TYPE_CHECKING:
     from limitsets.robust.margins.finding import Margin
@@ -17,19 +18,20 @@ if TYPE_CHECKING:
 __all__ = ["margin"]
 
 HEADS = ("quantity", "reading", "proved safe up to", "shown to fail from")
-READINGS = {"fixed": "fixed, unknown", "per-throw": "at every throw", "tolerance": "of the tolerance"}
 
 
 def margin(
     scene: Scene,
     quantity: Annotated[
         list[str] | None,
-        typer.Argument(metavar="[QUANTITY]...", help='Like throw.speed, or "joint"; default: all there are.'),
+        typer.Argument(metavar="QUANTITY", help='Like throw.speed, or "joint"; default: all there are.'),
     ] = None,
     reading: Annotated[
         str | None, typer.Option("--reading", metavar="R", help="fixed (but unknown) or per-throw.")
     ] = None,
-    x: Annotated[str | None, typer.Option("--x", metavar="X", help="Ask the goal at another X.")] = None,
+    x: Annotated[
+        str | None, typer.Option("--x", metavar="X", help="Ask the goal at another X: 20, or '50 cm'.")
+    ] = None,
     width: Annotated[
         float, typer.Option("--width", metavar="W", help="How close the two ends have to be, as a share.")
     ] = 0.01,
@@ -41,7 +43,10 @@ def margin(
     ] = None,
     json: Json = False,
 ) -> None:
-    """Bracket how much each quantity may deviate before the goal fails: proved below, refuted above."""
+    """Bracket how much each quantity may deviate before the goal fails: proved below, refuted above.
+
+    Exit 1 where nothing is proved of one of them, or its two ends are farther apart than asked.
+    """
     with progress() as tell:
         from limitsets.robust.margins.finding import margin as run
         from limitsets.scene import load
@@ -58,7 +63,7 @@ def margin(
             tell("files", len(found), len(found) + 1)
             _write(found, records, out)
     if json:
-        print(json_words.dumps(records, indent=2, allow_nan=False))
+        print(as_json(records), end="")
     else:
         _text(found, out)
     raise typer.Exit(
@@ -71,58 +76,44 @@ def _goal_at(scene: Any, text: str) -> Any:
     from dataclasses import replace
 
     from limitsets.goals import OrientedBeyond, Reaches
-    from limitsets.scene.units import convert, parse
 
     if not isinstance(scene.goal, OrientedBeyond | Reaches):
         kind = None if scene.goal is None else scene.goal.kind
         raise LimitsetsError("the goal", kind, "one that has an x", "leave --x out", key="--x")
-    try:
-        place = float(text)
-    except ValueError:
-        place = convert(parse(text, "length", key="--x"), scene.unit)
-    if not 0 <= place < scene.arm_length:
+    x = place(scene, text)
+    if not 0 <= x < scene.arm_length:
         allowed = f"from 0 to below the arm's length, {scene.arm_length:.9g} {scene.unit}"
         raise LimitsetsError("the position", text, allowed, "correct it", key="--x")
-    return replace(scene.goal, x=place)
+    return replace(scene.goal, x=x)
 
 
 def _write(found: tuple[Margin, ...], records: list[dict[str, Any]], out: Path) -> None:
     from limitsets.errors import AnswerError
-    from limitsets.files import replaced
     from limitsets.plot.margins import tornado
+    from limitsets.report.writing import DPI, filled
 
     for each, record in zip(found, records, strict=True):
         try:
             record["certificate"] = [path.name for path in each.save(out)] or None
         except AnswerError:  # effects: nothing rechecks them, the margin stands
             record["certificate"] = None
-    with replaced(out) as draft:
-        (draft / "margins.json").write_text(
-            json_words.dumps(records, indent=2, allow_nan=False) + "\n", encoding="utf-8"
-        )
-        tornado(found).savefig(draft / "margins.png")
-
-
-def _size(value: float | None, unit: str, *, up: bool) -> str:
-    """Write a size with four digits that is not better than what is known."""
-    if value is None:
-        return "-"
-    from decimal import ROUND_CEILING, ROUND_FLOOR, Context, Decimal
-
-    short = Context(prec=4, rounding=ROUND_CEILING if up else ROUND_FLOOR).create_decimal(
-        Decimal(repr(value))
-    )
-    return f"{short:f} {unit}".strip() if unit else f"{short:f} times"
+    with filled(out) as draft:
+        (draft / "margins.json").write_text(as_json(records), encoding="utf-8", newline="\n")
+        tornado(found).savefig(draft / "margins.png", dpi=DPI)
 
 
 def _text(found: tuple[Margin, ...], out: Path | None) -> None:
+    from limitsets.report.questions import question_of
+    from limitsets.report.robust_pages import READINGS
+    from limitsets.report.tables import bound
+
     rows = []
     for each in found:
-        low, high = _size(each.proved, each.unit, up=False), _size(each.refuted, each.unit, up=True)
+        unit = each.unit or "times"
+        low, high = bound(each.proved, unit), bound(each.refuted, unit, up=True)
         rows.append([each.quantity, READINGS[each.reading], low, high])
-    typer.echo(
-        f"{found[0].scene.name}: {' and '.join(_words(goal, found[0].scene.unit) for goal in found[0].goals)}"
-    )
+    scene = found[0].scene
+    typer.echo(f"{scene.name}: {' and '.join(question_of(goal, scene.unit) for goal in found[0].goals)}")
     table(HEADS, rows)
     for each in found:
         if each.reason:
@@ -131,13 +122,3 @@ def _text(found: tuple[Margin, ...], out: Path | None) -> None:
         typer.echo(
             f"written to {out}: margins.json, margins.png, certificates (check them: limitsets recheck FILE)"
         )
-
-
-def _words(goal: Any, unit: str) -> str:
-    where = "from anywhere on the arm" if goal.from_anywhere else "in the limit set"
-    if goal.kind == "oriented_beyond":
-        return f"beyond x = {goal.x:g} {unit} only side {goal.side}, {where}"
-    if goal.kind == "reaches":
-        who = "every orbit" if goal.every_orbit else "almost every orbit"
-        return f"{who} reaches x = {goal.x:g} {unit} on side {goal.side}"
-    return f"{goal.kind.replace('_', ' ')}, {where}"

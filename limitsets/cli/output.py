@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import signal
 import sys
 import threading
@@ -15,6 +14,7 @@ from typing import Annotated, Any
 import typer
 
 from limitsets.errors import LimitsetsError
+from limitsets.files import as_json, replaced
 
 __all__ = ["Json", "Out", "Scene", "answer", "progress", "saved", "table"]
 
@@ -48,8 +48,6 @@ def table(heads: Sequence[str], rows: Sequence[Sequence[object]]) -> None:
 @contextmanager
 def saved(file: Path) -> Iterator[Path]:
     """Write one file whole: a draft to write to, which takes its place at the end."""
-    from limitsets.files import replaced
-
     if file.exists() and not file.is_file():
         raise LimitsetsError(
             "the output file", str(file), "a regular file", "it is a folder or a device; name a file"
@@ -64,14 +62,14 @@ def saved(file: Path) -> Iterator[Path]:
         ) from None
 
 
-def answer(record: Any, as_json: bool, out: Path | None, text: Callable[[], None]) -> None:
+def answer(record: Any, json: bool, out: Path | None, text: Callable[[], None]) -> None:
     """Give an answer as JSON or as text, and write it to a file where one is named."""
-    words = json.dumps(record, indent=2, allow_nan=False)
+    words = as_json(record)
     if out is not None:
         with saved(out) as draft:
-            draft.write_text(words + "\n", encoding="utf-8", newline="\n")
-    if as_json:
-        print(words)
+            draft.write_text(words, encoding="utf-8", newline="\n")
+    if json:
+        print(words, end="")
     else:
         text()
 
@@ -91,6 +89,8 @@ class _Lines:
 
     def stop(self) -> None:
         self.timer.cancel()
+        if self.timer.is_alive():  # it may be printing: not after the command is over
+            self.timer.join()
 
     def _say(self, text: str) -> None:
         self.last = time.monotonic()

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-import json as json_words
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from limitsets.cli.arguments import position
 from limitsets.cli.output import Json, Scene, progress, saved
 from limitsets.errors import LimitsetsError
+from limitsets.files import as_json
 
 if TYPE_CHECKING:
     from limitsets.analysis import Analysis
@@ -18,7 +19,6 @@ if TYPE_CHECKING:
 __all__ = ["plot"]
 
 FORMATS = (".png", ".svg", ".pdf")
-DPI = 150
 
 
 class Kind(StrEnum):
@@ -33,7 +33,7 @@ class Kind(StrEnum):
 
 def plot(
     scene: Scene,
-    kind: Annotated[Kind, typer.Argument(help="What to draw.")],
+    kind: Annotated[Kind, typer.Argument(metavar="KIND", help="What to draw.")],
     out: Annotated[
         Path | None,
         typer.Option(
@@ -66,14 +66,13 @@ def plot(
         file = out if out is not None else Path(f"{analysis.scene.name}-{kind}.png")
         _draw(analysis, kind, file, x, side)
     if json:
-        print(json_words.dumps({"figure": str(file)}))
+        print(as_json({"figure": str(file)}), end="")
     else:
         typer.echo(f"figure: {file}")
 
 
 def _draw(analysis: Analysis, kind: Kind, file: Path, x: str | None, side: int | None) -> None:
-    from limitsets.cli.throw import position
-    from limitsets.report.writing import figure
+    from limitsets.report.writing import DPI, figure
 
     throw = None if x is None or side is None else (position(analysis.scene, x), side)
     drawn = figure(analysis, str(kind), throw)

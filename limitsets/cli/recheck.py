@@ -17,10 +17,13 @@ CODES = {"proved": 0, "failed": 1, "bad file": 2}
 
 def recheck(
     file: Annotated[Path, typer.Argument(metavar="FILE", help="A certificate, NAME.proof.zip.")],
-    json: Json = False,
     out: Out = None,
+    json: Json = False,
 ) -> None:
-    """Check a certificate by other code and in other arithmetic than those that made it."""
+    """Check a certificate by other code and in other arithmetic than those that made it.
+
+    Exit 1 where it fails.
+    """
     with progress() as tell:
         from limitsets.proofs.confirm import recheck as check
 

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import json as json_words
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from limitsets.cli.certify import deviations
+from limitsets.cli.arguments import deviations
 from limitsets.cli.output import Json, Scene, progress, table
+from limitsets.files import as_json
 
 if TYPE_CHECKING:
     from limitsets.robust.sheet.summary import Robustness
@@ -56,7 +56,10 @@ def robustness(
     ] = None,
     json: Json = False,
 ) -> None:
-    """Say how far each quantity may drift before the goal fails, and write report.md, figures and certificates."""
+    """Say how far each quantity may drift before the goal fails, and write report.md, figures and certificates.
+
+    Exit 1 where the goal is not proved of the scene as it is.
+    """
     with progress() as tell:
         from limitsets.scene import load
 
@@ -87,7 +90,7 @@ def robustness(
         tell("files", len(found.entries), len(found.entries) + 1)
         files = write_robustness(found, folder)
     if json:
-        print(json_words.dumps(found.to_json(), indent=2, allow_nan=False))
+        print(as_json(found.to_json()), end="")
     else:
         _text(found, files)
     raise typer.Exit(0 if found.verdict == "proved" else 1)

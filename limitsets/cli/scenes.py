@@ -7,7 +7,7 @@ from limitsets.cli.output import Json, Out, answer, table
 __all__ = ["scenes"]
 
 
-def scenes(json: Json = False, out: Out = None) -> None:
+def scenes(out: Out = None, json: Json = False) -> None:
     """List the built-in scenes."""
     from limitsets.scene import load
     from limitsets.scene import scenes as names

@@ -3,43 +3,19 @@
 from __future__ import annotations
 
 import math
-import re
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from limitsets.cli.arguments import position
 from limitsets.cli.output import Json, Out, Scene, answer, table
-from limitsets.errors import LimitsetsError
 
 if TYPE_CHECKING:
-    from limitsets.scene import Scene as SceneOf
     from limitsets.thrower import Trace
 
-__all__ = ["position", "throw"]
+__all__ = ["throw"]
 
 MOST_THROWS = 1_000_000
-_BARE = re.compile(r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]{1,3})?")
-
-
-def position(scene: SceneOf, text: str) -> float:
-    """Read x: with a unit, or a bare number in the scene's unit.
-
-    Raises
-    ------
-    LimitsetsError
-        No number, a unit of something else, or a place beyond the arm's end.
-    """
-    from limitsets.scene.units import convert, parse
-
-    value = (
-        float(text)
-        if _BARE.fullmatch(text.strip())
-        else convert(parse(text, "length", key="--x"), scene.unit)
-    )
-    if not (math.isfinite(value) and value <= scene.arm_length):
-        allowed = f"a place on the arm, up to {scene.arm_length:g} {scene.unit}"
-        raise LimitsetsError("x", text, allowed, "start where a part can rest", key="--x")
-    return value
 
 
 def throw(
@@ -49,8 +25,8 @@ def throw(
     count: Annotated[
         int, typer.Option("--count", min=1, max=MOST_THROWS, metavar="N", help="How many throws.")
     ] = 1,
-    json: Json = False,
     out: Out = None,
+    json: Json = False,
 ) -> None:
     """Throw a part, and say what each throw does; ends at the first exit."""
     from limitsets.scene import load

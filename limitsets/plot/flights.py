@@ -78,12 +78,9 @@ def flight(scene: Scene, x: float, side: int) -> Figure:
         axes.set_aspect("equal")
         axes.set_xlim(lo - 1.0, hi + 1.0)
         axes.set_ylim(min(0.0, scene.surface_height) - 0.9, float(everything[:, 1].max()) + 0.5)
-        axes.label_outer()
         axes.set_xlabel(f"distance from the joint [{scene.unit}]")
-    above.set_ylabel(f"height over the joint [{scene.unit}]")
-    # The axes come from a grid (`_canvas`), so that neither subplotspec is None.
-    below.set_ylabel(above.get_ylabel() if below.get_subplotspec().is_first_col() else "")  # type: ignore[union-attr]
-    above.set_xlabel(below.get_xlabel() if above.get_subplotspec().is_last_row() else "")  # type: ignore[union-attr]
+        axes.set_ylabel(f"height over the joint [{scene.unit}]")
+        axes.label_outer()  # last: it takes the inner labels away
     _flight(above, scene, x, side, phi, air)
     _landing(below, scene, rolled, after, side_after)
     _titles(above, below, scene, (x, side), (after, side_after), phi, int(seen.code[0]))

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from limitsets.scene.quantities import NAMES
+from limitsets.proofs.tiles import joined
+from limitsets.scene.quantities import texts
 from limitsets.scene.units import convert, parse
 
 if TYPE_CHECKING:
@@ -64,22 +64,8 @@ def _claim(proof: Proof, claim: Claim) -> dict[str, Any]:
 def values(proof: Proof) -> Iterator[tuple[str, str | list[str]]]:
     """Name every quantity of the scene with its text: the two ends where it is fixed but unknown."""
     spans = proof.spans
-    for name, text in _texts(proof.scene.text, ""):
+    for name, text in texts(proof.scene.text):
         yield name, spans.get(name, text)
-
-
-def _texts(node: Any, name: str) -> Iterator[tuple[str, str]]:
-    """Walk a scene for what bears the name of a quantity."""
-    if isinstance(node, str):
-        if re.sub(r"\[[0-9]+\]", "[i]", name) in NAMES:
-            yield name, node
-    elif isinstance(node, dict):
-        for word, inner in node.items():
-            yield from _texts(inner, f"{name}.{word}" if name else word)
-    elif isinstance(node, list):
-        corner = name.startswith("part.vertices[")
-        for k, inner in enumerate(node):
-            yield from _texts(inner, f"{name}.{'xy'[k]}" if corner else f"{name}[{k}]")
 
 
 def _state(proof: Proof, claim: Claim, state: State) -> dict[str, Any]:
@@ -141,16 +127,7 @@ def outer_extents(proof: Proof) -> dict[int, list[tuple[float, float]]]:
     for found in proof.attractions:
         for side, parts in found.cells.extents().items():
             together.setdefault(side, []).extend(parts)
-    joined: dict[int, list[tuple[float, float]]] = {}
-    for side in sorted(together):
-        out: list[tuple[float, float]] = []
-        for lo, hi in sorted(together[side]):
-            if out and lo <= out[-1][1]:
-                out[-1] = (out[-1][0], max(out[-1][1], hi))
-            else:
-                out.append((lo, hi))
-        joined[side] = out
-    return joined
+    return {side: joined(together[side]) for side in sorted(together)}
 
 
 def _extents(proof: Proof, claim: Claim) -> dict[str, Any]:

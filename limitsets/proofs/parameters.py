@@ -7,8 +7,7 @@ go through; only the last step rounds to doubles, outward.
 from __future__ import annotations
 
 import copy
-import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
@@ -16,13 +15,14 @@ from typing import Any
 import numpy as np
 
 from limitsets.errors import AnswerError
-from limitsets.geometry import OnSide, mass_of, rest_of, side_ends, triangle_of
+from limitsets.geometry import rest_of, side_ends
 from limitsets.geometry.polygon import above_side
 from limitsets.proofs.mean_value import Slope, about, middle, root
 from limitsets.proofs.rational import Span, angle, pi, sine, square_root
 from limitsets.proofs.simulated import simulated
 from limitsets.scene import Scene
-from limitsets.scene.quantities import NAMES, find
+from limitsets.scene.body import Shape, shape_of
+from limitsets.scene.quantities import STANDARD_GRAVITY, base_unit, find, text_at, texts
 from limitsets.scene.units import exact_factor, parse
 from limitsets.thrower import Throw
 from limitsets.thrower.motion import FullThrow, Outline
@@ -68,34 +68,20 @@ class ParameterBox:
         """Whether more than the minimal model is thrown."""
         return isinstance(self.lo, FullThrow)
 
+    @property
+    def middle_kappa(self) -> float:
+        """Kappa of a throw without noise, to rounding."""
+        return 0.5 * (self.lo.kappa + self.hi.kappa)
+
+    @property
+    def kappa_varies(self) -> bool:
+        """Whether kappa is another one at every throw."""
+        return "throw.speed" in self.noise or "gravity.tilt" in self.noise
+
     def at_kappa(self, kappa: float) -> Throw | FullThrow:
         """Return one map of the box, thrown with a kappa."""
         bare = self.bare[0]._replace(kappa=kappa)
         return self.lo._replace(bare=bare) if isinstance(self.lo, FullThrow) else bare
-
-
-def _at(tree: Mapping[str, Any], name: str) -> Any:
-    node: Any = tree
-    for word in find(name).path:
-        node = node[word]
-    return node
-
-
-def _pattern(name: str) -> str:
-    return re.sub(r"\[[0-9]+\]", "[i]", name)
-
-
-def _lengths(node: Any, name: str) -> Iterator[str]:
-    """Name the lengths in a part's text: leaves, or pairs of texts."""
-    if isinstance(node, dict):
-        for word, inner in node.items():
-            yield from _lengths(inner, f"{name}.{word}")
-    elif NAMES.get(_pattern(name)) == "length":
-        yield name
-    elif isinstance(node, list):
-        corner = name.startswith("part.vertices[")
-        for k, inner in enumerate(node):
-            yield from _lengths(inner, f"{name}.{'xy'[k]}" if corner else f"{name}[{k}]")
 
 
 class _Reader:
@@ -113,9 +99,9 @@ class _Reader:
         """Return a quantity, or the span between the two texts of a tolerance, or what stands in for it."""
         if name in self.instead:
             return self.instead[name]
-        found = _at(self.tree, name)
-        texts = found if isinstance(found, list) else [found, found]
-        lo, hi = (self.one(text, find(name).dimension) for text in texts)
+        found = text_at(self.tree, name)
+        pair = found if isinstance(found, list) else [found, found]
+        lo, hi = (self.one(text, find(name).dimension) for text in pair)
         return Span(lo.lo, hi.hi)
 
     def one(self, text: str, dimension: str) -> Span:
@@ -124,8 +110,7 @@ class _Reader:
         if dimension in ("angle", "angular speed"):
             turn = pi() / 180 if quantity.unit.startswith("deg") else Span.of(Fraction(1))
             return turn * Span.of(number)
-        target = {"acceleration": f"{self.unit}/s^2", "mass": "kg", "mass per area": f"kg/{self.unit}^2"}
-        return Span.of(number * exact_factor(quantity.unit, target.get(dimension, self.unit)))
+        return Span.of(number * exact_factor(quantity.unit, base_unit(dimension, self.unit)))
 
     def deviation(self, name: str, noise: Mapping[str, str]) -> tuple[Span, Span]:
         """Return the noise of a quantity as a share of it, and in its own dimension; one of the two is 0."""
@@ -151,7 +136,7 @@ class _Reader:
             gravity = self.span("gravity.acceleration") * self.share_of_gravity(noise)
         else:
             tilt = self.tilt(noise)
-            gravity = self.one("9.80665 m/s^2", "acceleration") * sine(tilt)
+            gravity = self.one(STANDARD_GRAVITY, "acceleration") * sine(tilt)
         speed = self.span("throw.speed")
         slow, fast = speed * slow - more, speed * fast + more
         if not (gravity.lo > 0 and slow.lo > 0):
@@ -186,38 +171,14 @@ class _Reader:
             )
         self.tilt(noise)
         share, more = self.deviation("gravity.tilt", noise)
-        found = _at(self.tree, "gravity.tilt")
+        found = text_at(self.tree, "gravity.tilt")
         least = self.one(found[0] if isinstance(found, list) else found, "angle")
         flat, steep = sine(least * (1 - share) - more), sine(least * (1 + share) + more)
         return Span((flat / sine(least)).lo, (steep / sine(least)).hi)
 
-    def shape(self) -> tuple[list[Any], Any, list[Span] | None, Span]:
-        """Return the vertices, the centre of mass, the sides' lengths where they are given, the radius of gyration."""
-        part = self.tree["part"]
-        lengths = None
-        vertices: list[Any]
-        if "sides" in part:
-            lengths = [self.span(f"part.sides[{k}]") for k in range(3)]
-            vertices = list(triangle_of(lengths, root))
-        else:
-            vertices = [
-                tuple(self.span(f"part.vertices[{k}].{axis}") for axis in "xy")
-                for k in range(len(part["vertices"]))
-            ]
-        mass = part["mass"]
-        if "center" in mass:
-            along, above = (self.span(f"part.mass.center.{word}") for word in ("along", "above"))
-            centre: Any = OnSide(mass["center"]["side"], along, above)
-            radius = self.span("part.mass.radius_of_gyration")
-        else:
-            points: list[Any] = [
-                tuple(self.span(f"part.mass.points[{k}].{word}") for word in ("x", "y", "mass"))
-                for k in range(len(mass.get("points", ())))
-            ]
-            density = self.one(mass["plate_density"], "mass per area")
-            found: Any = mass_of(vertices, density, points, root)
-            centre, radius = found.centre, found.radius_of_gyration
-        return vertices, centre, lengths, radius
+    def shape(self) -> Shape:
+        """Return the part as `shape_of` gives it, in spans or in slopes over them."""
+        return shape_of(self.tree["part"], self.span, self.one, root)
 
     def body(self) -> tuple[list[tuple[Any, ...]], Span]:
         """Return (a, d, length) of every side, and the radius of gyration."""
@@ -229,9 +190,9 @@ class _Reader:
     def narrow_body(self) -> tuple[list[tuple[Any, ...]], Span]:
         """As `body`, but narrower where several of its numbers are known to a tolerance only."""
         plain, radius = self.body()
-        names = [
-            name for name in _lengths(self.tree["part"], "part") if isinstance(_at(self.tree, name), list)
-        ]
+        # pairs of texts are what has a tolerance
+        wide = [name for name, text in texts(self.tree["part"], "part") if isinstance(text, list)]
+        names = [name for name in wide if find(name).dimension == "length"]
         if not names:
             return plain, radius
         box = [self.span(name) for name in names]
@@ -263,7 +224,8 @@ class _Reader:
 def lengths_of(scene: Scene, tree: Mapping[str, Any]) -> dict[str, Span]:
     """Name the lengths of the part, and say what is known of each, in the scene's unit."""
     reader = _Reader(scene, tree)
-    return {name: reader.span(name) for name in _lengths(tree["part"], "part")}
+    names = [name for name, _ in texts(tree["part"], "part") if find(name).dimension == "length"]
+    return {name: reader.span(name) for name in names}
 
 
 def body_at(

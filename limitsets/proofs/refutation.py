@@ -8,24 +8,21 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
 from limitsets.goals import OrientedBeyond
 from limitsets.proofs.asked import State
+from limitsets.proofs.asked.oriented_beyond import section_of
 from limitsets.proofs.attraction import Attraction
 from limitsets.proofs.certificate import write
 from limitsets.scene import Scene
-from limitsets.scene.quantities import find
+from limitsets.scene.quantities import text_at
 
 __all__ = ["write_refutation"]
 
 
 def _nominal(scene: Scene, name: str) -> str:
     by_kappa = name == "throw.speed" and "kappa" in scene.text["throw"]
-    node: Any = scene.text
-    for word in find("throw.kappa" if by_kappa else name).path:
-        node = node[word]
-    return str(node)
+    return str(text_at(scene.text, "throw.kappa" if by_kappa else name))
 
 
 def write_refutation(
@@ -54,14 +51,12 @@ def write_refutation(
         The nominal scene.
     """
     box = found.cover.box
-    varies = "throw.speed" in box.noise or "gravity.tilt" in box.noise
-    asked: dict[str, Any] = {"kind": goal.kind, "x": f"{goal.x!r} {scene.unit}", "side": goal.side}
     section = {
-        "goal": asked | ({"from_anywhere": True} if goal.from_anywhere else {}),
+        "goal": section_of(goal, scene),
         "start": {"x": float(states[0].lo).hex(), "side": states[0].side},
         "throws": [
             {
-                "kappa": float(state.kappa).hex() if varies and state.kappa is not None else None,
+                "kappa": float(state.kappa).hex() if box.kappa_varies and state.kappa is not None else None,
                 "landing": float(state.landing).hex() if state.landing else None,
             }
             for state in states[:-1]

@@ -18,7 +18,7 @@ from typing import Any
 from limitsets.errors import AnswerError
 from limitsets.proofs.rational import Span
 from limitsets.scene import Scene
-from limitsets.scene.quantities import find
+from limitsets.scene.quantities import find, text_at
 from limitsets.scene.units import exact_factor, parse
 
 __all__ = ["Piece", "whole"]
@@ -34,16 +34,6 @@ def _decimal(value: Fraction, up: bool) -> str:
     whole_part = math.ceil(scaled) if up else math.floor(scaled)
     sign, digits = ("-" if whole_part < 0 else ""), str(abs(whole_part)).rjust(DIGITS + 1, "0")
     return f"{sign}{digits[:-DIGITS]}.{digits[-DIGITS:]}".rstrip("0").rstrip(".")
-
-
-def _at(tree: Any, name: str) -> Any:
-    """Return what stands in a scene under a name, None if nothing does."""
-    for word in find(name).path:
-        known = word in tree if isinstance(tree, Mapping) else isinstance(word, int) and word < len(tree)
-        if not known:
-            return None
-        tree = tree[word]
-    return tree
 
 
 @dataclass(frozen=True)
@@ -65,7 +55,7 @@ class Piece:
         """Both ends of each quantity, as text with the unit in which the scene gives it."""
         found = {}
         for name, span in self.spans.items():
-            unit = parse(_at(self.scene.text, name), find(name).dimension).unit
+            unit = parse(text_at(self.scene.text, name), find(name).dimension).unit
             found[name] = [f"{_decimal(span.lo, up=False)} {unit}", f"{_decimal(span.hi, up=True)} {unit}"]
         return found
 
@@ -128,7 +118,7 @@ def whole(scene: Scene, tolerance: Mapping[str, str]) -> Piece:
             kappa = Fraction(parse(scene.text["throw"]["kappa"], "length").number)
             spans["throw.kappa"] = Span(kappa / (1 + share) ** 2, kappa / (1 - share) ** 2)
             continue
-        node = _at(scene.text, name)
+        node = text_at(scene.text, name)
         if node is None:
             raise AnswerError("the tolerance", name, "a quantity that the scene gives", "name another")
         given = parse(node, find(name).dimension)

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import json
 import math
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from limitsets import plot
-from limitsets.files import replaced
+from limitsets.files import as_json
 from limitsets.report.tables import intervals, percent, table
-from limitsets.report.writing import DPI, refusal
+from limitsets.report.writing import DPI, filled
 
 if TYPE_CHECKING:
     from limitsets.auditing import Audit, Finding
@@ -180,12 +179,8 @@ def write_audit(found: Audit, folder: str | Path) -> list[Path]:
         The folder cannot be written.
     """
     names = ["audit.md", "audit.json", "audit.png"]
-    try:
-        with replaced(folder) as draft:
-            plot.audit(found).savefig(draft / names[2], dpi=DPI)
-            record = json.dumps(found.to_json(), indent=2, allow_nan=False)
-            (draft / names[1]).write_text(record + "\n", encoding="utf-8", newline="\n")
-            (draft / names[0]).write_text(audit_page(found, names[2]), encoding="utf-8", newline="\n")
-    except OSError as error:
-        raise refusal(folder, f"it could not be: {error.strerror or error}") from None
+    with filled(folder) as draft:
+        plot.audit(found).savefig(draft / names[2], dpi=DPI)
+        (draft / names[1]).write_text(as_json(found.to_json()), encoding="utf-8", newline="\n")
+        (draft / names[0]).write_text(audit_page(found, names[2]), encoding="utf-8", newline="\n")
     return [Path(folder) / name for name in names]

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from limitsets import plot
-from limitsets.files import replaced
+from limitsets.files import as_json
 from limitsets.report.robust_pages import READINGS, robustness_page, shown, violated_of
-from limitsets.report.writing import DPI, refusal
+from limitsets.report.writing import DPI, filled
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -60,15 +59,12 @@ def write_robustness(found: Robustness, folder: str | Path) -> list[Path]:
         The folder cannot be written.
     """
     figures: dict[str, str] = {}
-    try:
-        with replaced(folder) as draft:
-            for kind, figure in _drawn(found):
-                figures[kind] = f"{kind}.png"
-                figure.savefig(draft / figures[kind], dpi=DPI)
-            record = json.dumps(found.to_json(), indent=2, allow_nan=False)
-            (draft / "robustness.json").write_text(record + "\n", encoding="utf-8", newline="\n")
-            page = robustness_page(found, figures)
-            (draft / "report.md").write_text(page, encoding="utf-8", newline="\n")
-    except OSError as error:
-        raise refusal(folder, f"it could not be: {error.strerror or error}") from None
+    with filled(folder) as draft:
+        for kind, figure in _drawn(found):
+            figures[kind] = f"{kind}.png"
+            figure.savefig(draft / figures[kind], dpi=DPI)
+        record = as_json(found.to_json())
+        (draft / "robustness.json").write_text(record, encoding="utf-8", newline="\n")
+        page = robustness_page(found, figures)
+        (draft / "report.md").write_text(page, encoding="utf-8", newline="\n")
     return [Path(folder) / name for name in ["report.md", "robustness.json", *figures.values()]]

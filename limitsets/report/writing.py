@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-import json
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from limitsets import plot
 from limitsets.errors import LimitsetsError
-from limitsets.files import replaced
+from limitsets.files import as_json, replaced
 from limitsets.maps import FLIP
 from limitsets.plot.style import stretch
 from limitsets.report.pages import page
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     from limitsets.analysis import Analysis
 
-__all__ = ["DPI", "FIGURES", "figure", "refusal", "require_place", "write"]
+__all__ = ["DPI", "FIGURES", "figure", "filled", "require_place", "write"]
 
 Progress = Callable[[str, int, int], None]
 
@@ -84,14 +84,29 @@ def require_place(folder: str | Path) -> None:
     """
     nearest = next(path for path in (Path(folder), *Path(folder).absolute().parents) if path.exists())
     if not nearest.is_dir():
-        raise refusal(folder, f"{nearest} is not a folder")
+        raise _refusal(folder, f"{nearest} is not a folder")
     if not os.access(nearest, os.W_OK):
-        raise refusal(folder, f"{nearest} may not be written")
+        raise _refusal(folder, f"{nearest} may not be written")
 
 
-def refusal(folder: str | Path, reason: str) -> LimitsetsError:
-    """Make the error for a folder that cannot be written."""
+def _refusal(folder: str | Path, reason: str) -> LimitsetsError:
     return LimitsetsError("the folder of the report", str(folder), "a folder that can be written", reason)
+
+
+@contextmanager
+def filled(folder: str | Path) -> Iterator[Path]:
+    """Write files of a report as `limitsets.files.replaced` does: all of them or none.
+
+    Raises
+    ------
+    LimitsetsError
+        The folder cannot be written.
+    """
+    try:
+        with replaced(folder) as draft:
+            yield draft
+    except OSError as error:
+        raise _refusal(folder, f"it could not be: {error.strerror or error}") from None
 
 
 def write(analysis: Analysis, folder: str | Path, *, progress: Progress | None = None) -> list[Path]:
@@ -128,17 +143,14 @@ def write(analysis: Analysis, folder: str | Path, *, progress: Progress | None =
     """
     figures = {kind: f"{kind}.png" for kind in FIGURES}
     names = ["report.md", "analysis.json", *figures.values()]
-    try:
-        with replaced(folder) as draft:
-            for number, (kind, name) in enumerate(figures.items()):
-                if progress is not None:
-                    progress(name, number, len(names))
-                figure(analysis, kind).savefig(draft / name, dpi=DPI)
+    with filled(folder) as draft:
+        for number, (kind, name) in enumerate(figures.items()):
             if progress is not None:
-                progress("report.md", len(figures), len(names))
-            record = json.dumps(analysis.to_json(), indent=2, allow_nan=False)
-            (draft / "analysis.json").write_text(record + "\n", encoding="utf-8", newline="\n")
-            (draft / "report.md").write_text(page(analysis, figures), encoding="utf-8", newline="\n")
-    except OSError as error:
-        raise refusal(folder, f"it could not be: {error.strerror or error}") from None
+                progress(name, number, len(names))
+            figure(analysis, kind).savefig(draft / name, dpi=DPI)
+        if progress is not None:
+            progress("report.md", len(figures), len(names))
+        record = as_json(analysis.to_json())
+        (draft / "analysis.json").write_text(record, encoding="utf-8", newline="\n")
+        (draft / "report.md").write_text(page(analysis, figures), encoding="utf-8", newline="\n")
     return [Path(folder) / name for name in names]

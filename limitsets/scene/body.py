@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -11,18 +12,23 @@ from limitsets.geometry import (
     OnSide,
     RestingSides,
     convex_polygon,
+    mass_of,
     plate_with_points,
     require_inside,
     require_rest,
     resting_sides,
     triangle,
+    triangle_of,
 )
 from limitsets.scene.resolve import LEAST, Resolver
 
 if TYPE_CHECKING:
     from limitsets.scene.schema import CenterTable, MassTable, PartTable
 
-__all__ = ["Body", "resolve_body"]
+__all__ = ["Body", "Shape", "resolve_body", "shape_of"]
+
+Shape: TypeAlias = tuple[list[Any], Any, list[Any] | None, Any]
+"""Vertices, centre of mass, the sides' lengths where they are given, radius of gyration; in any scalars."""
 
 
 class Body(NamedTuple):
@@ -55,6 +61,46 @@ def resolve_body(table: PartTable, resolver: Resolver) -> Body:
         require_rest(sides, resolver.unit)
     vertices.flags.writeable = False
     return Body(vertices, centre, radius, sides)
+
+
+def shape_of(
+    part: Mapping[str, Any],
+    number: Callable[[str], Any],
+    read: Callable[[str, str], Any],
+    sqrt: Callable[[Any], Any],
+) -> Shape:
+    """Read ``[part]`` of a scene that was checked, in other scalars than floats.
+
+    Parameters
+    ----------
+    part : mapping
+        The table, as text.
+    number : callable
+        From a quantity's name to its scalar.
+    read : callable
+        From a text and its dimension to a scalar, for what is no quantity: the plate's density.
+    sqrt : callable
+        Square root for these scalars.
+    """
+    lengths, vertices = None, []
+    if "sides" in part:
+        lengths = [number(f"part.sides[{k}]") for k in range(3)]
+        vertices = list(triangle_of(lengths, sqrt))
+    else:
+        vertices = [
+            tuple(number(f"part.vertices[{k}].{axis}") for axis in "xy") for k in range(len(part["vertices"]))
+        ]
+    mass = part["mass"]
+    if "center" in mass:
+        along, above = (number(f"part.mass.center.{word}") for word in ("along", "above"))
+        centre = OnSide(mass["center"]["side"], along, above)
+        return vertices, centre, lengths, number("part.mass.radius_of_gyration")
+    points: list[Any] = [
+        tuple(number(f"part.mass.points[{k}].{word}") for word in ("x", "y", "mass"))
+        for k in range(len(mass.get("points", ())))
+    ]
+    found = mass_of(vertices, read(mass["plate_density"], "mass per area"), points, sqrt)
+    return vertices, found.centre, lengths, found.radius_of_gyration
 
 
 def _shape(table: PartTable, resolver: Resolver) -> tuple[npt.NDArray[np.float64], list[float] | None]:

@@ -8,18 +8,16 @@ from typing import TYPE_CHECKING
 from limitsets.scene.body import resolve_body
 from limitsets.scene.facts import Deviation
 from limitsets.scene.purpose import resolve_effects, resolve_goal, resolve_world
-from limitsets.scene.quantities import deviation, require
+from limitsets.scene.quantities import STANDARD_GRAVITY, deviation, require
 from limitsets.scene.resolve import LEAST, Resolver
 from limitsets.scene.scene import Scene
-from limitsets.scene.units import Quantity, convert, parse
+from limitsets.scene.units import parse
 from limitsets.scene.validation import Tree, plain, validate
 
 if TYPE_CHECKING:
     from limitsets.scene.schema import GravityTable, SceneTable
 
 __all__ = ["build"]
-
-_STANDARD_GRAVITY = Quantity("9.80665", "m/s^2")
 
 
 def build(structure: object, file: str | None) -> Scene:
@@ -100,7 +98,7 @@ def _gravity(table: GravityTable, resolver: Resolver) -> float:
     if not 0 < tilt <= pi / 2:
         allowed = "above 0 and up to 90 deg"
         raise resolver.refusal("gravity.tilt", "the tilt", table.tilt, allowed, "90 deg is an upright table")
-    return convert(_STANDARD_GRAVITY, f"{resolver.unit}/s^2") * sin(tilt)
+    return resolver.value(STANDARD_GRAVITY, "acceleration", "gravity") * sin(tilt)
 
 
 def _kappa(table: SceneTable, gravity: float | None, resolver: Resolver) -> float:

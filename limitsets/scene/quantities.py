@@ -7,7 +7,7 @@ import difflib
 import math
 import numbers
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from limitsets.errors import SceneError
@@ -18,7 +18,20 @@ from limitsets.scene.validation import Tree
 if TYPE_CHECKING:
     from limitsets.scene.scene import Scene
 
-__all__ = ["NAMES", "Place", "base_unit", "deviation", "find", "replaced", "require", "value_of"]
+__all__ = [
+    "NAMES",
+    "STANDARD_GRAVITY",
+    "Place",
+    "base_unit",
+    "deviation",
+    "find",
+    "in_units",
+    "replaced",
+    "require",
+    "text_at",
+    "texts",
+    "value_of",
+]
 
 NAMES: dict[str, str] = {
     "throw.speed": "angular speed",
@@ -39,6 +52,8 @@ NAMES: dict[str, str] = {
     "landing.x": "length",
 }
 """The quantities and their dimensions; i stands for a number."""
+
+STANDARD_GRAVITY = "9.80665 m/s^2"
 
 # a scene gives one of each pair; naming the other replaces it
 _RIVALS = {
@@ -98,20 +113,46 @@ def base_unit(dimension: str, unit: str) -> str:
     )
 
 
-def _text_at(tree: Mapping[str, Any], path: tuple[str | int, ...]) -> str | None:
+def text_at(tree: Mapping[str, Any], name: str) -> Any:
+    """Return what stands in a scene's text under the name of a quantity; None if nothing does.
+
+    Examples
+    --------
+    >>> text_at({"part": {"vertices": [["0 in", "1 in"]]}}, "part.vertices[0].y")
+    '1 in'
+    """
     node: Any = tree
-    for word in path:
-        known = word in node if isinstance(node, dict) else isinstance(word, int) and word < len(node)
+    for word in find(name).path:
+        known = word in node if isinstance(node, Mapping) else isinstance(word, int) and word < len(node)
         if not known:
             return None
         node = node[word]
-    return str(node)
+    return node
+
+
+def texts(tree: Any, name: str = "") -> Iterator[tuple[str, Any]]:
+    """Walk a scene's text, or what stands in it under `name`: the quantities in it by name, and what is written there.
+
+    Examples
+    --------
+    >>> list(texts({"part": {"vertices": [["0 in", "1 in"]]}, "throw": {"kappa": "9 in"}}))[1:]
+    [('part.vertices[0].y', '1 in'), ('throw.kappa', '9 in')]
+    """
+    if re.sub(r"\[[0-9]+\]", "[i]", name) in NAMES:
+        yield name, tree
+    elif isinstance(tree, Mapping):
+        for word, inner in tree.items():
+            yield from texts(inner, f"{name}.{word}" if name else word)
+    elif isinstance(tree, list):
+        corner = name.startswith("part.vertices[")
+        for k, inner in enumerate(tree):
+            yield from texts(inner, f"{name}.{'xy'[k]}" if corner else f"{name}[{k}]")
 
 
 def require(tree: Tree, name: str, key: str, file: str | None) -> None:
     """Refuse a quantity of a part that this scene describes in other words, or that the part does not have."""
     place = find(name, key=key, file=file)
-    if place.path[0] == "part" and _text_at(tree, place.path) is None:
+    if place.path[0] == "part" and text_at(tree, name) is None:
         raise SceneError(
             "the quantity",
             name,
@@ -122,12 +163,20 @@ def require(tree: Tree, name: str, key: str, file: str | None) -> None:
         )
 
 
+def in_units(scene: Scene, name: str, value: float | str, *, key: str | None = None) -> float:
+    """Give what was said of a quantity, a number in the scene's units or text with a unit, in the scene's units."""
+    if not isinstance(value, str):
+        return float(value)
+    dimension = find(name).dimension
+    return convert(parse(value, dimension, key=key), base_unit(dimension, scene.unit))
+
+
 def value_of(scene: Scene, name: str) -> float:
     """Give the value of a quantity in the scene's units (`Scene.value`)."""
-    place = find(name, file=scene.file)
-    text = _text_at(scene.text, place.path)
+    find(name, file=scene.file)  # an error names the file
+    text = text_at(scene.text, name)
     if text is not None:
-        return convert(parse(text, place.dimension), base_unit(place.dimension, scene.unit))
+        return in_units(scene, name, text)
     derived = {
         "throw.kappa": scene.kappa,
         "throw.speed": None if scene.gravity is None else math.sqrt(scene.gravity / scene.kappa),

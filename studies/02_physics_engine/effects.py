@@ -92,6 +92,7 @@ HEAD = (
     "| effects | throws | same law | of these same side | error of x' [in]: median | 95 % | worst "
     "| aside: map does not say | slides back | rocks | solver | of these same side | median [in] | worst |"
 )
+ERRORS = ("median", "95 %", "worst")
 WHY = ("outside", "slides back", "rocks", "solver")
 
 
@@ -136,6 +137,13 @@ def nearest_start(scene: Any, x: float, side: int, wanted: int) -> float:
     return float(best)
 
 
+def summary(size: Any) -> dict[str, float | None]:
+    """Return the median, the 95 % quantile and the worst of some errors; None where there are no errors."""
+    if not size.size:
+        return dict.fromkeys(ERRORS)
+    return dict(zip(ERRORS, (*np.quantile(size, (0.5, 0.95)).tolist(), float(size.max())), strict=True))
+
+
 def agreement(case: Case, seen: Any) -> dict[str, Any]:
     """Sides and places of one case, apart for throws that follow the same law and for those that do not."""
     why, scene = reasons(seen), case.load()
@@ -151,11 +159,7 @@ def agreement(case: Case, seen: Any) -> dict[str, Any]:
         "aside_same_side": int((~same & seen.agree).sum()),
         "aside_median": float(np.median(aside)) if aside.size else 0.0,
         "aside_worst": float(aside.max(initial=0.0)),
-        "error": {
-            "median": float(np.median(size)),
-            "95 %": float(np.quantile(size, 0.95)),
-            "worst": float(size.max()),
-        },
+        "error": summary(size),
         "sides_that_differ": [
             {
                 "x": float(seen.x[k]),
@@ -180,9 +184,25 @@ def convergence(name: str, seen: Any, count: int = 10) -> dict[str, Any]:
     errors = []
     for step in STEPS:
         again = ls.engine.compare(case.load(), seen.x[rows], seen.side[rows], step=step, **case.how)
-        errors.append(float(np.median(np.abs(again.error[again.agree]))))
-    rate = float(np.polyfit(np.log(STEPS), np.log(errors), 1)[0])
+        errors.append(summary(np.abs(again.error[again.agree]))["median"])
+    known = None not in errors
+    rate = float(np.polyfit(np.log(STEPS), np.log(errors), 1)[0]) if known else None
     return {"step": list(STEPS), "error": errors, "order": rate}
+
+
+def missing(numbers: dict[str, Any]) -> list[str]:
+    """Say which cases drew too few throws for a number."""
+    lines = [
+        f"{name}: none of {numbers[name]['throws']} throws follows the same law and ends on the same side"
+        for name in CASES
+        if not numbers[name]["same_side"]
+    ]
+    lines += [
+        f"{name}: no throw to show how the error falls with the step"
+        for name, found in numbers["convergence"].items()
+        if found["order"] is None
+    ]
+    return ["", *(f"{line}; take more --throws." for line in lines)] if lines else []
 
 
 def table(numbers: dict[str, Any]) -> str:
@@ -193,13 +213,14 @@ def table(numbers: dict[str, Any]) -> str:
     ]
     for name in CASES:
         found = numbers[name]
-        error = " | ".join(f"{found['error'][key]:.1e}" for key in ("median", "95 %", "worst"))
+        sizes = [found["error"][key] for key in ERRORS]
+        error = " | ".join("none" if size is None else f"{size:.1e}" for size in sizes)
         aside = " | ".join(str(found["aside"][key]) for key in WHY)
         rest = f"{found['aside_same_side']} | {found['aside_median']:.2g} | {found['aside_worst']:.2g}"
         lines.append(
             f"| {name} | {found['throws']} | {found['same_law']} | {found['same_side']} | {error} | {aside} | {rest} |"
         )
-    return "\n".join(lines)
+    return "\n".join([*lines, *missing(numbers)])
 
 
 def figure(seen: dict[str, Any], numbers: dict[str, Any]) -> Figure:
@@ -260,6 +281,8 @@ def _draw_laws(axes: Any, found: Any) -> None:
 def _draw_steps(axes: Any, found: dict[str, Any]) -> None:
     marks = iter("osD^")
     for name, rows in found.items():
+        if rows["order"] is None:
+            continue
         colour, line = LOOK[name]
         label = f"{name}: order {rows['order']:.2f}"
         axes.loglog(rows["step"], rows["error"], color=colour, ls=line, marker=next(marks), ms=4, label=label)

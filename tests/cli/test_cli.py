@@ -1,15 +1,18 @@
 """The command line: exit codes, what goes to which stream, JSON words, and files that stay whole."""
 
+import io
 import json
 import signal
 import subprocess
 import sys
+import threading
 import time
 from pathlib import Path
 
 import pytest
 
 import limitsets as ls
+from limitsets.cli import output
 from tests.cli.command import PROGRESS, run
 
 SCENES = Path(__file__).parents[1] / "analysis"
@@ -271,6 +274,23 @@ def test_exit_codes_and_streams_of_a_process():
     out, err = process.communicate()
     assert (process.returncode, out) == (2, "")
     assert err.count("\n") == 1
+
+
+def test_no_progress_is_printed_after_the_command(monkeypatch):
+    begun = threading.Event()
+
+    class Slow(io.StringIO):
+        def write(self, text):
+            begun.set()
+            time.sleep(0.1)
+            return super().write(text)
+
+    monkeypatch.setattr(output, "PATIENCE", 0.0)
+    monkeypatch.setattr(sys, "stderr", Slow())
+    with output.progress() as tell:
+        tell("throwing", 0, 1)
+        assert begun.wait(10)
+    assert sys.stderr.getvalue() == "limitsets: throwing (1 of 1)\n"
 
 
 def test_a_reader_that_goes_away():

@@ -6,21 +6,9 @@ from pathlib import Path
 import pytest
 
 import limitsets as ls
-from limitsets.cli import main
+from tests.cli.command import run
 
 VARY = "part.mass.center.along,part.mass.center.above,throw.speed"
-
-
-@pytest.fixture(autouse=True)
-def here(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-
-
-def run(capfd, *words):
-    code = main(words)
-    out, err = capfd.readouterr()
-    assert "Traceback" not in err
-    return code, out, err
 
 
 def points_of(scene):

@@ -35,6 +35,15 @@ def test_a_search_writes_scene_answer_and_figure(here, capfd):
     assert again.value("throw.kappa") == record["values"]["throw.kappa"]
 
 
+def test_the_scene_alone(capfd):
+    words = ("--robust", "--evaluations", "20", "--seconds", "0", "-o", "found.toml")
+    code, out, _ = run(capfd, "design", "paper-designed", *words)
+    assert code == 0
+    assert out.splitlines()[-1] == "scene: found.toml"
+    assert [path.name for path in Path().iterdir()] == ["found.toml"]
+    assert ls.load("found.toml").value("throw.kappa") > 0
+
+
 @pytest.mark.parametrize(
     ("words", "says"),
     [

@@ -6,20 +6,7 @@ from pathlib import Path
 import pytest
 
 import limitsets as ls
-from limitsets.cli import main
-
-
-@pytest.fixture(autouse=True)
-def here(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-
-
-def run(capfd, *words):
-    code = main(words)
-    out, err = capfd.readouterr()
-    assert "Traceback" not in err
-    assert all(line.startswith("limitsets: ") for line in err.splitlines())
-    return code, out, err
+from tests.cli.command import run
 
 
 def test_a_table_in_units_that_people_use(capfd):
@@ -27,7 +14,7 @@ def test_a_table_in_units_that_people_use(capfd):
         capfd, "margin", "paper-designed", "throw.speed", "arm.surface_height", "--width", "0.1"
     )
     assert code == 0
-    assert "beyond x = 20 in only side 2" in out
+    assert "beyond x = 20 in lies on side 2" in out
     rows = {line.split()[0]: line for line in out.splitlines() if line.split()[:1]}
     low, high = (float(word) for word in rows["throw.speed"].replace("%", "").split()[-2:])
     assert low < 0.733 < high

@@ -263,6 +263,56 @@ def test_where_the_decision_jumps():
     assert a * math.sin(phi) + d * math.cos(phi) < 0.0  # H < 0
 
 
+def first_impact(q, side, x):
+    """Where the height of the vertex over the arm is negative for the first time, by the plain formula [rad]."""
+    (a, d), phi = map(float, exact.feet(q)[side]), np.linspace(1e-6, 2.0 * np.pi, 200_001)
+    over = x * phi - a * np.sin(phi) + d * (1.0 - np.cos(phi)) - 0.5 * q[exact.KAPPA] * phi**2
+    return float(phi[np.flatnonzero(over < 0.0)[0]])
+
+
+# A centre that is past the vertex would fall on over it, but the part comes down turning back (omega < 0): where that
+# is just enough to lift it back, K = V, jog and flip change places.  Upside down (H < 0) the other form of V counts.
+PAST = {"ALONG": 4.44, "ABOVE": 0.75, "KAPPA": 33.3, "RHO": 0.43, "H": -3.3}
+UPSIDE_DOWN = {"ALONG": 3.9, "ABOVE": 0.55, "KAPPA": 3.6, "RHO": 0.42, "H": 6.0}
+SHORT_OF_IT = {"ALONG": 4.45, "ABOVE": 2.42, "KAPPA": 1.2, "RHO": 2.09, "H": -3.3}
+
+
+@pytest.mark.parametrize(
+    ("values", "side", "past", "upright"),
+    [
+        (PAST, 0, True, True),
+        (PAST, 1, True, True),
+        (PAST, 2, True, True),
+        (UPSIDE_DOWN, 0, True, False),
+        (UPSIDE_DOWN, 1, True, False),
+        (SHORT_OF_IT, 0, False, False),
+    ],
+)
+def test_a_centre_past_the_vertex(values, side, past, upright):
+    scene = changed("paper-initial", **values)
+    q, found = quantities(scene), critical_jacobian(scene, *ALL)
+    x, model = found.x[side], ("exact", "signed")
+    phi = first_impact(q, side, x)
+    a, d = map(float, exact.feet(q)[side])
+    right, above = a * math.cos(phi) - d * math.sin(phi), a * math.sin(phi) + d * math.cos(phi)
+    assert (right < -0.1, above > 0.1) == (past, upright)
+    assert abs(right) > 0.1
+    assert abs(above) > 0.1
+    moment = q[exact.RHO] ** 2 + right * (x - q[exact.KAPPA] * phi) + above * (q[exact.H] + d)
+    assert (moment < -0.1) == past
+    assert found.reasons[side] is None
+    below, beyond = (exact.margin(q, side, *model, x * (1.0 + s), phi) > 0.0 for s in (-1e-9, 1e-9))
+    assert found.kinds[side] == {(False, True): "jog->flip", (True, False): "flip->jog"}[below, beyond]
+
+    def root(at):
+        return exact.critical_point(at, side, *model, (x, phi))
+
+    assert x == pytest.approx(float(root(q)), rel=1e-14)
+    wanted = [float(exact.slope(root, q, name)) for name in ALL]
+    size = float(np.abs(wanted).max())
+    assert found.matrix[side] == pytest.approx(wanted, rel=1e-11, abs=1e-13 * size)
+
+
 @pytest.mark.parametrize(
     ("names", "error"),
     [

@@ -233,6 +233,13 @@ def test_every_quantity_of_a_scene_is_measured():
     assert along.unit == "%"
 
 
+def test_the_value_is_in_the_unit_of_its_deviation():
+    # -0.2 in; an inch is 25.4 mm
+    own = ls.load(ls.load("paper-designed").as_dict() | {"tolerance": {"arm.surface_height": "0.1 mm"}})
+    (found,) = ls.margin(own, "arm.surface_height", width=0.5)
+    assert (found.unit, found.nominal) == ("mm", pytest.approx(-5.08, rel=1e-15))
+
+
 @pytest.mark.parametrize(
     ("quantity", "options", "words"),
     [

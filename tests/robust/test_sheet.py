@@ -30,8 +30,7 @@ def folder(tmp_path_factory):
     return tmp_path_factory.mktemp("sheet")
 
 
-@pytest.fixture(scope="module")
-def sheet(folder):
+def asked(folder):
     return ls.robustness(
         "paper-designed",
         "throw.speed",
@@ -41,6 +40,11 @@ def sheet(folder):
         leave_out=["curve", "noise", "audit"],
         folder=folder,
     )
+
+
+@pytest.fixture(scope="module")
+def sheet(folder):
+    return asked(folder)
 
 
 def with_tables(name="paper-designed", **tables):
@@ -109,15 +113,7 @@ def test_what_was_found_is_found_again(sheet, folder, monkeypatch):
 
     monkeypatch.setattr(gathering, "margin", fails)
     monkeypatch.setattr(gathering, "joint_margin", fails)
-    again = ls.robustness(
-        "paper-designed",
-        "throw.speed",
-        reading="fixed",
-        tolerance={"throw.speed": "2 %"},
-        width=0.1,
-        leave_out=["curve", "noise", "audit"],
-        folder=folder,
-    )
+    again = asked(folder)
     assert again.again == 2
     assert again.entries == sheet.entries
 

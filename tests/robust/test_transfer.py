@@ -186,7 +186,10 @@ def test_a_parameter_that_scatters():
         exact += np.bincount(np.repeat(np.arange(n), 100) * n + cell, minlength=n * n).reshape(n, n)
     exact /= exact.sum(axis=1, keepdims=True)
     _, weight = stationary(exact)
-    centred = lambda deviation: ls.maps.Logistic(3.6 + deviation)  # noqa: E731
+
+    def centred(deviation):
+        return ls.maps.Logistic(3.6 + deviation)
+
     (found,) = [
         part
         for part in classes(transfer(centred, ls.grid(LINE, cells=n), parameter=Uniform(0.1)))

@@ -156,3 +156,22 @@ def test_throws_are_set_aside_where_the_laws_part(effects_in_engine):
             assert found["aside"]["solver"] > 10
         if name in ("landing", "landing, roll", "landing, roll, bounce", "drive, landing"):
             assert found["same_law"] == 60
+
+
+def test_too_few_throws_are_said_to_be_too_few(effects_in_engine, tmp_path):
+    """Of one throw a case some are set aside (half of those at friction 5 are), and there are no errors to tell of."""
+    study, enough, _ = effects_in_engine
+    assert study.missing(enough) == []
+    numbers = study.main(seed=0, out=tmp_path, throws=1)
+    without = [name for name in study.CASES if numbers[name]["same_side"] == 0]
+    assert without
+    table, _, gap = study.table(numbers).partition("\n\n")
+    rows = dict(zip(study.CASES, table.splitlines()[2:], strict=True))
+    for name in study.CASES:
+        assert ("| none | none | none |" in rows[name]) == (name in without)
+        assert (f"{name}: none of 1 throws" in gap) == (name in without)
+        assert (None in numbers[name]["error"].values()) == (name in without)
+    for name, found in numbers["convergence"].items():
+        assert (found["order"] is None) == (name in without)
+    json.dumps(numbers, allow_nan=False)
+    assert (tmp_path / "effects.png").stat().st_size > 20_000

@@ -11,11 +11,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from limitsets.geometry import OnSide, mass_of, rest_of, triangle_of
+from limitsets.geometry import rest_of
 from limitsets.inverse.critical.dual import Dual, sine, square_root
 from limitsets.scene import Scene
-from limitsets.scene.quantities import base_unit, find, value_of
-from limitsets.scene.units import Quantity, convert, parse
+from limitsets.scene.body import shape_of
+from limitsets.scene.quantities import STANDARD_GRAVITY, base_unit, value_of
+from limitsets.scene.units import convert, parse
 
 __all__ = ["Numbers", "numbers_of", "present", "with_present"]
 
@@ -93,8 +94,9 @@ class _Reader:
         self.open_speed = SPEED in names and _speed_is_open(scene, SPEED)
         shown = {name: value_of(scene, name) for name in names if not (self.open_speed and name == SPEED)}
         # a speed is written in place of kappa, a tilt in place of an acceleration: then it is what counts
-        self.tree: Any = scene.with_values(shown).text
-        self.unit, self.names, self.before = scene.unit, list(names), before
+        self.scene = scene.with_values(shown)
+        self.tree: Any = self.scene.text
+        self.names, self.before = list(names), before
 
     def constant(self, value: float) -> Dual:
         return Dual(value, np.zeros(self.before + len(self.names)))
@@ -105,17 +107,12 @@ class _Reader:
             found.slope[self.before + self.names.index(name)] = 1.0
         return found
 
-    def number(self, name: str) -> Dual:
-        place, node = find(name), self.tree
-        for word in place.path:
-            node = node[word]
-        value = convert(parse(node, place.dimension), base_unit(place.dimension, self.unit))
-        return self.seeded(value, name)
+    def read(self, text: str, dimension: str) -> Dual:
+        """Read a text that bears no quantity's name."""
+        return self.constant(convert(parse(text, dimension), base_unit(dimension, self.scene.unit)))
 
-    def triple(self, name: str) -> tuple[Dual, Dual, Dual]:
-        """Return a point mass: x, y, mass."""
-        x, y, mass = (self.number(f"{name}.{word}") for word in ("x", "y", "mass"))
-        return x, y, mass
+    def number(self, name: str) -> Dual:
+        return self.seeded(value_of(self.scene, name), name)
 
     def kappa(self) -> Dual:
         if "kappa" in self.tree["throw"]:
@@ -125,37 +122,13 @@ class _Reader:
         if "acceleration" in self.tree["gravity"]:
             gravity = self.number("gravity.acceleration")
         else:
-            standard = convert(Quantity("9.80665", "m/s^2"), f"{self.unit}/s^2")
-            gravity = sine(self.number("gravity.tilt")) * standard
+            gravity = sine(self.number("gravity.tilt")) * self.read(STANDARD_GRAVITY, "acceleration")
         speed = self.number(SPEED)
         return gravity / (speed * speed)
 
     def body(self) -> tuple[list[Dual], list[Dual], list[Dual], Dual]:
         """Return a, d and the length per side, and the radius of gyration."""
-        part, lengths = self.tree["part"], None
-        vertices: list[Any]
-        if "sides" in part:
-            lengths = [self.number(f"part.sides[{k}]") for k in range(3)]
-            vertices = list(triangle_of(lengths, square_root))
-        else:
-            vertices = [
-                tuple(self.number(f"part.vertices[{k}].{axis}") for axis in "xy")
-                for k in range(len(part["vertices"]))
-            ]
-        mass = part["mass"]
-        centre: Any
-        if "center" in mass:
-            along, above = (self.number(f"part.mass.center.{word}") for word in ("along", "above"))
-            centre, rho = (
-                OnSide(mass["center"]["side"], along, above),
-                self.number("part.mass.radius_of_gyration"),
-            )
-        else:
-            points = [self.triple(f"part.mass.points[{k}]") for k in range(len(mass.get("points", ())))]
-            unit = base_unit("mass per area", self.unit)
-            density = self.constant(convert(parse(mass["plate_density"], "mass per area"), unit))
-            found: Any = mass_of(vertices, density, points, square_root)
-            centre, rho = found.centre, found.radius_of_gyration
+        vertices, centre, lengths, rho = shape_of(self.tree["part"], self.number, self.read, square_root)
         # the throw does not depend on the corners
         sides = rest_of(vertices, centre, lengths, square_root, lambda y, _x: y)
         return [side[0] for side in sides], [side[1] for side in sides], [side[2] for side in sides], rho

@@ -19,8 +19,7 @@ from limitsets.errors import AnswerError
 from limitsets.inverse.critical.derivatives import is_share
 from limitsets.inverse.critical.seeded import present
 from limitsets.scene import Scene
-from limitsets.scene.quantities import base_unit, find
-from limitsets.scene.units import convert, parse
+from limitsets.scene.quantities import find, in_units
 
 __all__ = ["Unknowns", "unknowns_of"]
 
@@ -131,8 +130,4 @@ def _pair(scene: Scene, name: str, given: Sequence[Any] | None) -> tuple[float, 
 def _end(scene: Scene, name: str, value: Any, missing: float) -> float:
     if value is None:
         return missing
-    if isinstance(value, str):
-        dimension = find(name).dimension
-        unit = base_unit(dimension, scene.unit)
-        return convert(parse(value, dimension, key=name), unit)
-    return float(value)
+    return in_units(scene, name, value, key=name)

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from limitsets.files import as_json
 from limitsets.scene import Scene, dump
 
 if TYPE_CHECKING:
@@ -78,8 +78,6 @@ def save(found: RobustDesign, folder: Path) -> tuple[Path, ...]:
     folder.mkdir(parents=True, exist_ok=True)
     scene, answer = folder / f"{found.scene.name}.toml", folder / "design.json"
     dump(found.scene, scene)
-    answer.write_text(
-        json.dumps(to_json(found), indent=2, allow_nan=False) + "\n", encoding="utf-8", newline="\n"
-    )
+    answer.write_text(as_json(to_json(found)), encoding="utf-8", newline="\n")
     certificates = [path for one in found.margins for path in one.save(folder)]
     return (scene, answer, *certificates)

@@ -11,7 +11,7 @@ from limitsets.maps import advance
 from limitsets.maps.contract import kind_of
 from limitsets.scene import Scene
 
-__all__ = ["Feeding", "throws_to_feed"]
+__all__ = ["ThrowsToFeed", "throws_to_feed"]
 
 # Starts, and throws after which one that is not fed is given up.
 STARTS, MOST = 2000, 2000
@@ -20,7 +20,7 @@ NEAR = 0.05
 
 
 @dataclass(frozen=True)
-class Feeding:
+class ThrowsToFeed:
     """Throws to feed, sampled from random starts.
 
     Attributes
@@ -51,7 +51,7 @@ class Feeding:
         }
 
 
-def throws_to_feed(scene: Scene, x: float, side: int, *, starts: int = STARTS, seed: int = 0) -> Feeding:
+def throws_to_feed(scene: Scene, x: float, side: int, *, starts: int = STARTS, seed: int = 0) -> ThrowsToFeed:
     """Count throws until a part rests at x or beyond on a side.
 
     Parameters
@@ -67,7 +67,7 @@ def throws_to_feed(scene: Scene, x: float, side: int, *, starts: int = STARTS, s
 
     Returns
     -------
-    Feeding
+    ThrowsToFeed
 
     Examples
     --------
@@ -96,5 +96,5 @@ def throws_to_feed(scene: Scene, x: float, side: int, *, starts: int = STARTS, s
             break
     done = counts[counts > 0]
     if not done.size:
-        return Feeding(np.nan, np.nan, 0, lost, starts)
-    return Feeding(float(done.mean()), float(np.quantile(done, 0.95)), int(done.size), lost, starts)
+        return ThrowsToFeed(np.nan, np.nan, 0, lost, starts)
+    return ThrowsToFeed(float(done.mean()), float(np.quantile(done, 0.95)), int(done.size), lost, starts)

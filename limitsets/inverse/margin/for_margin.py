@@ -20,7 +20,7 @@ import numpy as np
 
 from limitsets.errors import AnswerError
 from limitsets.goals import Goal, OrientedBeyond, Reaches
-from limitsets.inverse.margin.feeding import Feeding, throws_to_feed
+from limitsets.inverse.margin.feeding import ThrowsToFeed, throws_to_feed
 from limitsets.inverse.margin.front import Option, best_of, front_of
 from limitsets.inverse.margin.lead import Lead, lead_of
 from limitsets.inverse.margin.search import POPULATION, Candidate, Search, Tell, bounds_of
@@ -28,6 +28,7 @@ from limitsets.inverse.margin.sharp import Box, Sharp, on_all_corners
 from limitsets.robust import Margin
 from limitsets.robust.margins.joint import joint_margin
 from limitsets.scene import Scene, load
+from limitsets.scene.quantities import base_unit, find
 
 __all__ = ["TOLERANCE", "RobustDesign", "fed_at", "robust_design"]
 
@@ -72,7 +73,7 @@ class RobustDesign:
         Proved and refuted, one for each of `goals`; empty where no proof was asked for.
     lead : Lead
         The point mass that makes it of a plate.
-    feeding : Feeding
+    feeding : ThrowsToFeed
         Throws to feed, sampled.
     front : tuple of Option
         Designs that no other one beats both in margin and in throws, by floats; the surest first.
@@ -84,7 +85,7 @@ class RobustDesign:
         The margin there, at the best X there, by floats.
     before_margins : tuple of Margin
         The same, proved and refuted.
-    before_feeding : Feeding or None
+    before_feeding : ThrowsToFeed or None
         Throws to feed there, sampled.
     evaluations : int
         Designs looked at.
@@ -101,13 +102,13 @@ class RobustDesign:
     sampled: Sharp
     margins: tuple[Margin, ...]
     lead: Lead
-    feeding: Feeding
+    feeding: ThrowsToFeed
     front: tuple[Option, ...]
     history: tuple[Candidate, ...]
     before: Scene
     before_sampled: Sharp | None
     before_margins: tuple[Margin, ...]
-    before_feeding: Feeding | None
+    before_feeding: ThrowsToFeed | None
     evaluations: int
     seconds: float
 
@@ -181,8 +182,10 @@ def _searched(
 
 def _rounded(scene: Scene, search: Search) -> Scene:
     """Write what was varied with few decimals."""
-    unit = scene.unit
-    return scene.with_values({name: f"{scene.value(name):.{DECIMALS}f} {unit}" for name in search.bounds})
+    units = {name: base_unit(find(name).dimension, scene.unit) for name in search.bounds}
+    return scene.with_values(
+        {name: f"{scene.value(name):.{DECIMALS}f} {unit}".rstrip() for name, unit in units.items()}
+    )
 
 
 def _with_purpose(scene: Scene, x: float, side: int, tolerance: Mapping[str, str], name: str) -> Scene:

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from limitsets.inverse.margin.feeding import Feeding, throws_to_feed
+from limitsets.inverse.margin.feeding import ThrowsToFeed, throws_to_feed
 from limitsets.inverse.margin.search import Candidate, Search
 from limitsets.inverse.margin.sharp import on_all_corners
 
@@ -26,12 +26,12 @@ class Option:
     ----------
     candidate : Candidate
         The design, with its margin by floats.
-    feeding : Feeding
+    feeding : ThrowsToFeed
         Throws to feed at its own best X, sampled.
     """
 
     candidate: Candidate
-    feeding: Feeding
+    feeding: ThrowsToFeed
 
     def to_json(self) -> dict[str, Any]:
         """Give it as a plain table for JSON."""

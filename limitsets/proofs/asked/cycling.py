@@ -43,7 +43,7 @@ def cycle_that(
     box = parameter_box(scene, tree=found.cover.box.scene)
     quiet = replace(found, cover=replace(found.cover, box=box))
     scattered = found.cover.box.landing > 0.0
-    kappa, landing = 0.5 * (box.lo.kappa + box.hi.kappa), 0.0 if scattered else None
+    kappa, landing = box.middle_kappa, 0.0 if scattered else None
     for cycle in proved_cycles(quiet, longest).cycles:
         if refutes(cycle):
             points = zip(cycle.lo.tolist(), cycle.hi.tolist(), cycle.side.tolist(), strict=True)

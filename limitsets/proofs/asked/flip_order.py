@@ -73,7 +73,7 @@ def _is_cycle(order: tuple[int, ...], sides: int) -> bool:
 def _against(found: Attraction, order: tuple[int, ...]) -> tuple[State, ...]:
     """Find an orbit in the attracting cells with a flip that the order has not, and prove it."""
     box = found.cover.box
-    choice = Choice(0.5 * (box.lo.kappa + box.hi.kappa), 0.0)
+    choice = Choice(box.middle_kappa, 0.0)
     start, on = settled(found)
     path = orbit(box.at_kappa(choice.kappa), start, on, THROWS)
     allowed = set(zip(order, (*order[1:], order[0]), strict=True))

@@ -20,7 +20,7 @@ from limitsets.proofs.attraction import BELOW, Attraction
 from limitsets.proofs.certificate import everywhere, targets
 from limitsets.scene import Scene
 
-__all__ = ["Answer", "Kind", "above", "below", "common", "peeled", "place", "undecided"]
+__all__ = ["Answer", "Kind", "above", "below", "common", "peeled", "place", "thrown_into", "undecided"]
 
 Mask = NDArray[np.bool_]
 
@@ -79,6 +79,17 @@ def place(found: Attraction, cell: int) -> str:
     side = int(found.cover.grid.side_of(cell))
     lo, hi = found.cover.grid.boxes([cell], side)
     return f"side {side}, x in [{lo[0, 0]:.6g}, {hi[0, 0]:.6g}]"
+
+
+def thrown_into(found: Attraction, bad: Mask) -> str:
+    """Name a cell from which a throw may land in one of some cells; empty if there is none."""
+    number = np.concatenate([[0], np.cumsum(bad)])
+    for ends in everywhere(found.cover):
+        cells = np.flatnonzero(ends[:, 0] >= 0)
+        hit = cells[number[ends[cells, 1] + 1] > number[ends[cells, 0]]]
+        if hit.size:
+            return place(found, int(hit[0]))
+    return ""
 
 
 def below(x: float) -> float:

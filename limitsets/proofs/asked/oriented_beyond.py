@@ -9,15 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from limitsets.goals import OrientedBeyond
-from limitsets.proofs.asked.kind import Answer, Kind, below, common, place, undecided
+from limitsets.proofs.asked.kind import Answer, Kind, below, common, thrown_into, undecided
 from limitsets.proofs.asked.search import from_attracting
 from limitsets.proofs.asked.starts import one_throw
 from limitsets.proofs.attraction import Attraction
-from limitsets.proofs.certificate import everywhere
 from limitsets.proofs.chains import stays_below
 from limitsets.scene import Scene
 
-__all__ = ["KIND"]
+__all__ = ["KIND", "section_of"]
 
 
 def _exceptions(found: Attraction, goal: OrientedBeyond) -> NDArray[np.bool_]:
@@ -32,7 +31,7 @@ def _exceptions(found: Attraction, goal: OrientedBeyond) -> NDArray[np.bool_]:
 def _prove(found: Attraction, scene: Scene, goal: OrientedBeyond) -> Answer:
     missing = common(found, anywhere=goal.from_anywhere)
     bad = _exceptions(found, goal)
-    more: dict[str, Any] = {"from_anywhere": True} if goal.from_anywhere else {}
+    more: dict[str, Any] = {}
     if goal.from_anywhere:
         reason = _thrown_there(found, goal, bad)
         # above the joint no cells are near enough: say that, not that a throw from there may land anywhere
@@ -44,9 +43,13 @@ def _prove(found: Attraction, scene: Scene, goal: OrientedBeyond) -> Answer:
             reason, more = "", {"throws": 2}
     if reason:
         return undecided(reason)
-    return Answer(
-        "proved", "", {"kind": goal.kind, "x": f"{goal.x!r} {scene.unit}", "side": goal.side} | more
-    )
+    return Answer("proved", "", section_of(goal, scene) | more)
+
+
+def section_of(goal: OrientedBeyond, scene: Scene) -> dict[str, Any]:
+    """Write the goal as a certificate has it."""
+    section = {"kind": goal.kind, "x": f"{goal.x!r} {scene.unit}", "side": goal.side}
+    return section | ({"from_anywhere": True} if goal.from_anywhere else {})
 
 
 def _beyond(found: Attraction, goal: OrientedBeyond, bad: NDArray[np.bool_]) -> str:
@@ -78,15 +81,9 @@ def _ask(found: Attraction, scene: Scene, goal: OrientedBeyond) -> Answer:
 
 def _thrown_there(found: Attraction, goal: OrientedBeyond, bad: NDArray[np.bool_]) -> str:
     """Name a throw that may land beyond x on another side; empty if there is none."""
-    number = np.concatenate([[0], np.cumsum(bad)])
-    for ends in everywhere(found.cover):
-        cells = np.flatnonzero(ends[:, 0] >= 0)
-        hit = cells[number[ends[cells, 1] + 1] > number[ends[cells, 0]]]
-        if hit.size:
-            return (
-                f"a throw from {place(found, int(hit[0]))} may land beyond x = {goal.x:g} on another side than"
-                f" {goal.side}"
-            )
+    start = thrown_into(found, bad)
+    if start:
+        return f"a throw from {start} may land beyond x = {goal.x:g} on another side than {goal.side}"
     for side, near in enumerate(found.joint):
         if (side != goal.side or near.rolls) and not near.reach <= below(goal.x):
             return f"a throw from near the joint on side {side} may land beyond x = {goal.x:g}"

@@ -14,11 +14,10 @@ from numpy.typing import NDArray
 
 from limitsets.errors import AnswerError
 from limitsets.goals import Predicate
-from limitsets.proofs.asked.kind import Answer, Kind, common, place, undecided
+from limitsets.proofs.asked.kind import Answer, Kind, common, place, thrown_into, undecided
 from limitsets.proofs.asked.search import State, from_attracting
 from limitsets.proofs.asked.starts import one_throw
 from limitsets.proofs.attraction import Attraction
-from limitsets.proofs.certificate import everywhere
 from limitsets.scene import Scene
 
 __all__ = ["KIND"]
@@ -47,12 +46,9 @@ def _missing(found: Attraction, goal: Predicate) -> str:
     if not goal.from_anywhere:
         wrong = np.flatnonzero(bad & (found.component >= 0))
         return f"{goal.name}: not on {place(found, int(wrong[0]))}" if wrong.size else ""
-    number = np.concatenate([[0], np.cumsum(bad)])
-    for ends in everywhere(found.cover):
-        cells = np.flatnonzero(ends[:, 0] >= 0)
-        hit = cells[number[ends[cells, 1] + 1] > number[ends[cells, 0]]]
-        if hit.size:
-            return f"{goal.name}: not where a throw from {place(found, int(hit[0]))} may land"
+    start = thrown_into(found, bad)
+    if start:
+        return f"{goal.name}: not where a throw from {start} may land"
     foot = found.cover.box.bare[0].a
     for side, near in enumerate(found.joint):
         landing = np.array([foot[side]]), np.array([near.reach])

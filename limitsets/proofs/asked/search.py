@@ -20,7 +20,6 @@ from limitsets.proofs.parameters import ParameterBox
 from limitsets.proofs.replay import replay
 
 __all__ = [
-    "MORE_THAN_ROUNDING",
     "Choice",
     "Path",
     "Reached",
@@ -30,9 +29,12 @@ __all__ = [
     "from_attracting",
     "long_orbit",
     "middle",
+    "proved_wrong",
+    "proved_wrong_inside",
     "replayed",
     "settled",
     "throws",
+    "violation",
 ]
 
 Wrong: TypeAlias = Callable[[Any, Any], Any]
@@ -98,9 +100,10 @@ def choices(box: ParameterBox, kappas: int = CHOICES) -> list[Choice]:
     A little inside the bounds, so that each is one of the noise's whatever the last digit.
     """
     ends, shift = (box.lo.kappa, box.hi.kappa), box.landing * (1.0 - 1e-9)
-    varies = "throw.speed" in box.noise or "gravity.tilt" in box.noise
     margin = 1e-9 * (ends[1] - ends[0])
-    values = np.linspace(ends[0] + margin, ends[1] - margin, kappas) if varies else [0.5 * sum(ends)]
+    values = (
+        np.linspace(ends[0] + margin, ends[1] - margin, kappas) if box.kappa_varies else [box.middle_kappa]
+    )
     shifts = (-shift, 0.0, shift) if shift > 0.0 else (0.0,)
     return [Choice(float(kappa), landing) for kappa in values for landing in shifts]
 
@@ -131,6 +134,12 @@ def throws(box: ParameterBox, x: Any, side: Any, options: list[Choice]) -> Throw
                     stays = (after > box.hi.a[to]) & (after <= box.lo.arm_length)
                     found.append((after, to, state, np.full(to.size, number), stays))
     return Thrown(*(np.concatenate(part) for part in zip(*found, strict=True)))
+
+
+def violation(thrown: Thrown, wrong: Wrong) -> NDArray[np.int64]:
+    """Find the farthest image on the arm that violates the goal by more than rounding: its number, or no number."""
+    bad = np.flatnonzero(wrong(thrown.x * MORE_THAN_ROUNDING, thrown.side) & thrown.stays)
+    return bad[np.argsort(-thrown.x[bad])[:1]]
 
 
 @dataclass(eq=False)
@@ -188,7 +197,7 @@ def settled(found: Attraction) -> tuple[float, int]:
     """
     start, on = middle(found, found.cells.numbers())
     box = found.cover.box
-    path = orbit(box.at_kappa(0.5 * (box.lo.kappa + box.hi.kappa)), start, on, SETTLING)
+    path = orbit(box.at_kappa(box.middle_kappa), start, on, SETTLING)
     return float(path.x[-1]), int(path.side[-1])
 
 
@@ -201,9 +210,9 @@ def _search(found: Attraction, wrong: Wrong) -> Path | None:
     reached, options = Reached.of(x, side), choices(found.cover.box)
     for _ in range(MOST_THROWS):
         thrown = throws(found.cover.box, x, side, options)
-        bad = np.flatnonzero(wrong(thrown.x * MORE_THAN_ROUNDING, thrown.side) & thrown.stays)
+        bad = violation(thrown, wrong)
         if bad.size:
-            reached.add(thrown, bad[np.argmax(thrown.x[bad])][None])
+            reached.add(thrown, bad)
             return reached.path(0, options)
         cells = np.full(thrown.x.size, -1)
         for s in np.unique(thrown.side).tolist():
@@ -236,7 +245,7 @@ def long_orbit(
         Length at most.
     """
     start, on = settled(found) if cells is None else middle(found, cells)
-    (choice,) = {Choice(0.5 * (found.cover.box.lo.kappa + found.cover.box.hi.kappa), 0.0)}
+    choice = Choice(found.cover.box.middle_kappa, 0.0)
     path = orbit(found.cover.box.at_kappa(choice.kappa), start, on, throws)
     bad = np.flatnonzero(wrong(path.x * MORE_THAN_ROUNDING, path.side))
     if not bad.size:
@@ -261,13 +270,21 @@ def from_attracting(found: Attraction, wrong: Wrong) -> tuple[State, ...]:
     tuple of State
         The orbit, enclosed; empty if the search finds none.
     """
-    box = found.cover.box
-    path = _search(found, wrong) if box.noise else long_orbit(found, wrong)
-    if path is None:
-        return ()
+    path = _search(found, wrong) if found.cover.box.noise else long_orbit(found, wrong)
+    return () if path is None else proved_wrong_inside(found, path, wrong)
+
+
+def proved_wrong_inside(found: Attraction, path: Path, wrong: Wrong) -> tuple[State, ...]:
+    """Prove an orbit as `proved_wrong`, and that it begins in the attracting cells; empty if it cannot be."""
     (cell,) = found.cover.grid.index([path.x[0]], path.side[0])
+    inside = cell >= 0 and found.component[cell] >= 0
+    return proved_wrong(found.cover.box, path, wrong) if inside else ()
+
+
+def proved_wrong(box: ParameterBox, path: Path, wrong: Wrong) -> tuple[State, ...]:
+    """Prove an orbit as `replayed`, and that its last state violates the goal; empty if it cannot be."""
     states = replayed(box, path)
-    if cell < 0 or found.component[cell] < 0 or not states:
+    if not states:
         return ()
     return states if wrong(np.array([states[-1].lo]), np.array([states[-1].side])).all() else ()
 
@@ -282,8 +299,7 @@ def replayed(box: ParameterBox, path: Path) -> tuple[State, ...]:
     path : Path
         The orbit as found.
     """
-    varies = "throw.speed" in box.noise or "gravity.tilt" in box.noise
-    ends = [[t.kappa, t.kappa] if varies else [box.lo.kappa, box.hi.kappa] for t in path.thrown]
+    ends = [[t.kappa, t.kappa] if box.kappa_varies else [box.lo.kappa, box.hi.kappa] for t in path.thrown]
     bounds = np.array(ends, dtype=float).reshape(-1, 2).T
     shifts = np.array([t.landing for t in path.thrown], dtype=float)
     lo, hi, sides = replay(box, path.x[0], path.side[0], bounds, shifts)

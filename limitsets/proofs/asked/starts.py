@@ -8,15 +8,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from limitsets.proofs.asked.search import (
-    MORE_THAN_ROUNDING,
     Choice,
     Path,
     Reached,
     State,
     Wrong,
     choices,
+    proved_wrong,
     replayed,
     throws,
+    violation,
 )
 from limitsets.proofs.attraction import Attraction
 from limitsets.proofs.parameters import ParameterBox
@@ -34,15 +35,13 @@ def one_throw(found: Attraction, wrong: Wrong) -> tuple[State, ...]:
     side = np.repeat(np.arange(grid.sides), [edges.size - 1 for (edges,) in grid.edges])
     options = choices(box, 3)
     thrown = throws(box, x, side, options)
-    bad = np.flatnonzero(wrong(thrown.x * MORE_THAN_ROUNDING, thrown.side) & thrown.stays)
+    bad = violation(thrown, wrong)
     if not bad.size:
         return ()
     reached = Reached.of(x, side)
-    reached.add(thrown, bad[np.argmax(thrown.x[bad])][None])
-    states = replayed(box, reached.path(0, options))
-    if not states or not wrong(np.array([states[-1].lo]), np.array([states[-1].side])).all():
-        return ()
-    return states if states[-1].hi <= box.lo.arm_length else ()
+    reached.add(thrown, bad)
+    states = proved_wrong(box, reached.path(0, options), wrong)
+    return states if states and states[-1].hi <= box.lo.arm_length else ()
 
 
 def leaving(found: Attraction) -> tuple[State, ...]:

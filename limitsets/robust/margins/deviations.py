@@ -6,19 +6,17 @@ here are what `limitsets.certify` and a certificate take, so a size is always on
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from decimal import ROUND_CEILING, ROUND_FLOOR, Context, Decimal
 from fractions import Fraction
-from typing import Any
 
 from limitsets.errors import AnswerError
 from limitsets.proofs.parameters import VARYING
 from limitsets.proofs.rational import Span
 from limitsets.proofs.tolerance import Piece
 from limitsets.scene import Scene
-from limitsets.scene.quantities import NAMES, find
-from limitsets.scene.units import exact_factor, parse
+from limitsets.scene.quantities import find, text_at, texts
+from limitsets.scene.units import Quantity, exact_factor, parse
 
 __all__ = ["READINGS", "Measure", "decimal", "given", "measure", "measures", "short"]
 
@@ -101,9 +99,14 @@ class Measure:
         return "throw.kappa" if by_kappa else self.quantity
 
     @property
+    def given(self) -> Quantity:
+        """The value of `key` as the scene gives it."""
+        return parse(_text_at(self.scene, self.key), find(self.key).dimension)
+
+    @property
     def nominal(self) -> Fraction:
         """The value of `key`, in the unit in which the scene gives it."""
-        return Fraction(parse(_text_at(self.scene, self.key), find(self.key).dimension).number)
+        return Fraction(self.given.number)
 
     @property
     def least(self) -> Fraction:
@@ -128,8 +131,7 @@ class Measure:
             return None
         if self.relative:
             return 100 * _WIDEST
-        own = parse(_text_at(self.scene, self.key), find(self.key).dimension).unit
-        return max(abs(self.nominal) * exact_factor(own, self.unit) * _WIDEST, self.least)
+        return max(abs(self.nominal) * exact_factor(self.given.unit, self.unit) * _WIDEST, self.least)
 
     def text(self, size: Fraction) -> str:
         """Write a size with its unit, as `limitsets.certify` takes it."""
@@ -141,8 +143,7 @@ class Measure:
             return self.nominal / (1 + size / 100) ** 2
         if self.relative:
             return self.nominal * (1 + size / 100)
-        own = parse(_text_at(self.scene, self.key), find(self.key).dimension).unit
-        return self.nominal + size * exact_factor(self.unit, own)
+        return self.nominal + size * exact_factor(self.unit, self.given.unit)
 
     def between(self, one: Fraction, other: Fraction) -> Span:
         """Return the values at all deviations between two."""
@@ -164,31 +165,12 @@ class Measure:
 
 
 def _text_at(scene: Scene, name: str) -> str:
-    node: Any = scene.text
-    for word in find(name).path:
-        known = word in node if isinstance(node, dict) else isinstance(word, int) and word < len(node)
-        if not known:
-            raise AnswerError(
-                "the quantity", name, f"one that the scene gives: {', '.join(given(scene))}", "name another"
-            )
-        node = node[word]
-    return str(node)
-
-
-def _names(node: Any, name: str) -> Iterator[str]:
-    """Walk a scene for what bears the name of a quantity."""
-    if isinstance(node, str):
-        parts = name.split("[")
-        pattern = "[i]".join([parts[0], *(part.split("]", 1)[1] for part in parts[1:])])
-        if pattern in NAMES:
-            yield name
-    elif isinstance(node, dict):
-        for word, inner in node.items():
-            yield from _names(inner, f"{name}.{word}" if name else word)
-    elif isinstance(node, list):
-        corner = name.startswith("part.vertices[")
-        for k, inner in enumerate(node):
-            yield from _names(inner, f"{name}.{'xy'[k]}" if corner else f"{name}[{k}]")
+    text = text_at(scene.text, name)
+    if text is None:
+        raise AnswerError(
+            "the quantity", name, f"one that the scene gives: {', '.join(given(scene))}", "name another"
+        )
+    return str(text)
 
 
 def given(scene: Scene) -> tuple[str, ...]:
@@ -203,7 +185,7 @@ def given(scene: Scene) -> tuple[str, ...]:
     by_kappa = "kappa" in scene.text["throw"]
     gravity = ("gravity.acceleration", "gravity.tilt")
     tables = {word: scene.text[word] for word in ("part", "arm", "throw", "gravity") if word in scene.text}
-    found = [name for name in _names(tables, "") if name not in ("throw.kappa", "throw.speed")]
+    found = [name for name, _ in texts(tables) if name not in ("throw.kappa", "throw.speed")]
     kept = [name for name in found if not (by_kappa and name in gravity[:1])]
     return (*kept, "throw.speed", "landing.x")
 

@@ -21,6 +21,7 @@ from limitsets.robust.margins.asking import Asked, Question
 from limitsets.robust.margins.brackets import Bracket, bracket_fixed, bracket_per_throw
 from limitsets.robust.margins.deviations import Measure, measure, measures
 from limitsets.scene import Scene, load
+from limitsets.scene.units import exact_factor
 
 __all__ = ["Margin", "asked_of", "goals_of", "margin"]
 
@@ -122,7 +123,7 @@ def goals_of(scene: Scene, goal: GoalLike | Sequence[GoalLike] | None) -> tuple[
     found: list[Goal] = []
     for one in several:
         if hasattr(one, "kind"):
-            found.append(one)  # type: ignore[arg-type]
+            found.append(one)  # type: ignore[arg-type]  # a kind is what makes it a goal
         elif callable(one):
             found.append(Predicate(one, getattr(one, "__name__", "the predicate")))
         else:
@@ -243,7 +244,7 @@ def _single(question: Question, one: Measure, width: Fraction, tell: Callable[[f
         float(found.proved),
         None if found.refuted is None else float(found.refuted),
         one.unit,
-        None if one.quantity == "landing.x" else _nominal(question.scene, one),
+        _nominal(one),
         found.reason,
         found.closed(width),
         time.perf_counter() - begin,
@@ -263,10 +264,11 @@ def _texts(one: Measure, size: Fraction) -> tuple[dict[str, str], dict[str, str]
     return (said, {}) if one.reading == "fixed" else ({}, said)
 
 
-def _nominal(scene: Scene, one: Measure) -> float | None:
-    if one.key != one.quantity:
+def _nominal(one: Measure) -> float | None:
+    """Give the value; of a length or an angle in the unit of its deviation."""
+    if one.key != one.quantity or one.quantity == "landing.x":
         return None
-    return float(one.nominal)
+    return float(one.nominal if one.relative else one.nominal * exact_factor(one.given.unit, one.unit))
 
 
 def _of_none(question: Question, nominal: Asked) -> Bracket:

@@ -12,16 +12,16 @@ from numpy.typing import NDArray
 
 from limitsets.maps import Orbit, orbit
 from limitsets.proofs.asked.search import (
-    MORE_THAN_ROUNDING,
     Choice,
     Path,
     Reached,
     State,
     Wrong,
     choices,
-    replayed,
+    proved_wrong_inside,
     settled,
     throws,
+    violation,
 )
 from limitsets.proofs.attraction import Attraction
 
@@ -94,8 +94,7 @@ def worst_orbit(found: Attraction, wrong: Wrong) -> tuple[State, ...]:
     box, options = found.cover.box, choices(found.cover.box, KAPPAS)
     raster = _Raster(found)
     start, on = settled(found)
-    usual = Choice(0.5 * (box.lo.kappa + box.hi.kappa), 0.0)
-    path = orbit(box.at_kappa(usual.kappa), start, on, LENGTH)
+    path = orbit(box.at_kappa(box.middle_kappa), start, on, LENGTH)
     here = raster.nearest(path.x, path.side)
     levels = [_beside(wrong(raster.x, raster.side))]
     known = np.zeros(raster.x.size, dtype=bool)
@@ -132,8 +131,7 @@ def _followed(
     for back, level in reversed(list(enumerate(levels[:-1]))):
         thrown = throws(found.cover.box, reached.x[-1], reached.side[-1], options)
         if back == 0:
-            keep = np.flatnonzero(wrong(thrown.x * MORE_THAN_ROUNDING, thrown.side) & thrown.stays)
-            keep = keep[np.argsort(-thrown.x[keep])[:1]]
+            keep = violation(thrown, wrong)
         else:
             to = raster.nearest(thrown.x, thrown.side)
             keep = np.flatnonzero((to >= 0) & level[to] & thrown.stays)
@@ -149,16 +147,11 @@ def _followed(
 
 def _proved(found: Attraction, wrong: Wrong, path: Orbit, first: int, tail: Path) -> tuple[State, ...]:
     """Prove the orbit, with some throws of the long one before; empty if it cannot be."""
-    box = found.cover.box
     before = slice(first - SHOWN, first)
-    usual = Choice(0.5 * (box.lo.kappa + box.hi.kappa), 0.0)
+    usual = Choice(found.cover.box.middle_kappa, 0.0)
     whole = Path(
         [*path.x[before].tolist(), *tail.x],
         [*path.side[before].tolist(), *tail.side],
         [*([usual] * SHOWN), *tail.thrown],
     )
-    states = replayed(box, whole)
-    if not states or not wrong(np.array([states[-1].lo]), np.array([states[-1].side])).all():
-        return ()
-    (cell,) = found.cover.grid.index([whole.x[0]], whole.side[0])
-    return states if cell >= 0 and found.component[cell] >= 0 else ()
+    return proved_wrong_inside(found, whole, wrong)

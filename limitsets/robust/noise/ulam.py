@@ -109,7 +109,8 @@ class Transfer:
         """Return a function's expected value one step later, from each cell: P v; ways out count nothing."""
         if self.written_out:
             return self.matrix @ values  # type: ignore[no-any-return]  # scipy is untyped
-        return self.throw.apply(values if self.landing is None else self.landing.apply(values))  # type: ignore[no-any-return]
+        after = values if self.landing is None else self.landing.apply(values)
+        return self.throw.apply(after)  # type: ignore[no-any-return]  # Any: it may be a sparse array
 
     def adjoint(self, masses: Array) -> Array:
         """Where masses in the cells are one step later: P^T u; what leaves is missing."""

@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from limitsets.scene.quantities import find
+from limitsets.scene.quantities import find, text_at
 from limitsets.scene.units import exact_factor, parse
 
 if TYPE_CHECKING:
@@ -153,15 +153,9 @@ def nominal_of(scene: Scene, quantity: str) -> tuple[float | None, str]:
     """Find the value of a quantity as people say it, and its unit; None for what has none."""
     if quantity in ("joint", "landing.x"):
         return None, scene.unit
-    place = find(quantity)
-    node: Any = scene.text
-    for word in place.path:
-        known = word in node if isinstance(node, Mapping) else isinstance(word, int) and word < len(node)
-        if not known:
-            break
-        node = node[word]
-    else:
-        given = parse(node, place.dimension)
+    text = text_at(scene.text, quantity)
+    if text is not None:
+        given = parse(text, find(quantity).dimension)
         return float(given.number), given.unit
     if quantity == "throw.speed" and scene.gravity is not None:
         return math.degrees(math.sqrt(scene.gravity / scene.kappa)), "deg/s"

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from limitsets.errors import AnswerError
-from limitsets.files import replaced
+from limitsets.files import as_json, replaced
 from limitsets.goals import Goal, Predicate
 from limitsets.robust.margins.answer import goal_table
 from limitsets.robust.margins.finding import Margin
@@ -137,8 +137,7 @@ class Kept:
             "curve": self.curve,
         }
         with replaced(self.folder) as draft:
-            words = json.dumps(record, indent=2, allow_nan=False)
-            (draft / RECORD).write_text(words + "\n", encoding="utf-8", newline="\n")
+            (draft / RECORD).write_text(as_json(record), encoding="utf-8", newline="\n")
 
     def _files(self, margin: Margin) -> list[str]:
         """Write the proof and the counterexample; their names, seen from the folder of the report."""

@@ -1,0 +1,78 @@
+"""What people write after options: numbers, places on the arm, deviations and bounds of quantities."""
+
+from __future__ import annotations
+
+import math
+import re
+from typing import TYPE_CHECKING, TypeAlias
+
+from limitsets.errors import LimitsetsError
+
+if TYPE_CHECKING:
+    from limitsets.scene import Scene
+
+__all__ = ["Ends", "deviations", "ends_of", "number", "place", "position"]
+
+_BARE = re.compile(r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]{1,3})?")
+
+Ends: TypeAlias = tuple[float | str | None, float | str | None]
+"""Lowest and highest: a number in the scene's unit, text with a unit, or None for no bound."""
+
+
+def number(word: str) -> float | str:
+    """Read a bare number in the scene's unit; text with a unit is read further on."""
+    return float(word) if _BARE.fullmatch(word.strip()) else word.strip()
+
+
+def place(scene: Scene, text: str) -> float:
+    """Read --x: with a unit, or a bare number in the scene's unit."""
+    from limitsets.scene.units import convert, parse
+
+    word = number(text)
+    return word if isinstance(word, float) else convert(parse(text, "length", key="--x"), scene.unit)
+
+
+def position(scene: Scene, text: str) -> float:
+    """Read --x, where a part is to rest.
+
+    Raises
+    ------
+    LimitsetsError
+        No number, a unit of something else, or a place beyond the arm's end.
+    """
+    value = place(scene, text)
+    if not (math.isfinite(value) and value <= scene.arm_length):
+        allowed = f"a place on the arm, up to {scene.arm_length:g} {scene.unit}"
+        raise LimitsetsError("x", text, allowed, "start where a part can rest", key="--x")
+    return value
+
+
+def deviations(option: str, words: list[str] | None) -> dict[str, str]:
+    """Read the words of a repeatable option, QUANTITY=DEVIATION each."""
+    found: dict[str, str] = {}
+    for word in words or []:
+        name, sign, text = word.partition("=")
+        name = name.strip()
+        if not sign or name in found:
+            remedy = "name each quantity once" if sign else "put a sign of equality between them"
+            raise LimitsetsError(option.lstrip("-"), word, "QUANTITY=DEVIATION", remedy, key=option)
+        found[name] = text.strip()
+    return found
+
+
+def ends_of(words: list[str] | None) -> dict[str, Ends]:
+    """Read the words of --bounds, QUANTITY=LOWEST:HIGHEST each."""
+    found: dict[str, Ends] = {}
+    for word in words or []:
+        name, sign, text = word.partition("=")
+        lo, colon, hi = text.partition(":")
+        if not (sign and colon) or name.strip() in found:
+            remedy = (
+                "name each quantity once"
+                if sign and colon
+                else "put = after the quantity, : between the bounds"
+            )
+            raise LimitsetsError("the bounds", word, "QUANTITY=LOWEST:HIGHEST", remedy, key="--bounds")
+        ends = [number(end.strip("'\" ")) if end.strip("'\" ") else None for end in (lo, hi)]
+        found[name.strip()] = (ends[0], ends[1])
+    return found
