@@ -33,6 +33,9 @@ FINER = (0.06, 0.015)
 # A part is worth a try from this share of what its worst corner has to spare.
 WORTH = 0.15
 
+# Share of the largest cost that a quantity counts for at least, where nothing attracts.
+LEAST_SHARE = 0.2
+
 # A piece narrower than this share of the box is not cut again.
 NARROWEST = Fraction(1, 4096)
 
@@ -94,7 +97,7 @@ class Cutting:
             return _Guess(1.0, 1.0, k, (part.low[k] + part.high[k]) / 2)
         costs, fall = self.cost * effects.cost, np.abs(effects.fall)
         at_corner = effects.spare - effects.fall @ (0.5 * (low + high)) - fall @ half
-        left = at_corner - np.maximum(costs - fall, 0.0) @ half
+        left = at_corner - np.where(effects.kept[:, None], 0.0, np.maximum(costs - fall, 0.0)) @ half
         worst = int(np.argmin(left))
         k = int(np.argmax(costs[worst] * half))
         # the part on the good side is to be as long as it may be
@@ -131,10 +134,24 @@ class Cutting:
             if why:
                 failed.append((part.near, why))
                 continue
-            for piece in part.cut(guess.k, guess.at, number):
+            k, at = self._where(part, guess, found)
+            for piece in part.cut(k, at, number):
                 heapq.heappush(waiting, piece)
             number += 2
         return min(failed, default=(Fraction(1), ""))
+
+    def _where(self, part: _Part, guess: _Guess, found: Asked | None) -> tuple[int, Fraction]:
+        """Say along which quantity to cut a part, and where.
+
+        Where nothing attracts, or no part is proved to rest, what a quantity costs elsewhere says little: the widest.
+        """
+        cells = None if found is None else found.found
+        if found is None or (cells is not None and (cells.component >= 0).any()):
+            return guess.k, guess.at
+        widths = np.array([float(hi - lo) for lo, hi in zip(part.low, part.high, strict=True)])
+        cost = self.effects.cost.max(axis=0, initial=0.0)
+        k = int(np.argmax(widths * np.maximum(cost / max(cost.max(initial=0.0), 1e-300), LEAST_SHARE)))
+        return k, (part.low[k] + part.high[k]) / 2
 
     def _stop(self, part: _Part, guess: _Guess, found: Asked | None, waiting: list[_Part], late: bool) -> str:
         """Say why a part is given up; empty if it is to be cut."""

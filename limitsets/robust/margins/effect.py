@@ -52,12 +52,22 @@ class Effects:
     fall : ndarray, shape (n, quantities)
         By how much each falls when a quantity rises by its tolerance.
     cost : ndarray, shape (n, quantities)
-        By how much less is proved of each when a quantity may be anywhere in its tolerance, proved as a whole.
+        By how much less is proved of each when a quantity may be anywhere in its tolerance, proved as noise.
+    kept : ndarray of bool, shape (n,)
+        Whether two throws with the same parameters are looked at: then what is proved falls as the corners do.
     """
 
     spare: NDArray[np.float64]
     fall: NDArray[np.float64]
     cost: NDArray[np.float64]
+    kept: NDArray[np.bool_]
+
+    @classmethod
+    def none(cls, quantities: int) -> Effects:
+        """Return what is known where nothing attracts."""
+        return cls(
+            np.zeros(0), np.zeros((0, quantities)), np.zeros((0, quantities)), np.zeros(0, dtype=np.bool_)
+        )
 
     def corners(self) -> list[tuple[int, ...]]:
         """Signs of the worst corner for each way to fail, the worst of all first."""
@@ -101,7 +111,7 @@ def effects_of(question: Question, measures: Sequence[Measure], tolerance: Mappi
     """
     nominal = question.prove(finest=1)
     if nominal.found is None or not (nominal.found.component >= 0).any():
-        return Effects(np.zeros(0), *(np.zeros((0, len(measures))),) * 2)
+        return Effects.none(len(measures))
     start, none = settled(nominal.found), [Fraction(0)] * len(measures)
     spare = _spare(question, scene_at(measures, none), start)
     falls, costs = [], []
@@ -120,7 +130,12 @@ def effects_of(question: Question, measures: Sequence[Measure], tolerance: Mappi
     fall = np.array(falls)
     cost = np.maximum(np.array(costs), 1.2 * np.abs(fall))
     usable = np.isfinite(spare) & np.isfinite(fall).all(axis=0) & np.isfinite(cost).all(axis=0)
-    return Effects(spare[usable], fall.T[usable], cost.T[usable])
+    kept = [
+        isinstance(goal, OrientedBeyond) and not goal.from_anywhere
+        for goal in question.goals
+        for _ in _to_spare(goal, np.zeros(question.box(None, {}).lo.a.size).tolist())
+    ]
+    return Effects(spare[usable], fall.T[usable], cost.T[usable], np.array(kept, dtype=np.bool_)[usable])
 
 
 def _proved_of(question: Question, piece: Piece | None) -> NDArray[np.float64]:

@@ -10,8 +10,6 @@ import time
 from collections.abc import Mapping
 from fractions import Fraction
 
-import numpy as np
-
 from limitsets.goals import Goal
 from limitsets.robust.margins.asking import Asked
 from limitsets.robust.margins.corners import at_corners, rounded
@@ -67,11 +65,7 @@ def joint_margin(
     texts = dict(scene.text.get("tolerance", {}) if tolerance is None else tolerance)
     vector = Tolerance.of(question.scene, texts)
     share = Fraction(repr(width))
-    effects = (
-        effects_of(question, vector.measures, _sizes(vector))
-        if vector.measures
-        else Effects(np.zeros(0), np.zeros((0, 0)), np.zeros((0, 0)))
-    )
+    effects = effects_of(question, vector.measures, _sizes(vector)) if vector.measures else Effects.none(0)
     good, bad, against, reason = at_corners(question, vector, effects, share / 8)
     target = rounded(min(good, bad * (1 - share * Fraction(9, 10))) if bad is not None else good)
     tell(0.05)
