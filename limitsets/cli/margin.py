@@ -103,22 +103,13 @@ def _write(found: tuple[Margin, ...], records: list[dict[str, Any]], out: Path) 
         tornado(found).savefig(draft / "margins.png")
 
 
-def _size(value: float | None, unit: str, *, up: bool) -> str:
-    """Write a size with four digits that is not better than what is known."""
-    if value is None:
-        return "-"
-    from decimal import ROUND_CEILING, ROUND_FLOOR, Context, Decimal
-
-    short = Context(prec=4, rounding=ROUND_CEILING if up else ROUND_FLOOR).create_decimal(
-        Decimal(repr(value))
-    )
-    return f"{short:f} {unit}".strip() if unit else f"{short:f} times"
-
-
 def _text(found: tuple[Margin, ...], out: Path | None) -> None:
+    from limitsets.robust.margins.words import bound
+
     rows = []
     for each in found:
-        low, high = _size(each.proved, each.unit, up=False), _size(each.refuted, each.unit, up=True)
+        unit = each.unit or "times"
+        low, high = bound(each.proved, unit), bound(each.refuted, unit, up=True)
         rows.append([each.quantity, READINGS[each.reading], low, high])
     typer.echo(
         f"{found[0].scene.name}: {' and '.join(_words(goal, found[0].scene.unit) for goal in found[0].goals)}"

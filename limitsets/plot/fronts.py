@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.lines import Line2D
-from matplotlib.ticker import ScalarFormatter
+from matplotlib.ticker import LogLocator, NullFormatter, ScalarFormatter
 
 from limitsets.errors import AnswerError
 from limitsets.plot import style
@@ -78,6 +78,7 @@ def _front(axes: Axes, found: RobustDesign) -> list[Line2D]:
     for margins_of, sampled, feeding, colour, marker, label in points:
         if sampled is None or feeding is None:
             continue
+        axes.vlines(sampled.margin, feeding.mean, feeding.quantile_95, color=colour, lw=0.8, alpha=0.6)
         axes.plot(sampled.margin, feeding.mean, color=colour, marker=marker, ms=7.0, ls="none")
         said = label
         for one in margins_of:
@@ -87,8 +88,9 @@ def _front(axes: Axes, found: RobustDesign) -> list[Line2D]:
     axes.set_xlabel("joint margin, as a factor of the tolerance")
     axes.set_ylabel("throws to feed from random starts")
     axes.set_yscale("log")
+    axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
     axes.yaxis.set_major_formatter(ScalarFormatter())
-    axes.yaxis.set_minor_formatter(ScalarFormatter())
+    axes.yaxis.set_minor_formatter(NullFormatter())
     axes.set_title("throws: mean, and 95 % at the end of each line", loc="left", fontsize=10)
     return handles
 

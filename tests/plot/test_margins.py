@@ -48,7 +48,7 @@ def test_the_curve_is_drawn(curve):
 
 
 def test_a_side_that_is_never_farthest_is_refused():
-    with pytest.raises(LimitsetsError, match="farther"):
+    with pytest.raises(LimitsetsError, match="farthest out on, 2;"):
         margins_beyond("paper-designed", 0, places=2)
 
 

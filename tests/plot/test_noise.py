@@ -36,7 +36,7 @@ def test_density_has_the_shares_in_its_titles(found, thrown):
         values, edges, _ = drawn[0].get_data()
         assert float(values @ np.diff(edges)) == pytest.approx(share, rel=1e-9)
     words = [text.get_text() for legend in figure.legends for text in legend.get_texts()]
-    assert words == ["2e4 throws", "transfer operator", "x = 20.5"]
+    assert words == ["2e4 throws", "transfer operator", "X = 20.5 in"]
 
 
 def test_arrivals_mark_mean_and_quantile(found, thrown):

@@ -259,3 +259,12 @@ def test_a_scene_without_a_goal_is_asked_for_one():
     del tree["goal"]
     with pytest.raises(LimitsetsError, match="say what has to hold"):
         ls.margin(ls.load(tree), "throw.speed")
+
+
+def test_the_value_is_in_the_unit_of_its_deviation():
+    """The scene in metres with its surface 0.2 in below the joint: 5.08 mm."""
+    tree = ls.load("paper-designed").as_dict()
+    tree["arm"] = {"surface_height": "-5.08 mm", "length": "0.7112 m"}
+    (found,) = ls.margin(ls.load(tree), "arm.surface_height", goal=OrientedBeyond(0.508, 2), width=0.5)
+    assert found.unit == "m"
+    assert found.nominal == pytest.approx(-0.00508, rel=1e-12)

@@ -106,6 +106,11 @@ class Measure:
         return Fraction(parse(_text_at(self.scene, self.key), find(self.key).dimension).number)
 
     @property
+    def own_unit(self) -> str:
+        """The unit in which the scene gives `key`."""
+        return parse(_text_at(self.scene, self.key), find(self.key).dimension).unit
+
+    @property
     def least(self) -> Fraction:
         """A size that is small for such a quantity: where a search begins."""
         if self.relative:
@@ -128,8 +133,7 @@ class Measure:
             return None
         if self.relative:
             return 100 * _WIDEST
-        own = parse(_text_at(self.scene, self.key), find(self.key).dimension).unit
-        return max(abs(self.nominal) * exact_factor(own, self.unit) * _WIDEST, self.least)
+        return max(abs(self.nominal) * exact_factor(self.own_unit, self.unit) * _WIDEST, self.least)
 
     def text(self, size: Fraction) -> str:
         """Write a size with its unit, as `limitsets.certify` takes it."""
@@ -141,8 +145,7 @@ class Measure:
             return self.nominal / (1 + size / 100) ** 2
         if self.relative:
             return self.nominal * (1 + size / 100)
-        own = parse(_text_at(self.scene, self.key), find(self.key).dimension).unit
-        return self.nominal + size * exact_factor(self.unit, own)
+        return self.nominal + size * exact_factor(self.unit, self.own_unit)
 
     def between(self, one: Fraction, other: Fraction) -> Span:
         """Return the values at all deviations between two."""

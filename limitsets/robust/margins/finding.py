@@ -21,6 +21,7 @@ from limitsets.robust.margins.asking import Asked, Question
 from limitsets.robust.margins.brackets import Bracket, bracket_fixed, bracket_per_throw
 from limitsets.robust.margins.deviations import Measure, measure, measures
 from limitsets.scene import Scene, load
+from limitsets.scene.units import exact_factor
 
 __all__ = ["Margin", "asked_of", "goals_of", "margin"]
 
@@ -266,7 +267,7 @@ def _texts(one: Measure, size: Fraction) -> tuple[dict[str, str], dict[str, str]
 def _nominal(scene: Scene, one: Measure) -> float | None:
     if one.key != one.quantity:
         return None
-    return float(one.nominal)
+    return float(one.nominal if one.relative else one.nominal * exact_factor(one.own_unit, one.unit))
 
 
 def _of_none(question: Question, nominal: Asked) -> Bracket:
