@@ -10,6 +10,7 @@ from matplotlib.ticker import LogLocator, NullFormatter, ScalarFormatter
 
 from limitsets.errors import AnswerError
 from limitsets.plot import style
+from limitsets.robust.margins.words import bound
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -83,7 +84,7 @@ def _front(axes: Axes, found: RobustDesign) -> list[Line2D]:
         said = label
         for one in margins_of:
             axes.plot([one.proved, sampled.margin], [feeding.mean] * 2, color=colour, lw=2.0, alpha=0.4)
-            said += f"\n{one.goals[0].kind.replace('_', ' ')}: proved to {one.proved:.2f}"
+            said += f"\n{one.goals[0].kind.replace('_', ' ')}: proved to {bound(one.proved)}"
         handles.append(Line2D([], [], color=colour, marker=marker, ms=7.0, lw=2.5, label=said))
     axes.set_xlabel("joint margin, as a factor of the tolerance")
     axes.set_ylabel("throws to feed from random starts")

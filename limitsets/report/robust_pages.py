@@ -215,7 +215,18 @@ def deviation_of(entry: Entry) -> str:
     at = bound(entry.refuted, entry.unit, up=True)
     if entry.reading == "per-throw":
         return f"{entry.quantity} off by up to {at}, chosen anew at every throw,"
-    return f"{entry.quantity} off by {at}, the same at every throw,"
+    return f"{entry.quantity} off by {at}{_value_at(entry)}, the same at every throw,"
+
+
+def _value_at(entry: Entry) -> str:
+    """Give the value itself at which the orbit violates the goal: it says to which side."""
+    thrown = (entry.counterexample[0]["parameters"] if entry.counterexample else None) or {}
+    for name, words in ((entry.quantity, "at"), ("throw.kappa", "kappa =")):
+        given = thrown.get(name)
+        if given is not None and (name == entry.quantity or entry.quantity == "throw.speed"):
+            value, unit = (given if isinstance(given, str) else given[0]).split()
+            return f" ({words} {float(value):.6g} {unit})"
+    return ""
 
 
 def _states(entry: Entry, found: Robustness) -> tuple[list[list[str]], list[str]]:

@@ -132,7 +132,7 @@ def _sensitivity(found: Robustness) -> str:
         ]
         for quantity, slopes in noise.sensitivity.items()
     ]
-    return "What changes:\n\n" + table(heads, rows)
+    return "What changes, shares in percentage points:\n\n" + table(heads, rows)
 
 
 def trusted(found: Robustness) -> str:

@@ -62,3 +62,5 @@ def test_levels_leave_out_what_is_nothing():
     assert [len(axes.lines) for axes in figure.axes] == [1, 2, 0]
     assert figure.axes[0].lines[0].get_xdata().tolist() == [1.0]
     assert figure.axes[2].texts[0].get_text() == "none"
+    # what is nothing at one level and something at another is marked on the axis
+    assert [[at[0] for at in marks.get_offsets()] for marks in figure.axes[0].collections] == [[0.0]]
