@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 __all__ = ["robust_design"]
 
 BEFORE, AFTER = "#6E6E6E", style.JOG
+# Bars of the scene before, apart from the design's also in grey.
+PALE = "#D6D6D6"
 # What is drawn of the quantities' names: the last word says which it is.
 MOST_ROWS = 12
 
@@ -108,7 +110,8 @@ def _costs(axes: Axes, found: RobustDesign) -> None:
             continue
         room = sampled.reach - sampled.threshold
         costs = [100.0 * sum(sampled.effects[name]) / room for name in names]
-        axes.barh(rows + shift, costs, height=0.36, color=colour, label=label)
+        face = colour if colour != BEFORE else PALE
+        axes.barh(rows + shift, costs, height=0.36, facecolor=face, edgecolor=colour, label=label)
     axes.set_yticks(rows, [name.removeprefix("part.mass.").removeprefix("part.") for name in names])
     axes.invert_yaxis()
     axes.set_xlabel("% of the room for X that one tolerance takes")
