@@ -105,7 +105,7 @@ def _write(found: tuple[Margin, ...], records: list[dict[str, Any]], out: Path) 
 def _text(found: tuple[Margin, ...], out: Path | None) -> None:
     from limitsets.report.questions import question_of
     from limitsets.report.robust_pages import READINGS
-    from limitsets.report.tables import bound
+    from limitsets.robust.margins.words import bound
 
     rows = []
     for each in found:

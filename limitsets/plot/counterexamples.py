@@ -49,7 +49,7 @@ def counterexample(
     violated : Goal, optional
         What it violates.
     name : str
-        What deviates, for the title.
+        What deviates, for the title's second line.
 
     Returns
     -------
@@ -92,7 +92,7 @@ def counterexample(
     axes.set_xlabel("throws")
     axes.set_ylabel(f"x at rest [{scene.unit}]")
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
-    style.title(figure, f"{scene.name}: an orbit that violates the goal{f', {name}' if name else ''}")
+    style.title(figure, f"{scene.name}: an orbit that violates the goal" + (f"\n{name}" if name else ""))
     style.legend(figure, [*_sides(sides), *areas], 3)
     return figure
 

@@ -70,7 +70,7 @@ def design(found: Design, sets: Sequence[Sequence[Extents]] | None = None) -> Fi
     _frame(axes, found, sets, deep * rows)
     several = max((len(attractors) for attractors in sets), default=1) > 1
     style.title(figure, f"{found.start.name}: limit sets while the critical points move")
-    style.legend(figure, _legend(found, count, several), 4)
+    style.legend(figure, _legend(found, count, several), 5)
     return figure
 
 
@@ -116,7 +116,8 @@ def _words(axes: Axes, found: Design, scene: Scene, row: int, middle: float) -> 
         if name.startswith("throw."):
             values.append(f"$\\kappa$ = {scene.kappa:.4g} {scene.unit}")
         else:
-            values.append(f"{name.split('.')[-1].replace('_', ' ')} = {scene.value(name):.4g}")
+            unit = found.quantities()[name][2]
+            values.append(f"{name.split('.')[-1].replace('_', ' ')} = {scene.value(name):.4g} {unit}")
     axes.annotate(
         "\n".join([head, *values]),
         (1.0, middle),

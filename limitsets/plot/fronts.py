@@ -6,10 +6,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.lines import Line2D
-from matplotlib.ticker import ScalarFormatter
+from matplotlib.ticker import LogLocator, NullFormatter, ScalarFormatter
 
 from limitsets.errors import AnswerError
 from limitsets.plot import style
+from limitsets.robust.margins.words import bound
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -20,6 +21,8 @@ if TYPE_CHECKING:
 __all__ = ["robust_design"]
 
 BEFORE, AFTER = "#6E6E6E", style.JOG
+# Bars of the scene before, apart from the design's also in grey.
+PALE = "#D6D6D6"
 # What is drawn of the quantities' names: the last word says which it is.
 MOST_ROWS = 12
 
@@ -78,17 +81,19 @@ def _front(axes: Axes, found: RobustDesign) -> list[Line2D]:
     for margins_of, sampled, feeding, colour, marker, label in points:
         if sampled is None or feeding is None:
             continue
+        axes.vlines(sampled.margin, feeding.mean, feeding.quantile_95, color=colour, lw=0.8, alpha=0.6)
         axes.plot(sampled.margin, feeding.mean, color=colour, marker=marker, ms=7.0, ls="none")
         said = label
         for one in margins_of:
             axes.plot([one.proved, sampled.margin], [feeding.mean] * 2, color=colour, lw=2.0, alpha=0.4)
-            said += f"\n{one.goals[0].kind.replace('_', ' ')}: proved to {one.proved:.2f}"
+            said += f"\n{one.goals[0].kind.replace('_', ' ')}: proved to {bound(one.proved)}"
         handles.append(Line2D([], [], color=colour, marker=marker, ms=7.0, lw=2.5, label=said))
     axes.set_xlabel("joint margin, as a factor of the tolerance")
     axes.set_ylabel("throws to feed from random starts")
     axes.set_yscale("log")
+    axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
     axes.yaxis.set_major_formatter(ScalarFormatter())
-    axes.yaxis.set_minor_formatter(ScalarFormatter())
+    axes.yaxis.set_minor_formatter(NullFormatter())
     axes.set_title("throws: mean, and 95 % at the end of each line", loc="left", fontsize=10)
     return handles
 
@@ -105,7 +110,8 @@ def _costs(axes: Axes, found: RobustDesign) -> None:
             continue
         room = sampled.reach - sampled.threshold
         costs = [100.0 * sum(sampled.effects[name]) / room for name in names]
-        axes.barh(rows + shift, costs, height=0.36, color=colour, label=label)
+        face = colour if colour != BEFORE else PALE
+        axes.barh(rows + shift, costs, height=0.36, facecolor=face, edgecolor=colour, label=label)
     axes.set_yticks(rows, [name.removeprefix("part.mass.").removeprefix("part.") for name in names])
     axes.invert_yaxis()
     axes.set_xlabel("% of the room for X that one tolerance takes")

@@ -11,6 +11,7 @@ from matplotlib.patches import Patch
 
 from limitsets.errors import AnswerError
 from limitsets.plot import style
+from limitsets.robust.margins.words import bound
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -23,8 +24,11 @@ __all__ = ["margin_curve", "tolerance_box", "tornado"]
 
 SAFE: dict[str, Any] = {"facecolor": "#9BD1B8", "edgecolor": "#2F6B52", "lw": 0.7}
 OPEN: dict[str, Any] = {"facecolor": "#F4F4F4", "edgecolor": "#9A9A9A", "hatch": "....", "lw": 0.6}
+BOX: dict[str, Any] = {"facecolor": "none", "edgecolor": style.FLIP, "ls": (0, (4, 2)), "lw": 1.2}
 FAILS: dict[str, Any] = {"color": style.FLIP, "marker": "D", "ms": 5.0, "ls": "none"}
 READINGS = {"fixed": "", "per-throw": ", every throw"}
+# Where the two columns of numbers end, to the right of the axes [points].
+COLUMNS = (66, 138)
 
 
 def _percent(margin: Margin, size: float) -> tuple[float, str]:
@@ -42,12 +46,8 @@ def _percent(margin: Margin, size: float) -> tuple[float, str]:
     ) / least, " (of the shortest side)"
 
 
-def _said(size: float, unit: str) -> str:
-    return f"{size:.4g} {unit}".strip()
-
-
 def tornado(margins: Sequence[Margin]) -> Figure:
-    """Draw the margins of single quantities, the smallest on top, as percent of the value.
+    """Draw the margins of single quantities, the smallest on top, as percent of the value; beside them the numbers.
 
     Parameters
     ----------
@@ -66,12 +66,14 @@ def tornado(margins: Sequence[Margin]) -> Figure:
     ['throw.speed', 'arm.surface_height']
     """
     single = [each for each in margins if each.quantity != "joint"]
-    single.sort(key=lambda each: _percent(each, each.proved if each.refuted is None else each.refuted)[0])
-    figure, (axes,) = style.canvas(7.6, 0.42 * max(len(single), 2) + 1.7)
+    single.sort(key=lambda each: _percent(each, each.proved)[0])
+    figure, (axes,) = style.canvas(8.4, 0.36 * max(len(single), 2) + 1.8)
     known = [_percent(each, size)[0] for each in single for size in (each.proved, each.refuted) if size]
-    low, high = (min(known) / 3.0, max(known) * 12.0) if known else (0.1, 100.0)
+    low, high = (min(known) / 3.0, max(known) * 1.6) if known else (0.1, 100.0)
     for row, each in enumerate(single):
         _bar(axes, each, row, low, high)
+    for at, words in zip(COLUMNS, ("safe up to", "fails from"), strict=True):
+        _beside(axes, at, -0.75, words)
     names = [each.quantity + READINGS[each.reading] for each in single]
     names = [name + _percent(each, 0.0)[1] for name, each in zip(names, single, strict=True)]
     axes.set_yticks(range(len(single)), names, fontsize=style.SMALL)
@@ -79,7 +81,7 @@ def tornado(margins: Sequence[Margin]) -> Figure:
     axes.set_xscale("log")
     axes.set_xlim(low, high)
     axes.xaxis.set_major_formatter("{x:g}")
-    axes.set_xlabel("deviation to either side [% of the value]")
+    axes.set_xlabel("deviation to either side [% of the value], logarithmic")
     axes.tick_params(axis="y", length=0)
     for border in ("top", "right", "left"):
         axes.spines[border].set_visible(False)
@@ -93,20 +95,23 @@ def tornado(margins: Sequence[Margin]) -> Figure:
 
 
 def _bar(axes: Axes, margin: Margin, row: int, low: float, high: float) -> None:
+    """Draw one margin; where no upper end is known nothing is shown up to the end of the axis."""
     proved = max(_percent(margin, margin.proved)[0], low)
-    refuted = high if margin.refuted is None else max(_percent(margin, margin.refuted)[0], low)
-    end = refuted if margin.refuted is not None else min(3.0 * proved, high)
+    end = high if margin.refuted is None else max(_percent(margin, margin.refuted)[0], low)
     axes.barh(row, end - proved, left=proved, height=0.62, gid="open", zorder=1, **OPEN)
     axes.barh(row, proved - low, left=low, height=0.62, gid="proved", zorder=2, **SAFE)
-    words = f"{_said(margin.proved, margin.unit)} / "
-    if margin.refuted is None:
-        words += "none"
-    else:
-        axes.plot([refuted], [row], gid="refuted", zorder=3, **FAILS)
-        words += _said(margin.refuted, margin.unit)
+    if margin.refuted is not None:
+        axes.plot([end], [row], gid="refuted", zorder=3, **FAILS)
+    for at, size, up in zip(COLUMNS, (margin.proved, margin.refuted), (False, True), strict=True):
+        _beside(axes, at, row, bound(size, margin.unit, up=up))
+
+
+def _beside(axes: Axes, at: int, row: float, words: str) -> None:
+    """Write into a column to the right of the axes."""
     axes.annotate(
-        words, (end, row), (7, 0), textcoords="offset points", va="center", fontsize=style.SMALL - 0.5
-    )
+        words, (1.0, row), xycoords=("axes fraction", "data"), xytext=(at, 0), textcoords="offset points",
+        ha="right", va="center", fontsize=style.SMALL, annotation_clip=False, gid="number",
+    )  # fmt: skip
 
 
 def margin_curve(found: MarginsBeyond) -> Figure:
@@ -143,7 +148,7 @@ def margin_curve(found: MarginsBeyond) -> Figure:
             axes.spines[border].set_visible(False)
     panels[-1].set_xlabel(f"X, beyond which only side {found.side} [{found.scene.unit}]")
     panels[0].legend(fontsize=style.SMALL, frameon=False, loc="upper right")
-    style.title(figure, f"{found.scene.name}: margins by where the arm ends")
+    style.title(figure, f"{found.scene.name}: margins against X")
     return figure
 
 
@@ -167,20 +172,21 @@ def tolerance_box(margin: Margin) -> Figure:
     for row, (name, text) in enumerate(texts.items()):
         size, unit = float(text.split()[0]), text.split()[1]
         axes.barh(row, 2 * margin.proved, left=-margin.proved, height=0.6, gid="proved", zorder=2, **SAFE)
-        if margin.refuted is not None:
-            axes.plot([-margin.refuted, margin.refuted], [row, row], gid="refuted", zorder=3, **FAILS)
-        words = f"+- {margin.proved * size:.3g} {unit}" + (", every throw" if name == "landing.x" else "")
+        words = f"± {bound(margin.proved * size, unit)}" + (", every throw" if name == "landing.x" else "")
         axes.annotate(words, (0, row), ha="center", va="center", fontsize=style.SMALL, zorder=4)
     axes.set_yticks(range(len(texts)), list(texts), fontsize=style.SMALL)
-    axes.set_ylim(len(texts) - 0.4, -0.6)
+    axes.set_ylim(len(texts) - 0.3, -0.7)
+    wide = 1.1 * max(margin.proved, margin.refuted or 0.0, 1e-9)
+    axes.set_xlim(-wide, wide)
     axes.set_xlabel("deviation as a factor of the tolerance")
     axes.tick_params(axis="y", length=0)
     for border in ("top", "right", "left"):
         axes.spines[border].set_visible(False)
     style.title(figure, f"{margin.scene.name}: all quantities together")
-    handles = [
-        Patch(label="proved safe", **SAFE),
-        Line2D([], [], label="a corner of this box is shown to fail", **FAILS),
-    ]
+    handles = [Patch(label="proved safe, all at once", **SAFE)]
+    if margin.refuted is not None:
+        high, middle = margin.refuted, 0.5 * (len(texts) - 1)
+        axes.barh(middle, 2 * high, left=-high, height=len(texts), gid="refuted", zorder=1, **BOX)
+        handles.append(Patch(label="somewhere in this larger box it fails", **BOX))
     style.legend(figure, handles, 2)
     return figure

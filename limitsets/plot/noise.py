@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.ticker import MaxNLocator
@@ -26,8 +26,17 @@ __all__ = ["noise_arrivals", "noise_density", "noise_levels"]
 BAR = "#C9DCEA"
 LINES = ("-", (0, (5, 2)), (0, (1.2, 1.6)), (0, (6, 1.5, 1.2, 1.5)))
 COLOURS = (style.JOG, style.FLIP, style.ROLL, style.GOAL)
-# Shares below this are not shown.
+# Shares below this are not drawn: a mark on the axis says where they are.
 LEAST = 1e-6
+# What numbers are called in a legend, and what their axis shows.
+WORDS = {
+    "wrong beyond": "of the rests beyond X",
+    "first beyond is wrong": "of the first rests beyond X",
+    "mean throws": "mean",
+    "95 % throws": "until 95 % of the starts are there",
+    "escape": "from the limit set, per throw",
+    "lost": "of the starts, before they are there",
+}
 
 
 def _main(found: NoiseStatistics) -> NoisyClass:
@@ -74,7 +83,13 @@ def noise_density(found: NoiseStatistics, thrown: Thrown | None = None) -> Figur
         some = np.flatnonzero(height > LEAST)
         if some.size:
             axes.set_xlim(*_widened(float(edges[some[0]]), float(edges[some[-1] + 1])))
-        axes.axvline(found.goal[0], color=style.GOAL, lw=1.0, ls=(0, (4, 2)), label=f"x = {found.goal[0]:g}")
+        axes.axvline(
+            found.goal[0],
+            color=style.GOAL,
+            lw=1.0,
+            ls=(0, (4, 2)),
+            label=f"X = {found.goal[0]:g} {found.unit}",
+        )
         axes.set_title(
             f"side {side}: {100 * part.sides[side]:.2f} % of the rests", loc="left", fontsize=style.TEXT
         )
@@ -163,26 +178,18 @@ def noise_levels(
     Returns
     -------
     matplotlib.figure.Figure
-        A panel each for what is wrongly oriented, the throws to the goal and what leaves; shares below 1e-6 are left
-        out.
+        A panel each for what is wrongly oriented, the throws to the goal and what leaves; where shares are below 1e-6
+        there is an open mark on the axis.
     """
     (word, unit), *_ = at.items()
     panels_of = shown or {
-        "wrong side beyond x": ("wrong beyond", "first beyond is wrong"),
+        "on a wrong side": ("wrong beyond", "first beyond is wrong"),
         "throws to the goal": ("mean throws", "95 % throws"),
-        "leaves": ("escape", "lost"),
+        "leave the arm": ("escape", "lost"),
     }
-    figure, panels = style.canvas(3.6 * len(panels_of) + 0.4, 3.6, 1, len(panels_of))
+    figure, panels = style.canvas(3.6 * len(panels_of) + 0.4, 4.0, 1, len(panels_of))
     for axes, (title, names) in zip(panels, panels_of.items(), strict=True):
-        for name, colour, line in zip(names, COLOURS, LINES, strict=False):
-            values: NDArray[np.float64] = levels.numbers.get(name, np.full(levels.factors.size, np.nan))
-            some = values > LEAST
-            label = "escape per throw" if name == "escape" else name
-            if some.any():
-                x = levels.factors * unit
-                axes.plot(
-                    x[some], values[some], color=colour, ls=line, marker="o", ms=3.5, lw=1.4, label=label
-                )
+        _against_level(axes, levels, names, unit)
         axes.set_title(title, loc="left", fontsize=style.TEXT)
         axes.set_xlabel(word, fontsize=style.SMALL)
         axes.set_xlim(*_widened(0.0, float(levels.factors.max()) * unit))
@@ -191,9 +198,31 @@ def noise_levels(
             axes.set_yticks([])
         elif "throws" in title:
             axes.set_ylim(bottom=0.0)
+            axes.set_ylabel("throws", fontsize=style.SMALL)
         else:
             axes.set_yscale("log")
+            # a decade at least, or rounding looks like a change
+            low, high = axes.get_ylim()
+            axes.set_ylim(min(low, high / 30.0), 1.3 * high)
+            axes.set_ylabel("share", fontsize=style.SMALL)
         if axes.lines:
-            axes.legend(fontsize=style.SMALL, frameon=False)
+            axes.legend(fontsize=style.SMALL, frameon=False, loc="upper left", bbox_to_anchor=(0.0, -0.16))
         _plain(axes)
     return figure
+
+
+def _against_level(axes: Axes, levels: Levels, names: Sequence[str], unit: float) -> None:
+    """Draw the numbers of one panel; below the least share that is drawn, marks on the axis."""
+    x, none = levels.factors * unit, np.zeros(levels.factors.size, dtype=bool)
+    for name, colour, line in zip(names, COLOURS, LINES, strict=False):
+        values: NDArray[np.float64] = levels.numbers.get(name, np.full(x.size, np.nan))
+        some = values > LEAST
+        if not some.any():
+            continue
+        none |= values <= LEAST
+        label = WORDS.get(name, name)
+        axes.plot(x[some], values[some], color=colour, ls=line, marker="o", ms=3.5, lw=1.4, label=label)
+    if none.any():
+        on_axis: dict[str, Any] = {"transform": axes.get_xaxis_transform(), "clip_on": False, "zorder": 3}
+        look: dict[str, Any] = {"marker": "v", "s": 18, "facecolors": "white", "edgecolors": style.FAINT}
+        axes.scatter(x[none], np.zeros(int(none.sum())), label=f"below {LEAST:g}", **look, **on_axis)

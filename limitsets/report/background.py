@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 from limitsets.analysis import overlap
-from limitsets.report.tables import intervals, number, percent, table
+from limitsets.report.tables import intervals, percent, table
 
 if TYPE_CHECKING:
     from limitsets.analysis import Accuracy, Analysis
@@ -147,7 +147,7 @@ def scene_of(scene: Scene) -> str:
         f"{abs(scene.surface_height):g} {unit} {'below' if scene.surface_height < 0 else 'above'} the joint"
     )
     rows = [
-        [side, number(float(sides.length[side])), number(float(sides.a[side])), number(float(sides.d[side]))]
+        [side, *(f"{float(each[side]):.5g}" for each in (sides.length, sides.a, sides.d))]
         for side in range(len(sides))
     ]
     return "\n\n".join(

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from limitsets import plot
 from limitsets.files import as_json
-from limitsets.report.robust_pages import READINGS, robustness_page, shown, violated_of
+from limitsets.report.robust_pages import deviation_of, robustness_page, shown, violated_of
 from limitsets.report.writing import DPI, filled
 
 if TYPE_CHECKING:
@@ -33,7 +33,7 @@ def _drawn(found: Robustness) -> Iterator[tuple[str, Figure]]:
     yield from _noise(found)
     first = shown(found)
     if first is not None:
-        name = f"{first.quantity} {READINGS[first.reading]}" if first.holds else "the scene as it is"
+        name = deviation_of(first).rstrip(",") if first.holds else "the scene as it is"
         yield (
             "counterexample",
             plot.counterexample(found.scene, first.counterexample, violated_of(first, found.goals), name),
@@ -41,12 +41,13 @@ def _drawn(found: Robustness) -> Iterator[tuple[str, Figure]]:
 
 
 def _noise(found: Robustness) -> Iterator[tuple[str, Figure]]:
-    """Draw the noise: of a scene in which nothing stays there is no density."""
+    """Draw the noise: where nothing stays there is no density, and where nothing is fed no throws until then."""
     if found.noise is None or found.levels is None:
         return
     if found.noise.classes:
         yield "density", plot.noise_density(found.noise)
-    yield "throws", plot.noise_arrivals(found.noise)
+    if found.noise.feeding.mean is not None:
+        yield "throws", plot.noise_arrivals(found.noise)
     yield "levels", plot.noise_levels(found.levels, {"level of the noise, as given = 1": 1.0})
 
 

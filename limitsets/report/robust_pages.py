@@ -10,14 +10,24 @@ from limitsets.goals import Goal, OrientedBeyond
 from limitsets.report.background import figure_line, scene_of
 from limitsets.report.questions import question_of
 from limitsets.report.robust_trust import checked_again, noise_of, trusted
-from limitsets.report.tables import bound, table
+from limitsets.report.tables import table
+from limitsets.robust.margins.words import bound
 from limitsets.robust.sheet.entries import Entry, percent_of
 
 if TYPE_CHECKING:
     from limitsets.robust.margins.beyond import MarginsBeyond
     from limitsets.robust.sheet.summary import Robustness
 
-__all__ = ["HEADS", "answer", "lines_of", "robustness_page", "tightest"]
+__all__ = [
+    "HEADS",
+    "answer",
+    "deviation_of",
+    "lines_of",
+    "robustness_page",
+    "shown",
+    "tightest",
+    "violated_of",
+]
 
 HEADS = ("quantity", "value", "deviates", "proved safe up to", "shown to fail from", "in % of the value")
 READINGS = {"fixed": "fixed, but unknown", "per-throw": "at every throw", "tolerance": "together"}
@@ -67,7 +77,8 @@ def answer(found: Robustness) -> str:
     lines = [f"**Asked:** {goals}. {verdict}"]
     first = tightest(found)
     if first is not None and first.holds:
-        lines.append(f"Least room is left to {_named(first)}: {_bracket(first)}.")
+        by = ", for its tolerance" if _by_tolerance(found) else ""
+        lines.append(f"Least room{by} is left to {_named(first)}: {_bracket(first)}.")
     joint = found.joint
     if joint is not None:
         lines.append(_met(joint))
@@ -92,13 +103,14 @@ def tightest(found: Robustness) -> Entry | None:
 
     A landing place has no value: it is compared with the shortest side.
     """
-    rated = [(_room(entry, found), number) for number, entry in enumerate(found.singles)]
-    given = [pair for pair in rated if pair[0][0] == 0]
-    room = min(
-        given if len(given) > 1 else [((1, _share(e, found)), k) for k, e in enumerate(found.singles)],
-        default=None,
-    )
-    return None if room is None else found.singles[room[1]]
+    if _by_tolerance(found):
+        return min(found.singles, key=lambda entry: _room(entry, found))
+    return min(found.singles, key=lambda entry: _share(entry, found), default=None)
+
+
+def _by_tolerance(found: Robustness) -> bool:
+    """Whether margins are compared by their tolerances: where two or more have one."""
+    return sum(_room(entry, found)[0] == 0 for entry in found.singles) > 1
 
 
 def _room(entry: Entry, found: Robustness) -> tuple[int, float]:
@@ -173,7 +185,7 @@ def _limits(found: Robustness, figures: Mapping[str, str]) -> str:
     begin = (
         "Already in the scene as it is, an orbit violates the goal"
         if not first.holds
-        else f"With {_deviation(first)} an orbit violates the goal"
+        else f"With {deviation_of(first)} an orbit violates the goal"
     )
     last = first.counterexample[-1]
     how = ""
@@ -196,13 +208,25 @@ def shown(found: Robustness) -> Entry | None:
     return next((entry for entry in [*candidates, *found.entries] if entry.counterexample), None)
 
 
-def _deviation(entry: Entry) -> str:
+def deviation_of(entry: Entry) -> str:
+    """Say by how much a quantity is off at the upper end of its margin, for use within a sentence."""
     if entry.quantity == "joint":
         return f"every quantity {bound(entry.refuted, up=True)} times its tolerance off at most"
     at = bound(entry.refuted, entry.unit, up=True)
     if entry.reading == "per-throw":
         return f"{entry.quantity} off by up to {at}, chosen anew at every throw,"
-    return f"{entry.quantity} off by {at}, the same at every throw,"
+    return f"{entry.quantity} off by {at}{_value_at(entry)}, the same at every throw,"
+
+
+def _value_at(entry: Entry) -> str:
+    """Give the value itself at which the orbit violates the goal: it says to which side."""
+    thrown = (entry.counterexample[0]["parameters"] if entry.counterexample else None) or {}
+    for name, words in ((entry.quantity, "at"), ("throw.kappa", "kappa =")):
+        given = thrown.get(name)
+        if given is not None and (name == entry.quantity or entry.quantity == "throw.speed"):
+            value, unit = (given if isinstance(given, str) else given[0]).split()
+            return f" ({words} {float(value):.6g} {unit})"
+    return ""
 
 
 def _states(entry: Entry, found: Robustness) -> tuple[list[list[str]], list[str]]:
@@ -235,6 +259,8 @@ def _kappa_off(thrown: Mapping[str, Any], found: Robustness) -> str:
 
 def _met(joint: Entry) -> str:
     """Say whether the tolerance is met."""
+    if joint.counterexample and not joint.holds:
+        return "The tolerance is **not met**: the scene as it is fails already."
     if joint.proved >= 1.0:
         return f"The tolerance is **met, proved**: up to {bound(joint.proved)} times all of it together."
     if joint.refuted is not None and joint.refuted <= 1.0:
@@ -250,6 +276,8 @@ def _joint(found: Robustness, figures: Mapping[str, str]) -> str:
     joint = found.joint
     if joint is None:
         return f"{head}\n\nNo joint margin: {found.left_out.get('joint', 'not asked for')}."
+    if joint.counterexample and not joint.holds:
+        return f"{head}\n\nNothing is left for deviations: the scene as it is fails already."
     rows = []
     for name, text in found.tolerance.items():
         number, unit = (text[:-1], "%") if text.endswith("%") else text.rsplit(" ", 1)
@@ -284,7 +312,7 @@ def _best(curve: MarginsBeyond) -> str:
     )
     return (
         f"Most room is proved at **X = {best:.4g} {unit}**, of the places that were tried: {name} is safe up to "
-        f"{bound(size, curve.units[0])} there.{doubt}"
+        f"{bound(size, curve.units[0] or 'times the tolerance')} there.{doubt}"
     )
 
 
@@ -296,7 +324,7 @@ def _curve(found: Robustness, figures: Mapping[str, str]) -> str:
     heads = [f"X [{found.scene.unit}]"]
     for name, unit in zip(curve.names, curve.units, strict=True):
         what = f"{name} [{unit}]" if unit else f"{name} [times the tolerance]"
-        heads += [f"{what}: safe up to", "fails from"]
+        heads += [f"{what}: proved safe up to", "shown to fail from"]
     rows: list[Sequence[str]] = []
     for x, proved, refuted in zip(curve.x.tolist(), curve.proved, curve.refuted, strict=True):
         row = [f"{x:.4g}"]

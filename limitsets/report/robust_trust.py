@@ -44,6 +44,13 @@ def _value(value: float | None, kind: str) -> str:
     return f"{value:.1e}" if kind == "rate" else f"{100.0 * value:.4g} %"
 
 
+def _error(value: float | None, kind: str) -> str:
+    """Write an error with the two digits that it has."""
+    if value is None or not math.isfinite(value) or value < NOTHING:
+        return _value(value, "share")
+    return f"{value:.2g}" if kind != "share" else f"{100.0 * value:.2g} %"
+
+
 def _change(value: float, kind: str) -> str:
     if not math.isfinite(value):
         return "-"
@@ -84,7 +91,7 @@ def noise_of(found: Robustness, figures: Mapping[str, str]) -> str:
     x, side = noise.goal
     sides = [[f"rests on side {k}", f"time on side {k}", "share"] for k in range(len(found.scene.sides))]
     rows = [
-        [words, _value(noise.numbers.get(name), kind), _value(noise.errors.get(name), kind)]
+        [words, _value(noise.numbers.get(name), kind), _error(noise.errors.get(name), kind)]
         for words, name, kind in [*sides, *([words, name, kind] for name, (words, kind) in NUMBERS.items())]
         if name in noise.numbers
     ]
@@ -92,11 +99,12 @@ def noise_of(found: Robustness, figures: Mapping[str, str]) -> str:
     lines = [
         head,
         (
-            f"Every throw scatters on its own. {laws[0].upper()}{laws[1:]} ({found.law}). Fed is a part at rest "
-            f"beyond X = {x:g} {noise.unit} on side {side}. Random starts lie evenly on all sides from "
-            f"{', '.join(f'{a:.4g}' for a in noise.starts)} {noise.unit} up to X."
+            f"Computed, not proved. Every throw scatters on its own. "
+            f"{laws[0].upper()}{laws[1:]} ({found.law}). Fed is a part at rest "
+            f"beyond X = {x:g} {noise.unit} on side {side}. Random starts lie evenly on all sides, from "
+            f"{', '.join(f'{a:.4g}' for a in noise.starts)} {noise.unit} on sides 0, 1, ... up to X."
         ),
-        table(["", "", "error, about"], rows),
+        table(["number", "computed", "error, about"], rows),
         _sensitivity(found),
     ]
     text = "\n\n".join(line for line in lines if line)
@@ -124,7 +132,7 @@ def _sensitivity(found: Robustness) -> str:
         ]
         for quantity, slopes in noise.sensitivity.items()
     ]
-    return "What changes:\n\n" + table(heads, rows)
+    return "What changes, shares in percentage points:\n\n" + table(heads, rows)
 
 
 def trusted(found: Robustness) -> str:

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from decimal import ROUND_CEILING, ROUND_FLOOR, Context, Decimal
 from itertools import pairwise
 
-__all__ = ["bands", "bound", "count", "intervals", "number", "percent", "table"]
+__all__ = ["bands", "count", "intervals", "number", "percent", "table"]
 
 Extents = Mapping[int, Sequence[tuple[float, float]]]
 
@@ -37,22 +36,6 @@ def number(value: float | None, digits: int = 3) -> str:
     ('19.753', '-')
     """
     return "-" if value is None else f"{value:z.{digits}f}"
-
-
-def bound(value: float | None, unit: str = "", *, up: bool = False) -> str:
-    """Write a size with four digits, rounded so that it claims no more than is known; a dash for none.
-
-    Examples
-    --------
-    >>> bound(0.395408203, "%"), bound(0.397675781, "%", up=True), bound(None)
-    ('0.3954 %', '0.3977 %', '-')
-    """
-    if value is None:
-        return "-"
-    if value == 0:
-        return f"0 {unit}".rstrip()
-    context = Context(prec=4, rounding=ROUND_CEILING if up else ROUND_FLOOR)
-    return f"{context.create_decimal(Decimal(repr(value))):f} {unit}".rstrip()
 
 
 def percent(share: float) -> str:

@@ -16,6 +16,7 @@ import limitsets as ls
 from limitsets.goals import OrientedBeyond
 from limitsets.robust.margins.beyond import margins_beyond
 from limitsets.robust.margins.joint import joint_margin
+from limitsets.robust.margins.words import bound
 
 HERE = Path(__file__).resolve().parent
 
@@ -90,9 +91,7 @@ def table(found: dict[str, Any]) -> str:
     lines = ["| scene | quantity | reading | proved | refuted |", "|---|---|---|---|---|"]
     for name, each in found.items():
         for one in each.get("margins", ()):
-            ends = [
-                "-" if one[key] is None else f"{one[key]:.4g} {one['unit']}" for key in ("proved", "refuted")
-            ]
+            ends = bound(one["proved"], one["unit"]), bound(one["refuted"], one["unit"], up=True)
             lines.append(f"| {name} | {one['quantity']} | {one['reading']} | {ends[0]} | {ends[1]} |")
     return "\n".join(lines)
 

@@ -109,15 +109,16 @@ def test_json_alone_on_stdout_and_a_second_run_asks_nothing(capfd):
 def test_a_goal_that_fails_is_exit_1_and_the_orbit_is_there(capfd):
     tree = ls.load("paper-initial").as_dict() | {"goal": {"oriented_beyond": {"x": "20 in", "side": 2}}}
     ls.dump(ls.load(tree), "fails.toml")
-    code, out, _ = run(
-        capfd, "robustness", "fails.toml", "-o", "sheet", "--without", "curve", "--without", "audit"
-    )
+    words = ("--tolerance", "throw.speed=1 %", "--without", "curve", "--without", "audit")
+    code, out, _ = run(capfd, "robustness", "fails.toml", "-o", "sheet", *words)
     assert code == 1
     assert "this fails: an orbit shows it" in out
+    assert "The tolerance is not met: the scene as it is fails already." in out
     page = Path("sheet/report.md").read_text(encoding="utf-8")
     assert "Already in the scene as it is, an orbit violates the goal: after " in page
     assert Path("sheet/counterexample.png").exists()
     assert not Path("sheet/margins.png").exists()
+    assert "times its tolerance" not in page
 
 
 @pytest.mark.parametrize(

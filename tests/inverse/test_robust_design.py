@@ -11,8 +11,9 @@ from limitsets.errors import LimitsetsError
 from limitsets.inverse import robust_design
 from limitsets.inverse.margin.front import unbeaten
 from limitsets.inverse.margin.lead import lead_of, lead_weight
+from limitsets.inverse.margin.polishing import polished
 from limitsets.inverse.margin.search import Search, bounds_of
-from limitsets.inverse.margin.sharp import Box, sharp
+from limitsets.inverse.margin.sharp import Box, failing, sharp
 from limitsets.inverse.margin.trap import trap
 from limitsets.maps import advance
 from tests.studies.test_studies import load_study
@@ -157,6 +158,36 @@ def test_a_small_search_finds_scenes_that_hold_throughout_their_box(small):
                 assert not ((x > small.x) & (side != small.side)).any()
                 arrived |= (x >= small.x) & (side == small.side)
         assert arrived.all()
+
+
+def test_the_margin_of_the_design_is_that_of_its_worst_corner(small):
+    """By `failing`, which tries corner after corner at one factor: none at the margin, one a little beyond."""
+    box = Box.of(small.scene, small.tolerance)
+    fails = [
+        failing(small.scene, box, 2, small.sampled, share * small.sampled.margin) for share in (1.0, 1.001)
+    ]
+    assert fails[0] == []
+    assert fails[1]
+
+
+def test_what_stands_on_the_front_holds_on_all_corners(small):
+    box = Box.of(small.scene, small.tolerance)
+    for option in small.front[:3]:
+        scene, found = small.before.with_values(option.candidate.values), option.candidate.found
+        assert failing(scene, box, 2, found, found.margin) == []
+
+
+def test_polishing_never_ends_below_its_start():
+    """The scene itself as the start, its margin from a search for the worst corner that knows nothing of polishing."""
+    scene = ls.load("paper-designed")
+    box = Box.of(scene, SPEED)
+    search = Search(scene, box, 2, bounds_of(scene, {"throw.kappa": (20.0, 30.0)}))
+    start = math.log(scene.kappa / 20.0) / math.log(1.5)
+    before = sharp(scene, box, 2, steps=20).margin
+    made, found = polished(search, [[start]], lambda each: each, 12, lambda *_: None)
+    assert found.margin > 1.01 * before
+    assert failing(made, box, 2, found, found.margin) == []
+    assert 20.0 <= made.kappa <= 30.0
 
 
 def test_a_small_search_says_how_it_was_found(small):

@@ -48,7 +48,7 @@ def test_the_curve_is_drawn(curve):
 
 
 def test_a_side_that_is_never_farthest_is_refused():
-    with pytest.raises(LimitsetsError, match="farther"):
+    with pytest.raises(LimitsetsError, match="farthest out on, 2;"):
         margins_beyond("paper-designed", 0, places=2)
 
 
@@ -67,6 +67,14 @@ def test_bars_are_the_brackets():
         [speed.proved, 100 * landing.proved / 3.6, 100 * height.proved / 0.2]  # of the shortest side; of |h|
     )
     assert len(named(axes, "refuted")) == 3
+    # the numbers beside them never claim more than is known
+    words = {round(text.xy[1]): [] for text in named(axes, "number")}
+    for text in named(axes, "number"):
+        words[round(text.xy[1])].append(text.get_text())
+    for row, one in enumerate((speed, landing, height)):
+        low, high = (float(word.split()[0]) for word in words[row])
+        assert 0.999 * one.proved < low <= one.proved
+        assert one.refuted <= high < 1.001 * one.refuted
 
 
 def test_the_joint_box_is_drawn():
@@ -76,6 +84,10 @@ def test_the_joint_box_is_drawn():
     FigureCanvasAgg(figure).draw()
     (axes,) = figure.axes
     assert [bar.get_width() for bar in named(axes, "proved")] == pytest.approx([2 * found.proved] * 2)
+    (larger,) = named(axes, "refuted")
+    assert (larger.get_x(), larger.get_width()) == pytest.approx((-found.refuted, 2 * found.refuted))
+    assert larger.get_height() == 2
+    assert axes.get_xlim()[1] > found.refuted
     (single,) = ls.margin("paper-designed", "arm.surface_height", width=0.5)
     with pytest.raises(LimitsetsError, match="joint"):
         ls.plot.tolerance_box(single)

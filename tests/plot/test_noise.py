@@ -36,7 +36,7 @@ def test_density_has_the_shares_in_its_titles(found, thrown):
         values, edges, _ = drawn[0].get_data()
         assert float(values @ np.diff(edges)) == pytest.approx(share, rel=1e-9)
     words = [text.get_text() for legend in figure.legends for text in legend.get_texts()]
-    assert words == ["2e4 throws", "transfer operator", "x = 20.5"]
+    assert words == ["2e4 throws", "transfer operator", "X = 20.5 in"]
 
 
 def test_arrivals_mark_mean_and_quantile(found, thrown):
@@ -62,3 +62,5 @@ def test_levels_leave_out_what_is_nothing():
     assert [len(axes.lines) for axes in figure.axes] == [1, 2, 0]
     assert figure.axes[0].lines[0].get_xdata().tolist() == [1.0]
     assert figure.axes[2].texts[0].get_text() == "none"
+    # what is nothing at one level and something at another is marked on the axis
+    assert [[at[0] for at in marks.get_offsets()] for marks in figure.axes[0].collections] == [[0.0]]

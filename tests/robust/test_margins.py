@@ -238,6 +238,11 @@ def test_the_value_is_in_the_unit_of_its_deviation():
     own = ls.load(ls.load("paper-designed").as_dict() | {"tolerance": {"arm.surface_height": "0.1 mm"}})
     (found,) = ls.margin(own, "arm.surface_height", width=0.5)
     assert (found.unit, found.nominal) == ("mm", pytest.approx(-5.08, rel=1e-15))
+    # the scene in metres, its surface given in millimetres
+    tree = ls.load("paper-designed").as_dict()
+    tree["arm"] = {"surface_height": "-5.08 mm", "length": "0.7112 m"}
+    (found,) = ls.margin(ls.load(tree), "arm.surface_height", goal=OrientedBeyond(0.508, 2), width=0.5)
+    assert (found.unit, found.nominal) == ("m", pytest.approx(-0.00508, rel=1e-12))
 
 
 @pytest.mark.parametrize(

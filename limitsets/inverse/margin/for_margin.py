@@ -21,8 +21,9 @@ import numpy as np
 from limitsets.errors import AnswerError
 from limitsets.goals import Goal, OrientedBeyond, Reaches
 from limitsets.inverse.margin.feeding import ThrowsToFeed, throws_to_feed
-from limitsets.inverse.margin.front import Option, best_of, front_of
+from limitsets.inverse.margin.front import Option, front_of
 from limitsets.inverse.margin.lead import Lead, lead_of
+from limitsets.inverse.margin.polishing import polished
 from limitsets.inverse.margin.search import POPULATION, Candidate, Search, Tell, bounds_of
 from limitsets.inverse.margin.sharp import Box, Sharp, on_all_corners
 from limitsets.robust import Margin
@@ -47,6 +48,8 @@ TOLERANCE = {
 DECIMALS, DECIMALS_OF_X = 4, 3
 # Designs drawn for each order of the sides, and how many orders go on.
 DRAWN, ORDERS_KEPT = 120, 2
+# Designs of the search that are rated on all corners, and the share of its evaluations spent on improving the best.
+POLISHED, POLISH = 3, 8
 # Seconds for the proof of a box.
 SECONDS = 240.0
 
@@ -255,20 +258,21 @@ def robust_design(
         for number, one in enumerate(orders_of(start) if orders else [start])
     ]
     search, population = _searched(searches, evaluations, seed, tell)
-    best = search.scene_of(population[0])
-    found = None if best is None else on_all_corners(_rounded(best, search), box, on, search.hard)
-    if best is None or found is None or not found.margin > 0.0:
+    polish = max(evaluations // POLISH, 1)
+    best = polished(search, population[:POLISHED], lambda made: _rounded(made, search), polish, tell)
+    if best is None:
         raise AnswerError(
             "the design", "none that feeds", "one at least", "widen the bounds, or look at more designs"
         )
+    made, found = best
     x = round(found.x, DECIMALS_OF_X)
-    design = _with_purpose(_rounded(best, search), x, on, texts, f"{start.name}-robust")
+    design = _with_purpose(made, x, on, texts, f"{start.name}-robust")
     before = on_all_corners(start, box, on)
     history = tuple(candidate for each in searches for candidate in each.history)
     feeding = throws_to_feed(design, x, on, seed=seed)
     values = {name: design.value(name) for name in search.bounds}
     own_option = Option(Candidate(values, found, search.order), feeding)
-    front = tuple(best_of([own_option, *front_of(searches, history, on, seed, tell)]))
+    front = front_of(searches, history, own_option, on, seed, tell)
     seconds = time.perf_counter() - begin
     known = before is not None and before.margin > 0.0
     fed = throws_to_feed(start, before.x, on, seed=seed) if before is not None and known else None

@@ -16,6 +16,8 @@ __all__ = ["Option", "best_of", "front_of", "unbeaten"]
 
 # Candidates whose throws are counted: the surest of each class of margins, and classes.
 CLASSES, PER_CLASS = 30, 6
+# Designs that are looked at on all corners, seconds each.
+MOST_SURE = 60
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,6 +66,7 @@ def unbeaten(margin: Sequence[float], throws: Sequence[float]) -> list[int]:
 def front_of(
     searches: Sequence[Search],
     history: Sequence[Candidate],
+    own: Option,
     side: int,
     seed: int,
     tell: Callable[[str, int, int], None],
@@ -76,6 +79,8 @@ def front_of(
         By order.
     history : sequence of Candidate
         Designs tried.
+    own : Option
+        The design chosen, rated on all corners: no other need be looked at that it beats.
     side : int
         The side wanted.
     seed : int
@@ -90,7 +95,7 @@ def front_of(
     """
     known = [each for each in history if each.found.margin > 0.0 and np.isfinite(each.found.x)]
     if not known:
-        return ()
+        return (own,)
     margins = np.array([each.found.margin for each in known])
     which = np.minimum((CLASSES * margins / margins.max()).astype(int), CLASSES - 1)
     chosen = []
@@ -100,22 +105,39 @@ def front_of(
         early = [known[k].found.x / known[k].found.reach for k in mine]
         chosen += [int(k) for k in mine[np.argsort(early)[:PER_CLASS]]]
     chosen += [int(k) for k in np.argsort(-margins)[:PER_CLASS]]
-    options = []
+    options = [own]
     for number, k in enumerate(dict.fromkeys(chosen)):
         tell("throws to feed", number, len(chosen))
         option = _option(known[k], searches[known[k].order], side, seed)
         if option is not None:
             options.append(option)
-    sure: list[Option] = []
-    front = best_of(options)
-    for number, option in enumerate(front):
-        # the search knew some corners only; what stands is what holds on all of them
-        tell("designs on all corners", number, len(front))
+    return _sure(options, searches, side, seed, tell)
+
+
+def _sure(
+    options: list[Option],
+    searches: Sequence[Search],
+    side: int,
+    seed: int,
+    tell: Callable[[str, int, int], None],
+) -> tuple[Option, ...]:
+    """Rate again on all corners whatever stands on the front, until all that does has been; the first one has been.
+
+    The search knew some corners only: a rating from then may be too high, and hides designs that are better on all.
+    """
+    sure = [options[0]]
+    for number in range(MOST_SURE):
+        option = next((each for each in best_of(options) if each not in sure), None)
+        if option is None:
+            break
+        tell("designs on all corners", number, MOST_SURE)
+        options.remove(option)
         one, search = option.candidate, searches[option.candidate.order]
         found = on_all_corners(search.scene.with_values(dict(one.values)), search.box, side, search.hard)
         if found is not None and found.margin > 0.0:
             again = _option(replace(one, found=found), search, side, seed)
             sure += [] if again is None else [again]
+            options += [] if again is None else [again]
     return tuple(best_of(sure))
 
 

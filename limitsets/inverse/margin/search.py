@@ -112,22 +112,33 @@ class Search:
         scene = self.scene_of(unknowns)
         if scene is None:
             return -30.0
-        if self.lead:
-            weight = lead_of(scene)
-            lacking = max(weight.share - MOST_LEAD, -weight.inside / float(scene.sides.length.mean()))
-            if not lacking <= 0.0:
-                return -20.0 - min(lacking, 9.0)
+        lacking = self.lacking(scene)
+        if lacking < 0.0:
+            return lacking
         found = sharp(scene, self.box, self.side, hard=self.hard, above=above)
         if found is None:
             return -10.0
         if found.margin > 0.0:
-            lacking = assumptions_kept(scene, found.kept)
-            if self.everywhere:
-                lacking = min(lacking, least_room(scene.bare_map) / scene.arm_length)
+            lacking = self.broken(scene, found)
             if lacking < 0.0:
-                return max(lacking, -9.0)
+                return lacking
             self.history.append(Candidate(self._values(scene), found, self.order))
         return found.margin
+
+    def lacking(self, scene: Scene) -> float:
+        """Rate a part that no lead weight makes: -20 or below; 0 where one does."""
+        if not self.lead:
+            return 0.0
+        weight = lead_of(scene)
+        lacking = max(weight.share - MOST_LEAD, -weight.inside / float(scene.sides.length.mean()))
+        return 0.0 if lacking <= 0.0 else -20.0 - min(9.0, lacking)
+
+    def broken(self, scene: Scene, found: Sharp) -> float:
+        """Rate a design outside of the model, or one that loses parts: below 0; 0 or above for any other."""
+        spare = assumptions_kept(scene, found.kept)
+        if self.everywhere:
+            spare = min(spare, least_room(scene.bare_map) / scene.arm_length)
+        return max(spare, -9.0)
 
     def _values(self, scene: Scene) -> dict[str, float]:
         return {name: scene.value(name) for name in self.bounds}

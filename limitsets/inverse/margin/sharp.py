@@ -30,8 +30,10 @@ Signs = tuple[int, ...]
 
 # Steps towards the margin between two factors; corners that are tried where a box has more.
 STEPS, MOST_CORNERS = 5, 512
-# Steps for designs that are looked at on all corners, and how often corners that fail are put first.
-FINE, TURNS = 14, 6
+# How close the ends of that search come to each other, as a share.
+CLOSE = 0.005
+# The same for designs that are looked at on all corners.
+FINE, FINELY = 20, 2e-4
 
 
 @dataclass(frozen=True, eq=False)
@@ -167,6 +169,7 @@ def sharp(
     hard: list[Signs] | None = None,
     above: float = 0.0,
     steps: int = STEPS,
+    close: float = CLOSE,
 ) -> Sharp | None:
     """Find the joint margin and the best X by floats.
 
@@ -185,7 +188,9 @@ def sharp(
     above : float
         Margins below this are of no interest: they are bounded only.
     steps : int
-        How finely the margin is sought.
+        How often a factor is tried at most.
+    close : float
+        How close a factor that holds and one that does not have to be, as a share.
 
     Returns
     -------
@@ -226,7 +231,8 @@ def sharp(
         return Sharp(linear, math.nan, threshold, reach, nominal, effects)
     asked = list(hard or [])
     asked += [tuple(int(s) for s in np.where(row < 0.0, -1, 1)) for row in falls.T]
-    margin, x = _sought(fed, list(dict.fromkeys(asked)), min(linear, 1e3), above, reach - threshold, steps)
+    spare, top = reach - threshold, min(linear, 1e3)
+    margin, x = _sought(fed, list(dict.fromkeys(asked)), top, above, spare, steps, close)
     return Sharp(margin, x, threshold, reach, nominal, effects)
 
 
@@ -254,6 +260,8 @@ def failing(scene: Scene, box: Box, side: int, found: Sharp, factor: float) -> l
 def on_all_corners(scene: Scene, box: Box, side: int, hard: Sequence[Signs] = ()) -> Sharp | None:
     """Find the margin on all corners: those at which it fails are put first, and it is sought anew.
 
+    What it gives holds at every corner at that very factor and X.  A corner is found to fail once at most.
+
     Parameters
     ----------
     scene, box, side
@@ -262,16 +270,14 @@ def on_all_corners(scene: Scene, box: Box, side: int, hard: Sequence[Signs] = ()
         Corners to begin with.
     """
     first = list(hard)
-    for _ in range(TURNS):
-        found = sharp(scene, box, side, hard=first, steps=FINE)
+    while True:
+        found = sharp(scene, box, side, hard=first, steps=FINE, close=FINELY)
         if found is None or not found.margin > 0.0:
             return found
-        wrong = failing(scene, box, side, found, 0.99 * found.margin)
-        new = [signs for signs in wrong if signs not in first]
+        new = [signs for signs in failing(scene, box, side, found, found.margin) if signs not in first]
         if not new:
             return found
         first = new + first
-    return found
 
 
 def _start(found: Sharp, side: int) -> tuple[float, int]:
@@ -280,11 +286,12 @@ def _start(found: Sharp, side: int) -> tuple[float, int]:
 
 
 def _sought(
-    fed: _Fed, asked: list[Signs], top: float, above: float, spare: float, steps: int
+    fed: _Fed, asked: list[Signs], top: float, above: float, spare: float, steps: int, close: float
 ) -> tuple[float, float]:
     """Close in on the margin between 0 (or `above`) and a little over its linear estimate."""
     good, bad, x = 0.0, 1.05 * top, math.nan
     factor = above if above > 0.0 else 0.98 * top
+    under = 1.0 - 0.4 * close
     for _ in range(steps):
         highest, least, failed = fed.all(factor, asked)
         if failed is None:
@@ -292,7 +299,7 @@ def _sought(
             # T and R close in on each other about evenly
             ahead = factor * spare / max(spare - (least - highest), 1e-9)
             factor = min(
-                max(0.998 * ahead, 0.9 * good + 0.1 * bad), 0.5 * (good + bad) if ahead > bad else bad
+                max(under * ahead, 0.9 * good + 0.1 * bad), 0.5 * (good + bad) if ahead > bad else bad
             )
         else:
             bad = factor
@@ -300,7 +307,7 @@ def _sought(
                 return 0.97 * above, math.nan
             crossed = math.isfinite(highest - least)
             ahead = factor * spare / (spare - (least - highest)) if crossed else 0.0
-            factor = max(0.998 * ahead, 0.5 * (good + bad)) if crossed else 0.5 * (good + bad)
-        if bad - good < 0.005 * bad:
+            factor = max(under * ahead, 0.5 * (good + bad)) if crossed else 0.5 * (good + bad)
+        if bad - good < close * bad:
             break
     return good, x

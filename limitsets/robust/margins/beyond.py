@@ -146,7 +146,11 @@ def places_beyond(scene: Scene, side: int, places: int) -> NDArray[np.float64]:
     others = max((top for s, top in highest.items() if s != side), default=0.0)
     own = highest.get(side, -np.inf)
     if not others < own:
+        farthest = max(highest, key=lambda s: highest[s], default=side)
         raise AnswerError(
-            "the side", side, "one that the limit set gets farther out on than on any other", "name another"
+            "the side",
+            side,
+            f"the one that the limit set gets farthest out on, {farthest}",
+            "ask about that one",
         )
     return np.linspace(others, own, places + 2)[1:-1]

@@ -1,0 +1,125 @@
+"""The last steps of a robust design: near the best one, with ratings that hold on every corner of the tolerance.
+
+The search knows some corners only, so that what it takes for the best fails a little earlier than it says.  Here a
+design counts as better once it is better on all of them.  The margin is the least of many smooth numbers, one per
+corner, and its top a ridge: scipy's simplex method climbs it, started anew each time a little smaller.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from limitsets.inverse.margin.search import Search, Tell
+from limitsets.inverse.margin.sharp import FINE, FINELY, Sharp, Signs, failing, on_all_corners, sharp
+from limitsets.scene import Scene
+
+__all__ = ["polished"]
+
+# Edges of the simplex at its starts, in shares of the bounds.
+EDGES = (0.02, 0.007, 0.0025)
+
+
+class _Best:
+    """The best design so far, and the corners at which others failed."""
+
+    def __init__(self, search: Search, made: Callable[[Scene], Scene], tell: Tell, of: int) -> None:
+        self.search, self.made, self.tell, self.of = search, made, tell, of
+        self.hard: list[Signs] = list(search.hard)
+        self.unknowns: list[float] = []
+        self.scene: Scene | None = None
+        self.found: Sharp | None = None
+        self.tried = 0
+
+    def rate(self, unknowns: Sequence[float]) -> float:
+        """Rate a design as it would be made: exactly where it is the best, from above where it is not."""
+        self.tried += 1
+        self.tell("designs near the best", min(self.tried, self.of), self.of)
+        scene = self.search.scene_of(unknowns)
+        if scene is None:
+            return -30.0
+        scene = self.made(scene)
+        lacking = self.search.lacking(scene)
+        if lacking < 0.0:
+            return lacking
+        best = 0.0 if self.found is None else self.found.margin
+        search = self.search
+        found = sharp(scene, search.box, search.side, hard=self.hard, steps=FINE, close=FINELY)
+        if found is not None and found.margin > best:
+            found = self._on_all_corners(scene, found)
+        if found is None:
+            return -10.0
+        if not found.margin > 0.0:
+            return found.margin
+        lacking = search.broken(scene, found)
+        if lacking < 0.0:
+            return lacking
+        if found.margin > best:
+            self.unknowns, self.scene, self.found = [float(u) for u in unknowns], scene, found
+        return found.margin
+
+    def _on_all_corners(self, scene: Scene, found: Sharp) -> Sharp | None:
+        search = self.search
+        wrong = failing(scene, search.box, search.side, found, found.margin)
+        new = [signs for signs in wrong if signs not in self.hard]
+        if not new:
+            return found
+        self.hard[:0] = new
+        return on_all_corners(scene, search.box, search.side, self.hard)
+
+
+def polished(
+    search: Search,
+    unknowns: Sequence[Sequence[float]],
+    made: Callable[[Scene], Scene],
+    evaluations: int,
+    tell: Tell,
+) -> tuple[Scene, Sharp] | None:
+    """Improve the best of a few designs, rated as they would be made and on all corners.
+
+    Parameters
+    ----------
+    search : Search
+        Whose quantities, tolerance and conditions.
+    unknowns : sequence of sequence of float
+        Where to begin: scaled unknowns, at least one.
+    made : callable
+        Gives a scene as it would be made: rounded.
+    evaluations : int
+        Designs to look at.
+    tell : callable
+        Progress.
+
+    Returns
+    -------
+    (Scene, Sharp) or None
+        The design and its margin, which holds on all corners; None if none of the first ones feeds.
+    """
+    from scipy.optimize import minimize
+
+    best = _Best(search, made, tell, evaluations)
+    for row in unknowns:
+        best.rate(row)
+    for number, edge in enumerate(EDGES):
+        share = (evaluations - best.tried) // (len(EDGES) - number)
+        if best.found is None or share < 1:
+            break
+        minimize(
+            lambda row: -best.rate(row),
+            best.unknowns,
+            method="Nelder-Mead",
+            bounds=[(0.0, 1.0)] * len(best.unknowns),
+            options={"initial_simplex": _simplex(best.unknowns, edge), "maxfev": share, "adaptive": True},
+        )
+    search.evaluations += best.tried
+    if best.scene is None or best.found is None:
+        return None
+    return best.scene, best.found
+
+
+def _simplex(corner: Sequence[float], edge: float) -> NDArray[np.float64]:
+    """Give a simplex at a place: a step along each axis, towards the middle of its bounds."""
+    place = np.array(corner)
+    return np.vstack([place, place + edge * np.diag(np.where(place < 0.5, 1.0, -1.0))])
