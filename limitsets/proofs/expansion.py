@@ -17,7 +17,7 @@ from limitsets.jit import proof_kernel
 from limitsets.proofs.cover import Cover
 from limitsets.thrower.motion import FullThrow
 from limitsets.thrower.side_box import gather_box
-from limitsets.thrower.throw_box import NOTHING, throw_box
+from limitsets.thrower.throw_box import NOTHING, sure_throw_box, throw_box
 
 __all__ = ["least_slope", "slopes"]
 
@@ -30,6 +30,8 @@ def _slopes(lo_map: Any, hi_map: Any, side: int, lo: Any, hi: Any, out: Any) -> 
     b = gather_box(lo_map, hi_map, side)
     for k in range(lo.size):
         state, _, _, slope, _ = throw_box(b, lo[k], hi[k])
+        if state == NOTHING:  # parameters so wide that the fast bracket of the impact angle is not confirmed
+            state, _, _, slope, _ = sure_throw_box(b, lo[k], hi[k])
         out[k] = slope[0] if state != NOTHING else -1.0
 
 
