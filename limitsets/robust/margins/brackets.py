@@ -1,9 +1,9 @@
 """The search for a bracket: how far a goal is proved to hold, and from where on an orbit refutes it.
 
 One quantity at a time.  Fixed but unknown: single scenes are asked first, which is quick and says where the goal
-breaks; then the proof grows outward from the scene as it is, in pieces that get narrower towards there.  A piece is
-proved for all its scenes at once, as if the quantity differed at every throw, so it cannot be wide where little is to
-spare; but no piece is proved twice.  Another one at every throw: there is no cutting, sizes are tried.
+breaks; then all scenes up to there are proved at once, where two throws with the same parameters settle it, or the
+proof grows outward from the scene as it is, in pieces that get narrower towards there, each proved as if the quantity
+differed at every throw.  Another one at every throw: there is no cutting, sizes are tried.
 """
 
 from __future__ import annotations
@@ -193,8 +193,13 @@ def bracket_fixed(question: Question, measure: Measure, width: Fraction, tell: T
 
 
 def _fixed_proof(question: Question, measure: Measure, found: Bracket, goal: Fraction, tell: Tell) -> Bracket:
-    """Grow the proof in both directions."""
+    """Prove it all at once, or grow the proof in both directions."""
     if goal <= NONE * measure.least:
+        return found
+    # all at once first: two throws with the same parameters may settle it
+    whole = question.prove(measure.piece(measure.between(-goal, goal)), finest=1)
+    if whole.verdict == "proved":
+        found.pieces, found.proved = [whole], goal
         return found
     wall = found.refuted or goal * Fraction(101, 100)
     for sign in (-1, 1):
