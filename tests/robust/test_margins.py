@@ -233,6 +233,22 @@ def test_every_quantity_of_a_scene_is_measured():
     assert along.unit == "%"
 
 
+def test_a_goal_that_fails_between_scenes_in_which_it_holds():
+    """The part's centre moved right in paper-initial: x > 21.8 off side 2 near 0.07 in, not at 0.097 in."""
+    (found,) = ls.margin("paper-initial", "part.mass.center.along", goal=OrientedBeyond(21.8, 2))
+    assert found.closed
+
+    def highest_off(size):
+        moved = ls.load("paper-initial").with_values({"part.mass.center.along": 3.9867006 + size})
+        path = ls.orbit(moved.map, 15.0, 2, 400_000)
+        x, side = np.asarray(path.x)[2000:], np.asarray(path.side)[2000:]
+        return float(x[side != 2].max())
+
+    assert highest_off(0.0972) < 21.8
+    assert max(highest_off(sign * found.proved) for sign in (-1, 1)) < 21.8
+    assert highest_off(1.01 * found.refuted) > 21.8
+
+
 def test_the_value_is_in_the_unit_of_its_deviation():
     # -0.2 in; an inch is 25.4 mm
     own = ls.load(ls.load("paper-designed").as_dict() | {"tolerance": {"arm.surface_height": "0.1 mm"}})

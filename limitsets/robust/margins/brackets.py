@@ -208,10 +208,24 @@ def _fixed_proof(question: Question, measure: Measure, found: Bracket, goal: Fra
         found.pieces += pieces
         if far < goal:
             goal, found.reason = far, reason + NARROWER
+            _fails_beyond(question, measure, sign, far, found)
             if not far:
                 break
     found.proved = goal
     return found
+
+
+def _fails_beyond(question: Question, measure: Measure, sign: int, far: Fraction, found: Bracket) -> None:
+    """Where a proof stops growing, look for a scene that fails: a goal may fail at a size and hold at larger ones."""
+    for k in range(10):
+        size = short(far * (1 + Fraction(2**k - 1, 400)), up=True)
+        if found.refuted is not None and size >= found.refuted:
+            return
+        against = question.refute(measure.piece(measure.at(sign * size)))
+        if against.verdict == "refuted":
+            found.refuted, found.sign = size, sign
+            found.against = replace(against, within={measure.quantity: measure.text(size)})
+            return
 
 
 class _Sizes:
