@@ -115,9 +115,9 @@ class Intervals:
         return Intervals(least, np.maximum(np.abs(self.lo), np.abs(self.hi)))
 
     def square_root(self) -> Intervals:
-        """Square root of numbers above 0."""
-        lo = np.sqrt(np.where(self.lo > 0.0, self.lo, np.nan))
-        return _outward(lo, np.sqrt(self.hi))
+        """Square root of numbers above 0; both ends are nan where some are not."""
+        sure = self.lo > 0.0
+        return _outward(*(np.sqrt(np.where(sure, end, np.nan)) for end in (self.lo, self.hi)))
 
 
 def _as(value: object) -> Intervals | None:

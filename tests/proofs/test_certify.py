@@ -180,9 +180,20 @@ def test_noise_at_every_throw(tmp_path):
 
 
 def test_a_speed_that_is_fixed_but_unknown(tmp_path):
-    """Sharp at 0.733 %, slower."""
-    proof = ls.certify("paper-designed", tolerance={"throw.speed": "0.7 %"})
+    """Sharp at 0.733 %, slower; by two throws with the same parameters in one piece."""
+    proof = ls.certify("paper-designed", tolerance={"throw.speed": "0.73 %"})
     assert verdicts(proof) == {"attracts-all": "proved", "goal": "proved"}
+    assert len(proof.attractions) == 1
+    require_rechecked(proof, tmp_path)
+    proof = ls.certify("paper-designed", tolerance={"throw.speed": "0.74 %"})
+    assert verdicts(proof)["goal"] == "refuted"
+
+
+def test_a_tolerance_is_cut_where_two_throws_do_not_do(tmp_path):
+    """The highest place of paper-initial off side 2, 21.5545 in, is three throws from what decides it."""
+    scene = ls.load("paper-initial").as_dict() | {"goal": {"oriented_beyond": {"x": "21.6 in", "side": 2}}}
+    proof = ls.certify(ls.load(scene), ["goal"], tolerance={"throw.speed": "0.05 %"})
+    assert verdicts(proof) == {"goal": "proved"}
     assert len(proof.attractions) > 1
     require_rechecked(proof, tmp_path)
 

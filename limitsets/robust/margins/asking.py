@@ -105,7 +105,7 @@ class Question:
         Parameters
         ----------
         piece : Piece, optional
-            Scenes, all at once: as if the quantities differed at every throw.
+            Scenes, all at once: cells as if the quantities differed at every throw.
         noise : mapping of str to str, optional
             What differs at every throw.
         finest : int

@@ -1,7 +1,8 @@
 """Proof of goals over a box of scenes, cut where it pays.
 
-Proved as a whole a piece counts as noise, which costs about as much again as its deviation does, so pieces have to be
-narrow near the worst corner, in the quantities that matter there, and nowhere else.
+Two throws with the same parameters may settle the box as a whole (`proofs/chains.py`).  Where they do not, a piece
+counts as noise, which costs about as much again as its deviation does, so pieces have to be narrow near the worst
+corner, in the quantities that matter there, and nowhere else.
 """
 
 from __future__ import annotations
