@@ -20,7 +20,6 @@ Source: weak duality (Lagrange multipliers); the monotonicity test of interval a
 from __future__ import annotations
 
 from collections.abc import Iterator
-from itertools import combinations
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -232,34 +231,26 @@ def _sum(terms: Any, weights: list[Intervals]) -> Intervals:
 def _weights(values: list[Intervals], slopes: list[list[Intervals]], half: Array) -> list[Intervals]:
     """Propose weights, in floats: any are right whose first two are not below 0.
 
-    The bound is a sum of absolute values of linear functions of the weights: it is least where three of the derivatives
-    or weights are nothing, one of them by an angle, as the angles' boxes are cut no finer than they must be.
+    How x'' changes with r is taken up by m(r), where the second branch ends; or by u, handed on to p, and there taken
+    up by m(p), where the first branch ends; or by nothing.  The best of these is taken.
     """
     at = np.array([0.5 * (value.lo + value.hi) for value in values])
-    steep = np.array([[0.5 * (by.lo + by.hi) for by in of] for of in slopes]) * half
-    axes = np.zeros((4, 2, half.shape[1]))
-    axes[1, 0] = axes[2, 1] = 1.0
-    lines = np.concatenate([steep, axes], axis=1)
+    steep = np.array([[0.5 * (by.lo + by.hi) for by in of] for of in slopes])
+    none = np.zeros(half.shape[1])
+    with np.errstate(all="ignore"):
+        handed = -steep[0, SECOND] / steep[3, SECOND]
+        some = [
+            (none, none, none),
+            (none, -steep[0, SECOND] / steep[2, SECOND], none),
+            (none, none, handed),
+            (-handed * steep[3, FIRST] / steep[1, FIRST], none, handed),
+        ]
     best, found = np.full(half.shape[1], np.inf), np.zeros((3, half.shape[1]))
-    for three in combinations(range(lines.shape[1]), 3):
-        if three[0] > SECOND:
-            break
-        with np.errstate(all="ignore"):
-            some = _crossing(lines[:, three])
-        some = np.where(np.isfinite(some).all(axis=0) & (some[:2] >= 0.0).all(axis=0), some, 0.0)
-        bound = at[0] + (some * at[1:]).sum(axis=0)
-        bound = bound + np.abs(steep[0] + (some[:, None] * steep[1:]).sum(axis=0)).sum(axis=0)
+    for weights in map(np.array, some):
+        good = np.isfinite(weights).all(axis=0) & (weights[:2] >= 0.0).all(axis=0)
+        tried = np.where(good, weights, 0.0)
+        loose = np.abs(steep[0] + (tried[:, None] * steep[1:]).sum(axis=0)) * half
+        bound = at[0] + (tried * at[1:]).sum(axis=0) + loose.sum(axis=0)
         better = bound < best
-        best, found = np.where(better, bound, best), np.where(better, some, found)
+        best, found = np.where(better, bound, best), np.where(better, tried, found)
     return [Intervals(each, each) for each in found]
-
-
-def _crossing(lines: Array) -> Array:
-    """Where three planes c + b . w = 0 meet, by Cramer's rule: (4, 3, n) to (3, n), not finite if nowhere."""
-    matrix, right = np.moveaxis(lines[1:], (0, 1, 2), (2, 1, 0)), -lines[0].T
-    det, found = np.linalg.det(matrix), []
-    for k in range(3):
-        other = matrix.copy()
-        other[:, :, k] = right
-        found.append(np.linalg.det(other) / det)
-    return np.array(found)
