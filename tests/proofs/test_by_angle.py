@@ -337,3 +337,50 @@ def test_the_root_of_what_may_be_0_is_nan_with_its_derivatives():
     for each in (found.value, found.by[0]):
         assert np.isnan(each.lo).all()
         assert np.isnan(each.hi).all()
+
+
+# --------------------------------------------------------------------- a variable in which G neither rises nor falls
+
+
+def an_open_box(model, second, names):
+    """A box, narrow but for the second angle r, over which G is convex in r and flat in its middle.
+
+    Along r, G = x''(r) + u (x'(p) - P(r)) with u = dx''/dP there; jogs and flips lead the farther on the farther out
+    they begin (dx'/dx rises while a sin p - d (1 - cos p) does).  Returns its ends, u, and G in its middle and at the
+    higher of its ends.
+    """
+    values = {name: mpf(value) for name, value in DESIGNED.items()}
+    kind, r = Two(2, JOG, second), mpf("0.8")
+
+    def terms(p, r):
+        return terms_by_hand(model, kind, values, p, r, mpf(0))
+
+    p = mp.findroot(lambda p: terms(p, r)[3], (mpf("0.7"), mpf("0.8")))
+    up, down = terms(p, r + mpf(10) ** -15), terms(p, r - mpf(10) ** -15)
+    u = float(-(up[0] - down[0]) / (up[3] - down[3]))
+    bounds = [float(terms(p, at)[0] + u * terms(p, at)[3]) for at in (r, r - mpf("0.05"), r + mpf("0.05"))]
+    centre = np.array([float(p), float(r), 0.0, *(DESIGNED[name] for name in names)])
+    half = np.where(np.arange(centre.size) == 1, 0.05, 1e-9)
+    return kind, centre - half, centre + half, u, bounds[0], max(bounds[1:])
+
+
+@pytest.mark.parametrize("second", [JOG, FLIP])
+def test_what_neither_rises_nor_falls_costs_its_derivative(second):
+    model = ("exact", "signed")
+    scene, wide = boxed(written("paper-designed", model), WIDTHS)
+    boxes = chains._Boxes(parameter_box(scene, tree=wide), scene, 20.0)
+    names = ["throw.kappa", "arm.surface_height", *boxes.names]
+    kind, lo, hi, u, middle, top = an_open_box(model, second, names)
+    assert middle < top - 1e-3
+    ends = tuple(each[:, None] for each in (lo, 0.5 * (lo + hi), hi))
+    rising = [
+        variable(Intervals(*each), k, lo.size) for k, each in enumerate(zip(ends[0], ends[2], strict=True))
+    ]
+    slopes = [[by.rows(1) for by in term.by] for term in boxes._terms(kind, rising)]
+    weights = [Intervals.of(each) for each in (0.0, 0.0, u)]
+    for x, failed in ((middle + 1e-5, 1), (top - 1e-5, 1), (top + 0.5, 0)):
+        boxes.x = x
+        left = np.array([0])
+        found, along = boxes._weighed(kind, left, slopes, weights, ends, 0.5 * (ends[2] - ends[0]) + 1e-15)
+        assert found.size == failed
+        assert (along == 1).all()

@@ -22,7 +22,7 @@ import limitsets as ls
 from limitsets.maps import images
 from limitsets.thrower import impact_angles
 from tests.proofs import forge
-from tests.proofs.test_by_angle import DESIGNED, MODELS, WIDTHS, boxed, by_hand, feet, written
+from tests.proofs.test_by_angle import DESIGNED, MODELS, WIDTHS, an_open_box, boxed, by_hand, feet, written
 from tests.proofs.test_recheck import checker, verdict
 from tests.proofs.test_tolerances import reread
 
@@ -315,3 +315,17 @@ def entries_of(f):
         np.save(out, array)
         found[f"{name}.npy"] = memoryview(out.getvalue())
     return found
+
+
+def test_what_neither_rises_nor_falls_costs_its_derivative(monkeypatch):
+    model = ("exact", "signed")
+    _, read, known = read_wide(model, 0.0)
+    names = ["throw.kappa", "arm.surface_height", *(where for _, where, _ in known)]
+    kind, lo, hi, u, middle, top = an_open_box(model, 0, names)  # that throw does jog
+    assert middle < top - 1e-3
+    monkeypatch.setattr(checker, "weigh", lambda *_: [0.0, 0.0, u])
+    box = list(zip(lo.tolist(), hi.tolist(), strict=True))
+    ids = [own for own, _, _ in known]
+    for x in (middle + 1e-5, top - 1e-5):
+        assert checker.pair_stays(read, checker.Two(*kind), ids, box, arb(x)) == checker.R
+    assert checker.pair_stays(read, checker.Two(*kind), ids, box, arb(top + 0.5)) == -1
