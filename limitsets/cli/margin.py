@@ -89,7 +89,7 @@ def _goal_at(scene: Any, text: str) -> Any:
 
 def _write(found: tuple[Margin, ...], records: list[dict[str, Any]], out: Path) -> None:
     from limitsets.errors import AnswerError
-    from limitsets.plot.margins import tornado
+    from limitsets.plot.margins import tolerance_box, tornado
     from limitsets.report.writing import DPI, filled
 
     for each, record in zip(found, records, strict=True):
@@ -99,7 +99,12 @@ def _write(found: tuple[Margin, ...], records: list[dict[str, Any]], out: Path) 
             record["certificate"] = None
     with filled(out) as draft:
         (draft / "margins.json").write_text(as_json(records), encoding="utf-8", newline="\n")
-        tornado(found).savefig(draft / "margins.png", dpi=DPI)
+        single = [each for each in found if each.reading != "tolerance"]
+        if single:
+            tornado(single).savefig(draft / "margins.png", dpi=DPI)
+        for each in found:
+            if each.reading == "tolerance":
+                tolerance_box(each).savefig(draft / "joint.png", dpi=DPI)
 
 
 def _text(found: tuple[Margin, ...], out: Path | None) -> None:
@@ -120,5 +125,5 @@ def _text(found: tuple[Margin, ...], out: Path | None) -> None:
             typer.echo(f"{each.quantity}: {each.reason}")
     if out is not None:
         typer.echo(
-            f"written to {out}: margins.json, margins.png, certificates (check them: limitsets recheck FILE)"
+            f"written to {out}: margins.json, figures, certificates (check them: limitsets recheck FILE)"
         )

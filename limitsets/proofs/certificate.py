@@ -104,6 +104,11 @@ def _say_nothing(arrays: dict[str, NDArray[Any]], found: Cover) -> None:
         arrays["phi"][cells] = SLACK, 2.0 * math.pi
 
 
+def _model(found: Cover) -> dict[str, str]:
+    first = found.box.bare[0]
+    return {"flight": FLIGHTS[type(first.flight)], "flip": FLIPS[type(first.flip)]}
+
+
 def _parameters(found: Cover) -> dict[str, Any]:
     lo, hi = found.box.lo, found.box.hi
 
@@ -154,18 +159,17 @@ def write(
     for number, proof in enumerate(proofs):
         arrays |= arrays_of(proof, f"{number}.")
         found = proof.cover
-        # what is left of the effects here is noise, which the header has
+        # what is left of the effects here is noise, which the header has; a scene may leave the model to its defaults
         scene = {word: table for word, table in found.box.scene.items() if word != "effects"}
+        scene["model"] = _model(found)
         boxes.append({"scene": scene, "parameters": _parameters(found), "prefix": f"{number}."})
-    first = proofs[0].cover.box.lo
     header = {
         "format": FORMAT,
         "version": VERSION,
         "map": {
             "name": "throw",
             "version": 1,
-            "flight": FLIGHTS[type(first.flight)],
-            "flip": FLIPS[type(first.flip)],
+            **_model(proofs[0].cover),
             "formulas": FORMULAS,
         },
         "state": f"x [{unit}]: centre of mass along the arm; side: the one the part rests on, in flip order",
