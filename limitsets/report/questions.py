@@ -26,10 +26,12 @@ def question_of(goal: Goal, unit: str) -> str:
     Examples
     --------
     >>> question_of(OrientedBeyond(20.0, 2), "in")
-    'every part at rest beyond x = 20 in lies on side 2'
+    'every part at rest beyond x = 20 in lies on side 2 (asked of the limit set)'
     """
-    where = " (asked of every throw from every start)" if goal.from_anywhere else ""
-    return _question(goal, unit) + where
+    if isinstance(goal, AttractsAll):
+        return _question(goal, unit)
+    where = "every throw from every start" if goal.from_anywhere else "the limit set"
+    return f"{_question(goal, unit)} (asked of {where})"
 
 
 def _question(goal: Goal, unit: str) -> str:

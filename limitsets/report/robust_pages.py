@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from limitsets.goals import Goal, OrientedBeyond
 from limitsets.report.background import figure_line, scene_of
 from limitsets.report.questions import question_of
-from limitsets.report.robust_trust import checked_again, noise_of, trusted
+from limitsets.report.robust_trust import called_for, checked_again, noise_of, trusted
 from limitsets.report.tables import table
 from limitsets.robust.margins.words import bound
 from limitsets.robust.sheet.entries import Entry, percent_of
@@ -82,6 +82,12 @@ def answer(found: Robustness) -> str:
     joint = found.joint
     if joint is not None:
         lines.append(_met(joint))
+    effects = called_for(found)
+    if effects:
+        lines.append(
+            f"All of it is about the model's throws: on the limit set {', '.join(effects)} would act as well "
+            "(`limitsets audit` says where)."
+        )
     if found.curve is not None and found.verdict != "proved":
         lines.append(_best(found.curve))
     return " ".join(lines)
@@ -335,6 +341,12 @@ def _curve(found: Robustness, figures: Mapping[str, str]) -> str:
         f"Asked of each X, on the limit set: beyond it the part lies on side {curve.side} only, and almost every orbit "
         f"comes to rest there. {_best(curve)}"
     )
+    joint = found.joint
+    if joint is not None and joint.proved > curve.best()[1] and curve.names[0] == "joint":
+        text += (
+            f" That is more than the scene's goal, which is proved up to {bound(joint.proved, 'times the tolerance')} "
+            "at its own X."
+        )
     rest = found.left_out.get("rest of the curve")
     text += f" ({rest[0].upper()}{rest[1:]}.)" if rest else ""
     return "\n\n".join([head, text, table(heads, rows)]) + figure_line(figures, "curve", "Margins against X")

@@ -13,7 +13,7 @@ from limitsets.robust.noise.laws import Gaussian, Law, Uniform
 if TYPE_CHECKING:
     from limitsets.robust.sheet.summary import Robustness
 
-__all__ = ["checked_again", "noise_of", "trusted"]
+__all__ = ["called_for", "checked_again", "noise_of", "trusted"]
 
 # What the numbers of the noise are called, and whether they are shares, throws, or a rate per throw.
 NUMBERS = {
@@ -158,13 +158,18 @@ def trusted(found: Robustness) -> str:
     return "\n\n".join(lines)
 
 
+def called_for(found: Robustness) -> list[str]:
+    """Name the effects that the limit set calls for and that are not simulated."""
+    limit = found.audit.on("limit-set") if found.audit is not None else ()
+    return list(dict.fromkeys(each.effect for each in limit if each.called_for and not each.simulated))
+
+
 def _flags(found: Robustness) -> str:
     """Say which assumptions an audit flags, in one line."""
     command = f"`limitsets audit {_scene(found)}`"
     if found.audit is None:
         return f"{command} says which assumptions of the model the scene breaks."
-    limit = found.audit.on("limit-set")
-    called = dict.fromkeys(each.effect for each in limit if each.called_for and not each.simulated)
+    limit, called = found.audit.on("limit-set"), called_for(found)
     unknown = dict.fromkeys(each.missing for each in limit if each.missing and each.called_for is None)
     words = f"flagged: {', '.join(called)}" if called else "none is seen to break"
     rest = f"; cannot be told without {', '.join(unknown)} in [world]" if unknown else ""

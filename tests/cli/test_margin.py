@@ -49,6 +49,17 @@ def test_json_and_files_that_recheck_accepts(capfd):
         assert code == 0
 
 
+def test_the_joint_margin_has_a_figure_of_its_own(capfd):
+    own = Path("own.toml")
+    ls.dump(ls.load(ls.load("paper-designed").as_dict() | {"tolerance": {"throw.speed": "0.5 %"}}), own)
+    code, out, _ = run(capfd, "margin", str(own), "joint", "--width", "0.1", "-o", "out")
+    assert code == 0
+    assert "asked of the limit set" in out
+    names = {path.name for path in Path("out").iterdir()}
+    assert {"joint.png", "margins.json"} < names
+    assert "margins.png" not in names
+
+
 def test_another_x_and_a_reading(capfd):
     words = ("margin", "paper-designed", "throw.speed", "--reading", "per-throw", "--width", "0.2", "--json")
     _, at_20, _ = run(capfd, *words)

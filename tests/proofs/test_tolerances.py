@@ -174,3 +174,39 @@ def test_halves_hold_the_whole_together_and_narrow_it():
             for a, d, s in zip(m.a, m.d, piece.sides, strict=True):
                 assert float(s.a.lower()) - 1e-12 <= a <= float(s.a.upper()) + 1e-12
                 assert float(s.d.lower()) - 1e-12 <= d <= float(s.d.upper()) + 1e-12
+
+
+LEAD_QUAD = {
+    "name": "lead-quad",
+    "part": {
+        "vertices": [["0 mm", "0 mm"], ["130 mm", "0 mm"], ["150 mm", "70 mm"], ["30 mm", "100 mm"]],
+        "mass": {"plate_density": "3 kg/m^2", "points": [{"x": "110 mm", "y": "15 mm", "mass": "60 g"}]},
+    },
+    "arm": {"surface_height": "-15 mm", "length": "700 mm"},
+    "throw": {"speed": "160 deg/s"},
+    "gravity": {"tilt": "30 deg"},
+    "goal": {"oriented_beyond": {"x": "52 cm", "side": 0}},
+}
+
+
+@pytest.mark.parametrize("model", [{}, {"model": {"flight": "exact"}}, {"model": {"flip": "energy"}}])
+def test_a_scene_that_leaves_its_model_to_the_defaults_is_rechecked(tmp_path, model):
+    proof = ls.certify(ls.load(LEAD_QUAD | model), ["goal"])
+    assert proof.proved
+    report = ls.recheck(proof.save(tmp_path / "quad.proof.zip"))
+    assert (report.verdict, report.reason) == ("proved", "")
+    flip = model.get("model", {}).get("flip", "signed")
+    assert f"flight exact, flip {flip}" in report.relied_on[0]
+
+
+def test_corners_and_masses_with_a_tolerance_are_rechecked(tmp_path):
+    """The length of a side bends with its corners: an interval holds it narrower than a ball does."""
+    tolerance = {
+        "part.vertices[2].x": "0.3 mm",
+        "throw.speed": "1.2 %",
+        "part.mass.points[0].x": "1.2 mm",
+    }
+    proof = ls.certify(ls.load(LEAD_QUAD), ["goal"], tolerance=tolerance)
+    assert proof.proved
+    report = ls.recheck(proof.save(tmp_path / "quad.proof.zip"))
+    assert (report.verdict, report.reason) == ("proved", "")

@@ -56,7 +56,8 @@ def test_everything_is_written(source, tmp_path):
 
 def test_the_goal_in_words():
     text = page(analysed("paper-designed"), {})
-    assert "every part at rest beyond x = 20 in lies on side 2. **It holds** (sampled: no proof)" in text
+    asked = "every part at rest beyond x = 20 in lies on side 2 (asked of the limit set)"
+    assert f"{asked}. **It holds** (sampled: no proof)" in text
     assert "from x = 19.753 in on" in text
     assert "does not hold" in page(analysed("paper-initial"), {})
     assert "But no part gets there" in page(analysed(SCENES / "five-sides.toml"), {})
