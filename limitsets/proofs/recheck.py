@@ -753,8 +753,9 @@ def check_parameters(scene: Scene, said: object, where: str) -> str:
         pairs = rows(said[key], key, len(balls), len(balls)) if key in ("a", "d", "length") else [said[key]]
         for i, (ball, pair) in enumerate(zip(balls, pairs, strict=True)):
             lo, hi = (arb(hex_float(text, key)) for text in rows(pair, key, 2, 2))
-            # a ball's radius has 30 bits, and where the formulas bend a ball is wider than an interval may be
-            slack = (hi - lo) * 2.0**-10 + abs(hi) * 2.0**-26
+            # a ball's radius has 30 bits; and where the formulas of a part with a tolerance bend, a ball is wider than
+            # an interval may be
+            slack = (hi - lo) * 2.0**-10 + (abs(hi) * 2.0**-26 if scene.loose > 0 else ZERO)
             if not (ball >= lo - slack and ball <= hi + slack):
                 return f"parameter {key} {i}: the scene gives {ball.str(17)}, not in [{lo.str(17)}, {hi.str(17)}]"
     return ""
