@@ -6,6 +6,7 @@ digits).  A tolerance of the speed alone makes the joint factor that margin over
 
 import json
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ from mpmath import mpf
 import limitsets as ls
 from limitsets.errors import LimitsetsError
 from limitsets.goals import OrientedBeyond
+from limitsets.report.robust_pages import answer, robustness_page
 from limitsets.robust.margins.beyond import MarginsBeyond
 from limitsets.robust.sheet import against_x, gathering
 from limitsets.robust.sheet.chance import noise_of, scattering_from, still
@@ -271,3 +273,17 @@ def test_margins_against_x_begin_in_the_middle_and_go_on_where_they_stopped(monk
     assert whole.x.tolist() == pytest.approx(np.linspace(19.753, 23.383, 9)[1:-1].tolist(), abs=0.01)
     assert whole.proved[:, 0] == pytest.approx(1.0 - np.abs(whole.x - 21.5))
     assert whole.best()[0] == first.x[0]
+
+
+def test_the_page_names_first_what_the_limit_set_calls_for(sheet):
+    """docs/model.md: in every jog on the limit set of paper-designed the pivot would have to pull at the vertex."""
+    assert "would act as well" not in answer(sheet)  # not audited: nothing is known
+    assert "on the limit set pivot" in answer(replace(sheet, audit=ls.audit("paper-designed")))
+
+
+@pytest.mark.parametrize(("at_best", "says"), [(0.01, True), (5.0, False)])
+def test_a_curve_that_asks_more_than_the_goal_is_not_taken_for_it(sheet, at_best, says):
+    # the sheet's own joint factor is 0.733 / 2, of the tolerance of 2 %
+    proved = np.array([[at_best]])
+    curve = MarginsBeyond(sheet.scene, 2, np.array([21.5]), ("joint",), ("",), proved, 2 * proved, ())
+    assert ("more than the scene's goal" in robustness_page(replace(sheet, curve=curve), {})) is says

@@ -38,7 +38,8 @@ def _prove(found: Attraction, scene: Scene, goal: OrientedBeyond) -> Answer:
         reason = missing if found.cover.points else reason or missing
     else:
         bad &= found.component >= 0
-        reason = missing or _beyond(found, goal, bad)
+        beyond = f"{bad.sum()} attracting cells reach beyond x = {goal.x:g} on other sides than {goal.side}"
+        reason = missing or (beyond if bad.any() else "")
         if reason and not missing and stays_below(found, scene, bad, below(goal.x)):
             reason, more = "", {"throws": 2}
     if reason:
@@ -50,16 +51,6 @@ def section_of(goal: OrientedBeyond, scene: Scene) -> dict[str, Any]:
     """Write the goal as a certificate has it."""
     section = {"kind": goal.kind, "x": f"{goal.x!r} {scene.unit}", "side": goal.side}
     return section | ({"from_anywhere": True} if goal.from_anywhere else {})
-
-
-def _beyond(found: Attraction, goal: OrientedBeyond, bad: NDArray[np.bool_]) -> str:
-    """Say that attracting cells lie beyond x on other sides; empty if none does."""
-    count = int((bad & (found.component >= 0)).sum())
-    return (
-        f"{count} attracting cells reach beyond x = {goal.x:g} on other sides than {goal.side}"
-        if count
-        else ""
-    )
 
 
 def _ask(found: Attraction, scene: Scene, goal: OrientedBeyond) -> Answer:

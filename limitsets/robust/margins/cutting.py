@@ -131,11 +131,11 @@ class Cutting:
                 continue
             if found is not None and self.effects.spare.size:
                 self.cost = min(MOST_COST, self.cost * 1.03)
-            why = self._stop(part, guess, found, waiting, time.perf_counter() > end)
+            k, at = self._where(part, guess, found)
+            why = self._stop(part, k, found, waiting, time.perf_counter() > end)
             if why:
                 failed.append((part.near, why))
                 continue
-            k, at = self._where(part, guess, found)
             for piece in part.cut(k, at, number):
                 heapq.heappush(waiting, piece)
             number += 2
@@ -147,14 +147,14 @@ class Cutting:
         Where nothing attracts, or no part is proved to rest, what a quantity costs elsewhere says little: the widest.
         """
         cells = None if found is None else found.found
-        if found is None or (cells is not None and (cells.component >= 0).any()):
+        if not part.low or found is None or (cells is not None and (cells.component >= 0).any()):
             return guess.k, guess.at
         widths = np.array([float(hi - lo) for lo, hi in zip(part.low, part.high, strict=True)])
         cost = self.effects.cost.max(axis=0, initial=0.0)
         k = int(np.argmax(widths * np.maximum(cost / max(cost.max(initial=0.0), 1e-300), LEAST_SHARE)))
         return k, (part.low[k] + part.high[k]) / 2
 
-    def _stop(self, part: _Part, guess: _Guess, found: Asked | None, waiting: list[_Part], late: bool) -> str:
+    def _stop(self, part: _Part, k: int, found: Asked | None, waiting: list[_Part], late: bool) -> str:
         """Say why a part is given up; empty if it is to be cut."""
         if late:
             return (
@@ -162,7 +162,7 @@ class Cutting:
             )
         if len(self.proved) + len(waiting) >= MOST_PIECES:
             return f"the box of all quantities is in {MOST_PIECES} pieces: ask for a wider bracket"
-        if part.low and part.high[guess.k] - part.low[guess.k] > NARROWEST:
+        if part.low and part.high[k] - part.low[k] > NARROWEST:
             return ""
         return (
             found.reason if found else ""

@@ -79,7 +79,7 @@ class Effects:
 
 def _spare(question: Question, piece: Piece, start: tuple[float, int]) -> NDArray[np.float64]:
     box = question.box(piece, {})
-    path = orbit(box.at_kappa(0.5 * (box.lo.kappa + box.hi.kappa)), *start, BEFORE + LENGTH)
+    path = orbit(box.at_kappa(box.middle_kappa), *start, BEFORE + LENGTH)
     x, side = np.asarray(path.x)[BEFORE:], np.asarray(path.side)[BEFORE:]
     count = box.lo.a.size
     highest = [float(x[side == s].max(initial=-math.inf)) for s in range(count)]

@@ -52,7 +52,7 @@ class Tolerance:
             deviation(text, name, scene.unit, key=f'tolerance."{name}"')
             one = measure(scene, name)
             share = text.rstrip().endswith("%")
-            given = parse(text, "share" if share else _dimension(name))
+            given = parse(text, "share" if share else find(name).dimension)
             one = replace(one, unit=given.unit)
             if name == "throw.speed" and one.key != name and not share:
                 raise AnswerError("the tolerance", text, "percent, for a scene given by kappa", "give it so")
@@ -93,7 +93,3 @@ class Tolerance:
             for one, size, lo, hi in zip(self.measures, self.sizes, low, high, strict=True)
         }
         return Piece(self.measures[0].scene, spans)
-
-
-def _dimension(name: str) -> str:
-    return find(name).dimension
