@@ -30,6 +30,9 @@ HELP_NOISE = (
 )
 
 
+HELP_NO_RECHECK = "Write the certificate without checking it first."
+
+
 def certify(
     scene: Scene,
     claim: Annotated[list[str] | None, typer.Option("--claim", metavar="C", help=HELP_CLAIM)] = None,
@@ -42,8 +45,9 @@ def certify(
         typer.Option("--out", "-o", metavar="FILE", help="The certificate, ./NAME.proof.zip by default."),
     ] = None,
     json: Json = False,
+    no_recheck: Annotated[bool, typer.Option("--no-recheck", help=HELP_NO_RECHECK)] = False,
 ) -> None:
-    """Prove where the throws lead, and write a certificate that `limitsets recheck` verifies.
+    """Prove where the throws lead, and write a certificate that `limitsets recheck` verifies; it is checked first.
 
     Exit 1 where a claim is not proved.
     """

@@ -24,7 +24,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-import limitsets.interval as iv
 from limitsets.cells import CellSet
 from limitsets.graph.components import ranks, reach
 from limitsets.jit import proof_kernel
@@ -201,12 +200,23 @@ def basin(found: Cover, component: NDArray[np.int32], joint: Sequence[NearJoint]
         (thick, "orbits are not proved to leave the recurrent cells at {}, which do not attract"),
         (flat, "the slope is not proved positive on {}"),
     )
-    missing = next((text.format(found.place(int(np.argmax(mask)))) for mask, text in reasons if mask.any()), "")
+    missing = next(
+        (text.format(found.place(int(np.argmax(mask)))) for mask, text in reasons if mask.any()), ""
+    )
     if not missing and not near:
-        missing = next((f"near the joint on side {side}: {each.reason}" for side, each in enumerate(joint) if each.reason), "")
+        missing = next(
+            (
+                f"near the joint on side {side}: {each.reason}"
+                for side, each in enumerate(joint)
+                if each.reason
+            ),
+            "",
+        )
     # a little more, so that other arithmetic can confirm it
     throws = throws + throws // 8 + 1 if thin.any() else 0
-    return Basin(rank, throws, near, start, explained, *_shares(found, joint, shut, near, start, explained), missing)
+    return Basin(
+        rank, throws, near, start, explained, *_shares(found, joint, shut, near, start, explained), missing
+    )
 
 
 def _reaching(found: Cover, cells: Mask) -> Mask:

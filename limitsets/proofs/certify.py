@@ -135,18 +135,24 @@ class Proof:
 
         return to_json(self)
 
-    def save(self, path: str | Path) -> Path:
-        """Write the certificate of the claims that are proved.
+    def save(self, path: str | Path, *, recheck: bool = True, workers: int | None = 1) -> Path:
+        """Write the certificate of the claims that are proved; it gets its name once `recheck` has confirmed it.
 
         Parameters
         ----------
         path : str or Path
             The file, replaced whole.
+        recheck : bool
+            Whether to have it checked first.
+        workers : int, optional
+            Processes that check it, as in `limitsets.recheck`.
 
         Raises
         ------
         AnswerError
             Nothing is proved, or it is proved of a map that no recheck knows.
+        DeniedError
+            The checker does not confirm it: it is kept as NAME.denied.zip, and what it denies is undecided.
         """
         if self.effects:
             raise AnswerError(
@@ -156,7 +162,7 @@ class Proof:
                 "nothing rechecks other maps; the proof stands in .claims and .to_json()",
             )
         good = [
-            {"claim": claim.claim, "section": claim.section}
+            {"claim": claim.claim, "section": claim.section, "verdict": claim.verdict}
             for claim in self.claims
             if claim.written
         ]
@@ -176,8 +182,26 @@ class Proof:
             tolerance=self.tolerance,
             unit=self.scene.unit,
             producer=producer,
+            recheck=recheck,
+            workers=workers,
         )
         return Path(path)
+
+    def denied(self, claims: Mapping[str, str]) -> Proof:
+        """Return what is left of it where the checker denies some claims: these are undecided."""
+        left = tuple(
+            replace(
+                each,
+                verdict="undecided",
+                reason=f"the checker denies it: {claims[each.claim]}",
+                section={},
+                starts=None,
+            )
+            if each.claim in claims
+            else each
+            for each in self.claims
+        )
+        return replace(self, claims=left)
 
 
 def _attracts_all(found: Attraction, scene: Scene) -> Claim:
@@ -449,7 +473,9 @@ def _halved(
         box = parameter_box(scene, tree=part.tree(), noise=noise)
         one, answers = _attempt(scene, wanted, box, (cells,), None)
         tried += one.cover.grid.n_cells
-        missing = tuple(each for each in answers if not (each.written and (each.final or each.verdict == "proved")))
+        missing = tuple(
+            each for each in answers if not (each.written and (each.final or each.verdict == "proved"))
+        )
         refuted = tuple(replace(each, fixed=part.texts()) for each in missing if each.verdict == "refuted")
         if (
             noise
@@ -491,7 +517,9 @@ def weakest_of(claims: Sequence[Claim]) -> Claim:
         section["least_slope"] = min((other["least_slope"] for other in sections), key=float.fromhex)
     if claims[0].starts is None:
         return Claim(claims[0].claim, "proved", "", section)
-    weakest = max(claims, key=lambda claim: STARTS.index(claim.starts if isinstance(claim.starts, str) else "from"))
+    weakest = max(
+        claims, key=lambda claim: STARTS.index(claim.starts if isinstance(claim.starts, str) else "from")
+    )
     starts = weakest.starts
     section.pop("lost", None)
     if isinstance(starts, dict):
@@ -500,10 +528,15 @@ def weakest_of(claims: Sequence[Claim]) -> Claim:
         section["starts"] = {"from": {side: x.hex() for side, x in starts["from"].items()}}
         lost = [other["lost"] for other in sections if "lost" in other]
         if len(lost) == len(given) and lost:
-            section["lost"] = {side: min((each[side] for each in lost), key=float.fromhex) for side in lost[0]}
+            section["lost"] = {
+                side: min((each[side] for each in lost), key=float.fromhex) for side in lost[0]
+            }
     else:
         section["starts"] = starts
-    least, most = {"share": min, "leaves": min, "creeps": min, "open": max}, [claim.shares for claim in claims]
+    least, most = (
+        {"share": min, "leaves": min, "creeps": min, "open": max},
+        [claim.shares for claim in claims],
+    )
     shares = {key: pick(each[key] for each in most) for key, pick in least.items()}
     notes = {claim.note for claim in claims}
     note = notes.pop() if len(notes) == 1 else ""
