@@ -114,9 +114,9 @@ class Basin:
 
 @proof_kernel(entry=True)
 def _shifts(lo_map: Any, hi_map: Any, side: int, lo: Any, hi: Any, out: Any) -> None:
-    """Bounds of the displacement of a jog from each cell for all kappa, its upper bound for the largest, and the decision.
+    """Bound the displacement of a jog from each cell.
 
-    `out`: rows of least displacement, largest displacement at the largest kappa, and 1 where that one is a decided jog.
+    `out`: rows of the least for all kappa, the largest for the largest kappa, and 1 where that one is a decided jog.
     """
     whole = gather_box(lo_map, hi_map, side)
     slow = with_kappa(whole, whole.kappa[1], whole.kappa[1])
@@ -232,7 +232,7 @@ def _passing(found: Cover, displaced: Sequence[Floats]) -> Mask:
     if found.box.effects:  # another vertex may land, elsewhere
         return np.zeros(found.grid.n_cells, dtype=bool)
     least = np.concatenate([each[:, 0] for each in displaced])
-    return least - found.box.landing > ROOM * np.abs(least)
+    return np.greater(least - found.box.landing, ROOM * np.abs(least))
 
 
 def _near(found: Cover, joint: Sequence[NearJoint], shut: Mask, *, thin: bool) -> bool:
@@ -266,7 +266,7 @@ def _start(
 def _shares(
     found: Cover, joint: Sequence[NearJoint], shut: Mask, near: bool, start: Floats, explained: Floats
 ) -> tuple[float, float, float, float, bool]:
-    """Shares of the arm that are claimed, leave, creep and are open; and whether the starts beyond `start` are claimed."""
+    """Shares of the arm that are claimed, leave, creep and are open; whether all beyond `start` is claimed."""
     lo, hi = found.box.bare
     total = float((lo.arm_length - hi.a).sum())
     wide = float((hi.arm_length - lo.a).sum())

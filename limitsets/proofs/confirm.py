@@ -98,10 +98,10 @@ def recheck(
     Returns
     -------
     Report
-        Its `verdict` is "proved", "proved-on-cells" (a goal, of the starts in some cells only), "refuted" (an orbit that
-        violates the goal is confirmed), "failed" or "bad file"; `reason` says what fails first; `statement`, `parameters`
-        and `relied_on` say what was claimed, of which scenes, and what that rests on; `starts` and `share`, for which
-        starts the goal is proved and what share of the arm they are.
+        Its `verdict` is "proved", "proved-on-cells" (a goal, of the starts in some cells only), "refuted" (an orbit
+        that violates the goal is confirmed), "failed" or "bad file"; `reason` says what fails first; `statement`,
+        `parameters` and `relied_on` say what was claimed, of which scenes, and what that rests on; `starts` and
+        `share`, for which starts the goal is proved and what share of the arm they are.
 
     Raises
     ------
