@@ -305,12 +305,10 @@ def quantity(value: object, kinds: str, where: str) -> Quantity:
     require(len(pair) == 2, f"{where}: an interval has two ends")
     read = []
     for text in pair:
-        short = isinstance(text, str) and len(text) <= LONGEST_TEXT and text == " ".join(text.split())
-        require(
-            short,
-            f"{where}: {plain(text)} is not a quantity of at most {LONGEST_TEXT} signs, with single blanks",
-        )
-        found = NUMBER.fullmatch(text)
+        words = text if isinstance(text, str) and len(text) <= LONGEST_TEXT else ""
+        tidy = words == " ".join(words.split()) != ""
+        require(tidy, f"{where}: {plain(text)} is not text of at most {LONGEST_TEXT} signs, with single blanks")
+        found = NUMBER.fullmatch(words)
         require(found is not None, f"{where}: {plain(text)} is not a decimal number and a unit")
         assert found is not None
         size = abs(Fraction(found[1]))
@@ -3393,8 +3391,8 @@ def check_certificate(
             claims["goal"].pop("found", None)
         tell_starts(report, claims["goal"], scenes, cells)
     report.statement = [statement_of(name, section, noise is not None) for name, section in claims.items()]
-    first = " (first box)" if len(cells) > 1 else ""
-    report.statement.append(f"attracting cells: {extents(cells[0])}{first}")
+    which = " (first box)" if len(cells) > 1 else ""
+    report.statement.append(f"attracting cells: {extents(cells[0])}{which}")
     if own is not None and not {"goal", "refuted"} & set(claims):
         report.statement.append("of the scene's own goal nothing is claimed")
     for name in claims:
