@@ -59,6 +59,10 @@ class Claim:
         The counterexample's values of what is fixed but unknown, as pairs of texts.
     final : bool
         Whether finer cells cannot change the verdict.
+    starts : str or None
+        Of a refutation, what is refuted: that it holds of "every" start, or of "almost-every" one.
+    recurs : dict
+        Why the orbit that refutes comes back, or that it need not: `limitsets.proofs.asked.recurring`.
     """
 
     claim: str
@@ -68,6 +72,8 @@ class Claim:
     counterexample: tuple[State, ...] = ()
     fixed: dict[str, list[str]] = field(default_factory=dict)
     final: bool = False
+    starts: Any = None
+    recurs: dict[str, Any] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)
@@ -161,13 +167,19 @@ class Proof:
         return Path(path)
 
 
+NOT_ATTRACTED = Claim(
+    "attracts-all", "refuted", "", {}, final=True, starts="every", recurs={"once": True}
+)
+
+
 def _attracts_all(found: Attraction, scene: Scene) -> Claim:
     if not found.proved:
-        noisy, may = found.cover.box.landing > 0.0, found.cover.graph.ranges.exits.any()
-        if (noisy or (found.cover.box.effects and may)) and not found.cover.points:
-            orbit = leaving(found)
-            verdict = "refuted" if orbit else "undecided"
-            return Claim("attracts-all", verdict, found.reason, {}, orbit, final=noisy or bool(orbit))
+        noisy = found.cover.box.landing > 0.0 and not found.cover.points
+        orbit = leaving(found) if noisy or found.cover.graph.ranges.exits.any() else ()
+        if orbit:
+            return replace(NOT_ATTRACTED, reason=found.reason, counterexample=orbit)
+        if noisy:
+            return Claim("attracts-all", "undecided", found.reason, {}, final=True)
         return _not_attracted(found, scene)
     joint: dict[str, dict[str, Any]] = {}
     for side, near in enumerate(found.joint):
@@ -231,6 +243,8 @@ def _goal(found: Attraction, scene: Scene) -> Claim:
         dict(answer.section),
         answer.counterexample,
         final=answer.final,
+        starts=answer.starts,
+        recurs=dict(answer.recurs),
     )
 
 

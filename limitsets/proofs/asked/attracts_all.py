@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from limitsets.goals import AttractsAll
-from limitsets.proofs.asked.kind import Answer, Kind, undecided
+from limitsets.proofs.asked.kind import Answer, Kind, once, undecided
 from limitsets.proofs.asked.starts import leaving
 from limitsets.proofs.attraction import Attraction
 from limitsets.scene import Scene
@@ -20,8 +20,7 @@ def _ask(found: Attraction, _: Scene, goal: AttractsAll) -> Answer:
         reason = f"{several} attracting components are each mapped into themselves: none takes every start"
         return undecided(reason, final=True)
     if found.missing:
-        orbit = leaving(found)
-        return Answer("refuted" if orbit else "undecided", found.missing, {}, orbit)
+        return once(leaving(found), found.missing)
     return Answer("proved", "", {"kind": goal.kind})
 
 

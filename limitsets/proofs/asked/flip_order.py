@@ -7,24 +7,21 @@ again: whether jogs alone, peeled off the attracting cells, come to an end.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from limitsets.goals import FlipOrder
-from limitsets.maps import codes, orbit
-from limitsets.proofs.asked.cycling import cycle_that
-from limitsets.proofs.asked.kind import Answer, Kind, common, peeled, place, undecided
-from limitsets.proofs.asked.search import Choice, Path, State, replayed, settled
+from limitsets.maps import codes
+from limitsets.proofs.asked.kind import Answer, Kind, against, common, peeled, place, undecided
+from limitsets.proofs.asked.recurring import Loop, Refutation, cycle_that
 from limitsets.proofs.attraction import Attraction
 from limitsets.proofs.certificate import targets
 from limitsets.scene import Scene
 
 __all__ = ["KIND"]
-
-# Throws of the orbit in which a flip against the order is looked for, and how many of the last are shown.
-THROWS, SHOWN = 10_000, 20
 
 
 def _ask(found: Attraction, scene: Scene, goal: FlipOrder) -> Answer:
@@ -39,9 +36,8 @@ def _ask(found: Attraction, scene: Scene, goal: FlipOrder) -> Answer:
         if not (inside & ~here).any():
             return Answer("proved", "", {"kind": goal.kind, "order": list(goal.order), "jogs": 0})
     if not _is_cycle(goal.order, sides):
-        against = _against(found, goal.order)
         reason = "a flip leads from each side to the one that is next in number, and the last one's to side 0"
-        return Answer("refuted" if against else "undecided", reason, {}, against, True)
+        return against(_other_flip(found, scene, goal.order), reason, final=True)
     if goal.from_anywhere and found.missing:
         return undecided(found.missing, final=found.cover.box.landing > 0.0)
     if any((ends[inside, 0] >= 0).any() for ends in _rolls(found)):
@@ -50,9 +46,8 @@ def _ask(found: Attraction, scene: Scene, goal: FlipOrder) -> Answer:
         )
     visits, left = peeled(found, inside, np.zeros_like(inside), (0,))
     if left.size:
-        stays = cycle_that(found, scene, lambda cycle: not cycle.branches.any())
-        reason = f"orbits may jog for ever on {place(found, int(left[0]))}"
-        return Answer("refuted" if stays else "undecided", reason, {}, stays)
+        stays = cycle_that(found, scene, lambda loop: not loop.branches.any())
+        return against(stays, f"orbits may jog for ever on {place(found, int(left[0]))}")
     section = {"kind": goal.kind, "order": list(goal.order), "jogs": max(visits - 1, 0)}
     return Answer("proved", "", section | ({"from_anywhere": True} if goal.from_anywhere else {}))
 
@@ -70,20 +65,15 @@ def _is_cycle(order: tuple[int, ...], sides: int) -> bool:
     )
 
 
-def _against(found: Attraction, order: tuple[int, ...]) -> tuple[State, ...]:
-    """Find an orbit in the attracting cells with a flip that the order has not, and prove it."""
-    box = found.cover.box
-    choice = Choice(box.middle_kappa, 0.0)
-    start, on = settled(found)
-    path = orbit(box.at_kappa(choice.kappa), start, on, THROWS)
+def _other_flip(found: Attraction, scene: Scene, order: tuple[int, ...]) -> Refutation:
+    """Find a periodic orbit with a flip that the order has not."""
     allowed = set(zip(order, (*order[1:], order[0]), strict=True))
-    pairs = list(zip(path.side[:-1].tolist(), path.side[1:].tolist(), strict=True))
-    bad = [k + 1 for k, (a, b) in enumerate(pairs) if a != b and (a, b) not in allowed]
-    if not bad:
-        return ()
-    begin = max(0, bad[0] - SHOWN)
-    cut = slice(begin, bad[0] + 1)
-    return replayed(box, Path(path.x[cut].tolist(), path.side[cut].tolist(), [choice] * (bad[0] - begin)))
+
+    def other(loop: Loop) -> bool:
+        sides = loop.side.tolist()
+        return any(a != b and (a, b) not in allowed for a, b in pairwise([*sides, sides[0]]))
+
+    return cycle_that(found, scene, other)
 
 
 def _sentence(section: Mapping[str, Any]) -> str:

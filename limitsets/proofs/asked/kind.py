@@ -15,24 +15,43 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from limitsets.proofs.asked.recurring import Refutation
 from limitsets.proofs.asked.search import State
 from limitsets.proofs.attraction import BELOW, Attraction
 from limitsets.proofs.certificate import everywhere, targets
 from limitsets.scene import Scene
 
-__all__ = ["Answer", "Kind", "above", "below", "common", "peeled", "place", "thrown_into", "undecided"]
+__all__ = [
+    "Answer",
+    "Kind",
+    "above",
+    "against",
+    "below",
+    "common",
+    "once",
+    "peeled",
+    "place",
+    "thrown_into",
+    "undecided",
+]
 
 Mask = NDArray[np.bool_]
 
 
 class Answer(NamedTuple):
-    """What became of a goal; the words are those of `limitsets.proofs.certify.Claim`."""
+    """What became of a goal; the words are those of `limitsets.proofs.certify.Claim`.
+
+    Of a refutation `starts` is what is refuted: that the goal holds from "every" start, or from "almost-every" one; and
+    `recurs` is why the orbit comes back.
+    """
 
     verdict: str
     reason: str = ""
     section: Mapping[str, Any] = {}
     counterexample: tuple[State, ...] = ()
     final: bool = False
+    starts: Any = None
+    recurs: Mapping[str, Any] = {}
 
 
 class Kind(NamedTuple):
@@ -59,6 +78,19 @@ class Kind(NamedTuple):
 def undecided(reason: str, *, final: bool = False) -> Answer:
     """Answer that nothing is proved."""
     return Answer("undecided", reason, final=final)
+
+
+def against(refutation: Refutation, reason: str, *, final: bool = False) -> Answer:
+    """Answer by a refutation; that nothing is proved if it is empty."""
+    if not refutation.of:
+        return undecided(reason, final=final)
+    states, of, recurs = refutation
+    return Answer("refuted", reason, {}, states, final, of, recurs)
+
+
+def once(orbit: tuple[State, ...], reason: str) -> Answer:
+    """Answer by one passage, which refutes what is asked of every start on the arm; or that nothing is proved."""
+    return against(Refutation(orbit, "every", {"once": True}) if orbit else Refutation(), reason)
 
 
 def common(found: Attraction, *, anywhere: bool) -> str:

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from limitsets.goals import OrientedBeyond
-from limitsets.proofs.asked.kind import Answer, Kind, below, common, thrown_into, undecided
-from limitsets.proofs.asked.search import from_attracting
+from limitsets.proofs.asked.kind import Answer, Kind, against, below, common, once, thrown_into, undecided
+from limitsets.proofs.asked.recurring import recurrent_violation
 from limitsets.proofs.asked.starts import one_throw
 from limitsets.proofs.attraction import Attraction
 from limitsets.proofs.chains import stays_below
@@ -60,14 +60,11 @@ def _ask(found: Attraction, scene: Scene, goal: OrientedBeyond) -> Answer:
     answer = _prove(found, scene, goal)
     if answer.verdict == "proved":
         return answer
-    reason = answer.reason
     if goal.from_anywhere:
         thrown = _thrown_there(found, goal, _exceptions(found, goal))
         orbit = one_throw(found, wrong) if thrown else ()
-        reason = thrown if orbit else reason
-    else:
-        orbit = from_attracting(found, wrong) if not common(found, anywhere=False) else ()
-    return Answer("refuted" if orbit else "undecided", reason, {}, orbit)
+        return once(orbit, thrown) if orbit else answer
+    return against(recurrent_violation(found, scene, wrong), answer.reason, final=answer.final)
 
 
 def _thrown_there(found: Attraction, goal: OrientedBeyond, bad: NDArray[np.bool_]) -> str:

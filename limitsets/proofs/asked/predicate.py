@@ -14,8 +14,9 @@ from numpy.typing import NDArray
 
 from limitsets.errors import AnswerError
 from limitsets.goals import Predicate
-from limitsets.proofs.asked.kind import Answer, Kind, common, place, thrown_into, undecided
-from limitsets.proofs.asked.search import State, from_attracting
+from limitsets.proofs.asked.kind import Answer, Kind, against, common, once, place, thrown_into, undecided
+from limitsets.proofs.asked.recurring import recurrent_violation
+from limitsets.proofs.asked.search import State
 from limitsets.proofs.asked.starts import one_throw
 from limitsets.proofs.attraction import Attraction
 from limitsets.scene import Scene
@@ -76,11 +77,8 @@ def _ask(found: Attraction, scene: Scene, goal: Predicate) -> Answer:
         return answer
     if goal.from_anywhere:
         orbit = one_throw(found, wrong)
-    else:
-        orbit = from_attracting(found, wrong) if not common(found, anywhere=False) else ()
-    if orbit and _throughout(goal, orbit[-1]):
-        return Answer("refuted", answer.reason, {}, orbit)
-    return answer
+        return once(orbit, answer.reason) if orbit and _throughout(goal, orbit[-1]) else answer
+    return against(recurrent_violation(found, scene, wrong), answer.reason, final=answer.final)
 
 
 def _throughout(goal: Predicate, last: State) -> bool:

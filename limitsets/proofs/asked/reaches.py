@@ -3,25 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from limitsets.cells import CellSet
 from limitsets.goals import Reaches
-from limitsets.proofs.asked.cycling import cycle_that
-from limitsets.proofs.asked.kind import Answer, Kind, Mask, above, common, peeled, place, undecided
-from limitsets.proofs.asked.search import State, long_orbit, replayed
+from limitsets.proofs.asked.kind import Answer, Kind, Mask, above, against, below, common, peeled, place, undecided
+from limitsets.proofs.asked.recurring import Loop, Refutation, cycle_that
+from limitsets.proofs.asked.search import passing
 from limitsets.proofs.asked.thinning import thinned
 from limitsets.proofs.attraction import Attraction
 from limitsets.proofs.expansion import slopes
-from limitsets.proofs.orbits import ProvedCycle
 from limitsets.scene import Scene
 
 __all__ = ["KIND"]
-
-# Throws of the orbit that is shown of a component that does not get there.
-SHOWN = 20
 
 
 def _wanted(found: Attraction, goal: Reaches) -> Mask:
@@ -36,14 +33,9 @@ def _ask(found: Attraction, scene: Scene, goal: Reaches) -> Answer:
     answer = _prove(found, scene, goal)
     if answer.verdict != "undecided" or common(found, anywhere=False):
         return answer
-    quiet = not found.cover.box.noise  # throws that differ may carry a part away from what attracts
-    if goal.every_orbit:
-        never = cycle_that(found, scene, lambda cycle: not _arrives(cycle, goal))
-    elif quiet and not (_not_null(found) if goal.from_anywhere else ""):
-        never = cycle_that(found, scene, lambda cycle: cycle.attracts and not _arrives(cycle, goal))
-    else:
-        never = ()
-    return answer._replace(verdict="refuted", counterexample=never) if never else answer
+    every = goal.every_orbit
+    never = cycle_that(found, scene, lambda loop: (every or loop.attracts) and not _arrives(loop, goal))
+    return against(never, answer.reason, final=answer.final)
 
 
 def _prove(found: Attraction, scene: Scene, goal: Reaches) -> Answer:
@@ -51,7 +43,7 @@ def _prove(found: Attraction, scene: Scene, goal: Reaches) -> Answer:
     if missing:
         return undecided(missing)
     wanted, inside = _wanted(found, goal), found.component >= 0
-    short = _falls_short(found, goal)
+    short = _falls_short(found, scene, goal)
     if short is not None:
         return short
     if goal.every_orbit:
@@ -103,28 +95,28 @@ def _section(scene: Scene, goal: Reaches, throws: int) -> dict[str, Any]:
     return section | ({"from_anywhere": True} if goal.from_anywhere else {})
 
 
-def _arrives(cycle: ProvedCycle, goal: Reaches) -> bool:
+def _arrives(loop: Loop, goal: Reaches) -> bool:
     """Whether it is not excluded that a periodic orbit gets there."""
-    return bool(((cycle.side == goal.side) & (cycle.hi >= goal.x)).any())
+    return bool(((loop.side == goal.side) & (loop.hi >= below(goal.x))).any())
 
 
-def _falls_short(found: Attraction, goal: Reaches) -> Answer | None:
-    """Refute the goal by an attracting component that ends below x: no orbit in it gets there."""
+def _falls_short(found: Attraction, scene: Scene, goal: Reaches) -> Answer | None:
+    """Refute the goal by an attracting component that ends below x: no orbit in it gets there.
+
+    It is mapped into itself and has an interior, so that it refutes what is said of almost every start.  The orbit is
+    shown, not needed: a periodic one if one is found.
+    """
     edges = found.cover.grid.edges[goal.side][0]
     reach = np.zeros(found.component.size, dtype=bool)
-    reach[found.cover.grid.of_side(goal.side)] = edges[1:] >= goal.x
+    reach[found.cover.grid.of_side(goal.side)] = edges[1:] >= below(goal.x)
     for number in range(int(found.component.max()) + 1):
         mine = found.component == number
         if not (mine & reach).any():
-            orbit = _any_orbit(found, np.flatnonzero(mine))
+            only = replace(found, component=np.where(mine, np.int32(0), np.int32(-1)))
+            shown = cycle_that(only, scene, lambda loop: not _arrives(loop, goal)).states or passing(only)
             reason = f"no orbit in the attracting component of {place(found, int(np.flatnonzero(mine)[0]))} gets there"
-            return Answer("refuted" if orbit else "undecided", reason, {}, orbit)
+            return against(Refutation(shown, "almost-every", {"component": number}), reason)
     return None
-
-
-def _any_orbit(found: Attraction, cells: Any) -> tuple[State, ...]:
-    path = long_orbit(found, lambda x, _: np.arange(x.size) == x.size - 1, cells, SHOWN)
-    return () if path is None else replayed(found.cover.box, path)
 
 
 def _sentence(section: Mapping[str, Any]) -> str:

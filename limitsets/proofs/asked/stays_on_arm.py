@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from limitsets.goals import StaysOnArm
-from limitsets.proofs.asked.kind import Answer, Kind, common
+from limitsets.proofs.asked.kind import Answer, Kind, common, once
 from limitsets.proofs.asked.starts import leaving
 from limitsets.proofs.attraction import Attraction
 from limitsets.scene import Scene
@@ -18,8 +18,7 @@ def _ask(found: Attraction, _: Scene, goal: StaysOnArm) -> Answer:
     missing = common(found, anywhere=goal.from_anywhere)
     if missing:
         # of attracting cells nothing can leave: where there are none, the question is whether anything stays
-        orbit = leaving(found) if goal.from_anywhere else ()
-        return Answer("refuted" if orbit else "undecided", missing, {}, orbit)
+        return once(leaving(found) if goal.from_anywhere else (), missing)
     return Answer("proved", "", {"kind": goal.kind} | ({"from_anywhere": True} if goal.from_anywhere else {}))
 
 
