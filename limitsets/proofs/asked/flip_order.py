@@ -7,7 +7,6 @@ again: whether jogs alone, peeled off the attracting cells, come to an end.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -15,17 +14,18 @@ from numpy.typing import NDArray
 
 from limitsets.goals import FlipOrder
 from limitsets.maps import codes
-from limitsets.proofs.asked.kind import Answer, Kind, against, common, peeled, place, undecided
-from limitsets.proofs.asked.recurring import Loop, Refutation, cycle_that
+from limitsets.proofs.asked.kind import Answer, Kind, against, common, peeled, undecided
+from limitsets.proofs.asked.recurring import Loop, cycle_that
 from limitsets.proofs.attraction import Attraction
-from limitsets.proofs.certificate import targets
+from limitsets.proofs.cover import targets
 from limitsets.scene import Scene
 
 __all__ = ["KIND"]
 
+AGAINST = "a flip leads from each side to the one that is next in number, and the last one's to side 0"
 
-def _ask(found: Attraction, scene: Scene, goal: FlipOrder) -> Answer:
-    sides = found.cover.grid.sides
+
+def _prove(found: Attraction, _: Scene, goal: FlipOrder) -> Answer:
     missing = common(found, anywhere=False)
     if missing:
         return undecided(missing)
@@ -35,9 +35,8 @@ def _ask(found: Attraction, scene: Scene, goal: FlipOrder) -> Answer:
         here[found.cover.grid.of_side(goal.order[0])] = True
         if not (inside & ~here).any():
             return Answer("proved", "", {"kind": goal.kind, "order": list(goal.order), "jogs": 0})
-    if not _is_cycle(goal.order, sides):
-        reason = "a flip leads from each side to the one that is next in number, and the last one's to side 0"
-        return against(_other_flip(found, scene, goal.order), reason, final=True)
+    if not _is_cycle(goal.order, found.cover.grid.sides):
+        return undecided(AGAINST, final=True)
     if goal.from_anywhere and found.missing:
         return undecided(found.missing, final=found.cover.box.landing > 0.0)
     if any((ends[inside, 0] >= 0).any() for ends in _rolls(found)):
@@ -46,10 +45,17 @@ def _ask(found: Attraction, scene: Scene, goal: FlipOrder) -> Answer:
         )
     visits, left = peeled(found, inside, np.zeros_like(inside), (0,))
     if left.size:
-        stays = cycle_that(found, scene, lambda loop: not loop.branches.any())
-        return against(stays, f"orbits may jog for ever on {place(found, int(left[0]))}")
+        return undecided(f"orbits may jog for ever on {found.cover.place(int(left[0]))}")
     section = {"kind": goal.kind, "order": list(goal.order), "jogs": max(visits - 1, 0)}
     return Answer("proved", "", section | ({"from_anywhere": True} if goal.from_anywhere else {}))
+
+
+def _refute(found: Attraction, scene: Scene, goal: FlipOrder) -> Answer:
+    if common(found, anywhere=False):
+        return undecided(common(found, anywhere=False))
+    if not _is_cycle(goal.order, found.cover.grid.sides):
+        return against(cycle_that(found, scene, lambda loop: _flips_otherwise(loop, goal.order)), AGAINST)
+    return against(cycle_that(found, scene, lambda loop: not loop.branches.any()))
 
 
 def _rolls(found: Attraction) -> list[NDArray[np.int32]]:
@@ -65,15 +71,11 @@ def _is_cycle(order: tuple[int, ...], sides: int) -> bool:
     )
 
 
-def _other_flip(found: Attraction, scene: Scene, order: tuple[int, ...]) -> Refutation:
-    """Find a periodic orbit with a flip that the order has not."""
+def _flips_otherwise(loop: Loop, order: tuple[int, ...]) -> bool:
+    """Whether a periodic orbit has a flip that the order has not."""
     allowed = set(zip(order, (*order[1:], order[0]), strict=True))
-
-    def other(loop: Loop) -> bool:
-        sides = loop.side.tolist()
-        return any(a != b and (a, b) not in allowed for a, b in pairwise([*sides, sides[0]]))
-
-    return cycle_that(found, scene, other)
+    pairs = zip(loop.side.tolist(), np.roll(loop.side, -1).tolist(), strict=True)
+    return any(a != b and (a, b) not in allowed for a, b in pairs)
 
 
 def _sentence(section: Mapping[str, Any]) -> str:
@@ -85,4 +87,4 @@ def _sentence(section: Mapping[str, Any]) -> str:
     return f"{where}, parts come to lie on sides {order} in turn, again and again; {jogs}."
 
 
-KIND = Kind(_ask, _sentence, lambda _: ())
+KIND = Kind(_prove, _refute, _sentence, lambda _: ())

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from limitsets.proofs.asked.recurring import Refutation
 from limitsets.proofs.asked.search import State
 from limitsets.proofs.attraction import BELOW, Attraction
-from limitsets.proofs.certificate import everywhere, targets
+from limitsets.proofs.cover import everywhere, targets
 from limitsets.scene import Scene
 
 __all__ = [
@@ -30,7 +30,6 @@ __all__ = [
     "common",
     "once",
     "peeled",
-    "place",
     "thrown_into",
     "undecided",
 ]
@@ -39,11 +38,7 @@ Mask = NDArray[np.bool_]
 
 
 class Answer(NamedTuple):
-    """What became of a goal; the words are those of `limitsets.proofs.certify.Claim`.
-
-    Of a refutation `starts` is what is refuted: that the goal holds from "every" start, or from "almost-every" one; and
-    `recurs` is why the orbit comes back.
-    """
+    """What became of a goal; the words are those of `limitsets.proofs.certify.Claim`."""
 
     verdict: str
     reason: str = ""
@@ -51,6 +46,8 @@ class Answer(NamedTuple):
     counterexample: tuple[State, ...] = ()
     final: bool = False
     starts: Any = None
+    shares: Mapping[str, float] = {}
+    note: str = ""
     recurs: Mapping[str, Any] = {}
 
 
@@ -59,20 +56,24 @@ class Kind(NamedTuple):
 
     Attributes
     ----------
-    ask : callable
-        From an `Attraction`, the scene and the goal to an `Answer`.
+    prove : callable
+        From an `Attraction`, the scene and the goal to an `Answer`, proved or undecided: of the attracting cells, or of
+        every start where the goal says `from_anywhere`.
+    refute : callable
+        As `prove`, to an `Answer` that is refuted or undecided.
     sentence : callable
-        From the section of a proved goal to a sentence.
+        From the section of a proved goal to a sentence about the attracting cells, or about every start.
     borders : callable
         From the goal to the borders of cells that it needs.
-    prove : callable or None
-        As `ask` without the search for what refutes, where that takes longer than the proof; None where it is `ask`.
+    almost : callable
+        From the goal to whether it speaks of almost every orbit only.
     """
 
-    ask: Callable[[Attraction, Scene, Any], Answer]
+    prove: Callable[[Attraction, Scene, Any], Answer]
+    refute: Callable[[Attraction, Scene, Any], Answer]
     sentence: Callable[[Mapping[str, Any]], str]
     borders: Callable[[Any], Sequence[float]]
-    prove: Callable[[Attraction, Scene, Any], Answer] | None = None
+    almost: Callable[[Any], bool] = lambda _: False
 
 
 def undecided(reason: str, *, final: bool = False) -> Answer:
@@ -80,16 +81,16 @@ def undecided(reason: str, *, final: bool = False) -> Answer:
     return Answer("undecided", reason, final=final)
 
 
-def against(refutation: Refutation, reason: str, *, final: bool = False) -> Answer:
-    """Answer by a refutation; that nothing is proved if it is empty."""
+def against(refutation: Refutation, reason: str = "") -> Answer:
+    """Answer by a refutation: `starts` of which it is not true; undecided if it is empty."""
     if not refutation.of:
-        return undecided(reason, final=final)
+        return undecided(reason)
     states, of, recurs = refutation
-    return Answer("refuted", reason, {}, states, final, of, recurs)
+    return Answer("refuted", reason, {}, states, starts=of, recurs=recurs)
 
 
-def once(orbit: tuple[State, ...], reason: str) -> Answer:
-    """Answer by one passage, which refutes what is asked of every start on the arm; or that nothing is proved."""
+def once(orbit: tuple[State, ...], reason: str = "") -> Answer:
+    """Answer by one passage, which refutes what is asked of every start on the arm; undecided without one."""
     return against(Refutation(orbit, "every", {"once": True}) if orbit else Refutation(), reason)
 
 
@@ -103,14 +104,7 @@ def common(found: Attraction, *, anywhere: bool) -> str:
         if not near.proved:
             return f"near the joint on side {side}: {near.reason}"
     leaving = np.flatnonzero(found.cover.graph.ranges.exits)
-    return f"the image of {place(found, int(leaving[0]))} may leave the cells" if leaving.size else ""
-
-
-def place(found: Attraction, cell: int) -> str:
-    """Name a cell."""
-    side = int(found.cover.grid.side_of(cell))
-    lo, hi = found.cover.grid.boxes([cell], side)
-    return f"side {side}, x in [{lo[0, 0]:.6g}, {hi[0, 0]:.6g}]"
+    return f"the image of {found.cover.place(int(leaving[0]))} may leave the cells" if leaving.size else ""
 
 
 def thrown_into(found: Attraction, bad: Mask) -> str:
@@ -120,7 +114,7 @@ def thrown_into(found: Attraction, bad: Mask) -> str:
         cells = np.flatnonzero(ends[:, 0] >= 0)
         hit = cells[number[ends[cells, 1] + 1] > number[ends[cells, 0]]]
         if hit.size:
-            return place(found, int(hit[0]))
+            return found.cover.place(int(hit[0]))
     return ""
 
 

@@ -227,11 +227,11 @@ def searched(found: Attraction, wrong: Wrong) -> Path | None:
     return None
 
 
-def passing(found: Attraction) -> tuple[State, ...]:
-    """Prove some throws in the attracting cells, to be shown."""
+def passing(found: Attraction, cells: NDArray[np.int64]) -> tuple[State, ...]:
+    """Prove some throws from the middle of some cells, to be shown."""
     box = found.cover.box
     choice = Choice(box.middle_kappa, 0.0)
-    path = orbit(box.at_kappa(choice.kappa), *settled(found), SHOWN)
+    path = orbit(box.at_kappa(choice.kappa), *middle(found, cells), SHOWN)
     return replayed(box, Path(path.x.tolist(), path.side.tolist(), [choice] * path.code.size))
 
 

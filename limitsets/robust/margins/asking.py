@@ -207,7 +207,7 @@ class Question:
         answer = prove(found, self.scene, goal)
         if not (found.component >= 0).any():
             return answer
-        return against(worst_orbit(found, wrong), answer.reason, final=answer.final)
+        return against(worst_orbit(found, wrong), answer.reason)
 
 
 def _said(error: AnswerError) -> str:
