@@ -21,8 +21,10 @@ def good():
 
 
 def with_goal(good, section, **header):
+    """The goal alone, claimed of every start unless it says another thing."""
     f = good.copy()
-    f.header["claims"] = [{"claim": "goal", "section": section}]
+    own = {key: f.header["claims"][4]["section"][key] for key in ("starts", "near_joint")}
+    f.header["claims"] = [{"claim": "goal", "section": own | section}]
     f.header |= header
     return f
 
