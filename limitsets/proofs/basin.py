@@ -293,8 +293,8 @@ def _shares(
 def _leaving(found: Cover) -> float:
     """Total length of the cells all of whose orbits are proved to leave the arm.
 
-    From these no recurrent cell can be reached, and no cell whose image may lie, in part, between the arm's ends and the
-    cells.
+    From these no recurrent cell can be reached, and no cell whose image may lie, in part, between the foot
+    and the cells.
     """
     foot, parts = found.box.bare[0].a, found.graph.components()
     stays = parts.recurrent[parts.label] | np.concatenate([images.lost for images in found.images])
