@@ -70,6 +70,8 @@ class Claim:
         (`leaves`) or to creep to the joint (`creeps`), and of whose starts nothing is proved (`open`).
     note : str
         What a reader of a proved goal should know, empty if nothing.
+    recurs : dict
+        Why the orbit that refutes comes back, or that it need not: as in `limitsets.proofs.asked.recurring.Refutation`.
     """
 
     claim: str
@@ -82,6 +84,7 @@ class Claim:
     starts: Any = None
     shares: dict[str, float] = field(default_factory=dict)
     note: str = ""
+    recurs: dict[str, Any] = field(default_factory=dict)
 
     @property
     def written(self) -> bool:
@@ -206,11 +209,13 @@ class Proof:
 
 def _attracts_all(found: Attraction, scene: Scene) -> Claim:
     if not found.proved:
-        noisy, may = found.cover.box.landing > 0.0, found.cover.graph.ranges.exits.any()
-        if (noisy or (found.cover.box.effects and may)) and not found.cover.points:
-            orbit = leaving(found)
-            verdict = "refuted" if orbit else "undecided"
-            return Claim("attracts-all", verdict, found.reason, {}, orbit, final=noisy or bool(orbit))
+        noisy = found.cover.box.landing > 0.0 and not found.cover.points
+        orbit = leaving(found) if noisy or found.cover.graph.ranges.exits.any() else ()
+        if orbit:
+            once = {"once": True}
+            return Claim("attracts-all", "refuted", found.reason, {}, orbit, final=True, recurs=once)
+        if noisy:
+            return Claim("attracts-all", "undecided", found.reason, {}, final=True)
         return _not_attracted(found, scene)
     section = {"near_joint": near_section(found), "max_rank": found.max_rank}
     return Claim("attracts-all", "proved", "", section)
@@ -273,6 +278,7 @@ def _goal(found: Attraction, scene: Scene) -> Claim:
         starts=answer.starts,
         shares=dict(answer.shares),
         note=answer.note,
+        recurs=dict(answer.recurs),
     )
 
 
