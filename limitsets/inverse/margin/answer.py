@@ -76,7 +76,7 @@ def to_json(found: RobustDesign) -> dict[str, Any]:
 
 
 def save(found: RobustDesign, folder: Path, *, recheck: bool = True) -> tuple[RobustDesign, tuple[Path, ...]]:
-    """Write scene, answer, and what `limitsets.recheck` checks; return the design without what it denies, and the files."""
+    """Write scene, answer, and what `limitsets.recheck` checks; return the design without what it denies, the files."""
     folder.mkdir(parents=True, exist_ok=True)
     scene, answer = folder / f"{found.scene.name}.toml", folder / "design.json"
     dump(found.scene, scene)
