@@ -1785,16 +1785,17 @@ def follow(throws: Throws, orbit: Orbit, x0: Arb, x1: Arb) -> Followed:
     return Followed(states, slope)
 
 
-def prove_orbit(throws: Throws, cells: Union, orbit: Orbit) -> Followed:
+def prove_orbit(throws: Throws, cells: Union | None, orbit: Orbit) -> Followed:
     """Prove one periodic orbit: with G the throws along the itinerary, G(R) - R changes sign in the interval.
 
     Along the interval all decisions are those of the itinerary and f is concave, so that G is the map and continuous.
-    |G'| > 1 or < 1 on it: G(R) - R is monotone and the orbit alone.  The attracting cells are invariant: one point of
-    the orbit in them is enough.
+    |G'| > 1 or < 1 on it: G(R) - R is monotone and the orbit alone.  The attracting cells, if it has to lie in them,
+    are invariant: one point of the orbit in them is enough.
     """
-    here: Union = [[] for _ in cells]
-    here[orbit.side] = [(orbit.lo, orbit.hi)]
-    prove(not first_outside(here, cells), "not in the attracting cells")
+    if cells is not None:
+        here: Union = [[] for _ in cells]
+        here[orbit.side] = [(orbit.lo, orbit.hi)]
+        prove(not first_outside(here, cells), "not in the attracting cells")
     lo, hi = arb(orbit.lo), arb(orbit.hi)
     first, last = (follow(throws, orbit, x, x).states[-1] for x in (lo, hi))
     prove(first[0] == orbit.side, "it ends on another side")
@@ -1851,46 +1852,91 @@ INSIDE = (
 )  # a stated kappa keeps this share of it from the ends of its noise: these are known to 100 bits
 
 
+RECURS = (
+    "cycle",
+    "closed",
+    "once",
+)  # why an orbit refutes: it is periodic, it closes with noise, once is enough
+BROKEN = {  # keys of a goal that an orbit may refute, besides from_anywhere, and what is said of the orbit
+    "oriented_beyond": ("kind x side", "comes to lie beyond x = {text} on another side than {side}"),
+    "reaches": ("kind x side every_orbit", "never comes to rest on side {side} at x >= {text}"),
+    "flip_order": ("kind order", "does not follow the order {order} of sides"),
+    "stays_on_arm": ("kind", "leaves the arm"),
+    "attracts_all": ("kind", "leaves the arm"),
+}
+
+
 def read_refutation(section: dict[str, Any], n_sides: int) -> dict[str, Any]:
-    """Read an orbit that refutes a goal: its start and what each throw was like."""
-    goal = table(section["goal"], "refuted.goal", "kind x side", "from_anywhere")
-    require(goal["kind"] == "oriented_beyond", "refuted.goal: not a kind that an orbit refutes")
-    start = table(section["start"], "refuted.start", "x side")
-    throws = []
-    for each in rows(section["throws"], "refuted.throws", 1, 100_000):
-        one = table(each, "a throw", "kappa landing")
-        numbers = (
-            None if one[key] is None else arb(hex_float(one[key], key)) for key in ("kappa", "landing")
-        )
-        throws.append(tuple(numbers))
+    """Read an orbit that refutes a goal: its start, what each throw was like, and why it comes back; or a cycle."""
+    goal = section["goal"]
+    kind = goal.get("kind") if isinstance(goal, dict) else None
+    require(kind in list(BROKEN), "refuted.goal: not a kind that an orbit refutes")
+    goal = table(goal, "refuted.goal", BROKEN[kind][0], "from_anywhere")
+    goal = {"throws": 0} | goal if kind == "reaches" else {"jogs": 0} | goal if kind == "flip_order" else goal
     nominal, tolerance = section["nominal"], section["tolerance"]
     same = isinstance(nominal, dict) and isinstance(tolerance, dict) and set(nominal) == set(tolerance)
     require(
         same and len(nominal) <= 64, "refuted: nominal values and tolerance do not name the same quantities"
     )
-    return {
-        "goal": read_goal(goal, n_sides),
-        "x": hex_float(start["x"], "refuted.start.x"),
-        "side": read_side(start["side"], n_sides),
-        "throws": throws,
-        "nominal": nominal,
-        "tolerance": tolerance,
-    }
+    found = {"goal": read_goal(goal, n_sides), "nominal": nominal, "tolerance": tolerance, "why": ""}
+    if "recurs" in section:
+        recurs = table(section["recurs"], "refuted.recurs", "", " ".join(RECURS))
+        require(len(recurs) == 1, "refuted.recurs is not one of cycle, closed and once")
+        (found["why"],) = recurs
+        if found["why"] == "cycle":
+            require(not {"start", "throws"} & set(section), "refuted: a cycle has no start and no throws")
+            (orbit,) = read_orbits({"cycles": [recurs["cycle"]], "complete": False}, n_sides)["orbits"]
+            return found | {"orbit": orbit}
+        require(recurs[found["why"]] is True, "refuted.recurs is not true")
+    require({"start", "throws"} <= set(section), "refuted: start or throws are missing")
+    start = table(section["start"], "refuted.start", "x side")
+    throws = [read_throw(each) for each in rows(section["throws"], "refuted.throws", 1, 100_000)]
+    spans = [number for number, (kappa, _) in enumerate(throws) if isinstance(kappa, tuple)]
+    last = not spans or (found["why"] == "closed" and spans == [len(throws) - 1])
+    require(last, "two values of kappa are those of the throw that closes an orbit")
+    x, side = hex_float(start["x"], "refuted.start.x"), read_side(start["side"], n_sides)
+    return found | {"x": x, "side": side, "throws": throws}
+
+
+def read_throw(value: object) -> tuple[Any, Any]:
+    """Read what a throw was like: kappa, two values between which it lies, or None; how far off it landed, or None."""
+    one = table(value, "a throw", "kappa landing")
+    kappa, landing = one["kappa"], one["landing"]
+    if isinstance(kappa, list):
+        low, high = (hex_float(end, "kappa") for end in rows(kappa, "kappa", 2, 2))
+        require(low < high, "kappa is an empty interval")
+        kappa = arb(low), arb(high)
+    elif kappa is not None:
+        kappa = arb(hex_float(kappa, "kappa"))
+    return kappa, None if landing is None else arb(hex_float(landing, "landing"))
 
 
 def statement_of_refutation(section: dict[str, Any]) -> str:
     """Put it in words."""
+    kinds = "length angle speed acceleration mass density share"
     near = ", ".join(
-        f"{plain(name)} within {plain(dev)} of {plain(section['nominal'][name])}"
+        f"{plain(name)} within {quantity(dev, kinds, 'tolerance')} of"
+        f" {quantity(section['nominal'][name], kinds, 'nominal')}"
         for name, dev in section["tolerance"].items()
     )
     goal = section["goal"]
-    where = "on the arm" if goal["anywhere"] else "in the attracting cells"
-    return (
-        f"refuted: the orbit from x = {section['x']!r} on side {section['side']}, {where}, of"
-        f" {len(section['throws'])} throws ends beyond x = {plain(goal['text'])} on another side than {goal['side']}"
-        + (f"; {near}" if near else "")
-    )
+    order = " ".join(map(str, goal.get("order", ())))
+    broken = BROKEN[goal["kind"]][1].format(text=goal.get("text"), side=goal.get("side"), order=order)
+    if section["why"] == "cycle":
+        o = section["orbit"]
+        of = "almost every start" if o.attracts else "every start"
+        orbit = f"a periodic orbit, of {len(o.word)} throws, with a place x in [{o.lo!r}, {o.hi!r}] on side {o.side}"
+        what = f"not from {of}: {orbit}, which {'attracts' if o.attracts else 'repels'}, {broken}"
+    else:
+        start = f"x = {section['x']!r} on side {section['side']}"
+        number = f"{len(section['throws'])} throws"
+        if section["why"] == "closed":
+            what = (
+                f"not for every sequence of throws: an orbit of {number} from {start} back to there {broken}"
+            )
+        else:
+            what = f"not from every start on the arm: the orbit from {start}, of {number}, {broken}"
+    return f"refuted: {what}" + (f"; {near}" if near else "")
 
 
 def check_deviations(scene: Scene, section: dict[str, Any]) -> str:
@@ -1920,40 +1966,117 @@ def check_deviations(scene: Scene, section: dict[str, Any]) -> str:
 
 
 def check_refuted(scene: Scene, c: Cells, section: dict[str, Any]) -> str:
-    """Throw the orbit again in balls, given that the attracting cells are what they say; "" or what fails."""
+    """Throw the orbit again in balls; "" or what fails."""
+    why, goal = section["why"], section["goal"]
+    if not why:
+        return "it shows a passing orbit only: a goal is refuted by one that comes back"
     bad = check_deviations(scene, section)
     if bad:
         return bad
-    goal, side, x = section["goal"], section["side"], arb(section["x"])
-    inside = any(lo <= section["x"] <= hi for lo, hi in attracting(c)[side])
-    if not (inside or goal["anywhere"]):
-        return "the orbit does not start in the attracting cells"
-    throws, fixed = Throws(scene), scene.k_lo.union(scene.k_hi)
-    varies = isinstance(scene.noise, dict) and bool({"throw.speed", "gravity.tilt"} & set(scene.noise))
+    once = goal["kind"] in ("stays_on_arm", "attracts_all")
+    if once or (goal["kind"] == "oriented_beyond" and goal["anywhere"]):
+        if why != "once":
+            return "an orbit that comes back is not what refutes this goal"
+    elif why == "once":
+        return "once is not enough: the goal does not speak of every throw from every start"
     try:
-        for number, (kappa, landing) in enumerate(section["throws"]):
-            s = scene.sides[side]
-            prove(bool(x > s.a and x <= s.arm), f"the part does not lie on the arm before throw {number + 1}")
-            if kappa is None:
-                prove(not varies, f"throw {number + 1} does not say its kappa")
-            else:
-                within = kappa > scene.k_lo * (1 + INSIDE) and kappa < scene.k_hi * (1 - INSIDE)
-                prove(varies and bool(within), f"the kappa of throw {number + 1} is not within the noise")
-            k, shift = fixed if kappa is None else kappa, ZERO if landing is None else landing
-            prove(
-                bool(abs(shift) <= s.landing), f"throw {number + 1} lands farther off than the noise allows"
-            )
-            thrown = throws.box(side, x.lower(), x.upper(), k.lower(), k.upper())
-            prove(thrown.decision != 2, f"the decision of throw {number + 1} is not settled")
-            x = thrown.lo.union(thrown.hi) + shift
-            if thrown.decision == 1:
-                x, side = x - s.shift, (side + 1) % len(scene.sides)
+        states = periodic(scene, section["orbit"]) if why == "cycle" else thrown_again(scene, section)
+        if why == "once":
+            return left_or_beyond(scene, goal, states[-1])
+        prove(breaks(scene, goal, states), "no state of the orbit violates the goal")
     except UnprovedError as error:
         return str(error)
-    s, end = scene.sides[side], goal["x"].ball() / exact(LENGTHS[scene.unit])
-    if not (side != goal["side"] and x > end and x <= s.arm):
-        return f"the orbit ends on side {side} at x = {x.str(12)}, which the goal allows"
+    if goal["kind"] == "reaches" and not goal["every"] and not (why == "cycle" and section["orbit"].attracts):
+        return "the goal speaks of almost every start, and the orbit is not proved to attract"
     return ""
+
+
+State = tuple[int, Arb, Arb]  # side, and bounds of x
+
+
+def periodic(scene: Scene, orbit: Orbit) -> list[State]:
+    """Prove a periodic orbit of the scene without noise, which is one of the sequences allowed; its states."""
+    quiet = read_scene({**scene.raw, "effects": {}}, None)
+    prove(all(s.concave for s in quiet.sides), "kappa > ell is not proved")
+    states = prove_orbit(Throws(quiet), None, orbit).states
+    for side, lo, hi in states:
+        s = quiet.sides[side]
+        prove(bool(lo > s.a and hi <= s.arm), "a point of the periodic orbit is not proved to lie on the arm")
+    return states
+
+
+def thrown_again(scene: Scene, section: dict[str, Any]) -> list[State]:
+    """Prove every throw of an orbit, and that it comes back exactly to its start where that is said; its states."""
+    side, x = section["side"], arb(section["x"])
+    throws, fixed = Throws(scene), scene.k_lo.union(scene.k_hi)
+    varies = isinstance(scene.noise, dict) and bool({"throw.speed", "gravity.tilt"} & set(scene.noise))
+    states = [(side, x, x)]
+    for number, (said, landing) in enumerate(section["throws"], 1):
+        s = scene.sides[side]
+        prove(bool(x > s.a and x <= s.arm), f"the part does not lie on the arm before throw {number}")
+        kappa = said if isinstance(said, tuple) else () if said is None else (said,)
+        prove(varies or not kappa, f"the kappa of throw {number} is not within the noise: it is known")
+        prove(bool(kappa) or not varies, f"throw {number} does not say its kappa")
+        for k in kappa:
+            within = k > scene.k_lo * (1 + INSIDE) and k < scene.k_hi * (1 - INSIDE)
+            prove(bool(within), f"the kappa of throw {number} is not within the noise")
+        shift = ZERO if landing is None else landing
+        prove(bool(abs(shift) <= s.landing), f"throw {number} lands farther off than the noise allows")
+        images = []
+        for k in (kappa[0].union(kappa[1]), *kappa) if len(kappa) > 1 else kappa or (fixed,):
+            thrown = throws.box(side, x.lower(), x.upper(), k.lower(), k.upper())
+            prove(thrown.decision != 2, f"the decision of throw {number} is not settled")
+            turned = s.shift if thrown.decision == 1 else ZERO
+            images.append(thrown.lo.union(thrown.hi) + shift - turned)
+        if number == len(section["throws"]) and section["why"] == "closed":
+            to = states[0][0]
+            prove((side + thrown.decision) % len(scene.sides) == to, "the last throw ends on another side")
+            prove(
+                comes_back(scene, states[0][1], images, landing),
+                "that the last throw comes back is not proved",
+            )
+            return states
+        x, side = images[0], (side + thrown.decision) % len(scene.sides)
+        states.append((side, x.lower(), x.upper()))
+    return states
+
+
+def comes_back(scene: Scene, start: Arb, images: list[Arb], landing: Arb | None) -> bool:
+    """Whether a throw can land exactly on the start.
+
+    By the noise of the landing, if it spans the distance from all of the enclosed place; or between two values of kappa
+    whose places lie on either side: f being concave the place moves continuously with kappa.
+    """
+    if len(images) == 1:
+        return landing is None and bool(abs(images[0] - start) <= scene.sides[0].landing.lower())
+    _, first, last = images
+    parted = bool(first < start and last > start) or bool(first > start and last < start)
+    return parted and all(s.concave for s in scene.sides)
+
+
+def breaks(scene: Scene, goal: dict[str, Any], states: list[State]) -> bool:
+    """Whether an orbit that comes back to its first state violates a goal, whichever number each ball stands for."""
+    if goal["kind"] == "flip_order":
+        order, sides = goal["order"], [side for side, _, _ in states]
+        allowed = set(zip(order, [*order[1:], order[0]], strict=True))
+        flips = [(a, b) for a, b in itertools.pairwise([*sides, sides[0]]) if a != b]
+        return bool(set(flips) - allowed) or (not flips and len(set(order)) > 1)
+    x = goal["x"].ball() / exact(LENGTHS[scene.unit])
+    if goal["kind"] == "oriented_beyond":
+        return any(side != goal["side"] and bool(lo > x) for side, lo, _ in states)
+    return all(side != goal["side"] or bool(hi < x) for side, _, hi in states)
+
+
+def left_or_beyond(scene: Scene, goal: dict[str, Any], last: State) -> str:
+    """Check that a state is off the arm, or beyond x on another side; "" or what fails."""
+    side, lo, hi = last
+    s = scene.sides[side]
+    if goal["kind"] != "oriented_beyond":
+        off = bool(hi <= s.a or lo > s.arm)
+        return "" if off else f"the orbit ends on side {side} at x = {lo.union(hi).str(12)}, on the arm"
+    if breaks(scene, goal, [last]) and hi <= s.arm:
+        return ""
+    return f"the orbit ends on side {side} at x = {lo.union(hi).str(12)}, which the goal allows"
 
 
 # --------------------------------------------------------------------------------------------------- near the joint
@@ -2171,9 +2294,9 @@ SECTIONS = {  # the claims that are known, and the keys of their sections
     "expanding": "least_slope",
     "end-points": "images ends pieces",
     "cycles": "cycles complete",
-    "refuted": "goal start throws nominal tolerance",
+    "refuted": "goal nominal tolerance",
 }
-MORE_KEYS: dict[str, str] = {}  # that a section may have besides
+MORE_KEYS = {"refuted": "recurs start throws"}  # that a section may have besides
 WORDS = {  # of a verdict, in JSON and for people
     "proved": "PROVED",
     "proved-on-cells": "PROVED ON CELLS",

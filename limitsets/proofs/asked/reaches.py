@@ -121,7 +121,9 @@ def _falls_short(found: Attraction, goal: Reaches) -> Answer | None:
         mine = found.component == number
         if not (mine & reach).any():
             reason = f"no orbit in the attracting component of {found.cover.place(int(np.flatnonzero(mine)[0]))} gets there"
-            refutation = Refutation(passing(found, np.flatnonzero(mine)), "almost-every", {"component": number})
+            refutation = Refutation(
+                passing(found, np.flatnonzero(mine)), "almost-every", {"component": number}
+            )
             return against(refutation, reason)
     return None
 

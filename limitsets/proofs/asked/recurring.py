@@ -265,13 +265,11 @@ def _root_on_orbit(map_now: Any, path: Orbit, k: int, period: int) -> tuple[floa
 
 
 def _loop(cycle: ProvedCycle) -> Loop:
-    return Loop(
-        cycle.lo, cycle.hi, cycle.side, cycle.branches, cycle.attracts, {"cycle": cycle.section()}
-    )
+    return Loop(cycle.lo, cycle.hi, cycle.side, cycle.branches, cycle.attracts, {"cycle": cycle.section()})
 
 
 def _enclosed(box: ParameterBox, around: Orbit) -> Loop | None:
-    """Prove a periodic orbit of a map with effects: all of an interval goes one way, and its ends part or come nearer."""
+    """Prove a periodic orbit of a map with effects: an interval goes one way, and its ends part or come nearer."""
     if not _continuous(box):
         return None
     x, side, period = float(around.x[0]), int(around.side[0]), around.code.size
@@ -363,7 +361,7 @@ def _ends(box: ParameterBox) -> tuple[float, float]:
 
 
 def _within_reach(box: ParameterBox, path: Path, x: Array, side: Ints) -> Ints:
-    """Pairs of one of these states and a place of the path where one throw from it can land, the latest places first."""
+    """Pairs of one of these states and a place of the path where a throw from it can land, the latest first."""
     bounds, sides = np.full((2, x.size), np.nan), np.full((2, x.size), -1)
     for row, kappa in enumerate(_ends(box)):
         thrown = throws(box, x, side, [Choice(kappa, 0.0)])
@@ -422,15 +420,11 @@ def _kappa_to(box: ParameterBox, x: float, side: int, to: float, on: int) -> flo
 
 def _landed(box: ParameterBox, state: State, kappa: tuple[float, float]) -> tuple[float, float, int]:
     """Enclose one throw from a state, with every kappa from one to another: bounds and side; nan where not decided."""
-    lo, hi, side = replay(
-        box, (state.lo, state.hi), state.side, np.array(kappa).reshape(2, 1), np.zeros(1)
-    )
+    lo, hi, side = replay(box, (state.lo, state.hi), state.side, np.array(kappa).reshape(2, 1), np.zeros(1))
     return (float(lo[1]), float(hi[1]), int(side[1])) if lo.size > 1 else (np.nan, np.nan, -1)
 
 
-def _closing(
-    box: ParameterBox, state: State, kappa: float, to: float, on: int
-) -> tuple[float, float] | None:
+def _closing(box: ParameterBox, state: State, kappa: float, to: float, on: int) -> tuple[float, float] | None:
     """Bounds of kappa between which the throw lands exactly there, whatever the rounding; None if it is not proved."""
     if box.landing > 0.0:
         only = (kappa, kappa) if box.kappa_varies else (box.lo.kappa, box.hi.kappa)

@@ -8,11 +8,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from limitsets.errors import AnswerError
-from limitsets.goals import Goal, OrientedBeyond, Predicate
+from limitsets.goals import Goal, Predicate
 from limitsets.proofs.asked import State
 from limitsets.proofs.certify import Claim, Proof, weakest_of
 from limitsets.proofs.confirm import DeniedError
-from limitsets.proofs.refutation import write_refutation
+from limitsets.proofs.refutation import KINDS, write_refutation
 
 if TYPE_CHECKING:
     from limitsets.robust.margins.finding import Margin
@@ -125,17 +125,19 @@ def save(margin: Margin, folder: Path, *, recheck: bool = True) -> tuple[Path, .
         last = f"-{goal.kind.replace('_', '-')}" if len(margin.goals) > 1 else ""
         written.append(proof.save(folder / f"{stem}{last}.proof.zip", recheck=recheck))
     against = margin.against
-    # what refutes the other goals is no single place
-    if against is not None and against.found is not None and isinstance(against.refuted, OrientedBeyond):
-        path = folder / f"{stem}.refuted.zip"
-        write_refutation(
-            path,
-            against.found,
-            against.refuted,
-            against.counterexample,
-            against.within,
-            margin.scene,
-            recheck=recheck,
-        )
-        written.append(path)
+    if against is not None and against.found is not None and against.refuted is not None:
+        states, recurs = against.counterexample, against.answers[0].recurs
+        if any(word in recurs for word in KINDS):
+            path = folder / f"{stem}.refuted.zip"
+            write_refutation(
+                path,
+                against.found,
+                against.refuted,
+                states,
+                recurs,
+                against.within,
+                margin.scene,
+                recheck=recheck,
+            )
+            written.append(path)
     return tuple(written)
