@@ -138,18 +138,24 @@ class Proof:
 
         return to_json(self)
 
-    def save(self, path: str | Path) -> Path:
-        """Write the certificate of the claims that are proved.
+    def save(self, path: str | Path, *, recheck: bool = True, workers: int | None = 1) -> Path:
+        """Write the certificate of the claims that are proved; it gets its name once `recheck` has confirmed it.
 
         Parameters
         ----------
         path : str or Path
             The file, replaced whole.
+        recheck : bool
+            Whether to have it checked first.
+        workers : int, optional
+            Processes that check it, as in `limitsets.recheck`.
 
         Raises
         ------
         AnswerError
             Nothing is proved, or it is proved of a map that no recheck knows.
+        DeniedError
+            The checker does not confirm it: it is kept as NAME.denied.zip, and what it denies is undecided.
         """
         if self.effects:
             raise AnswerError(
@@ -158,7 +164,11 @@ class Proof:
                 "the minimal model, and noise",
                 "nothing rechecks other maps; the proof stands in .claims and .to_json()",
             )
-        good = [{"claim": claim.claim, "section": claim.section} for claim in self.claims if claim.written]
+        good = [
+            {"claim": claim.claim, "section": claim.section, "verdict": claim.verdict}
+            for claim in self.claims
+            if claim.written
+        ]
         if not good:
             raise AnswerError(
                 "the certificate", "without a proved claim", "at least one", "see the reasons in .claims"
@@ -175,8 +185,26 @@ class Proof:
             tolerance=self.tolerance,
             unit=self.scene.unit,
             producer=producer,
+            recheck=recheck,
+            workers=workers,
         )
         return Path(path)
+
+    def denied(self, claims: Mapping[str, str]) -> Proof:
+        """Return what is left of it where the checker denies some claims: these are undecided."""
+        left = tuple(
+            replace(
+                each,
+                verdict="undecided",
+                reason=f"the checker denies it: {claims[each.claim]}",
+                section={},
+                starts=None,
+            )
+            if each.claim in claims
+            else each
+            for each in self.claims
+        )
+        return replace(self, claims=left)
 
 
 def _attracts_all(found: Attraction, scene: Scene) -> Claim:

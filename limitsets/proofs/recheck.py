@@ -894,24 +894,29 @@ def over_angles(s: Side, phi: Arb, R: Arb, kappa: Arb) -> tuple[int, Arb, Arb]:
 
 
 def decide_exact(s: Side, spin: Arb, X: Arb, H: Arb, kappa: Arb) -> int:
-    """Decide by the flip criterion of the exact model over a box; X^2 + H^2 = ell^2 gives ell - H = X^2/(ell + H)."""
-    top = s.ell + H
-    if s.signed:
-        if top > 0:
-            V = kappa * X * abs(X) / top
-        elif X > 0:
-            V = kappa * (s.ell - H)
-        elif X < 0:
-            V = kappa * (H - s.ell)
-        else:
-            return 2
-        F = spin * abs(spin) * s.over_2m - V
-        return 1 if F > 0 else 0 if F < 0 else 2
-    V = kappa * X * X / top if top > 0 else kappa * (s.ell - H)
-    F = spin * spin * s.over_2m - V
-    if X < 0 or F > 0:
+    """Decide by the flip criterion of the exact model over a box.
+
+    X^2 + H^2 = ell^2 gives ell - H = X^2/(ell + H): the right of it is narrow where H > 0, and next to H = -ell only
+    the left is; both hold wherever they are defined.
+    """
+    V = kappa * barrier(s.ell, X, H, s.signed)
+    F = spin * (abs(spin) if s.signed else spin) * s.over_2m - V
+    if F > 0 or (X < 0 and not s.signed):
         return 1
-    return 0 if F < 0 and X > 0 else 2
+    return 0 if F < 0 and (s.signed or X > 0) else 2
+
+
+def barrier(ell: Any, X: Any, H: Any, signed: bool) -> Any:
+    """Evaluate V/kappa = ell - H, with the sign of X where that counts."""
+    top, below_it = ell + H, ell - H
+    if signed and not X > 0:
+        below_it = -below_it if -X > 0 else None  # of either sign
+    if not top > 0:
+        return arb("nan") if below_it is None else below_it
+    above_it = X * (abs(X) if signed else X) / top
+    if below_it is None or H > 0 or isinstance(above_it, Rising):
+        return above_it if below_it is None or H > 0 else below_it
+    return above_it.intersection(below_it)
 
 
 def positive_until(s: Side, x: Arb, kappa: Arb, end: Angle) -> bool:
@@ -2594,21 +2599,21 @@ def read_starts(section: dict[str, Any], goal: dict[str, Any], n_sides: int) -> 
     if "lost" in section:
         lost = [hex_float(each, "lost") for each in by_side(section["lost"], "lost", n_sides)]
     starts = Starts(kind, x, thinning, near, lost)
+    anywhere = goal["anywhere"] and goal["kind"] != "attracts_all"  # which is of every start in any case
+    almost = goal["kind"] == "reaches" and not goal["every"]
     points = [starts.fixed(i) for i in range(n_sides)]
+    require(lost is None or kind in ("from", "cells"), f"starts {kind}: none of them are lost")
     if kind in ("every", "almost-every"):
         require(
-            near is not None and lost is None, f"starts {kind}: near_joint is needed, and nothing is lost"
+            (near is not None or anywhere) and not any(points), f"starts {kind}: near_joint does not say so"
         )
-        require(points == [None] * n_sides, f"starts {kind}, and parts that creep to the joint")
-        require(("thinning" in section) == (kind == "almost-every"), f"starts {kind} and thinning do not fit")
-    elif near is not None:
+        fits = ("thinning" in section) == (kind == "almost-every") or (almost and kind == "almost-every")
+        require(fits, f"starts {kind} and thinning do not fit")
+    for i, point in enumerate(points):
         require(
-            None not in points or kind == "cells", "starts from x on, and near_joint without fixed points"
+            x is None or point is None or x[i] >= point[1],
+            "starts before the end of a fixed point are claimed",
         )
-        require(lost is None, "starts near the joint are claimed and lost")
-        ends = [None if point is None else point[1] for point in points]
-        require(kind == "cells" or x == ends, "starts do not begin where the fixed points end")
-    anywhere = goal["anywhere"] and goal["kind"] != "attracts_all"  # which is of every start in any case
     require(kind == "every" or not anywhere, "a goal from anywhere is one of every start")
     require(kind != "cells" or goal["kind"] != "attracts_all", "attracts_all of some cells")
     return starts
@@ -2636,8 +2641,9 @@ def explained_in_words(starts: Starts) -> list[str]:
         if fixed is not None:
             lines.append(f"    side {i}: starts a_{i} < x < {fixed[0]!r} stay on it and creep to a_{i}")
         elif starts.lost is not None:
-            worst = "a worst sequence of landings takes to the joint"
-            lines.append(f"    side {i}: starts a_{i} < x <= {starts.lost[i]!r} are those that {worst}")
+            lines.append(
+                f"    side {i}: each start a_{i} < x <= {starts.lost[i]!r} is lost by a worst sequence of landings"
+            )
     return lines
 
 
@@ -2753,11 +2759,9 @@ def check_starts(c: Cells, scene: Scene, goal: dict[str, Any], starts: Starts) -
         if starts.kind != "cells":
             if Fraction(float(edges[-1])) < scene.arm[1]:
                 return f"side {i}: the cells end before arm.length"
-            needed[:] = True
-        if starts.x is not None and near is None:
-            if not starts.x[i] >= first:
-                return f"side {i}: starts are claimed that lie before the cells"
-            needed = edges[1:] > starts.x[i]
+            needed = edges[1:] > (-math.inf if starts.x is None else starts.x[i])
+        if starts.x is not None and near is None and not starts.x[i] >= first:
+            return f"side {i}: starts are claimed that lie before the cells"
         if near is not None:
             bad = over_halves(scene, check_below_cells, i, first, near[0][i], near[1][i])
             if bad:
@@ -2845,6 +2849,8 @@ def check_lost(scene: Scene, side: int, end: float) -> str:
     s, x = scene.sides[side], arb(end)
     if not s.landing > 0:
         return "without noise of the landing place no part is lost by it"
+    if x <= s.a:
+        return ""  # nothing is said
     if not (x > s.a and x <= s.arm):
         return "they do not lie on the arm"
     loose = any(
@@ -2895,11 +2901,11 @@ def shares(c: Cells, scene: Scene, starts: Starts, cells: Array) -> tuple[float,
         begin, fixed = above(s.a), starts.fixed(i)
         whole += above(exact(scene.arm[1])) - below(s.a)
         edges = np.minimum(c.edges[i], end)
-        lower = edges[:-1] if starts.x is None else np.maximum(edges[:-1], starts.x[i])
+        since = -math.inf if starts.x is None else starts.x[i]
         own = cells[c.start[i] : c.start[i + 1]]
-        claimed += float(np.clip(edges[1:] - lower, 0.0, None)[own].sum())
+        claimed += float(np.clip(edges[1:] - np.maximum(edges[:-1], since), 0.0, None)[own].sum())
         if starts.near is not None:
-            claimed += max(0.0, float(c.edges[i][0]) - (begin if fixed is None else fixed[1]))
+            claimed += max(0.0, float(edges[0]) - max(begin if fixed is None else fixed[1], since))
         until = fixed[0] if fixed is not None else begin if starts.lost is None else starts.lost[i]
         explained += max(0.0, min(until, end) - begin)
     room = 1 - 2.0**-30  # against the rounding of these sums
@@ -2997,7 +3003,7 @@ def by_angle(scene: Scene, rest: Any, rho: Any, kappa: Any, h: Any, p: Any) -> t
         jog = x - h * p + a * (ONE - cos) - d * (p - sin)
         X, H = a * cos - d * sin, a * sin + d * cos
         spin = rho**2 + X * (x - kappa * p) + H * (h + d)
-        V = kappa * (X * abs(X) / (ell + H))
+        V = kappa * barrier(ell, X, H, signed=True)
     else:
         x = a + HALF * (kappa - d if "2" in scene.raw["model"]["flight"] else kappa) * p
         jog = x - h * p
@@ -3149,6 +3155,7 @@ def near_angle(s: Side, k_lo: Arb, k_hi: Arb, edge: float) -> Arb:
 def near_landing(s: Side, k_lo: Arb, k_hi: Arb, edge: float) -> Arb:
     """Bound where throws from (a, edge] land: R' <= R - h phi + a phi^2/2."""
     bound = near_angle(s, k_lo, k_hi, edge)
+    bound = root_above(s, arb(edge), k_lo, at_angle(s, bound)).p if bound.is_finite() else bound
     return arb(edge) + abs(s.h) * bound + HALF * s.a * bound**2 + s.landing
 
 

@@ -65,8 +65,10 @@ def write_refutation(
     recurs: Mapping[str, Any],
     within: Mapping[str, str],
     scene: Scene,
+    *,
+    recheck: bool = True,
 ) -> None:
-    """Write it, replacing an older file whole.
+    """Write it, replacing an older file whole; it gets its name once the checker has confirmed it.
 
     Parameters
     ----------
@@ -84,6 +86,8 @@ def write_refutation(
         Deviations from the nominal scene that its own do not exceed, by quantity.
     scene : Scene
         The nominal scene.
+    recheck : bool
+        Whether to check it first.
 
     Raises
     ------
@@ -110,9 +114,10 @@ def write_refutation(
     write(
         path,
         [found],
-        [{"claim": "refuted", "section": section}],
+        [{"claim": "refuted", "section": section, "verdict": "refuted"}],
         noise=box.noise or None,
         tolerance=None,
         unit=scene.unit,
         producer={},
+        recheck=recheck,
     )

@@ -209,6 +209,7 @@ def near_joint(m: Plain, i: int, begin: float, edge: float) -> dict:
 
 def starts_of(m: Plain, edges: list, rank: np.ndarray, near: dict, landing: float) -> dict:
     """For which starts a goal is claimed: every one; beyond the fixed points; or from where landings do not matter."""
+    near = copy.deepcopy(near)
     if not landing:
         if m.h < 0:
             return {"starts": "every", "near_joint": near}

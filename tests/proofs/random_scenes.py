@@ -35,14 +35,14 @@ def case(seed: int) -> Case:
         total = sum(weights)
         x, y = (sum(w * c[k] for w, c in zip(weights, corners, strict=True)) / total for k in (0, 1))
         points.append({"x": f"{x:.3f} mm", "y": f"{y:.3f} mm", "mass": f"{rng.uniform(0.1, 6):.3f} g"})
-    kappa = size * rng.choice([rng.uniform(0.9, 2), rng.uniform(2, 8)])
-    arm = size * rng.uniform(4, 14)
+    kappa = size * rng.choice([rng.uniform(1.2, 3), rng.uniform(3, 9)])
+    arm = size * rng.uniform(8, 16)
     sign = 1 if rng.random() < 0.25 else -1
     model = {
-        "flight": rng.choice(["exact", "exact", "exact", "small-angle", "small-angle-2"]),
+        "flight": rng.choice(["exact"] * 5 + ["small-angle", "small-angle-2"]),
         "flip": rng.choice(["signed", "energy"]),
     }
-    height = sign * size * (rng.uniform(0.005, 0.06) if sign > 0 else rng.uniform(0.005, 0.3))
+    height = sign * size * (rng.uniform(0.005, 0.06) if sign > 0 else rng.uniform(0.005, 0.15))
     side = rng.randrange(n)
     place = f"{rng.uniform(0.15, 0.9) * arm:.3f} mm"
     goal: dict[str, Any] = rng.choice(
