@@ -1880,8 +1880,8 @@ def read_refutation(section: dict[str, Any], n_sides: int) -> dict[str, Any]:
     """Read an orbit that refutes a goal: its start, what each throw was like, and why it comes back; or a cycle."""
     goal = section["goal"]
     kind = goal.get("kind") if isinstance(goal, dict) else None
-    require(kind in list(BROKEN), "refuted.goal: not a kind that an orbit refutes")
-    goal = table(goal, "refuted.goal", BROKEN[kind][0], "from_anywhere")
+    require(isinstance(kind, str) and kind in BROKEN, "refuted.goal: not a kind that an orbit refutes")
+    goal = table(goal, "refuted.goal", BROKEN[str(kind)][0], "from_anywhere")
     goal = {"throws": 0} | goal if kind == "reaches" else {"jogs": 0} | goal if kind == "flip_order" else goal
     nominal, tolerance = section["nominal"], section["tolerance"]
     same = isinstance(nominal, dict) and isinstance(tolerance, dict) and set(nominal) == set(tolerance)

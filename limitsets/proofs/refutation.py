@@ -1,7 +1,7 @@
 """Writing an orbit that refutes a goal, so that a stranger can throw it again.
 
-A certificate with the one claim "refuted": the goal; an orbit that comes back, or that refutes by one passage; and within
-which deviations of which nominal values the scene lies.  The cells of the scene are in the file as in every other.
+A certificate with the one claim "refuted": the goal; an orbit that comes back, or that refutes by one passage; and
+within which deviations of which nominal values the scene lies.  The scene's cells are in the file as in every other.
 """
 
 from __future__ import annotations

@@ -120,11 +120,9 @@ def _falls_short(found: Attraction, goal: Reaches) -> Answer | None:
     for number in range(int(found.component.max(initial=-1)) + 1):
         mine = found.component == number
         if not (mine & reach).any():
-            reason = f"no orbit in the attracting component of {found.cover.place(int(np.flatnonzero(mine)[0]))} gets there"
-            refutation = Refutation(
-                passing(found, np.flatnonzero(mine)), "almost-every", {"component": number}
-            )
-            return against(refutation, reason)
+            cells = np.flatnonzero(mine)
+            reason = f"no orbit in the attracting component of {found.cover.place(int(cells[0]))} gets there"
+            return against(Refutation(passing(found, cells), "almost-every", {"component": number}), reason)
     return None
 
 

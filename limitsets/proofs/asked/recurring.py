@@ -1,13 +1,13 @@
 """Orbits that refute a goal because they come back: what passes once on its way to where it ends refutes nothing.
 
 Without noise they are *periodic*.  A long orbit shows where a goal is violated; from such a place on its itinerary is
-followed until it comes near again, and the periodic orbit of that itinerary lies nearer still, by the slope of all these
-throws.  It is proved in intervals, with a point on it that violates the goal.  One that repels refutes "from every
-start", one that attracts "from almost every start".
-With noise they are *closed*: from a violating place on the throws are steered back, one state per place of a raster, until
-one more can land exactly on an earlier place of the same orbit, by the scatter of the landing or, where kappa alone
-differs, between two values of it that land on either side.  From there on the same throws lead to the violation again.
-No noise at all is one of the sequences allowed.
+followed until it comes near again, and the periodic orbit of that itinerary lies nearer still, by the slope of all
+these throws.  It is proved in intervals, with a point on it that violates the goal.  One that repels refutes "from
+every start", one that attracts "from almost every start".
+With noise they are *closed*: from a violating place on the throws are steered back, one state per place of a raster,
+until one more can land exactly on an earlier place of the same orbit, by the scatter of the landing or, where kappa
+alone differs, between two values of it that land on either side.  From there on the same throws lead to the violation
+again.  No noise at all is one of the sequences allowed.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ NEAR, STEEPEST = 1e-3, 1e10
 # Starts per side, besides those in the attracting cells, and throws of theirs that are searched.
 OTHERS, SHORT = 12, 2000
 
-# Steering back: places of the raster along the arm, values of kappa tried, throws at most, ways to close that are tried.
+# Steering back: places of the raster along the arm, values of kappa, throws at most, ways to close that are tried.
 PLACES, KAPPAS, BACK, CLOSINGS = 20_000, 5, 60, 20
 
 # An exact landing between two values of kappa: so near to it, as shares of the way to the ends of the noise.
@@ -83,7 +83,7 @@ class Refutation(NamedTuple):
 
 
 class Loop(NamedTuple):
-    """A periodic orbit that is proved to exist, each point enclosed; `recurs` is empty where no recheck knows the map."""
+    """A periodic orbit that is proved, each point enclosed; `recurs` is empty where no recheck knows the map."""
 
     lo: Array
     hi: Array
@@ -159,7 +159,7 @@ def cycle_that(
 
 
 def _quiet(found: Attraction, scene: Scene) -> ParameterBox:
-    """The scene's parameters without noise."""
+    """Return the scene's parameters without noise."""
     box = found.cover.box
     return parameter_box(scene, tree=box.scene) if box.noise else box
 
