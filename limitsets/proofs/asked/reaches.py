@@ -9,7 +9,18 @@ import numpy as np
 
 from limitsets.cells import CellSet
 from limitsets.goals import Reaches
-from limitsets.proofs.asked.kind import Answer, Kind, Mask, above, against, below, common, peeled, undecided
+from limitsets.proofs.asked.kind import (
+    Answer,
+    Kind,
+    Mask,
+    above,
+    against,
+    below,
+    common,
+    peeled,
+    place_text,
+    undecided,
+)
 from limitsets.proofs.asked.recurring import Loop, Refutation, cycle_that
 from limitsets.proofs.asked.search import passing
 from limitsets.proofs.attraction import Attraction
@@ -89,7 +100,7 @@ def _every(found: Attraction, scene: Scene, goal: Reaches, wanted: Mask) -> Answ
 def _section(scene: Scene, goal: Reaches, throws: int) -> dict[str, Any]:
     section = {
         "kind": goal.kind,
-        "x": f"{goal.x!r} {scene.unit}",
+        "x": place_text(goal, scene),
         "side": goal.side,
         "every_orbit": goal.every_orbit,
         "throws": throws,
