@@ -41,7 +41,11 @@ def _wanted(found: Attraction, goal: Reaches) -> Mask:
 
 def _refute(found: Attraction, scene: Scene, goal: Reaches) -> Answer:
     every = goal.every_orbit
-    never = cycle_that(found, scene, lambda loop: (every or loop.attracts) and not _arrives(loop, goal))
+
+    def refutes(loop: Loop) -> bool:
+        return (every or loop.attracts) and not _arrives(loop, goal)
+
+    never = cycle_that(found, scene, refutes, attracting=not every)
     short = _falls_short(found, goal)
     if short is None:
         return against(never)

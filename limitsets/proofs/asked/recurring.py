@@ -47,6 +47,9 @@ __all__ = ["Loop", "Refutation", "closed", "cycle_near", "cycle_that", "recurren
 # Places of an orbit from which it is followed back to them, and throws until it has to have come back.
 TRIED, LONGEST = 48, 80
 
+# Places from which orbits are followed that refute a goal by what they never do: any place on them will do.
+FEW = 12
+
 # A periodic orbit is looked for this near to a place, relative to x; beyond such a slope floats do not resolve it.
 NEAR, STEEPEST = 1e-3, 1e10
 
@@ -123,7 +126,12 @@ def recurrent_violation(found: Attraction, scene: Scene, wrong: Wrong) -> Refuta
 
 
 def cycle_that(
-    found: Attraction, scene: Scene, refutes: Callable[[Loop], bool], longest: int = PERIODS[0]
+    found: Attraction,
+    scene: Scene,
+    refutes: Callable[[Loop], bool],
+    longest: int = PERIODS[0],
+    *,
+    attracting: bool = False,
 ) -> Refutation:
     """Find a periodic orbit that refutes a goal as a whole, by what it never does, and prove it.
 
@@ -137,6 +145,8 @@ def cycle_that(
         From a proved orbit to whether it is such a one.
     longest : int
         Largest period searched in the attracting cells.
+    attracting : bool
+        Look for orbits that attract only.
 
     Returns
     -------
@@ -146,13 +156,13 @@ def cycle_that(
     box = _quiet(found, scene)
     if not box.effects:
         quiet = replace(found, cover=replace(found.cover, box=box))
-        for cycle in proved_cycles(quiet, longest).cycles:
+        for cycle in () if attracting else proved_cycles(quiet, longest).cycles:
             loop = _loop(cycle)
             if refutes(loop):
                 return _of(loop, box, found)
     for path in _paths(found, box):
         ends = np.arange(max(path.x.size - 1 - 2 * LONGEST, 0), path.x.size)
-        best = cycle_near(box, path, ends, refutes)
+        best = cycle_near(box, path, ends, refutes, most=FEW, steepest=1.0 if attracting else STEEPEST)
         if best is not None:
             return _of(best, box, found)
     return Refutation()
@@ -165,15 +175,27 @@ def _quiet(found: Attraction, scene: Scene) -> ParameterBox:
 
 
 def _paths(found: Attraction, box: ParameterBox) -> Iterator[Orbit]:
-    """Long orbits where starts end: in the attracting cells, and wherever else those on the arm do."""
-    map_now = box.at_kappa(box.middle_kappa)
+    """Long orbits where starts end: one in each attracting component that is met, and wherever else starts end."""
+    map_now, met = box.at_kappa(box.middle_kappa), set()
     if (found.component >= 0).any():
-        yield orbit(map_now, *settled(found), SEARCHED)
+        first = settled(found)
+        met.add(_component(found, *first))
+        yield orbit(map_now, *first, SEARCHED)
     for side, (edges,) in enumerate(found.cover.grid.edges):
         for x in np.linspace(edges[0], edges[-1], OTHERS + 2)[1:-1].tolist():
             path = orbit(map_now, x, side, SETTLING)
-            if path.stopped is None:
-                yield orbit(map_now, float(path.x[-1]), int(path.side[-1]), SHORT)
+            last = float(path.x[-1]), int(path.side[-1])
+            if path.stopped is not None or _component(found, *last) in met:
+                continue
+            met.add(_component(found, *last))
+            met.discard(-1)  # off the attracting cells any two may end in different places
+            yield orbit(map_now, *last, SHORT)
+
+
+def _component(found: Attraction, x: float, side: int) -> int:
+    """Return the number of the attracting component in which a place lies, -1 if in none."""
+    (cell,) = found.cover.grid.index([x], side)
+    return int(found.component[cell]) if cell >= 0 else -1
 
 
 def _violates(wrong: Wrong, lo: float, hi: float, side: int) -> bool:
@@ -184,7 +206,15 @@ def _violates(wrong: Wrong, lo: float, hi: float, side: int) -> bool:
 # ---------------------------------------------------------------- periodic orbits
 
 
-def cycle_near(box: ParameterBox, path: Orbit, at: Ints, refutes: Callable[[Loop], bool]) -> Loop | None:
+def cycle_near(
+    box: ParameterBox,
+    path: Orbit,
+    at: Ints,
+    refutes: Callable[[Loop], bool],
+    *,
+    most: int = TRIED,
+    steepest: float = STEEPEST,
+) -> Loop | None:
     """Find a periodic orbit through, nearly, one of some places of a long orbit, and prove it.
 
     Parameters
@@ -197,6 +227,10 @@ def cycle_near(box: ParameterBox, path: Orbit, at: Ints, refutes: Callable[[Loop
         Numbers of the places.
     refutes : callable
         From a proved orbit, which begins near the place, to whether it is wanted.
+    most : int
+        Places tried.
+    steepest : float
+        Orbits with larger slopes are not looked for.
 
     Returns
     -------
@@ -204,15 +238,15 @@ def cycle_near(box: ParameterBox, path: Orbit, at: Ints, refutes: Callable[[Loop
         The first one found, the places tried from the largest x on.
     """
     order = at[np.argsort(-path.x[at], kind="stable")]
-    for k in order[:: max(1, order.size // TRIED)].tolist():
-        for loop in _returns(box, path, k):
+    for k in order[:: max(1, order.size // most)].tolist():
+        for loop in _returns(box, path, k, steepest):
             on_arm = (loop.lo > box.hi.a[loop.side]).all() and (loop.hi <= box.lo.arm_length).all()
             if on_arm and refutes(loop):
                 return loop
     return None
 
 
-def _returns(box: ParameterBox, path: Orbit, k: int) -> Iterator[Loop]:
+def _returns(box: ParameterBox, path: Orbit, k: int, steepest: float) -> Iterator[Loop]:
     """Periodic orbits near place k, by itineraries of growing length."""
     map_now = box.at_kappa(box.middle_kappa)
     for period in range(1, min(LONGEST, path.code.size - k) + 1):
@@ -221,7 +255,7 @@ def _returns(box: ParameterBox, path: Orbit, k: int) -> Iterator[Loop]:
         x, steep = (_root_on_orbit if box.effects else _root)(map_now, path, k, period)
         if abs(steep) > STEEPEST:
             return
-        if not abs(x - path.x[k]) <= NEAR * abs(path.x[k]):
+        if not (abs(x - path.x[k]) <= NEAR * abs(path.x[k]) and abs(steep) <= steepest):
             continue
         around = orbit(map_now, x, int(path.side[k]), period)
         if around.code.size < period or (around.side != path.side[k : k + period + 1]).any():
