@@ -902,9 +902,12 @@ def slope_over(s: Side, phi: Arb, kappa: Arb, rise: Arb, f_slope: Arb) -> Arb | 
     if not s.exact:
         return ONE - 2 * s.h / (kappa - s.small_d)
     steep = its_slope(s, ratios(phi), kappa) if phi < 3 else ZERO
-    if steep > 0:
-        return ONE + rise / steep
-    return ONE - rise * phi / f_slope if f_slope < 0 else None
+    wide, narrow = (ONE + rise / steep if steep > 0 else None), None
+    if f_slope < 0:  # better where the box is small, for R(p) is a series that ends
+        narrow = ONE - rise * phi / f_slope
+    if wide is None or narrow is None:
+        return narrow if wide is None else wide
+    return wide.intersection(narrow)
 
 
 def decide_exact(s: Side, spin: Arb, X: Arb, H: Arb, kappa: Arb) -> int:
