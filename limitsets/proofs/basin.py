@@ -259,7 +259,7 @@ def _start(
         start.append(below if near and last < 0 else float(edges[last + 1]))
         ends = float(lo.a[side]) if point is None else point[0]
         if each.reason == SCATTERED and each.reach - each.x < found.box.landing:
-            lost = (displaced[side][:, 1] < found.box.landing * (1.0 - ROOM)) & (displaced[side][:, 2] > 0.0)
+            lost = (displaced[side][:, 3] < found.box.landing * (1.0 - ROOM)) & (displaced[side][:, 2] > 0.0)
             ends = float(edges[int(np.argmin([*lost, False]))])
         explained.append(ends)
     return np.array(start), np.array(explained)
