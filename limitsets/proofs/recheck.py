@@ -1849,7 +1849,7 @@ def check_orbits(scene: Scene, c: Cells, section: dict[str, Any]) -> str:
 
 def check_sets(scene: Scene, c: Cells, claims: dict[str, dict[str, Any]]) -> Iterator[tuple[list[str], str]]:
     """Check end points and periodic orbits of attracting cells that are proved; yields what fails."""
-    for name, check in (("end-points", check_ends), ("cycles", check_orbits), ("refuted", check_refuted)):
+    for name, check in (("end-points", check_ends), ("cycles", check_orbits)):
         bad = check(scene, c, claims[name]) if name in claims else ""
         if bad:
             yield [name], bad
@@ -1975,8 +1975,8 @@ def check_deviations(scene: Scene, section: dict[str, Any]) -> str:
     return ""
 
 
-def check_refuted(scene: Scene, c: Cells, section: dict[str, Any]) -> str:
-    """Throw the orbit again in balls; "" or what fails."""
+def check_refuted(scene: Scene, section: dict[str, Any]) -> str:
+    """Throw the orbit again in balls, whatever the cells are; "" or what fails."""
     why, goal = section["why"], section["goal"]
     if not why:
         return "it shows a passing orbit only: a goal is refuted by one that comes back"
@@ -3382,6 +3382,13 @@ def check_box_claims(
     Images are proved to lie strictly inside the union of their target cells (or at most at the arm's length), so
     that "invariant" already gives "trapping".
     """
+    if "refuted" in claims:
+        bad = check_refuted(scene, claims["refuted"])
+        if bad:
+            yield ["refuted"], bad
+        claims = {name: section for name, section in claims.items() if name != "refuted"}
+        if not claims:
+            return
     everything = list(claims)
     first_version = claims.get("goal", {}).get("starts", "") is None
     bad = check_structure(c, scene, 0 if first_version else -1) or check_components(c)
@@ -3526,7 +3533,8 @@ def check_certificate(
         tell_starts(report, claims["goal"], scenes, cells)
     report.statement = [statement_of(name, section, noise is not None) for name, section in claims.items()]
     which = " (first box)" if len(cells) > 1 else ""
-    report.statement.append(f"attracting cells: {extents(cells[0])}{which}")
+    if set(claims) - {"refuted"}:  # which does not speak of them: they are not checked for it
+        report.statement.append(f"attracting cells: {extents(cells[0])}{which}")
     if own is not None and not {"goal", "refuted"} & set(claims):
         report.statement.append("of the scene's own goal nothing is claimed")
     for name in claims:
