@@ -217,16 +217,26 @@ def open_certificate(path: str | os.PathLike[str]) -> tuple[dict[str, Any], dict
 DECIMAL = r"[+-]?(?:[0-9]{1,100}(?:\.[0-9]{0,100})?|\.[0-9]{1,100})(?:[eE][+-]?[0-9]{1,3})?"
 NUMBER = re.compile(rf" *({DECIMAL})(?: +|(?=%))([a-z%/^0-9]{{1,8}}) *")  # as a scene may be written
 INCH = Fraction(254, 10_000)
-LENGTHS = {"m": Fraction(1), "cm": Fraction(1, 100), "mm": Fraction(1, 1000), "in": INCH, "ft": 12 * INCH}
+METRIC = {"m": Fraction(1), "cm": Fraction(1, 100), "mm": Fraction(1, 1000), "um": Fraction(1, 10**6)}
+LENGTHS = {**METRIC, "in": INCH, "ft": 12 * INCH}
+POUND = Fraction(45359237, 10**8)
 UNITS: dict[str, dict[str, Fraction]] = {
     "length": LENGTHS,
     "angle": {"rad": Fraction(1), "deg": Fraction(1, 180)},  # degrees as multiples of pi
-    "speed": {"rad/s": Fraction(1), "deg/s": Fraction(1, 180)},
+    "speed": {"rad/s": Fraction(1), "deg/s": Fraction(1, 180), "rpm": Fraction(1, 30)},
     "acceleration": {f"{unit}/s^2": factor for unit, factor in LENGTHS.items()},
-    "mass": {"kg": Fraction(1), "g": Fraction(1, 1000), "lb": Fraction(45359237, 100_000_000)},
-    "density": {"kg/m^2": Fraction(1)},
+    "mass": {
+        "t": Fraction(1000),
+        "kg": Fraction(1),
+        "g": Fraction(1, 1000),
+        "mg": Fraction(1, 10**6),
+        "lb": POUND,
+    },
+    "density": {"kg/m^2": Fraction(1), "g/cm^2": Fraction(10)},  # of a plate's area; and of its volume:
+    "bulk": {"kg/m^3": Fraction(1), "g/cm^3": Fraction(1000)},
     "share": {"%": Fraction(1, 100)},
 }
+BY_PI = ("deg", "deg/s", "rpm")
 G0 = Fraction(980665, 100_000)
 
 
@@ -275,9 +285,9 @@ def quantity(value: object, kinds: str, where: str) -> Quantity:
         require(len(factors) == 1, f"{where}: {plain(found[2])} is not a unit of {kinds}")
         read.append((Fraction(found[1]) * factors[0], found[2]))
     (lo, unit), (hi, other) = read
-    require(unit.startswith("deg") == other.startswith("deg"), f"{where}: mixes degrees and radians")
+    require((unit in BY_PI) == (other in BY_PI), f"{where}: mixes degrees and radians")
     require(lo <= hi, f"{where}: the interval is empty")
-    return Quantity(lo, hi, unit.startswith("deg"), unit)
+    return Quantity(lo, hi, unit in BY_PI, unit)
 
 
 def table(value: object, where: str, needed: str, optional: str = "") -> dict[str, Any]:
@@ -578,7 +588,7 @@ def read_part(
     n = len(vertices)
     mass = part["mass"]
     if "plate_density" in mass:
-        table(mass, "part.mass", "plate_density", "points")
+        table(mass, "part.mass", "plate_density", "plate_thickness points")
         require("vertices" in part or not mass.get("points"), "points of mass need vertices")
         start, rho2 = read_plate(mass, vertices, unit, length)
         (ex, ey), along, above, rho, own = (ONE, ZERO), ZERO, ZERO, rho2.sqrt(), -1
@@ -658,8 +668,13 @@ def read_plate(
         sx += (x0 + x1) * cross / 6
         sy += (y0 + y1) * cross / 6
         second += (x0 * x0 + x0 * x1 + x1 * x1 + y0 * y0 + y0 * y1 + y1 * y1) * cross / 12
-    density = quantity(mass["plate_density"], "density", "part.mass.plate_density")
+    thick = "plate_thickness" in mass
+    density = quantity(mass["plate_density"], "bulk" if thick else "density", "part.mass.plate_density")
     weight = density.ball() * exact(unit) ** 2
+    if thick:
+        thickness = quantity(mass["plate_thickness"], "length", "part.mass.plate_thickness")
+        require(thickness.lo > 0, "part.mass.plate_thickness is not positive")
+        weight = weight * thickness.ball()
     total, sx, sy, second = weight * area, weight * sx, weight * sy, weight * second
     for point in rows(mass.get("points", []), "part.mass.points", 0, 1000):
         table(point, "part.mass.points", "x y mass")

@@ -107,10 +107,15 @@ def base_unit(dimension: str, unit: str) -> str:
     >>> base_unit("acceleration", "in"), base_unit("angular speed", "in")
     ('in/s^2', 'rad/s')
     """
-    units = {"length": unit, "angle": "rad", "angular speed": "rad/s", "acceleration": f"{unit}/s^2"}
-    return units.get(
-        dimension, {"mass": "kg", "mass per area": f"kg/{unit}^2", "share": ""}.get(dimension, unit)
-    )
+    return {
+        "angle": "rad",
+        "angular speed": "rad/s",
+        "acceleration": f"{unit}/s^2",
+        "mass": "kg",
+        "mass per area": f"kg/{unit}^2",
+        "mass per volume": f"kg/{unit}^3",
+        "share": "",
+    }.get(dimension, unit)
 
 
 def text_at(tree: Mapping[str, Any], name: str) -> Any:

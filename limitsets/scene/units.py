@@ -7,7 +7,6 @@ a value in the unit asked for is the float of its text.
 
 from __future__ import annotations
 
-import difflib
 import math
 import re
 from fractions import Fraction
@@ -16,18 +15,47 @@ from typing import Any, NamedTuple
 
 from limitsets.errors import SceneError
 
-__all__ = ["UNITS", "Quantity", "convert", "exact_factor", "parse", "written"]
+__all__ = [
+    "UNITS",
+    "Quantity",
+    "convert",
+    "density_dimension",
+    "exact_factor",
+    "in_ascii",
+    "parse",
+    "share_of_pi",
+    "written",
+]
 
 UNITS: dict[str, tuple[str, ...]] = {
-    "length": ("m", "cm", "mm", "in", "ft"),
+    "length": ("m", "cm", "mm", "in", "ft", "um"),
     "angle": ("deg", "rad"),
-    "angular speed": ("deg/s", "rad/s"),
-    "acceleration": ("m/s^2", "cm/s^2", "mm/s^2", "in/s^2", "ft/s^2"),
-    "mass": ("kg", "g", "lb"),
-    "mass per area": ("kg/m^2",),
+    "angular speed": ("deg/s", "rad/s", "rpm"),
+    "acceleration": ("m/s^2", "cm/s^2", "mm/s^2", "in/s^2", "ft/s^2", "um/s^2"),
+    "mass": ("kg", "g", "lb", "t", "mg"),
+    "mass per area": ("kg/m^2", "g/cm^2"),
+    "mass per volume": ("kg/m^3", "g/cm^3"),
     "share": ("%",),
 }
 """The units a scene may use, by dimension."""
+
+_SPELLINGS = {"\u00b5m": "um", "\u03bcm": "um", "\u00b0": "deg"}
+"""Other signs for some of them: micro and Greek mu, the degree sign."""
+
+# Micro signs, degree signs and what looks like them, superscripts.
+_PLAIN_SIGNS = str.maketrans(
+    {
+        "\u00b5": "u",
+        "\u03bc": "u",
+        "\u00b0": "deg",
+        "\u00ba": "deg",
+        "\u02da": "deg",
+        "\u00b2": "^2",
+        "\u00b3": "^3",
+    }
+)
+
+_SHARES_OF_PI = {"deg": Fraction(1, 180), "deg/s": Fraction(1, 180), "rpm": Fraction(1, 30)}
 
 _EXAMPLES = {
     "length": "5.75 in",
@@ -36,10 +64,32 @@ _EXAMPLES = {
     "acceleration": "193.045 in/s^2",
     "mass": "20 g",
     "mass per area": "1.5 kg/m^2",
+    "mass per volume": "7850 kg/m^3",
     "share": "1 %",
 }
+
+# What people write instead: how many of which unit one of it is.
+_OTHER_NAMES: dict[str, tuple[Fraction, str]] = {
+    name: (Fraction(size), unit)
+    for unit, names in {
+        "m": {"meter": 1, "metre": 1, "meters": 1, "metres": 1, "dm": "0.1", "km": 1000, "Mm": 1000000},
+        "in": {"inch": 1, "inches": 1, '"': 1},
+        "ft": {"foot": 1, "feet": 1, "yd": 3},
+        "deg": {"degree": 1, "degrees": 1},
+        "rad": {"radian": 1, "radians": 1, "mrad": "0.001"},
+        "deg/s": {"deg/min": Fraction(1, 60), "rev/s": 360, "rps": 360},
+        "rad/s": {"rad/min": Fraction(1, 60)},
+        "rpm": {"rev/min": 1, "r/min": 1},
+        "kg": {"kilogram": 1, "kilograms": 1},
+        "g": {"gram": 1, "grams": 1, "oz": "28.349523125", "ug": "0.000001"},
+        "lb": {"lbs": 1, "pound": 1, "pounds": 1},
+        "t": {"tonne": 1, "tonnes": 1, "Mg": 1},
+        "g/cm^3": {"g/ml": 1, "kg/l": 1, "kg/dm^3": 1},
+    }.items()
+    for name, size in names.items()
+}
 _NUMBER = r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]{1,3})?"
-_QUANTITY = re.compile(rf"({_NUMBER})(?: +|(?=%))([^\s].*)")
+_QUANTITY = re.compile(rf"({_NUMBER})(?: +|(?=[%\u00b0]))([^\s].*)")
 _LONGEST = 64
 _SMALLEST, _LARGEST = 1e-300, 1e12
 
@@ -47,6 +97,7 @@ _SMALLEST, _LARGEST = 1e-300, 1e12
 _DEFINITIONS = """
 centi- = 0.01 = c-
 milli- = 0.001 = m-
+micro- = 0.000001 = u-
 kilo- = 1000 = k-
 pi = 3.1415926535897932384626433832795028841971693993751
 meter = [length] = m
@@ -55,13 +106,15 @@ foot = 12 * inch = ft
 second = [time] = s
 radian = [] = rad
 degree = pi / 180 * radian = deg
+revolution_per_minute = pi / 30 * radian / second = rpm
 gram = [mass] = g
+tonne = 1000000 * gram = t
 pound = 453.59237 * gram = lb
 """
 
 
 class Quantity(NamedTuple):
-    """A number as it was written, and its unit."""
+    """A number as it was written, and its unit in letters of ASCII."""
 
     number: str
     unit: str
@@ -98,7 +151,8 @@ def parse(text: object, dimension: str, *, key: str | None = None, file: str | N
     example = _EXAMPLES[dimension]
 
     def refuse(value: object, remedy: str) -> SceneError:
-        units = ", ".join(UNITS[dimension])
+        other = [sign for sign, unit in _SPELLINGS.items() if unit in UNITS[dimension]]
+        units = ", ".join([*UNITS[dimension], *other[:1]])
         allowed = f'{article} {dimension}, "<decimal number> <unit>" with a unit of {units}'
         return SceneError(f"this {dimension}", value, allowed, remedy, key=key, file=file)
 
@@ -109,9 +163,9 @@ def parse(text: object, dimension: str, *, key: str | None = None, file: str | N
     match = _QUANTITY.fullmatch(text.strip(" "))
     if match is None:
         raise refuse(text, _why_no_quantity(text, example))
-    number, unit = match[1], match[2]
+    number, unit = match[1], _SPELLINGS.get(match[2], match[2])
     if unit not in UNITS[dimension]:
-        raise refuse(text, _why_not_unit(unit, dimension, example))
+        raise refuse(text, _why_not_unit(number, unit, dimension))
     size = abs(float(number))
     if not (_SMALLEST <= size <= _LARGEST or _is_zero(number)):
         raise refuse(text, f"give 0 or a size from {_SMALLEST:g} to {_LARGEST:g}; choose another unit")
@@ -127,17 +181,47 @@ def _why_no_quantity(text: str, example: str) -> str:
         return f'write the decimal point as a point and leave no commas, like "{example}"'
     if re.fullmatch(_NUMBER, text.strip()):
         return f'add the unit, like "{example}"'
-    if re.fullmatch(_NUMBER + r"[a-zA-Z%]\S*", text.strip(" ")):
-        return f'put a space between number and unit, like "{example}"'
+    close = re.fullmatch(rf"({_NUMBER})([a-zA-Z\u00b5\u03bc]\S*)", text.strip(" "))
+    if close is not None:
+        return f'put a space between number and unit: "{close[1]} {close[2]}"'
     return f'write one finite decimal number, a space and the unit, like "{example}"'
 
 
-def _why_not_unit(unit: str, dimension: str, example: str) -> str:
+def _why_not_unit(number: str, unit: str, dimension: str) -> str:
+    """Say what is wrong with a unit; what is proposed is the same value, whatever the unit was."""
+    if unit == "N":
+        wanted = ", and a mass is wanted: give kg" if dimension == "mass" else ": the dimension is wrong"
+        return f"N is a unit of force{wanted}"
+    size, name = _in_known_unit(unit)
     for other, units in UNITS.items():
-        if unit in units:
+        if name in units and other != dimension:
             return f"{unit} is a unit of {other}: the dimension is wrong"
-    near = difflib.get_close_matches(unit.lower(), UNITS[dimension], n=1, cutoff=0.5)
-    return f"the unit {unit!r} is not known; {f'did you mean {near[0]!r}?' if near else f'write {example!r}'}"
+    if not name:
+        return f"the unit {unit!r} is not known; convert the value to one of these"
+    if size == 1:
+        return f"the unit {unit!r} is not known; did you mean {name!r}?"
+    return f'the unit {unit!r} is not known; write "{float(Fraction(number) * size):.15g} {name}"'
+
+
+def _in_known_unit(unit: str) -> tuple[Fraction, str]:
+    """Say how many of which known unit one of another is, or of one in another spelling; 0 and "" if that is not known.
+
+    Examples
+    --------
+    >>> _in_known_unit("km"), _in_known_unit("g/m\u00b2")
+    ((Fraction(1000, 1), 'm'), (Fraction(1, 1000), 'kg/m^2'))
+    """
+    if unit in _OTHER_NAMES:
+        return _OTHER_NAMES[unit]
+    name = unit.translate(_PLAIN_SIGNS).replace("**", "^").lower()
+    name = re.sub(r"(?<=[a-z])[23]$", r"^\g<0>", name)
+    if any(name in units for units in UNITS.values()):
+        return Fraction(1), name
+    density = re.fullmatch(r"([a-z]+)/([a-z]+)\^([23])", name)
+    if density is not None and density[1] in UNITS["mass"] and density[2] in UNITS["length"]:
+        power = int(density[3])
+        return exact_factor(density[1], "kg") / exact_factor(density[2], "m") ** power, f"kg/m^{power}"
+    return _OTHER_NAMES.get(name, (Fraction(0), ""))
 
 
 def convert(quantity: Quantity, unit: str) -> float:
@@ -174,6 +258,45 @@ def _registry() -> Any:
     import pint  # lazily: it takes 0.1 s, and most scenes need no conversion
 
     return pint.UnitRegistry(_DEFINITIONS.strip().splitlines(), non_int_type=Fraction)
+
+
+def density_dimension(text: object) -> str:
+    """Say of what a plate's density is one, by its unit: of an area or of a volume.
+
+    Examples
+    --------
+    >>> density_dimension("7850 kg/m^3"), density_dimension("3 kg/m^2")
+    ('mass per volume', 'mass per area')
+    """
+    volume = isinstance(text, str) and text.rstrip(" ").endswith(("3", "\u00b3"))
+    return "mass per volume" if volume else "mass per area"
+
+
+def share_of_pi(unit: str) -> Fraction | None:
+    """Say what share of pi an angle's unit is, or a speed's for 1 rad/s; None for all others.
+
+    Examples
+    --------
+    >>> share_of_pi("rpm"), share_of_pi("rad/s")
+    (Fraction(1, 30), None)
+    """
+    return _SHARES_OF_PI.get(unit)
+
+
+def in_ascii(tree: Any) -> Any:
+    """Spell the units in what stands in a scene with letters of ASCII; all else stays as it is.
+
+    Examples
+    --------
+    >>> in_ascii({"tilt": "30\u00b0", "order": [0, 1]})
+    {'tilt': '30 deg', 'order': [0, 1]}
+    """
+    if isinstance(tree, dict):
+        return {key: in_ascii(inner) for key, inner in tree.items()}
+    if isinstance(tree, list | tuple):
+        return [in_ascii(inner) for inner in tree]
+    match = _QUANTITY.fullmatch(tree.strip(" ")) if isinstance(tree, str) else None
+    return f"{match[1]} {_SPELLINGS[match[2]]}" if match is not None and match[2] in _SPELLINGS else tree
 
 
 def written(value: float, unit: str) -> str:
