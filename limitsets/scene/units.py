@@ -68,25 +68,30 @@ _EXAMPLES = {
     "share": "1 %",
 }
 
-# What people write instead: how many of which unit one of it is.
-_OTHER_NAMES: dict[str, tuple[Fraction, str]] = {
-    name: (Fraction(size), unit)
-    for unit, names in {
-        "m": {"meter": 1, "metre": 1, "meters": 1, "metres": 1, "dm": "0.1", "km": 1000, "Mm": 1000000},
-        "in": {"inch": 1, "inches": 1, '"': 1},
-        "ft": {"foot": 1, "feet": 1, "yd": 3},
-        "deg": {"degree": 1, "degrees": 1},
-        "rad": {"radian": 1, "radians": 1, "mrad": "0.001"},
-        "deg/s": {"deg/min": Fraction(1, 60), "rev/s": 360, "rps": 360},
-        "rad/s": {"rad/min": Fraction(1, 60)},
-        "rpm": {"rev/min": 1, "r/min": 1},
-        "kg": {"kilogram": 1, "kilograms": 1},
-        "g": {"gram": 1, "grams": 1, "oz": "28.349523125", "ug": "0.000001"},
-        "lb": {"lbs": 1, "pound": 1, "pounds": 1},
-        "t": {"tonne": 1, "tonnes": 1, "Mg": 1},
-        "g/cm^3": {"g/ml": 1, "kg/l": 1, "kg/dm^3": 1},
-    }.items()
-    for name, size in names.items()
+# What people write instead: how much of which unit one of it is.
+_OTHER_NAMES = {
+    "dm": "1/10 m",
+    "km": "1000 m",
+    "Mm": "1000000 m",
+    "yd": "3 ft",
+    "mrad": "1/1000 rad",
+    "deg/min": "1/60 deg/s",
+    "rev/s": "360 deg/s",
+    "rps": "360 deg/s",
+    "rad/min": "1/60 rad/s",
+    "oz": "28.349523125 g",
+    "ug": "1/1000000 g",
+    **dict.fromkeys(("meter", "metre", "meters", "metres"), "1 m"),
+    **dict.fromkeys(("inch", "inches", '"'), "1 in"),
+    **dict.fromkeys(("foot", "feet"), "1 ft"),
+    **dict.fromkeys(("degree", "degrees"), "1 deg"),
+    **dict.fromkeys(("radian", "radians"), "1 rad"),
+    **dict.fromkeys(("rev/min", "r/min"), "1 rpm"),
+    **dict.fromkeys(("kilogram", "kilograms"), "1 kg"),
+    **dict.fromkeys(("gram", "grams"), "1 g"),
+    **dict.fromkeys(("lbs", "pound", "pounds"), "1 lb"),
+    **dict.fromkeys(("tonne", "tonnes", "Mg"), "1 t"),
+    **dict.fromkeys(("g/ml", "kg/l", "kg/dm^3"), "1 g/cm^3"),
 }
 _NUMBER = r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]{1,3})?"
 _QUANTITY = re.compile(rf"({_NUMBER})(?: +|(?=[%\u00b0]))([^\s].*)")
@@ -211,17 +216,18 @@ def _in_known_unit(unit: str) -> tuple[Fraction, str]:
     >>> _in_known_unit("km"), _in_known_unit("g/m\u00b2")
     ((Fraction(1000, 1), 'm'), (Fraction(1, 1000), 'kg/m^2'))
     """
-    if unit in _OTHER_NAMES:
-        return _OTHER_NAMES[unit]
-    name = unit.translate(_PLAIN_SIGNS).replace("**", "^").lower()
-    name = re.sub(r"(?<=[a-z])[23]$", r"^\g<0>", name)
+    name = unit
+    if unit not in _OTHER_NAMES:
+        name = unit.translate(_PLAIN_SIGNS).replace("**", "^").lower()
+        name = re.sub(r"(?<=[a-z])[23]$", r"^\g<0>", name)
     if any(name in units for units in UNITS.values()):
         return Fraction(1), name
     density = re.fullmatch(r"([a-z]+)/([a-z]+)\^([23])", name)
     if density is not None and density[1] in UNITS["mass"] and density[2] in UNITS["length"]:
         power = int(density[3])
         return exact_factor(density[1], "kg") / exact_factor(density[2], "m") ** power, f"kg/m^{power}"
-    return _OTHER_NAMES.get(name, (Fraction(0), ""))
+    size, _, known = _OTHER_NAMES.get(name, "0").partition(" ")
+    return Fraction(size), known
 
 
 def convert(quantity: Quantity, unit: str) -> float:

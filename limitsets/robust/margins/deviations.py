@@ -115,6 +115,8 @@ class Measure:
             return Fraction(1, 10)
         if self.unit in ("deg", "rad"):
             return Fraction(1, 20) if self.unit == "deg" else Fraction(1, 1000)
+        if find(self.quantity).dimension != "length":
+            return short(abs(self.nominal) * exact_factor(self.given.unit, self.unit) / 1000)
         # lengths: about a thousandth of the part
         sides = [float(length) for length in self.scene.sides.length]
         return short(exact_factor(self.scene.unit, self.unit) * Fraction(min(sides)) / 1000)
