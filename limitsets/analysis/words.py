@@ -76,6 +76,7 @@ def to_json(analysis: Analysis) -> dict[str, Any]:
             "holds": goal.holds,
             "threshold": _number(goal.threshold),
             "how": goal.how,
+            "vacuous": goal.vacuous,
         },
         "effects": analysis.choice.to_json(),
         "other_vertex_first": _extents(analysis.other_vertex_first),

@@ -6,12 +6,12 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from limitsets.goals import Goal, OrientedBeyond
+from limitsets.goals import Goal, OrientedBeyond, Reaches
 from limitsets.report.background import figure_line, scene_of
 from limitsets.report.questions import question_of
 from limitsets.report.robust_trust import called_for, checked_again, noise_of, trusted
 from limitsets.report.tables import table
-from limitsets.robust.margins.words import bound
+from limitsets.robust.margins.words import bound, void_of
 from limitsets.robust.sheet.entries import Entry, percent_of
 
 if TYPE_CHECKING:
@@ -75,6 +75,9 @@ def answer(found: Robustness) -> str:
         "undecided": "Of the scene as it is this is **neither proved nor refuted**, so no deviation is proved safe.",
     }[found.verdict]
     lines = [f"**Asked:** {goals}. {verdict}"]
+    void = void_of(found.goals, found.reach, found.scene.unit)
+    if void:
+        lines.append(f"But it holds vacuously: {void}.")
     first = tightest(found)
     if first is not None and first.holds:
         by = ", for its tolerance" if _by_tolerance(found) else ""
@@ -341,11 +344,17 @@ def _curve(found: Robustness, figures: Mapping[str, str]) -> str:
         f"Asked of each X, on the limit set: beyond it the part lies on side {curve.side} only, and almost every orbit "
         f"comes to rest there. {_best(curve)}"
     )
-    joint = found.joint
-    if joint is not None and joint.proved > curve.best()[1] and curve.names[0] == "joint":
+    joint, best = found.joint, curve.best()[1]
+    if joint is not None and joint.proved > best and curve.names[0] == "joint":
+        own = next(goal for goal in found.goals if isinstance(goal, OrientedBeyond | Reaches))
+        asks = (
+            "That asks more than the scene's goal, which"
+            if found.goals == (OrientedBeyond(own.x, own.side),)
+            else "The scene's goal"
+        )
         text += (
-            f" That is more than the scene's goal, which is proved up to {bound(joint.proved, 'times the tolerance')} "
-            "at its own X."
+            f" {asks} at its own X = {own.x:g} {found.scene.unit} is proved up to "
+            f"{bound(joint.proved, 'times the tolerance')}, against {bound(best)} here."
         )
     rest = found.left_out.get("rest of the curve")
     text += f" ({rest[0].upper()}{rest[1:]}.)" if rest else ""

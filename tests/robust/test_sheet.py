@@ -6,6 +6,7 @@ digits).  A tolerance of the speed alone makes the joint factor that margin over
 
 import json
 import math
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -17,6 +18,7 @@ from limitsets.errors import LimitsetsError
 from limitsets.goals import OrientedBeyond
 from limitsets.report.robust_pages import answer, robustness_page
 from limitsets.robust.margins.beyond import MarginsBeyond
+from limitsets.robust.margins.words import bound
 from limitsets.robust.sheet import against_x, gathering
 from limitsets.robust.sheet.chance import noise_of, scattering_from, still
 from limitsets.robust.sheet.entries import Entry, percent_of
@@ -286,4 +288,28 @@ def test_a_curve_that_asks_more_than_the_goal_is_not_taken_for_it(sheet, at_best
     # the sheet's own joint factor is 0.733 / 2, of the tolerance of 2 %
     proved = np.array([[at_best]])
     curve = MarginsBeyond(sheet.scene, 2, np.array([21.5]), ("joint",), ("",), proved, 2 * proved, ())
-    assert ("more than the scene's goal" in robustness_page(replace(sheet, curve=curve), {})) is says
+    text = robustness_page(replace(sheet, curve=curve), {})
+    assert ("more than the scene's goal" in text) is says
+    # both numbers are named, and where each is
+    (joint,) = re.findall(
+        r"goal, which at its own X = 20 in is proved up to (\S+) times the tolerance, against 0.01 here", text
+    ) or [""]
+    assert (joint == bound(sheet.joint.proved)) is says
+
+
+def test_a_sheet_of_a_goal_that_no_part_gets_to_says_so():
+    """The limit set ends at 23.383 in (tests/test_paper.py)."""
+    goal = {"oriented_beyond": {"x": "25 in", "side": 2}}
+    left_out = ["margins", "joint", "curve", "noise", "audit"]
+    found = ls.robustness(with_tables(goal=goal), leave_out=left_out)
+    assert (
+        "But it holds vacuously: no part gets beyond x = 25 in: the attracting cells end at x = 23."
+        in answer(found)
+    )
+    assert found.to_json()["vacuous"] is True
+    assert 23.383 < found.reach < 23.6  # the ends of cells
+    other = ls.robustness("paper-designed", leave_out=left_out)
+    assert "vacuously" not in answer(other)
+    assert other.to_json()["vacuous"] is False
+    there = with_tables(goal=goal | {"from_anywhere": True})
+    assert ls.robustness(there, leave_out=left_out).to_json()["vacuous"] is False
