@@ -76,8 +76,8 @@ def to_json(analysis: Analysis) -> dict[str, Any]:
             "holds": goal.holds,
             "threshold": _number(goal.threshold),
             "how": goal.how,
-            "vacuous": goal.vacuous,
         },
+        "goal_vacuous": None if goal is None else goal.vacuous,
         "effects": analysis.choice.to_json(),
         "other_vertex_first": _extents(analysis.other_vertex_first),
         "spurious": [

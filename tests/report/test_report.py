@@ -100,8 +100,8 @@ def test_a_goal_that_no_part_gets_to_holds_vacuously(side):
     assert "The goal **holds vacuously** (sampled" in text.split("##")[0]
     assert "**It holds vacuously** (sampled" in text
     assert "But no part gets there: the limit set ends at x = 23.383 in, before x = 25 in." in text
-    assert found.to_json()["goal"]["vacuous"] is True
-    assert analysed("paper-designed").to_json()["goal"]["vacuous"] is False
+    assert found.to_json()["goal_vacuous"] is True
+    assert analysed("paper-designed").to_json()["goal_vacuous"] is False
     assert "vacuously" not in page(analysed("paper-designed"), {})
 
 
