@@ -25,6 +25,8 @@ pytest.importorskip("flint", reason="the checker needs python-flint")
 
 from flint import arb
 
+from limitsets.scene.quantities import base_unit
+from limitsets.scene.units import UNITS, convert, in_ascii, parse
 from tests.proofs import forge
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -805,6 +807,27 @@ def test_turns_per_minute_are_multiples_of_pi_as_degrees_are():
     raw["throw"] = {"speed": ["15 rpm", "1.6 rad/s"]}
     with pytest.raises(checker.BadFileError, match="mixes degrees and radians"):
         checker.read_scene(raw, None)
+
+
+CHECKERS = {  # the checker's words for the package's
+    "angular speed": "speed",
+    "mass per area": "density",
+    "mass per volume": "bulk",
+}
+
+
+@pytest.mark.parametrize("dimension", UNITS)
+def test_checker_and_package_know_the_same_units(dimension):
+    kind = CHECKERS.get(dimension, dimension)
+    assert set(checker.UNITS[kind]) == set(UNITS[dimension])
+    base = {"share": ""}.get(dimension, base_unit(dimension, "m"))
+    signs = {"um": ["\u00b5m", "\u03bcm"], "deg": ["\u00b0"]}
+    for unit in UNITS[dimension]:
+        for sign in [unit, *signs.get(unit, [])]:
+            (text,) = in_ascii([f"2.5 {sign}"])
+            read = checker.quantity(text, kind, "here")
+            mine = convert(parse(f"2.5 {sign}", dimension), base)
+            assert float(read.lo) * (math.pi if read.pi else 1.0) == pytest.approx(mine, rel=1e-15)
 
 
 @pytest.mark.parametrize(
