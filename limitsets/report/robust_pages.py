@@ -12,7 +12,8 @@ from limitsets.report.questions import question_of
 from limitsets.report.robust_trust import called_for, checked_again, noise_of, trusted
 from limitsets.report.tables import table
 from limitsets.robust.margins.words import bound, void_of
-from limitsets.robust.sheet.entries import Entry, percent_of
+from limitsets.robust.sheet.entries import Entry, in_unit_of, percent_of
+from limitsets.scene.quantities import parsed_deviation
 
 if TYPE_CHECKING:
     from limitsets.robust.margins.beyond import MarginsBeyond
@@ -127,7 +128,9 @@ def _room(entry: Entry, found: Robustness) -> tuple[int, float]:
     # the landing place is noise in a tolerance, all else fixed but unknown
     if text is None or (entry.reading == "per-throw") != (entry.quantity == "landing.x"):
         return 1, math.inf
-    return 0, entry.proved / float(text.split("%")[0].split()[0])
+    given = parsed_deviation(text, entry.quantity)
+    low = in_unit_of(entry, entry.proved, given.unit)
+    return 0, math.inf if low is None else low / float(given.number)
 
 
 def _share(entry: Entry, found: Robustness) -> float:
@@ -289,8 +292,8 @@ def _joint(found: Robustness, figures: Mapping[str, str]) -> str:
         return f"{head}\n\nNothing is left for deviations: the scene as it is fails already."
     rows = []
     for name, text in found.tolerance.items():
-        number, unit = (text[:-1], "%") if text.endswith("%") else text.rsplit(" ", 1)
-        size = float(number)
+        given = parsed_deviation(text, name)
+        size, unit = float(given.number), given.unit
         how = READINGS["per-throw" if name == "landing.x" else "fixed"]
         high = None if joint.refuted is None else joint.refuted * size
         rows.append([name, how, text, bound(joint.proved * size, unit), bound(high, unit, up=True)])

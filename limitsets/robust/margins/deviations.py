@@ -15,7 +15,7 @@ from limitsets.proofs.parameters import VARYING
 from limitsets.proofs.rational import Span
 from limitsets.proofs.tolerance import Piece
 from limitsets.scene import Scene
-from limitsets.scene.quantities import find, text_at, texts
+from limitsets.scene.quantities import find, parsed_deviation, text_at, texts
 from limitsets.scene.units import Quantity, exact_factor, parse
 
 __all__ = ["READINGS", "Measure", "decimal", "given", "measure", "measures", "short"]
@@ -196,8 +196,7 @@ def _unit(scene: Scene, quantity: str, reading: str) -> str:
     """Choose the unit: as the scene's [tolerance] has it, or as people give such a deviation."""
     text = scene.text.get("tolerance", {}).get(quantity)
     if text is not None:
-        share = text.rstrip().endswith("%")
-        return str(parse(text, "share" if share else find(quantity).dimension).unit)
+        return parsed_deviation(text, quantity).unit
     if quantity.startswith(_SHARES) or quantity.endswith(".mass"):
         return "%"
     if quantity == "gravity.tilt":
