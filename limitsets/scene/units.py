@@ -169,11 +169,11 @@ def parse(text: object, dimension: str, *, key: str | None = None, file: str | N
     if match is None:
         raise refuse(text, _why_no_quantity(text, example))
     number, unit = match[1], _SPELLINGS.get(match[2], match[2])
-    if unit not in UNITS[dimension]:
-        raise refuse(text, _why_not_unit(number, unit, dimension))
     size = abs(float(number))
     if not (_SMALLEST <= size <= _LARGEST or _is_zero(number)):
         raise refuse(text, f"give 0 or a size from {_SMALLEST:g} to {_LARGEST:g}; choose another unit")
+    if unit not in UNITS[dimension]:
+        raise refuse(text, _why_not_unit(number, unit, dimension))
     return Quantity(number, unit)
 
 

@@ -121,6 +121,7 @@ def test_refuses(text: object, words: str) -> None:
         ("3 km", "length", 'write "3000 m"'),
         ("3 dm", "length", 'write "0.3 m"'),
         ("3 nm", "length", "convert the value"),
+        ("3e999 km", "length", "size from"),  # no float to propose
         ("3 MM", "length", "did you mean 'mm'?"),
         ("25 rpm", "length", "rpm is a unit of angular speed: the dimension is wrong"),
         ("25 km", "mass", "km is a unit of length: the dimension is wrong"),
