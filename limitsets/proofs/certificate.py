@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from limitsets.files import replaced
 from limitsets.proofs.attraction import Attraction
 from limitsets.proofs.cover import Cover
-from limitsets.scene.units import in_ascii
+from limitsets.scene.units import spelled_plainly
 from limitsets.thrower import Energy, Exact, Signed, SmallAngle, SmallAngle2
 
 __all__ = ["FORMAT", "VERSION", "arrays_of", "everywhere", "targets", "write"]
@@ -174,10 +174,10 @@ def write(
             "formulas": FORMULAS,
         },
         "state": f"x [{unit}]: centre of mass along the arm; side: the one the part rests on, in flip order",
-        "noise": in_ascii(noise) if noise else None,
-        "tolerance": in_ascii(tolerance) if tolerance else None,
-        "boxes": in_ascii(boxes),
-        "claims": in_ascii(claims),
+        "noise": spelled_plainly(noise) if noise else None,
+        "tolerance": spelled_plainly(tolerance) if tolerance else None,
+        "boxes": spelled_plainly(boxes),
+        "claims": spelled_plainly(claims),
         "arrays": {
             name: {
                 "sha256": hashlib.sha256(value.tobytes()).hexdigest(),

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Mapping
 from fractions import Fraction
 from functools import lru_cache
 from typing import Any, NamedTuple
@@ -21,9 +22,9 @@ __all__ = [
     "convert",
     "density_dimension",
     "exact_factor",
-    "in_ascii",
     "parse",
     "share_of_pi",
+    "spelled_plainly",
     "written",
 ]
 
@@ -289,20 +290,22 @@ def share_of_pi(unit: str) -> Fraction | None:
     return _SHARES_OF_PI.get(unit)
 
 
-def in_ascii(tree: Any) -> Any:
-    """Spell the units in what stands in a scene with letters of ASCII; all else stays as it is.
+def spelled_plainly(tree: Any) -> Any:
+    """Spell every quantity in what stands in a scene in one way: number, one blank, unit in letters of ASCII.
 
     Examples
     --------
-    >>> in_ascii({"tilt": "30\u00b0", "order": [0, 1]})
+    >>> spelled_plainly({"tilt": " 30\u00b0", "order": [0, 1]})
     {'tilt': '30 deg', 'order': [0, 1]}
     """
-    if isinstance(tree, dict):
-        return {key: in_ascii(inner) for key, inner in tree.items()}
+    if isinstance(tree, Mapping):
+        return {key: spelled_plainly(inner) for key, inner in tree.items()}
     if isinstance(tree, list | tuple):
-        return [in_ascii(inner) for inner in tree]
+        return [spelled_plainly(inner) for inner in tree]
     match = _QUANTITY.fullmatch(tree.strip(" ")) if isinstance(tree, str) else None
-    return f"{match[1]} {_SPELLINGS[match[2]]}" if match is not None and match[2] in _SPELLINGS else tree
+    unit = "" if match is None else _SPELLINGS.get(match[2], match[2])
+    known = any(unit in units for units in UNITS.values())
+    return f"{match[1]} {unit}" if match is not None and known else tree
 
 
 def written(value: float, unit: str) -> str:

@@ -26,7 +26,7 @@ pytest.importorskip("flint", reason="the checker needs python-flint")
 from flint import arb
 
 from limitsets.scene.quantities import base_unit
-from limitsets.scene.units import UNITS, convert, in_ascii, parse
+from limitsets.scene.units import UNITS, convert, parse, spelled_plainly
 from tests.proofs import forge
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -824,7 +824,7 @@ def test_checker_and_package_know_the_same_units(dimension):
     signs = {"um": ["\u00b5m", "\u03bcm"], "deg": ["\u00b0"]}
     for unit in UNITS[dimension]:
         for sign in [unit, *signs.get(unit, [])]:
-            (text,) = in_ascii([f"2.5 {sign}"])
+            (text,) = spelled_plainly([f"2.5 {sign}"])
             read = checker.quantity(text, kind, "here")
             mine = convert(parse(f"2.5 {sign}", dimension), base)
             assert float(read.lo) * (math.pi if read.pi else 1.0) == pytest.approx(mine, rel=1e-15)
@@ -833,7 +833,7 @@ def test_checker_and_package_know_the_same_units(dimension):
 @pytest.mark.parametrize(
     "text", ["700000 \u00b5m", "700000 \u03bcm", "700000 u\u0301m", "700000 Um", "700000um", "700000 umm"]
 )
-def test_lengths_are_spelled_in_ascii(text):
+def test_lengths_are_spelled_spelled_plainly(text):
     raw = forge.scene("designed")
     raw["arm"]["length"] = "700000 um"
     assert checker.read_scene(raw, None).unit == "um"

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from limitsets.errors import SceneError
 from limitsets.scene.quantities import base_unit
-from limitsets.scene.units import UNITS, convert, in_ascii, parse, written
+from limitsets.scene.units import UNITS, convert, parse, spelled_plainly, written
 
 
 def test_factors_are_those_of_pints_own_registry() -> None:
@@ -147,13 +147,22 @@ def test_what_is_proposed_is_the_same_value(text: str, dimension: str, words: st
 
 def test_spellings_for_certificates() -> None:
     tree = {
-        "x": "600 \u00b5m ",
+        "x": " 600   \u00b5m ",
         "of": [["45\u00b0", "1 \u03bcm"], 3, True, None],
         "name": "\u00b5m",
-        "w": "25 rpm",
+        "w": "25  rpm",
+        "share": "1%",
+        "said": "5  parsec",
     }
-    wanted = {"x": "600 um", "of": [["45 deg", "1 um"], 3, True, None], "name": "\u00b5m", "w": "25 rpm"}
-    assert in_ascii(tree) == wanted
+    wanted = {
+        "x": "600 um",
+        "of": [["45 deg", "1 um"], 3, True, None],
+        "name": "\u00b5m",
+        "w": "25 rpm",
+        "share": "1 %",
+        "said": "5  parsec",
+    }
+    assert spelled_plainly(tree) == wanted
 
 
 @given(st.text(max_size=80))
