@@ -21,13 +21,14 @@ from numpy.typing import NDArray
 
 from limitsets.files import replaced
 from limitsets.proofs.attraction import Attraction
-from limitsets.proofs.cover import Cover
+from limitsets.proofs.confirm import DeniedError, require_confirmed
+from limitsets.proofs.cover import Cover, targets
 from limitsets.scene.units import spelled_plainly
 from limitsets.thrower import Energy, Exact, Signed, SmallAngle, SmallAngle2
 
-__all__ = ["FORMAT", "VERSION", "arrays_of", "everywhere", "targets", "write"]
+__all__ = ["FORMAT", "VERSION", "arrays_of", "write"]
 
-FORMAT, VERSION = "limitsets-proof", 1
+FORMAT, VERSION = "limitsets-proof", 2
 
 # Brackets of the impact are widened by this share of the angle, so that another arithmetic can confirm them.
 SLACK = 2.0**-34
@@ -46,33 +47,6 @@ FORMULAS = [
 ]
 
 
-def everywhere(found: Cover) -> list[NDArray[np.int32]]:
-    """First and last target cells, as `targets`, of every branch and every number of sides that it turns."""
-    sides = found.grid.sides
-    keys = {((to - side) % sides, of) for side, images in enumerate(found.images) for to, of in images.hulls}
-    return [targets(found, branch, turned) for turned, branch in sorted(keys)]
-
-
-def targets(found: Cover, branch: int, turned: int | None = None) -> NDArray[np.int32]:
-    """First and last target cell of one branch, -1 -1 where it is impossible.
-
-    A branch that leads to several sides is asked for with the number of sides it turns.
-    """
-    grid = found.grid
-    out = np.full((grid.n_cells, 2), -1, dtype=np.int32)
-    for side, images in enumerate(found.images):
-        for (to, of_branch), (lo, hi) in images.hulls.items():
-            if of_branch != branch or (turned is not None and (to - side) % grid.sides != turned):
-                continue
-            edges = grid.edges[to][0]
-            some = lo <= hi
-            first = np.clip(np.searchsorted(edges, lo[some], side="right") - 1, 0, edges.size - 2)
-            last = np.clip(np.searchsorted(edges, hi[some], side="left") - 1, 0, edges.size - 2)
-            rows = grid.offset[side] + np.flatnonzero(some)
-            out[rows] = np.stack([first, last], axis=1) + grid.offset[to]
-    return out
-
-
 def arrays_of(proof: Attraction, prefix: str) -> dict[str, NDArray[Any]]:
     """Arrays of one box of parameters."""
     found = proof.cover
@@ -84,7 +58,7 @@ def arrays_of(proof: Attraction, prefix: str) -> dict[str, NDArray[Any]]:
         "jog": jog,
         "flip": flip,
         "branch": np.where(jogs & flips, 2, np.where(flips, 1, 0)).astype(np.int8),
-        "rank": proof.rank.astype(np.int32),
+        "rank": proof.basin.rank,
         "component": proof.component,
         "phi": np.stack([phi[:, 0] - slack[:, 0], phi[:, 1] + slack[:, 1]], axis=1),
     }
@@ -128,6 +102,15 @@ def _parameters(found: Cover) -> dict[str, Any]:
     }
 
 
+def _tidy(table: Any) -> Any:
+    """Write the texts of a scene with single blanks."""
+    if isinstance(table, Mapping):
+        return {key: _tidy(value) for key, value in table.items()}
+    if isinstance(table, list):
+        return [_tidy(value) for value in table]
+    return " ".join(table.split()) if isinstance(table, str) else table
+
+
 def write(
     path: str | Path,
     proofs: Sequence[Attraction],
@@ -137,8 +120,10 @@ def write(
     tolerance: Mapping[str, str] | None,
     unit: str,
     producer: Mapping[str, str],
-) -> None:
-    """Write a certificate, replacing an older file whole.
+    recheck: bool = True,
+    workers: int | None = 1,
+) -> float | None:
+    """Write a certificate, replacing an older file whole; it gets its name once the checker has confirmed it.
 
     Parameters
     ----------
@@ -147,22 +132,38 @@ def write(
     proofs : sequence of Attraction
         One per box of parameters.
     claims : sequence of mapping
-        ``{"claim": ..., "section": {...}}`` each.
+        ``{"claim": ..., "section": {...}}`` each, and the ``verdict`` where it is not "proved".
     noise, tolerance : mapping or None
         What the parameters were allowed to do.
     unit : str
         Unit of length.
     producer : mapping
         Versions, for information.
+    recheck : bool
+        Whether to check it first.
+    workers : int, optional
+        Processes that check it, None for all processors.
+
+    Returns
+    -------
+    float or None
+        Seconds that the check took.
+
+    Raises
+    ------
+    DeniedError
+        The checker does not confirm it: it is kept as NAME.denied.zip.
     """
     arrays: dict[str, NDArray[Any]] = {}
     boxes = []
     for number, proof in enumerate(proofs):
         arrays |= arrays_of(proof, f"{number}.")
         found = proof.cover
-        # what is left of the effects here is noise, which the header has; a scene may leave the model to its defaults
-        scene = {word: table for word, table in found.box.scene.items() if word != "effects"}
+        # what is left of the effects here is a spread; a scene may leave the model to its defaults
+        scene = {word: _tidy(table) for word, table in found.box.scene.items() if word != "effects"}
         scene["model"] = _model(found)
+        if found.box.scene.get("effects", {}).get("spread"):
+            scene["effects"] = {"spread": found.box.scene["effects"]["spread"]}
         boxes.append({"scene": scene, "parameters": _parameters(found), "prefix": f"{number}."})
     header = {
         "format": FORMAT,
@@ -177,7 +178,7 @@ def write(
         "noise": spelled_plainly(noise) if noise else None,
         "tolerance": spelled_plainly(tolerance) if tolerance else None,
         "boxes": spelled_plainly(boxes),
-        "claims": spelled_plainly(claims),
+        "claims": spelled_plainly([{"claim": each["claim"], "section": each["section"]} for each in claims]),
         "arrays": {
             name: {
                 "sha256": hashlib.sha256(value.tobytes()).hexdigest(),
@@ -190,10 +191,20 @@ def write(
     }
     packed = io.BytesIO()
     np.savez(packed, **arrays)  # type: ignore[arg-type]  # arrays by name
-    target = Path(path)
-    with (
-        replaced(target.parent) as draft,
-        zipfile.ZipFile(draft / target.name, "w", zipfile.ZIP_STORED) as file,
-    ):
-        file.writestr("header.json", json.dumps(header, indent=1))
-        file.writestr("arrays.npz", packed.getvalue())
+    target, seconds, denied = Path(path), None, None
+    with replaced(target.parent) as draft:
+        written = draft / target.name
+        with zipfile.ZipFile(written, "w", zipfile.ZIP_STORED) as file:
+            file.writestr("header.json", json.dumps(header, indent=1))
+            file.writestr("arrays.npz", packed.getvalue())
+        if recheck:
+            kept = target.with_name(target.name.removesuffix(".zip").removesuffix(".proof") + ".denied.zip")
+            verdicts = {each["claim"]: each.get("verdict", "proved") for each in claims}
+            try:
+                seconds = require_confirmed(written, kept, verdicts, workers)
+            except DeniedError as error:
+                denied = error
+                written.rename(draft / kept.name)
+    if denied is not None:
+        raise denied
+    return seconds

@@ -14,7 +14,7 @@ from typing import Any
 from limitsets.errors import AnswerError
 from limitsets.proofs.asked import State, ask, borders
 from limitsets.proofs.asked.starts import leaving
-from limitsets.proofs.attraction import Attraction, attraction
+from limitsets.proofs.attraction import Attraction, attraction, near_section
 from limitsets.proofs.certificate import write
 from limitsets.proofs.cover import cover
 from limitsets.proofs.end_points import proved_ends
@@ -36,6 +36,9 @@ LADDER = (2048, 8192, 32768, 131072)
 # Pieces into which a tolerance may be cut, and cells that may be tried on them, before it is given up.
 MOST_PIECES, MOST_CELLS = 1024, 4_000_000
 
+# For which starts a goal holds: the fewer the later.
+STARTS = ("every", "almost-every", "from", "cells")
+
 Progress = Callable[[str, int, int], None]
 
 
@@ -48,17 +51,27 @@ class Claim:
     claim : str
         A word of `CLAIMS`.
     verdict : str
-        "proved", "refuted" or "undecided".
+        "proved", "refuted" or "undecided"; of a goal also "proved-on-cells", for the starts in some cells only.
     reason : str
         Why it is not proved: what is missing and where; empty if it is.
     section : dict
-        What a recheck needs, empty if it is not proved.
+        What a recheck needs, empty if nothing is proved.
     counterexample : tuple of State
         An orbit that refutes it, empty if none was found.
     fixed : dict of str to list of str
         The counterexample's values of what is fixed but unknown, as pairs of texts.
     final : bool
         Whether finer cells cannot change the verdict.
+    starts : str, dict or None
+        Of a goal that is proved, for which starts: "every", "almost-every", ``{"from": {"0": x}}`` or "cells"; of one
+        that is refuted, of which starts it is not true.  None for other claims.
+    shares : dict of str to float
+        Of a goal that is proved: shares of the arm for whose starts it is (`share`), whose starts are proved to leave
+        (`leaves`) or to creep to the joint (`creeps`), and of whose starts nothing is proved (`open`).
+    note : str
+        What a reader of a proved goal should know, empty if nothing.
+    recurs : dict
+        Why the orbit that refutes comes back, or that it need not: as in `limitsets.proofs.asked.recurring.Refutation`.
     """
 
     claim: str
@@ -68,6 +81,15 @@ class Claim:
     counterexample: tuple[State, ...] = ()
     fixed: dict[str, list[str]] = field(default_factory=dict)
     final: bool = False
+    starts: Any = None
+    shares: dict[str, float] = field(default_factory=dict)
+    note: str = ""
+    recurs: dict[str, Any] = field(default_factory=dict)
+
+    @property
+    def written(self) -> bool:
+        """Whether a certificate may hold it."""
+        return self.verdict in ("proved", "proved-on-cells")
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,18 +138,24 @@ class Proof:
 
         return to_json(self)
 
-    def save(self, path: str | Path) -> Path:
-        """Write the certificate of the claims that are proved.
+    def save(self, path: str | Path, *, recheck: bool = True, workers: int | None = 1) -> Path:
+        """Write the certificate of the claims that are proved; it gets its name once `recheck` has confirmed it.
 
         Parameters
         ----------
         path : str or Path
             The file, replaced whole.
+        recheck : bool
+            Whether to have it checked first.
+        workers : int, optional
+            Processes that check it, as in `limitsets.recheck`.
 
         Raises
         ------
         AnswerError
             Nothing is proved, or it is proved of a map that no recheck knows.
+        DeniedError
+            The checker does not confirm it: it is kept as NAME.denied.zip, and what it denies is undecided.
         """
         if self.effects:
             raise AnswerError(
@@ -137,9 +165,9 @@ class Proof:
                 "nothing rechecks other maps; the proof stands in .claims and .to_json()",
             )
         good = [
-            {"claim": claim.claim, "section": claim.section}
+            {"claim": claim.claim, "section": claim.section, "verdict": claim.verdict}
             for claim in self.claims
-            if claim.verdict == "proved"
+            if claim.written
         ]
         if not good:
             raise AnswerError(
@@ -157,24 +185,40 @@ class Proof:
             tolerance=self.tolerance,
             unit=self.scene.unit,
             producer=producer,
+            recheck=recheck,
+            workers=workers,
         )
         return Path(path)
+
+    def denied(self, claims: Mapping[str, str]) -> Proof:
+        """Return what is left of it where the checker denies some claims: these are undecided."""
+        left = tuple(
+            replace(
+                each,
+                verdict="undecided",
+                reason=f"the checker denies it: {claims[each.claim]}",
+                section={},
+                starts=None,
+            )
+            if each.claim in claims
+            else each
+            for each in self.claims
+        )
+        return replace(self, claims=left)
 
 
 def _attracts_all(found: Attraction, scene: Scene) -> Claim:
     if not found.proved:
-        noisy, may = found.cover.box.landing > 0.0, found.cover.graph.ranges.exits.any()
-        if (noisy or (found.cover.box.effects and may)) and not found.cover.points:
-            orbit = leaving(found)
-            verdict = "refuted" if orbit else "undecided"
-            return Claim("attracts-all", verdict, found.reason, {}, orbit, final=noisy or bool(orbit))
+        noisy = found.cover.box.landing > 0.0 and not found.cover.points
+        orbit = leaving(found) if noisy or found.cover.graph.ranges.exits.any() else ()
+        if orbit:
+            once = {"once": True}
+            return Claim("attracts-all", "refuted", found.reason, {}, orbit, final=True, recurs=once)
+        if noisy:
+            return Claim("attracts-all", "undecided", found.reason, {}, final=True)
         return _not_attracted(found, scene)
-    joint: dict[str, dict[str, Any]] = {}
-    for side, near in enumerate(found.joint):
-        joint[str(side)] = {"q": near.q.hex()}
-        if near.fixed_point is not None:
-            joint[str(side)]["fixed_point"] = [end.hex() for end in near.fixed_point]
-    return Claim("attracts-all", "proved", "", {"near_joint": joint, "max_rank": found.max_rank})
+    section = {"near_joint": near_section(found), "max_rank": found.max_rank}
+    return Claim("attracts-all", "proved", "", section)
 
 
 def _not_attracted(found: Attraction, scene: Scene) -> Claim:
@@ -231,6 +275,10 @@ def _goal(found: Attraction, scene: Scene) -> Claim:
         dict(answer.section),
         answer.counterexample,
         final=answer.final,
+        starts=answer.starts,
+        shares=dict(answer.shares),
+        note=answer.note,
+        recurs=dict(answer.recurs),
     )
 
 
@@ -352,8 +400,8 @@ def certify(
     --------
     >>> import limitsets as ls
     >>> proof = ls.certify("paper-designed")
-    >>> [(claim.claim, claim.verdict) for claim in proof.claims]
-    [('attracts-all', 'proved'), ('goal', 'proved')]
+    >>> [(claim.claim, claim.verdict, claim.starts) for claim in proof.claims]
+    [('attracts-all', 'proved', None), ('goal', 'proved', 'every')]
     """
     asked = scene if isinstance(scene, Scene) else load(scene)
     wanted = _chosen(asked, claims)
@@ -383,7 +431,7 @@ def _attempt(
             progress(f"{cells} cells a side", step, len(ladder))
         found = attraction(cover(box, cells, cuts))
         answers = tuple(PROVERS[word](found, scene) for word in wanted)
-        if all(answer.verdict != "undecided" or answer.final for answer in answers):
+        if all(answer.verdict in ("proved", "refuted") or answer.final for answer in answers):
             break
     return found, answers
 
@@ -431,7 +479,9 @@ def _halved(
         box = parameter_box(scene, tree=part.tree(), noise=noise)
         one, answers = _attempt(scene, wanted, box, (cells,), None)
         tried += one.cover.grid.n_cells
-        missing = tuple(answer for answer in answers if answer.verdict != "proved")
+        missing = tuple(
+            each for each in answers if not (each.written and (each.final or each.verdict == "proved"))
+        )
         refuted = tuple(replace(each, fixed=part.texts()) for each in missing if each.verdict == "refuted")
         if (
             noise
@@ -458,22 +508,45 @@ def _halved(
 
 
 def weakest_of(claims: Sequence[Claim]) -> Claim:
-    """Join one claim, proved on every piece: with the weakest of the numbers."""
+    """Join one claim, proved on every piece: with the weakest of the numbers, and for the fewest starts."""
     sections = [claim.section for claim in claims]
     section = dict(sections[0])
-    if "max_rank" in section:
-        section["max_rank"] = max(other["max_rank"] for other in sections)
-        section["near_joint"] = {
-            side: _weakest([other["near_joint"][side] for other in sections])
-            for side in section["near_joint"]
-        }
-    for count in ("throws", "jogs"):
+    near = [other["near_joint"] for other in sections if "near_joint" in other]
+    section.pop("near_joint", None)
+    if len(near) == len(sections):
+        section["near_joint"] = {side: _weakest([other[side] for other in near]) for side in near[0]}
+    for count in ("max_rank", "throws", "jogs", "thinning"):
         counts = [other[count] for other in sections if count in other]
         if counts:
             section[count] = max(counts)
     if "least_slope" in section:
         section["least_slope"] = min((other["least_slope"] for other in sections), key=float.fromhex)
-    return Claim(claims[0].claim, "proved", "", section)
+    if claims[0].starts is None:
+        return Claim(claims[0].claim, "proved", "", section)
+    weakest = max(
+        claims, key=lambda claim: STARTS.index(claim.starts if isinstance(claim.starts, str) else "from")
+    )
+    starts = weakest.starts
+    section.pop("lost", None)
+    if isinstance(starts, dict):
+        given = [claim.starts["from"] for claim in claims if isinstance(claim.starts, dict)]
+        starts = {"from": {side: max(each[side] for each in given) for side in given[0]}}
+        section["starts"] = {"from": {side: x.hex() for side, x in starts["from"].items()}}
+        lost = [other["lost"] for other in sections if "lost" in other]
+        if len(lost) == len(given) and lost:
+            section["lost"] = {
+                side: min((each[side] for each in lost), key=float.fromhex) for side in lost[0]
+            }
+    else:
+        section["starts"] = starts
+    least, most = (
+        {"share": min, "leaves": min, "creeps": min, "open": max},
+        [claim.shares for claim in claims],
+    )
+    shares = {key: pick(each[key] for each in most) for key, pick in least.items()}
+    notes = {claim.note for claim in claims}
+    note = notes.pop() if len(notes) == 1 else ""
+    return replace(weakest, section=section, counterexample=(), starts=starts, shares=shares, note=note)
 
 
 def _weakest(near: Sequence[dict[str, Any]]) -> dict[str, Any]:

@@ -9,18 +9,30 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from fractions import Fraction
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from limitsets.proofs.asked.recurring import Refutation
 from limitsets.proofs.asked.search import State
 from limitsets.proofs.attraction import BELOW, Attraction
-from limitsets.proofs.certificate import everywhere, targets
+from limitsets.proofs.cover import everywhere, targets
 from limitsets.scene import Scene
 
-__all__ = ["Answer", "Kind", "above", "below", "common", "peeled", "place", "thrown_into", "undecided"]
+__all__ = [
+    "Answer",
+    "Kind",
+    "above",
+    "against",
+    "below",
+    "common",
+    "once",
+    "peeled",
+    "place_text",
+    "thrown_into",
+    "undecided",
+]
 
 Mask = NDArray[np.bool_]
 
@@ -33,6 +45,10 @@ class Answer(NamedTuple):
     section: Mapping[str, Any] = {}
     counterexample: tuple[State, ...] = ()
     final: bool = False
+    starts: Any = None
+    shares: Mapping[str, float] = {}
+    note: str = ""
+    recurs: Mapping[str, Any] = {}
 
 
 class Kind(NamedTuple):
@@ -40,25 +56,42 @@ class Kind(NamedTuple):
 
     Attributes
     ----------
-    ask : callable
-        From an `Attraction`, the scene and the goal to an `Answer`.
+    prove : callable
+        From an `Attraction`, the scene and the goal to an `Answer`, proved or undecided: of the attracting cells, or of
+        every start where the goal says `from_anywhere`.
+    refute : callable
+        As `prove`, to an `Answer` that is refuted or undecided.
     sentence : callable
-        From the section of a proved goal to a sentence.
+        From the section of a proved goal to a sentence about the attracting cells, or about every start.
     borders : callable
         From the goal to the borders of cells that it needs.
-    prove : callable or None
-        As `ask` without the search for what refutes, where that takes longer than the proof; None where it is `ask`.
+    almost : callable
+        From the goal to whether it speaks of almost every orbit only.
     """
 
-    ask: Callable[[Attraction, Scene, Any], Answer]
+    prove: Callable[[Attraction, Scene, Any], Answer]
+    refute: Callable[[Attraction, Scene, Any], Answer]
     sentence: Callable[[Mapping[str, Any]], str]
     borders: Callable[[Any], Sequence[float]]
-    prove: Callable[[Attraction, Scene, Any], Answer] | None = None
+    almost: Callable[[Any], bool] = lambda _: False
 
 
 def undecided(reason: str, *, final: bool = False) -> Answer:
     """Answer that nothing is proved."""
     return Answer("undecided", reason, final=final)
+
+
+def against(refutation: Refutation, reason: str = "") -> Answer:
+    """Answer by a refutation: `starts` of which it is not true; undecided if it is empty."""
+    if not refutation.of:
+        return undecided(reason)
+    states, of, recurs = refutation
+    return Answer("refuted", reason, {}, states, starts=of, recurs=recurs)
+
+
+def once(orbit: tuple[State, ...], reason: str = "") -> Answer:
+    """Answer by one passage, which refutes what is asked of every start on the arm; undecided without one."""
+    return against(Refutation(orbit, "every", {"once": True}) if orbit else Refutation(), reason)
 
 
 def common(found: Attraction, *, anywhere: bool) -> str:
@@ -71,14 +104,7 @@ def common(found: Attraction, *, anywhere: bool) -> str:
         if not near.proved:
             return f"near the joint on side {side}: {near.reason}"
     leaving = np.flatnonzero(found.cover.graph.ranges.exits)
-    return f"the image of {place(found, int(leaving[0]))} may leave the cells" if leaving.size else ""
-
-
-def place(found: Attraction, cell: int) -> str:
-    """Name a cell."""
-    side = int(found.cover.grid.side_of(cell))
-    lo, hi = found.cover.grid.boxes([cell], side)
-    return f"side {side}, x in [{lo[0, 0]:.6g}, {hi[0, 0]:.6g}]"
+    return f"the image of {found.cover.place(int(leaving[0]))} may leave the cells" if leaving.size else ""
 
 
 def thrown_into(found: Attraction, bad: Mask) -> str:
@@ -88,18 +114,26 @@ def thrown_into(found: Attraction, bad: Mask) -> str:
         cells = np.flatnonzero(ends[:, 0] >= 0)
         hit = cells[number[ends[cells, 1] + 1] > number[ends[cells, 0]]]
         if hit.size:
-            return place(found, int(hit[0]))
+            return found.cover.place(int(hit[0]))
     return ""
 
 
+def place_text(goal: Any, scene: Scene) -> str:
+    """Write the x of a goal as a certificate has it: the scene's own words where it is the scene's own goal."""
+    own = scene.text.get("goal", {}).get(goal.kind)
+    if goal == scene.goal and isinstance(own, Mapping):
+        return " ".join(str(own["x"]).split())
+    return f"{goal.x!r} {scene.unit}"
+
+
 def below(x: float) -> float:
-    """Largest float that is not above the decimal that a certificate has for x."""
-    return x if Fraction(x) <= Fraction(repr(x)) else math.nextafter(x, -math.inf)
+    """Return a float that is not above the decimal that a certificate has for x, which x is next to."""
+    return math.nextafter(x, -math.inf)
 
 
 def above(x: float) -> float:
-    """Smallest float that is not below the decimal that a certificate has for x."""
-    return x if Fraction(x) >= Fraction(repr(x)) else math.nextafter(x, math.inf)
+    """Return a float that is not below the decimal that a certificate has for x, which x is next to."""
+    return math.nextafter(x, math.inf)
 
 
 def peeled(

@@ -9,8 +9,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from limitsets.goals import OrientedBeyond
-from limitsets.proofs.asked.kind import Answer, Kind, below, common, thrown_into, undecided
-from limitsets.proofs.asked.search import from_attracting
+from limitsets.proofs.asked.kind import (
+    Answer,
+    Kind,
+    against,
+    below,
+    common,
+    once,
+    place_text,
+    thrown_into,
+    undecided,
+)
+from limitsets.proofs.asked.recurring import recurrent_violation
 from limitsets.proofs.asked.starts import one_throw
 from limitsets.proofs.attraction import Attraction
 from limitsets.proofs.chains import stays_below
@@ -44,30 +54,28 @@ def _prove(found: Attraction, scene: Scene, goal: OrientedBeyond) -> Answer:
             reason, more = "", {"throws": 2}
     if reason:
         return undecided(reason)
-    return Answer("proved", "", section_of(goal, scene) | more)
+    ends = max(hi for parts in found.cells.extents().values() for _, hi in parts)
+    vacuous = (
+        f"the attracting cells end at x = {ends:.6g}, before x = {goal.x:g}: the goal asks nothing of them"
+    )
+    note = vacuous if ends <= goal.x and not goal.from_anywhere else ""
+    return Answer("proved", "", section_of(goal, scene) | more, note=note)
 
 
 def section_of(goal: OrientedBeyond, scene: Scene) -> dict[str, Any]:
     """Write the goal as a certificate has it."""
-    section = {"kind": goal.kind, "x": f"{goal.x!r} {scene.unit}", "side": goal.side}
+    section = {"kind": goal.kind, "x": place_text(goal, scene), "side": goal.side}
     return section | ({"from_anywhere": True} if goal.from_anywhere else {})
 
 
-def _ask(found: Attraction, scene: Scene, goal: OrientedBeyond) -> Answer:
+def _refute(found: Attraction, scene: Scene, goal: OrientedBeyond) -> Answer:
     def wrong(x: Any, side: Any) -> Any:
         return (x > goal.x) & (side != goal.side)
 
-    answer = _prove(found, scene, goal)
-    if answer.verdict == "proved":
-        return answer
-    reason = answer.reason
-    if goal.from_anywhere:
-        thrown = _thrown_there(found, goal, _exceptions(found, goal))
-        orbit = one_throw(found, wrong) if thrown else ()
-        reason = thrown if orbit else reason
-    else:
-        orbit = from_attracting(found, wrong) if not common(found, anywhere=False) else ()
-    return Answer("refuted" if orbit else "undecided", reason, {}, orbit)
+    if not goal.from_anywhere:
+        return against(recurrent_violation(found, scene, wrong))
+    reason = _thrown_there(found, goal, _exceptions(found, goal))
+    return once(one_throw(found, wrong) if reason else (), reason)
 
 
 def _thrown_there(found: Attraction, goal: OrientedBeyond, bad: NDArray[np.bool_]) -> str:
@@ -90,4 +98,4 @@ def _sentence(section: Mapping[str, Any]) -> str:
     return f"In the attracting cells, every part {beyond}"
 
 
-KIND = Kind(_ask, _sentence, lambda goal: [below(goal.x)], _prove)
+KIND = Kind(_prove, _refute, _sentence, lambda goal: [below(goal.x)])

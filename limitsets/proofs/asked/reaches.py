@@ -9,19 +9,26 @@ import numpy as np
 
 from limitsets.cells import CellSet
 from limitsets.goals import Reaches
-from limitsets.proofs.asked.cycling import cycle_that
-from limitsets.proofs.asked.kind import Answer, Kind, Mask, above, common, peeled, place, undecided
-from limitsets.proofs.asked.search import State, long_orbit, replayed
-from limitsets.proofs.asked.thinning import thinned
+from limitsets.proofs.asked.kind import (
+    Answer,
+    Kind,
+    Mask,
+    above,
+    against,
+    below,
+    common,
+    peeled,
+    place_text,
+    undecided,
+)
+from limitsets.proofs.asked.recurring import Loop, Refutation, cycle_that
+from limitsets.proofs.asked.search import passing
 from limitsets.proofs.attraction import Attraction
 from limitsets.proofs.expansion import slopes
-from limitsets.proofs.orbits import ProvedCycle
+from limitsets.proofs.thinning import thinned
 from limitsets.scene import Scene
 
-__all__ = ["KIND"]
-
-# Throws of the orbit that is shown of a component that does not get there.
-SHOWN = 20
+__all__ = ["KIND", "not_null"]
 
 
 def _wanted(found: Attraction, goal: Reaches) -> Mask:
@@ -32,18 +39,17 @@ def _wanted(found: Attraction, goal: Reaches) -> Mask:
     return wanted
 
 
-def _ask(found: Attraction, scene: Scene, goal: Reaches) -> Answer:
-    answer = _prove(found, scene, goal)
-    if answer.verdict != "undecided" or common(found, anywhere=False):
-        return answer
-    quiet = not found.cover.box.noise  # throws that differ may carry a part away from what attracts
-    if goal.every_orbit:
-        never = cycle_that(found, scene, lambda cycle: not _arrives(cycle, goal))
-    elif quiet and not (_not_null(found) if goal.from_anywhere else ""):
-        never = cycle_that(found, scene, lambda cycle: cycle.attracts and not _arrives(cycle, goal))
-    else:
-        never = ()
-    return answer._replace(verdict="refuted", counterexample=never) if never else answer
+def _refute(found: Attraction, scene: Scene, goal: Reaches) -> Answer:
+    every = goal.every_orbit
+
+    def refutes(loop: Loop) -> bool:
+        return (every or loop.attracts) and not _arrives(loop, goal)
+
+    never = cycle_that(found, scene, refutes, attracting=not every)
+    short = _falls_short(found, goal)
+    if short is None:
+        return against(never)
+    return short._replace(counterexample=never.states) if never.states else short
 
 
 def _prove(found: Attraction, scene: Scene, goal: Reaches) -> Answer:
@@ -56,29 +62,28 @@ def _prove(found: Attraction, scene: Scene, goal: Reaches) -> Answer:
         return short
     if goal.every_orbit:
         return _every(found, scene, goal, wanted)
-    missing = _not_null(found) if goal.from_anywhere else ""
+    missing = (found.missing or not_null(found)) if goal.from_anywhere else ""
     if missing:
         return undecided(missing, final=found.cover.box.landing > 0.0)
-    throws, reason = thinned(found, inside, wanted)
+    throws, _, reason = thinned(found.cover, inside & ~wanted)
     if reason:
         return undecided(reason)
     # a little more, so that other arithmetic can confirm it
     return Answer("proved", "", _section(scene, goal, throws + throws // 8 + 1))
 
 
-def _not_null(found: Attraction) -> str:
-    """Say what is missing for this: almost every start on the arm comes to almost every place in the attracting cells.
+def not_null(found: Attraction) -> str:
+    """Say what is missing for this: almost no start of the basin comes to a given set of length zero.
 
     Where the slope is positive, what is thrown to a set of length zero has length zero.
     """
-    if found.missing:
-        return found.missing
+    basin = found.basin
     for side, near in enumerate(found.joint):
-        if not near.rises:
+        if basin.near and not near.rises:
             return f"near the joint on side {side}: the landing is not proved to rise with the start"
-    off = found.component < 0
+    off = (found.component < 0) & (basin.rank >= 0)
     flat = np.flatnonzero(off & ~(slopes(found.cover, CellSet(found.cover.grid, off)) > 0.0))
-    return f"the slope is not proved positive on {place(found, int(flat[0]))}" if flat.size else ""
+    return f"the slope is not proved positive on {found.cover.place(int(flat[0]))}" if flat.size else ""
 
 
 def _every(found: Attraction, scene: Scene, goal: Reaches, wanted: Mask) -> Answer:
@@ -86,7 +91,7 @@ def _every(found: Attraction, scene: Scene, goal: Reaches, wanted: Mask) -> Answ
     cells = np.ones_like(wanted) if goal.from_anywhere else found.component >= 0
     throws, left = peeled(found, cells, wanted)
     if left.size:
-        return undecided(f"an orbit from {place(found, int(left[0]))} may never get there")
+        return undecided(f"an orbit from {found.cover.place(int(left[0]))} may never get there")
     if missing:
         return undecided(missing, final=found.cover.box.landing > 0.0)
     return Answer("proved", "", _section(scene, goal, throws))
@@ -95,7 +100,7 @@ def _every(found: Attraction, scene: Scene, goal: Reaches, wanted: Mask) -> Answ
 def _section(scene: Scene, goal: Reaches, throws: int) -> dict[str, Any]:
     section = {
         "kind": goal.kind,
-        "x": f"{goal.x!r} {scene.unit}",
+        "x": place_text(goal, scene),
         "side": goal.side,
         "every_orbit": goal.every_orbit,
         "throws": throws,
@@ -103,28 +108,26 @@ def _section(scene: Scene, goal: Reaches, throws: int) -> dict[str, Any]:
     return section | ({"from_anywhere": True} if goal.from_anywhere else {})
 
 
-def _arrives(cycle: ProvedCycle, goal: Reaches) -> bool:
+def _arrives(loop: Loop, goal: Reaches) -> bool:
     """Whether it is not excluded that a periodic orbit gets there."""
-    return bool(((cycle.side == goal.side) & (cycle.hi >= goal.x)).any())
+    return bool(((loop.side == goal.side) & (loop.hi >= below(goal.x))).any())
 
 
 def _falls_short(found: Attraction, goal: Reaches) -> Answer | None:
-    """Refute the goal by an attracting component that ends below x: no orbit in it gets there."""
+    """Refute the goal by an attracting component that ends below x: no orbit in it gets there.
+
+    It is mapped into itself and has an interior: so many starts never get there.  The orbit is shown, not needed.
+    """
     edges = found.cover.grid.edges[goal.side][0]
     reach = np.zeros(found.component.size, dtype=bool)
-    reach[found.cover.grid.of_side(goal.side)] = edges[1:] >= goal.x
-    for number in range(int(found.component.max()) + 1):
+    reach[found.cover.grid.of_side(goal.side)] = edges[1:] >= below(goal.x)
+    for number in range(int(found.component.max(initial=-1)) + 1):
         mine = found.component == number
         if not (mine & reach).any():
-            orbit = _any_orbit(found, np.flatnonzero(mine))
-            reason = f"no orbit in the attracting component of {place(found, int(np.flatnonzero(mine)[0]))} gets there"
-            return Answer("refuted" if orbit else "undecided", reason, {}, orbit)
+            cells = np.flatnonzero(mine)
+            reason = f"no orbit in the attracting component of {found.cover.place(int(cells[0]))} gets there"
+            return against(Refutation(passing(found, cells), "almost-every", {"component": number}), reason)
     return None
-
-
-def _any_orbit(found: Attraction, cells: Any) -> tuple[State, ...]:
-    path = long_orbit(found, lambda x, _: np.arange(x.size) == x.size - 1, cells, SHOWN)
-    return () if path is None else replayed(found.cover.box, path)
 
 
 def _sentence(section: Mapping[str, Any]) -> str:
@@ -135,4 +138,4 @@ def _sentence(section: Mapping[str, Any]) -> str:
     return f"From every start {where}, but for starts of total length zero, a part {there}."
 
 
-KIND = Kind(_ask, _sentence, lambda goal: [above(goal.x)], _prove)
+KIND = Kind(_prove, _refute, _sentence, lambda goal: [above(goal.x)], lambda goal: not goal.every_orbit)
