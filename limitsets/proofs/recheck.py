@@ -2767,7 +2767,7 @@ def check_starts(c: Cells, scene: Scene, goal: dict[str, Any], starts: Starts) -
 
     Let G be the cells with a rank.  No orbit leaves them, and off the components the rank never rises: so in the end it
     stays what it is.  It cannot where it falls along every target; nor for ever in a cell that only leads to itself and
-    to lower ranks, while each jog from it moves the part outward by more than the landing scatters.  What is left, Z,
+    to lower ranks, while each jog from it moves the part one way by more than the landing scatters.  What is left, Z,
     has to thin out, rank by rank; and starts of length zero have to come from starts of length zero only.
     """
     inside, claimed = c.component >= 0, c.rank >= 0
@@ -2837,15 +2837,16 @@ def level_cells(c: Cells, scene: Scene) -> tuple[Array, str]:
 
 
 def check_passing(scene: Scene, side: int, phi: list[float]) -> str:
-    """Check that jogs with angles in the bracket move outward by more than the landing scatters; "" or not."""
+    """Check that jogs with angles in the bracket all move one way by more than the landing scatters; "" or not."""
     s = scene.sides[side]
     low, high = at_angle(s, arb(phi[0])), at_angle(s, arb(phi[1]))
     rise = -s.h
     if s.exact:
         sin, cos = sine_cosine(low.p.union(high.p))
         rise = s.a * sin - s.d * (1 - cos) - s.h
-    moved = low.D if rise > 0 else low.D + rise * ZERO.union(high.p - low.p)
-    return "" if moved > s.landing else "a jog is not proved to move it outward"
+    moved = low.D.union(high.D) if rise > 0 else low.D + rise * ZERO.union(high.p - low.p)
+    one_way = moved > s.landing or moved < -s.landing
+    return "" if one_way else "a jog is not proved to move it one way"
 
 
 def leading_to(c: Cells, cells: Array) -> Array:
