@@ -77,6 +77,7 @@ def to_json(analysis: Analysis) -> dict[str, Any]:
             "threshold": _number(goal.threshold),
             "how": goal.how,
         },
+        "goal_vacuous": None if goal is None else goal.vacuous,
         "effects": analysis.choice.to_json(),
         "other_vertex_first": _extents(analysis.other_vertex_first),
         "spurious": [

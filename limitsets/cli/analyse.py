@@ -65,6 +65,7 @@ def _announce(plan: Plan) -> None:
 
 
 def _text(analysis: Analysis) -> None:
+    from limitsets.report.questions import verdict_of, void_of
     from limitsets.report.tables import count, intervals, percent
 
     unit = analysis.scene.unit
@@ -78,8 +79,11 @@ def _text(analysis: Analysis) -> None:
         ]
         table(["side", f"x [{unit}]", "jogs per visit"], rows)
     if analysis.goal is not None:
-        verdict = {True: "holds", False: "does not hold", None: "not decided"}[analysis.goal.holds]
-        typer.echo(f"goal {analysis.goal.goal.kind}: {verdict} ({analysis.goal.how}, not proved)")
+        void = void_of(analysis.goal, unit)
+        typer.echo(
+            f"goal {analysis.goal.goal.kind}: {verdict_of(analysis.goal)} ({analysis.goal.how}, not proved)"
+            + (f"; but {void}" if void else "")
+        )
     found = analysis.accuracy
     if found is not None and found.reached is not None:
         typer.echo(f"error of the ends: {found.reached:.2g} {unit} ({found.how})")

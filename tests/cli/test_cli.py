@@ -198,6 +198,16 @@ def test_analyse_in_words(capfd):
     assert f"report: {Path('here') / 'report.md'}" in out
 
 
+def test_analyse_of_a_goal_that_no_part_gets_to(capfd):
+    tree = ls.load("paper-designed").as_dict() | {"goal": {"oriented_beyond": {"x": "25 in", "side": 2}}}
+    ls.dump(ls.load(tree), Path("own.toml"))
+    _, out, _ = run(capfd, "analyse", "own.toml", "-o", "here", "--cells", "1024")
+    assert (
+        "goal oriented_beyond: holds vacuously (sampled, not proved); but no part gets there: the limit"
+        in out
+    )
+
+
 def test_analyse_to_an_error(capfd):
     code, out, err = run(capfd, "analyse", "paper-designed", "--error", "1e-6", "--json")
     assert code == 0
