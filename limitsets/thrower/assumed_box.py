@@ -142,9 +142,7 @@ def _throw(b: SideBox, rest: Rest, x: Interval, phi: Interval, slope: Interval, 
     along = iv.absolute(iv.sub(lever, iv.mul(omega, at.above)))
     # from the first friction can stop the vertex, from the second the impact does not set it sliding again
     stop = iv.div(along, press if press[0] > 0.0 else (press[1], press[1]))
-    turned = iv.div(
-        iv.absolute(iv.mul(at.right, at.above)), iv.add(b.rho2, iv.sqr(at.above))
-    )
+    turned = iv.div(iv.absolute(iv.mul(at.right, at.above)), iv.add(b.rho2, iv.sqr(at.above)))
     speed = iv.sub(at.falling, at.right)
     moved = iv.mul(iv.absolute(iv.sub(slope, (1.0, 1.0))), iv.mul(phi, b.kappa))
     half = iv.mul((0.5, 0.5), b.inertia)

@@ -217,7 +217,10 @@ def test_against_mechanics_written_apart(name):
 
 
 def test_the_friction_a_landing_needs_is_that_from_which_on_it_does_not_slip():
-    scene, random = told("paper-designed", {"friction": 1.0}, landing=True, slip=True), np.random.default_rng(6)
+    scene, random = (
+        told("paper-designed", {"friction": 1.0}, landing=True, slip=True),
+        np.random.default_rng(6),
+    )
     box, held = parameter_box(ls.load("paper-designed")), 0
     for side in range(3):
         for x in random.uniform(6.0, 20.0, 12):
@@ -226,9 +229,7 @@ def test_the_friction_a_landing_needs_is_that_from_which_on_it_does_not_slip():
             hit, _ = first_arrival(part.effects.landing, part, x)
             right, high = right_of(part, hit.vertex, hit.psi), above(part, hit.vertex, hit.psi)
             held += need == pytest.approx(abs(right * high) / (part.own.rho2 + high * high), rel=1e-9)
-            slides = [
-                struck(None, Slip(need * by), part, hit).slide != 0.0 for by in (1 - 1e-6, 1 + 1e-6)
-            ]
+            slides = [struck(None, Slip(need * by), part, hit).slide != 0.0 for by in (1 - 1e-6, 1 + 1e-6)]
             assert slides == [True, False], (side, x)
     assert held > 5
 

@@ -70,7 +70,13 @@ def _leg(
     for event in events:
         event.terminal, event.direction = True, -1.0
     run = solve_ivp(
-        lambda _, __: slope, (0.0, left), rates, method="DOP853", rtol=1e-13, atol=1e-15, events=events or None
+        lambda _, __: slope,
+        (0.0, left),
+        rates,
+        method="DOP853",
+        rtol=1e-13,
+        atol=1e-15,
+        events=events or None,
     )
     stopped = way != 0.0 and len(run.t_events[0]) > 0
     return run.y[:, -1], float(run.t[-1]), stopped

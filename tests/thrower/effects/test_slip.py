@@ -104,9 +104,7 @@ class Meeting:
         hit = Arrival(self.vertex, self.psi, 0.0, *rates)
         after = struck(Bounce(restitution, 0.0), Slip(mu), self.part, hit)
         right, high = self.arms
-        return np.array(
-            [after.slide - after.omega * high, after.lift + after.omega * right, after.omega]
-        )
+        return np.array([after.slide - after.omega * high, after.lift + after.omega * right, after.omega])
 
 
 def meetings(count: int, seed: int) -> list[Meeting]:
@@ -215,7 +213,9 @@ def test_where_the_stop_would_pull_endless_friction_lets_it_slide_on() -> None:
         assert off < 0.0
         for mu in (1e6, 1e9):
             slide, lift = at.lever @ at.struck(rates, mu)
-            assert slide == pytest.approx(along - off * a / b, rel=1e2 / mu * max(1.0, c / abs(b), a / abs(b)))
+            assert slide == pytest.approx(
+                along - off * a / b, rel=1e2 / mu * max(1.0, c / abs(b), a / abs(b))
+            )
             assert abs(lift) < 1e-12
             assert slide * along > 0.0
 
@@ -230,8 +230,8 @@ def test_without_friction_the_horizontal_velocity_stays_and_nothing_rests() -> N
         assert case.mapped(("slip",)) is None
 
 
-def test_where_the_stop_pushes_enough_friction_is_the_bare_map() -> None:
-    stuck = 0
+def test_endless_friction_is_the_bare_map_where_the_stop_pushes_and_only_there() -> None:
+    stuck, slid = 0, 0
     for case in cases(60, 2, friction=1e9):
         # the impulse that stops the vertex, from the throw's formulas in docs/model.md
         facts = case.body.numbers()
@@ -242,10 +242,15 @@ def test_where_the_stop_pushes_enough_friction_is_the_bare_map() -> None:
         right, high = a * math.cos(phi) - d * math.sin(phi), a * math.sin(phi) + d * math.cos(phi)
         fall = case.x - case.kappa * phi
         omega = (rho**2 + right * fall + high * (case.height + d)) / (rho**2 + a * a + d * d)
-        if omega * right - fall > 1e-6:
+        push = omega * right - fall
+        if push > 1e-6:
             stuck += 1
             assert same_end(case.mapped(("slip",)), case.mapped(()))
+        elif push < -1e-3:
+            slid += 1
+            assert not same_end(case.mapped(("slip",)), case.mapped(()))
     assert stuck > 20
+    assert slid > 5
 
 
 def _landing(a: float, d: float, kappa: float, x: float) -> float:
