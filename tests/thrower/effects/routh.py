@@ -1,4 +1,4 @@
-"""Routh's law of impact with friction, by integration of its differential equations: what the kernels are compared with.
+"""Routh's law of impact with friction, by integration of its differential equations: an oracle for the kernels.
 
 Written apart from them, in rates and masses and without a formula for where a path turns.  The normal impulse is the
 time; friction pulls mu as hard against the sliding, by Coulomb's law:

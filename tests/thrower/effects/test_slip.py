@@ -165,7 +165,7 @@ def test_it_is_the_limit_of_friction_that_is_a_smooth_function_of_the_sliding() 
 
 @pytest.mark.parametrize("restitution", [0.0, 0.6])
 def test_the_law_has_no_jump(restitution: float) -> None:
-    """Approach velocities along a line, over v_t = 0 and both borders of the cone; a jump does not shrink with the step."""
+    """Approach velocities on a line over v_t = 0 and both borders of the cone: a jump does not shrink with the step."""
     steep = 0
     for at in meetings(24, 42):
         compliance = at.lever @ at.gain
