@@ -305,12 +305,12 @@ def quantity(value: object, kinds: str, where: str) -> Quantity:
     require(len(pair) == 2, f"{where}: an interval has two ends")
     read = []
     for text in pair:
-        short = isinstance(text, str) and len(text) <= LONGEST_TEXT and text == " ".join(text.split())
+        words = text if isinstance(text, str) and len(text) <= LONGEST_TEXT else ""
+        tidy = words == " ".join(words.split()) != ""
         require(
-            short,
-            f"{where}: {plain(text)} is not a quantity of at most {LONGEST_TEXT} signs, with single blanks",
+            tidy, f"{where}: {plain(text)} is not text of at most {LONGEST_TEXT} signs, with single blanks"
         )
-        found = NUMBER.fullmatch(text)
+        found = NUMBER.fullmatch(words)
         require(found is not None, f"{where}: {plain(text)} is not a decimal number and a unit")
         assert found is not None
         size = abs(Fraction(found[1]))
@@ -960,15 +960,19 @@ def guess_root(floats: tuple[float, float, float], exact: bool, x: float, kappa:
     a, d, small = floats
     if not exact:
         return 2.0 * (x - a) / (kappa - small)
-    for _ in range(12):
+    last = math.inf
+    for k in range(
+        100
+    ):  # next to the joint the angle is far smaller than where it begins, and is halved at first
         sin, cos = math.sin(p), math.cos(p)
         slope = x - a * cos + d * sin - kappa * p
         if slope >= 0.0:
             return math.nan
         step = ((x - 0.5 * kappa * p) * p + d - a * sin - d * cos) / slope
         p -= step
-        if abs(step) < 1e-14 * p:
+        if abs(step) < 1e-14 * p or (k > 12 and abs(step) > 0.75 * last):
             break
+        last = abs(step)
     return p
 
 
@@ -1526,19 +1530,23 @@ def beside_root(s: Side, x: Arb, kappa: Arb, before: bool) -> Angle:
     x0, k = float(x), float(kappa)
     right = (x0 + math.sqrt(x0 * x0 + 2 * k * (d + math.hypot(a, d)))) / k  # f < 0 there
     p = arb(guess_root(s.floats, s.exact, x0, k, right) if 0 < right < 1e3 else math.nan)
-    for _ in range(2):
+    for tried in range(8):  # two will do, but where the floats are poor: next to the joint
         f = flight(x, kappa, at_angle(s, p))
         sin, cos = p.sin_cos()
         p = (p - f / (x - s.a * cos + s.d * sin - kappa * p)).mid()
-    at = at_angle(s, (p * (ONE - ROOT if before else ONE + ROOT)).mid())
-    f = flight(x, kappa, at)
-    # x > a and f concave: positive up to its one positive root and negative from there on
-    right_side = bool(f > 0 if before else f < 0) and bool(at.p > 0 and at.p < FULL_TURN)
+        root = ROOT if tried < 6 else WIDER_ROOT
+        at = at_angle(s, (p * (ONE - root if before else ONE + root)).mid())
+        f = flight(x, kappa, at)
+        # x > a and f concave: positive up to its one positive root and negative from there on
+        right_side = bool(f > 0 if before else f < 0) and bool(at.p > 0 and at.p < FULL_TURN)
+        if right_side or not p.is_finite():
+            break
     prove(right_side and s.concave and bool(x > s.a), f"the impact is not bracketed at x = {x0!r}")
     return at
 
 
-ROOT = arb(2) ** -70  # brackets of the impact are so narrow, relative to the angle
+# Brackets of the impact are so narrow, relative to the angle; or so where R - a is less than a millionth of a.
+ROOT, WIDER_ROOT = arb(2) ** -70, arb(2) ** -45
 
 
 class Throws:
@@ -1999,7 +2007,7 @@ State = tuple[int, Arb, Arb]  # side, and bounds of x
 
 def periodic(scene: Scene, orbit: Orbit) -> list[State]:
     """Prove a periodic orbit of the scene without noise, which is one of the sequences allowed; its states."""
-    quiet = read_scene(scene.raw, None)
+    quiet = read_scene({**scene.raw, "effects": {}}, None)
     prove(all(s.concave for s in quiet.sides), "kappa > ell is not proved")
     states = prove_orbit(Throws(quiet), None, orbit).states
     for side, lo, hi in states:
@@ -2747,7 +2755,7 @@ def check_starts(c: Cells, scene: Scene, goal: dict[str, Any], starts: Starts) -
 
     Let G be the cells with a rank.  No orbit leaves them, and off the components the rank never rises: so in the end it
     stays what it is.  It cannot where it falls along every target; nor for ever in a cell that only leads to itself and
-    to lower ranks, while each jog from it moves the part outward by more than the landing scatters.  What is left, Z,
+    to lower ranks, while each jog from it moves the part one way by more than the landing scatters.  What is left, Z,
     has to thin out, rank by rank; and starts of length zero have to come from starts of length zero only.
     """
     inside, claimed = c.component >= 0, c.rank >= 0
@@ -2817,15 +2825,16 @@ def level_cells(c: Cells, scene: Scene) -> tuple[Array, str]:
 
 
 def check_passing(scene: Scene, side: int, phi: list[float]) -> str:
-    """Check that jogs with angles in the bracket move outward by more than the landing scatters; "" or not."""
+    """Check that jogs with angles in the bracket all move one way by more than the landing scatters; "" or not."""
     s = scene.sides[side]
     low, high = at_angle(s, arb(phi[0])), at_angle(s, arb(phi[1]))
     rise = -s.h
     if s.exact:
         sin, cos = sine_cosine(low.p.union(high.p))
         rise = s.a * sin - s.d * (1 - cos) - s.h
-    moved = low.D if rise > 0 else low.D + rise * ZERO.union(high.p - low.p)
-    return "" if moved > s.landing else "a jog is not proved to move it outward"
+    moved = low.D.union(high.D) if rise > 0 else low.D + rise * ZERO.union(high.p - low.p)
+    one_way = moved > s.landing or moved < -s.landing
+    return "" if one_way else "a jog is not proved to move it one way"
 
 
 def leading_to(c: Cells, cells: Array) -> Array:
@@ -3524,9 +3533,9 @@ def check_certificate(
             claims["goal"].pop("found", None)
         tell_starts(report, claims["goal"], scenes, cells)
     report.statement = [statement_of(name, section, noise is not None) for name, section in claims.items()]
-    first = " (first box)" if len(cells) > 1 else ""
+    which = " (first box)" if len(cells) > 1 else ""
     if set(claims) - {"refuted"}:  # which does not speak of them: they are not checked for it
-        report.statement.append(f"attracting cells: {extents(cells[0])}{first}")
+        report.statement.append(f"attracting cells: {extents(cells[0])}{which}")
     if own is not None and not {"goal", "refuted"} & set(claims):
         report.statement.append("of the scene's own goal nothing is claimed")
     for name in claims:

@@ -126,7 +126,12 @@ def recurrent_violation(found: Attraction, scene: Scene, wrong: Wrong) -> Refuta
 
 
 def cycle_that(
-    found: Attraction, scene: Scene, refutes: Callable[[Loop], bool], longest: int = PERIODS[0]
+    found: Attraction,
+    scene: Scene,
+    refutes: Callable[[Loop], bool],
+    longest: int = PERIODS[0],
+    *,
+    attracting: bool = False,
 ) -> Refutation:
     """Find a periodic orbit that refutes a goal as a whole, by what it never does, and prove it.
 
@@ -140,6 +145,8 @@ def cycle_that(
         From a proved orbit to whether it is such a one.
     longest : int
         Largest period searched in the attracting cells.
+    attracting : bool
+        Look for orbits that attract only.
 
     Returns
     -------
@@ -149,13 +156,13 @@ def cycle_that(
     box = _quiet(found, scene)
     if not box.effects:
         quiet = replace(found, cover=replace(found.cover, box=box))
-        for cycle in proved_cycles(quiet, longest).cycles:
+        for cycle in () if attracting else proved_cycles(quiet, longest).cycles:
             loop = _loop(cycle)
             if refutes(loop):
                 return _of(loop, box, found)
     for path in _paths(found, box):
-        ends = np.arange(path.x.size)[-LONGEST - FEW : -LONGEST]
-        best = cycle_near(box, path, ends, refutes, FEW if box.effects else 1)
+        ends = np.arange(max(path.x.size - 2 * LONGEST, 0), max(path.x.size - LONGEST, 1))
+        best = cycle_near(box, path, ends, refutes, FEW)
         if best is not None:
             return _of(best, box, found)
     return Refutation()
@@ -168,15 +175,38 @@ def _quiet(found: Attraction, scene: Scene) -> ParameterBox:
 
 
 def _paths(found: Attraction, box: ParameterBox) -> Iterator[Orbit]:
-    """Long orbits where starts end: in the attracting cells, and wherever else those on the arm do."""
-    map_now = box.at_kappa(box.middle_kappa)
+    """Long orbits where starts end: one in each attracting component that is met, and wherever else starts end."""
+    map_now, met = box.at_kappa(box.middle_kappa), set()
     if (found.component >= 0).any():
-        yield orbit(map_now, *settled(found), SEARCHED)
+        first = settled(found)
+        met.add(_component(found, *first))
+        yield _lasting(map_now, *first, SEARCHED)
     for side, (edges,) in enumerate(found.cover.grid.edges):
         for x in np.linspace(edges[0], edges[-1], OTHERS + 2)[1:-1].tolist():
-            path = orbit(map_now, x, side, SETTLING)
-            if path.stopped is None:
-                yield orbit(map_now, float(path.x[-1]), int(path.side[-1]), SHORT)
+            path = _lasting(map_now, x, side, SETTLING)
+            last = float(path.x[-1]), int(path.side[-1])
+            if path.stopped is not None or _component(found, *last) in met:
+                continue
+            met.add(_component(found, *last))
+            met.discard(-1)  # off the attracting cells any two may end in different places
+            yield _lasting(map_now, *last, SHORT)
+
+
+def _lasting(map_now: Any, x: float, side: int, throws: int) -> Orbit:
+    """Follow an orbit; where it moves by less than floats can tell it is said to stay, so that one comes back there."""
+    path = orbit(map_now, x, side, throws)
+    if path.stopped != "stalled":
+        return path
+    code = images(map_now, path.x[-1:], int(path.side[-1])).code
+    return Orbit(
+        np.append(path.x, path.x[-1]), np.append(path.side, path.side[-1]), np.append(path.code, code), None
+    )
+
+
+def _component(found: Attraction, x: float, side: int) -> int:
+    """Return the number of the attracting component in which a place lies, -1 if in none."""
+    (cell,) = found.cover.grid.index([x], side)
+    return int(found.component[cell]) if cell >= 0 else -1
 
 
 def _violates(wrong: Wrong, lo: float, hi: float, side: int) -> bool:
@@ -225,7 +255,7 @@ def _returns(box: ParameterBox, path: Orbit, k: int, refutes: Callable[[Loop], b
             return
         if not abs(x - path.x[k]) <= NEAR * abs(path.x[k]):
             continue
-        around = orbit(map_now, x, int(path.side[k]), period)
+        around = _lasting(map_now, x, int(path.side[k]), period)
         same = around.code.size == period and (around.side == path.side[k : k + period + 1]).all()
         if not same or not (box.effects or (around.code == path.code[k : k + period]).all()):
             continue
