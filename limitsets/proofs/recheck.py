@@ -1918,7 +1918,8 @@ def read_refutation(section: dict[str, Any], n_sides: int) -> dict[str, Any]:
     start = table(section["start"], "refuted.start", "x side")
     throws = [read_throw(each) for each in rows(section["throws"], "refuted.throws", 1, 100_000)]
     spans = [number for number, (kappa, _) in enumerate(throws) if isinstance(kappa, tuple)]
-    last = not spans or (found["why"] == "closed" and spans == [len(throws) - 1])
+    closes = found["why"] == "closed" and spans == [len(throws) - 1]
+    last = not spans or not found["why"] or closes
     require(last, "two values of kappa are those of the throw that closes an orbit")
     x, side = hex_float(start["x"], "refuted.start.x"), read_side(start["side"], n_sides)
     return found | {"x": x, "side": side, "throws": throws}
