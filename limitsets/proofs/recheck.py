@@ -909,6 +909,20 @@ def over_angles(s: Side, phi: Arb, R: Arb, kappa: Arb) -> tuple[int, Arb, Arb]:
     return (1 if F > 0 else 0 if F < 0 else 2), -s.h, R - s.a - (kappa - s.small_d) * phi
 
 
+def slope_over(s: Side, phi: Arb, kappa: Arb, rise: Arb, f_slope: Arb) -> Arb | None:
+    """Enclose dR'/dR over a bracket of the angle; None where one root in it for each R, growing with R, is not proved.
+
+    f(p) = (R - R(p)) p, so that dphi/dR = 1/R'(phi) where R(p) rises: kappa, a and d stand there once, and R does not.
+    By df/dphi it is -phi/(df/dphi).
+    """
+    if not s.exact:
+        return ONE - 2 * s.h / (kappa - s.small_d)
+    steep = its_slope(s, ratios(phi), kappa) if phi < 3 else ZERO
+    if steep > 0:
+        return ONE + rise / steep
+    return ONE - rise * phi / f_slope if f_slope < 0 else None
+
+
 def decide_exact(s: Side, spin: Arb, X: Arb, H: Arb, kappa: Arb) -> int:
     """Decide by the flip criterion of the exact model over a box.
 
@@ -1248,7 +1262,7 @@ def check_box(
     """Check decision, images and slope over a box.
 
     R'(jog) = R + D(phi).  Where D' > 0 both terms are largest at the upper ends.  Otherwise, where R' is proved to
-    rise with R at each kappa (phi'(R) = phi/(-df/dphi)), its extremes lie at the ends of the cell, and D there is
+    rise with R at each kappa, its extremes lie at the ends of the cell, and D there is
     enclosed from a bracket of phi at that end by the mean value theorem; else the mean value theorem over the box.
     Noise of the landing place moves an image, and does not decide.
     """
@@ -1258,8 +1272,8 @@ def check_box(
     lo, hi = x0 + low.D, x1 + high.D
     slope = None
     rises = rise > 0
-    if (least is not None or not rises) and f_slope < 0:
-        slope = ONE - rise * phi / f_slope
+    if least is not None or not rises:
+        slope = slope_over(s, phi, k0.union(k1), rise, f_slope)
     if not rises:
         if slope is not None and slope > 0:
             lo = lo + rise * ZERO.union(root_above(s, x0, k0, high).p - low.p)
@@ -1587,10 +1601,7 @@ class Throws:
         low, high = beside_root(s, x0, k1, True), beside_root(s, x1, k0, False)
         phi, R, kappa = low.p.union(high.p), x0.union(x1), k0.union(k1)
         decision, rise, f_slope = over_angles(s, phi, R, kappa)
-        if not s.exact:
-            slope = ONE - 2 * s.h / (kappa - s.small_d)
-        else:
-            slope = ONE - rise * phi / f_slope if f_slope < 0 else None
+        slope = slope_over(s, phi, kappa, rise, f_slope)
         if rise > 0:
             return Thrown(decision, x0 + low.D, x1 + high.D, slope)
         whole = R + low.D + rise * (phi - low.p)
@@ -3257,9 +3268,10 @@ def steepness(
         since = root_below(s, arb(x0), k_hi, low, to.p)
         both = since.p.union(to.p)
         _, rise, f_slope = over_angles(s, both, arb(x0).union(arb(x1)), k_lo.union(k_hi))
-        if not f_slope < 0:
+        told = slope_over(s, both, k_lo.union(k_hi), rise, f_slope)
+        if told is None:
             return 0.0
-        slope = float((1 - rise * both / f_slope).lower())
+        slope = float(told.lower())
         least = min(least, slope if slope > 0 else 0.0)
     return least
 

@@ -1,0 +1,99 @@
+"""What was right and denied, or slow, found by a search over random scenes; and what becomes of what is denied."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+pytest.importorskip("flint", reason="the checker needs python-flint")
+
+import limitsets as ls
+from limitsets.proofs import certificate
+from limitsets.proofs.confirm import DeniedError
+from limitsets.robust.margins.answer import settled
+from tests.cli.command import run
+
+
+def test_a_constant_slope_is_seen_at_once(tmp_path):
+    """Small angles, and lengths known to 0.7 %: dR'/dR = 1 + 2|h|/kappa was enclosed by 16 383 boxes a cell."""
+    tree = ls.load("paper-initial-small-angle").as_dict()
+    del tree["goal"]
+    tree["part"]["mass"]["center"] |= {"along": "3.5298 in", "above": "1.9435 in"}
+    tree["arm"]["surface_height"], tree["throw"]["kappa"] = "-0.322 in", "72.9808 in"
+    tolerance = {"part.sides[2]": "0.02387 in", "part.mass.center.along": "0.02387 in"}
+    proof = ls.certify(ls.load(tree), ["invariant", "expanding"], tolerance=tolerance)
+    assert proof.proved
+    report = ls.recheck(proof.save(tmp_path / "x.proof.zip", recheck=False))
+    assert (report.verdict, report.reason) == ("proved", "")
+    inside = sum(int((found.component >= 0).sum()) for found in proof.attractions)
+    assert report.boxes < 4 * inside
+
+
+# ------------------------------------------------------------------------------ before a certificate gets its name
+
+
+@pytest.fixture
+def wrong(monkeypatch):
+    """A prover whose brackets of the impact angle are wrong on one side."""
+    right = certificate.arrays_of
+
+    def arrays_of(found, prefix):
+        arrays = right(found, prefix)
+        arrays[f"{prefix}phi"][:, 0] = 0.999 * arrays[f"{prefix}phi"][:, 1]
+        return arrays
+
+    monkeypatch.setattr(certificate, "arrays_of", arrays_of)
+
+
+def test_a_certificate_that_is_denied_does_not_get_its_name(tmp_path, wrong):
+    file = tmp_path / "designed.proof.zip"
+    file.write_text("an older one")
+    proof = ls.certify("paper-designed")
+    with pytest.raises(DeniedError, match="is not proved at x") as denied:
+        proof.save(file)
+    assert file.read_text() == "an older one"
+    kept = tmp_path / "designed.denied.zip"
+    assert ls.recheck(kept).verdict == "failed"
+    assert sorted(path.name for path in tmp_path.iterdir()) == [kept.name, file.name]
+    left = proof.denied(denied.value.claims)
+    assert [claim.verdict for claim in left.claims] == ["undecided", "undecided"]
+    assert not left.proved
+    proof.save(file, recheck=False)
+    assert ls.recheck(file).verdict == "failed"
+
+
+def test_a_verdict_that_the_checker_does_not_reach_is_denied(tmp_path):
+    proof = ls.certify("paper-designed", ["goal"])
+    (goal,) = proof.claims
+    section = {key: value for key, value in goal.section.items() if key != "near_joint"} | {"starts": "cells"}
+    proof = replace(proof, claims=(replace(goal, section=section),))
+    with pytest.raises(DeniedError, match="in the cells only"):
+        proof.save(tmp_path / "x.proof.zip")
+
+
+def test_the_command_says_undecided_and_exits_with_1(capfd, tmp_path, monkeypatch, wrong):
+    monkeypatch.chdir(tmp_path)
+    code, out, _ = run(capfd, "certify", "paper-designed")
+    assert code == 1
+    assert "goal: UNDECIDED" in out
+    assert "kept as paper-designed.denied.zip" in out
+    assert [path.name for path in Path().iterdir()] == ["paper-designed.denied.zip"]
+    code, out, _ = run(capfd, "certify", "paper-designed", "--json")
+    assert code == 1
+    claims = json.loads(out)
+    assert [claim["verdict"] for claim in claims] == ["undecided", "undecided"]
+    assert claims[0]["timings"]["recheck"] > 0
+    code, out, _ = run(capfd, "certify", "paper-designed", "--no-recheck")
+    assert code == 0
+    assert "paper-designed.proof.zip, not rechecked" in out
+
+
+def test_a_margin_that_is_denied_is_undecided(tmp_path, wrong):
+    (speed,) = ls.margin("paper-designed", "throw.speed", reading="fixed", width=0.5)
+    assert speed.proved > 0
+    left, files = settled(speed, tmp_path)
+    assert (left.proved, left.refuted, left.closed) == (0.0, None, False)
+    assert files == ()
+    assert "denied" in left.reason
+    assert {path.name.split(".", 1)[1] for path in tmp_path.iterdir()} == {"denied.zip", "refuted.denied.zip"}
