@@ -37,9 +37,18 @@ from typing import Any, ParamSpec, Protocol, TypeVar, overload
 
 import numba
 import numpy as np
+from llvmlite import ir
 from numba import extending, types
 
-__all__ = ["cover_foreign_class", "generic", "kernel", "named_tuple_class", "proof_kernel"]
+__all__ = [
+    "cover_foreign_class",
+    "generic",
+    "kernel",
+    "mark_undefined",
+    "named_tuple_class",
+    "proof_kernel",
+    "take_mark",
+]
 
 F = TypeVar("F", bound=Callable[..., Any])
 P = ParamSpec("P")
@@ -403,6 +412,47 @@ def proof_kernel(function: Any = None, *, entry: bool = False) -> Any:
     if function is None:
         return lambda f: _compile(f, _PROOF, entry)
     return _compile(function, _PROOF, entry)
+
+
+# ---------------------------------------------------------------- the mark of what is not defined
+
+# Compiled code notes here that a function was asked beyond where it is defined.  A proof kernel gives back bare
+# intervals, which cannot say it: the loop that asked it takes the mark afterwards.
+_MARK, _BYTE = "limitsets_mark", ir.IntType(8)
+
+
+def _mark_of(builder: Any) -> Any:
+    """The byte of the mark, one for all that is linked together."""
+    found = builder.module.globals.get(_MARK)
+    if found is None:
+        found = ir.GlobalVariable(builder.module, _BYTE, _MARK)
+        found.linkage, found.initializer = "linkonce_odr", ir.Constant(_BYTE, 0)
+    return found
+
+
+@extending.intrinsic
+def mark_undefined(typing: Any, wrong: Any) -> Any:
+    """Set the mark where `wrong` is true, in compiled code."""
+
+    def store(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        mark = _mark_of(builder)
+        builder.store(builder.or_(builder.load(mark), builder.zext(args[0], _BYTE)), mark)
+        return context.get_dummy_value()
+
+    return types.none(types.boolean), store
+
+
+@extending.intrinsic
+def take_mark(typing: Any) -> Any:
+    """Whether the mark was set since it was taken last, in compiled code; it no longer is."""
+
+    def take(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        mark = _mark_of(builder)
+        was = builder.icmp_unsigned("!=", builder.load(mark), _BYTE(0))
+        builder.store(_BYTE(0), mark)
+        return was
+
+    return types.boolean(), take
 
 
 def named_tuple_class(numba_type: Any) -> type | None:
