@@ -422,7 +422,7 @@ _MARK, _BYTE = "limitsets_mark", ir.IntType(8)
 
 
 def _mark_of(builder: Any) -> Any:
-    """The byte of the mark, one for all that is linked together."""
+    """Return the byte of the mark, one for all that is linked together."""
     found = builder.module.globals.get(_MARK)
     if found is None:
         found = ir.GlobalVariable(builder.module, _BYTE, _MARK)

@@ -61,7 +61,7 @@ def or_empty(good: bool, lo: float, hi: float) -> Interval:
 @proof_kernel
 def _number(y: float) -> float:
     """Product or quotient of two ends: 0 times an infinite end is 0."""
-    return y if y == y else 0.0  # noqa: PLR0124  # nan alone is unequal to itself
+    return y if y == y else 0.0  # nan alone is unequal to itself
 
 
 @proof_kernel

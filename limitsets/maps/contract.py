@@ -21,6 +21,10 @@ written once, here and in the rooms above, and know maps only through these func
                                         they differ at every step; asked by orbits, not by the images of cells
 ======================================  =============================================================================
 
+`image_box` is written with `limitsets.interval`.  A cell counts as one of which nothing is proved where its image is
+nan or unbounded, and where a function was asked beyond where it is defined (the contract of that room), whatever count
+the kernel gives.
+
 In two and three dimensions x is a tuple and the slope a tuple of rows.
 """
 
