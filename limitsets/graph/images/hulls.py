@@ -44,7 +44,7 @@ def _enclose(lo_map: Any, hi_map: Any, side: int, lo: Any, hi: Any, kept: Any) -
     one, two = on_side_box(lo_map, hi_map, side)
     for k in range(lo[0].size):
         _store(image_box(one, two, pick(lo, k), pick(hi, k), side), k, *kept)
-    return take_mark()
+    return bool(take_mark())
 
 
 @proof_kernel(entry=True)
