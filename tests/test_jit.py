@@ -182,7 +182,8 @@ ls.register(InScript, image=image)
 
 run(
     leslie=leslie, henon=henon, helper=(WithHelper(1.0), 2.0), plain=(WithPlain(1.0), 2.0),
-    constant=(WithConstant(1.0), 2.0), fields=(WithFields(push=1.0, pull=5.0), 2.0), part=(WithPart(5.0), 2.0), generic=(WithGeneric(1.0), 2.0),
+    constant=(WithConstant(1.0), 2.0), fields=(WithFields(push=1.0, pull=5.0), 2.0),
+    part=(WithPart(5.0), 2.0), generic=(WithGeneric(1.0), 2.0),
     script=(InScript(1.0), 2.0),
 )
 """
