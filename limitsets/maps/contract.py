@@ -21,16 +21,22 @@ written once, here and in the rooms above, and know maps only through these func
                                         they differ at every step; asked by orbits, not by the images of cells
 ======================================  =============================================================================
 
+`image_box` is written with `limitsets.interval`.  A cell counts as one of which nothing is proved where its image is
+nan or unbounded, and where a function was asked beyond where it is defined (the contract of that room), whatever count
+the kernel gives.
+
 In two and three dimensions x is a tuple and the slope a tuple of rows.
 """
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from limitsets.errors import MapError
 from limitsets.jit import cover_foreign_class, generic
@@ -50,6 +56,7 @@ __all__ = [
     "on_side",
     "on_side_box",
     "register",
+    "require_codes",
     "require_sides",
     "scattered",
 ]
@@ -257,6 +264,7 @@ def register(
                 "a function defined at module level",
                 "move it out of the function",
             )
+        _require_arguments(cls, name, plain)
     cover_foreign_class(cls, list(kernels.values()))
     for name, function in kernels.items():
         globals()[name].on(cls, function)
@@ -271,6 +279,51 @@ def register(
         displacement is not None,
     )
     return cls
+
+
+# Arguments of each kernel, as the table of this module has them.
+ARGUMENTS = {
+    "image": ("params", "x", "side"),
+    "image_on": ("params", "x", "side", "branch"),
+    "image_box": ("params_lo", "params_hi", "lo", "hi", "side"),
+    "fallback_box": ("params_lo", "params_hi", "lo", "hi", "side"),
+    "on_side": ("params", "side"),
+    "on_side_box": ("params_lo", "params_hi", "side"),
+    "fallback": ("params", "x", "side"),
+    "margin": ("params", "x", "side"),
+    "displacement": ("params", "x", "side"),
+    "scattered": ("params", "start", "step"),
+}
+
+
+def _require_arguments(cls: type, name: str, function: Callable[..., Any]) -> None:
+    """Refuse a kernel that cannot be called with its arguments."""
+    signature, wanted = inspect.signature(function), ARGUMENTS[name]
+    try:
+        signature.bind(*wanted)
+    except TypeError:
+        raise MapError(
+            f"the arguments of the kernel {name} of {cls.__name__}",
+            f"{function.__name__}{signature}",
+            f"{len(wanted)} of them ({', '.join(wanted)})",
+            "correct its first line",
+        ) from None
+
+
+def require_codes(params: Any, code: NDArray[np.int64]) -> None:
+    """Refuse codes of steps that the map's registration does not name."""
+    kind = kind_of(params)
+    known = [*range(len(kind.branches)), *kind.exits.values(), codes.OUTSIDE_MODEL]
+    wrong = code[~np.isin(code, known)]
+    if wrong.size:
+        branches = ", ".join(f"{k} {name}" for k, name in enumerate(kind.branches))
+        exits = ", ".join(f"{number} {name}" for name, number in kind.exits.items())
+        raise MapError(
+            f"the code that the kernel image of {kind.name} gives",
+            int(wrong[0]),
+            f"a branch ({branches}) or an exit ({exits})",
+            "correct the kernel, or name every branch in register(..., branches=(...))",
+        )
 
 
 def kind_of(params: Any) -> MapKind:

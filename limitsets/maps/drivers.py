@@ -22,6 +22,7 @@ from limitsets.maps.contract import (
     image_on,
     kind_of,
     on_side,
+    require_codes,
     require_sides,
     scattered,
 )
@@ -316,6 +317,7 @@ def orbit(params: Any, x: Any, side: int, count: int) -> Orbit:
     sides, code = np.empty(count + 1, np.int64), np.empty(count, np.int64)
     sides[0] = side
     made = _orbit(params, 0, xs, sides, code)
+    require_codes(params, code[:made])
     stopped = None
     if made and code[made - 1] < 0:
         stopped = next(name for name, exit_code in kind.exits.items() if exit_code == code[made - 1])
