@@ -35,7 +35,8 @@ class Survey:
         It leads nowhere else.
     destination : ndarray of int32, shape (n_cells,)
         What every path from the cell ends in: attractor number (0 for the first attracting component) or the code
-        of an exit; `UNDECIDED` (-4) where paths end in different places.
+        of an exit; `UNDECIDED` (-4) where paths end in different places, or may stay in a recurrent component that
+        is not attracting.
     """
 
     order: NDArray[np.bool_]
@@ -130,8 +131,8 @@ def survey(
         names = {len(chunk) + e: code for e, code in enumerate(exits.values())}
         for b in range(len(chunk)):
             order[:, begin + b] = seen >> np.uint64(b) & np.uint64(1)
-            if attracting[begin + b]:
-                names[b] = int(number[begin + b])
+            # An orbit may stay in a set that is not closed: where one can be reached, nothing is said.
+            names[b] = int(number[begin + b]) if attracting[begin + b] else codes.UNDECIDED
         for e in range(len(exits)):
             out[:, e] = seen >> np.uint64(len(chunk) + e) & np.uint64(1)
         destination = _destinations(marks, names, destination)

@@ -1,6 +1,7 @@
-"""Images of cells on which the branch changes.
+"""Images of cells on which the branch changes, or the map turns.
 
-In one dimension a cell is cut where the branch changes and each piece gets its image.  Otherwise the cell gets the
+In one dimension such a cell is cut into equal parts and where the branch changes, and each piece gets its image, from
+its least value to its greatest.  Otherwise the cell gets the
 image of every branch that one of its points takes, from all its points: together with the closed cells that is the
 closed relation, which holds the limits from both sides.  Ways out are taken from real images only; the image of a
 whole cell under a forced branch is clipped to the domain.
@@ -22,10 +23,14 @@ from limitsets.maps import codes, images_on, kind_of
 from limitsets.maps.contract import on_side
 from limitsets.maps.drivers import step
 
-__all__ = ["every_branch", "split"]
+__all__ = ["bent", "every_branch", "split"]
 
 # Pieces that one cell may be cut into, at first and at last: more than six are rare, more than the last an error.
 FEW_PIECES, MOST_PIECES = 6, 1536
+
+# Equal parts of such a cell, so that a hole or a bend in it is met, and steps in search of a piece's extreme values:
+# each leaves two thirds of the piece.
+PARTS, NARROWINGS = 16, 25
 
 # A forced image this close to a real one, relative to the domain's size, comes from the same branch.
 SAME_IMAGE = 1e-9
@@ -33,9 +38,9 @@ SAME_IMAGE = 1e-9
 
 @kernel(entry=True)
 def _pieces(
-    params: Any, side: int, lo: Any, hi: Any, most: int, x: Any, side_after: Any, code_after: Any
+    params: Any, side: int, lo: Any, hi: Any, most: int, ends: Any, x: Any, side_after: Any, code_after: Any
 ) -> int:
-    """Cut [lo, hi] where the branch changes: images of the ends of up to `most` pieces, in the order met.
+    """Cut [lo, hi] where the branch changes: ends of up to `most` pieces and their images, in the order met.
 
     Returns how many cells have more.
     """
@@ -46,6 +51,7 @@ def _pieces(
         left = lo[cell]
         end, to_end, code_end = step(here, hi[cell], side)
         for piece in range(most):
+            ends[cell, piece, 0], ends[cell, piece, 1] = left, hi[cell]
             x[cell, piece, 0], side_after[cell, piece], code_after[cell, piece] = step(here, left, side)
             if code_after[cell, piece] == code_end and side_after[cell, piece] == to_end:
                 x[cell, piece, 1] = end
@@ -61,15 +67,57 @@ def _pieces(
                     a = middle
                 else:
                     b = middle
+            ends[cell, piece, 1] = a
             x[cell, piece, 1], _, _ = step(here, a, side)
             left = b
     return more
 
 
+@kernel(entry=True)
+def _widen(params: Any, side: int, ends: Any, x: Any, code_after: Any) -> None:
+    """Widen the images of the ends of pieces to the extreme values in between: [lo, hi], codes of exits met there."""
+    here = on_side(params, side)
+    for k in range(code_after.size):
+        lo, hi = min(x[k, 0], x[k, 1]), max(x[k, 0], x[k, 1])
+        for sign in (-1.0, 1.0):
+            a, b = ends[k, 0], ends[k, 1]
+            for _ in range(NARROWINGS):
+                left, right = a + (b - a) / 3.0, b - (b - a) / 3.0
+                one, _, code_one = step(here, left, side)
+                two, _, code_two = step(here, right, side)
+                code_after[k] = min(code_after[k], code_one, code_two)
+                if code_one >= 0:
+                    lo, hi = min(lo, one), max(hi, one)
+                if code_two >= 0:
+                    lo, hi = min(lo, two), max(hi, two)
+                if sign * one > sign * two:
+                    b = right
+                else:
+                    a = left
+        x[k, 0], x[k, 1] = lo, hi
+
+
+def bent(after: NDArray[np.float64], to: NDArray[Any], code: NDArray[Any]) -> NDArray[np.bool_]:
+    """Cells between the points of one axis in which the image may turn, by its differences; the first and the last.
+
+    Where the difference has another sign than next door the map turns, or has a pole, in one of the two cells.
+    """
+    same = (code[1:] == code[:-1]) & (to[1:] == to[:-1]) & (code[1:] >= 0)
+    with np.errstate(invalid="ignore"):  # infinity less infinity has no sign, which is other than any
+        trend = np.where(same, np.sign(np.diff(after)), np.nan)
+    change = np.concatenate([[True], trend[1:] != trend[:-1], [True]])
+    found: NDArray[np.bool_] = change[1:] | change[:-1]
+    return found
+
+
 def split(params: Any, side: int, target: Target, samples: Samples, cells: NDArray[np.int64]) -> list[Boxes]:
-    """Images of the pieces of undecided cells in one dimension."""
-    edges = samples.axes[0]
-    pieces, more = FEW_PIECES // 2, cells.size
+    """Images of the pieces of some cells in one dimension."""
+    borders = samples.axes[0]
+    part = np.arange(PARTS + 1) / PARTS
+    cuts = borders[cells, None] + part * (borders[cells + 1] - borders[cells])[:, None]
+    cuts[:, -1] = borders[cells + 1]
+    lo, hi = cuts[:, :-1].ravel(), cuts[:, 1:].ravel()
+    pieces, more = FEW_PIECES // 2, lo.size
     while more:
         pieces *= 2
         if pieces > MOST_PIECES:
@@ -79,27 +127,22 @@ def split(params: Any, side: int, target: Target, samples: Samples, cells: NDArr
                 f"at most {MOST_PIECES}",
                 "ask for more cells",
             )
-        shape = (cells.size, pieces)
-        x = np.full((*shape, 2), np.nan)
+        shape = (lo.size, pieces)
+        ends, x = np.full((*shape, 2), np.nan), np.full((*shape, 2), np.nan)
         to: NDArray[np.int64] = np.zeros(shape, np.int64)
         code: NDArray[np.int64] = np.full(shape, codes.UNSETTLED, np.int64)
-        more = _pieces(params, side, edges[cells], edges[cells + 1], pieces, x, to, code)
-    owner = np.repeat(cells, pieces)
-    code, to, ends = code.reshape(-1), to.reshape(-1), x.reshape(-1, 2)
-    real = (code > codes.OUTSIDE_MODEL) & np.isfinite(ends).all(axis=1)
-    found = [
-        placed(
-            target,
-            owner[real],
-            to[real],
-            ends[real].min(axis=1, keepdims=True),
-            ends[real].max(axis=1, keepdims=True),
-            samples.pad,
-            inside=False,
-        )
-    ]
+        more = _pieces(params, side, lo, hi, pieces, ends, x, to, code)
+    owner = np.repeat(cells, PARTS * pieces)
+    code, to, ends, x = code.reshape(-1), to.reshape(-1), ends.reshape(-1, 2), x.reshape(-1, 2)
+    real = np.flatnonzero(code >= 0)
+    met, image = code[real], x[real]
+    _widen(params, side, ends[real], image, met)
     gone = (code < 0) & (code != codes.UNSETTLED)
-    return [*found, leaving(target, owner[gone], code[gone], 1)]
+    return [
+        placed(target, owner[real], to[real], image[:, :1], image[:, 1:], samples.pad, inside=False),
+        leaving(target, owner[real[met < 0]], met[met < 0], 1),
+        leaving(target, owner[gone], code[gone], 1),
+    ]
 
 
 def every_branch(
