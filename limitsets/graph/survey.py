@@ -93,7 +93,11 @@ def attracting_of(r: Ranges, components: Components, sets: Sequence[NDArray[np.i
 
 
 def survey(
-    r: Ranges, components: Components, exits: dict[str, int], sets: Sequence[NDArray[np.int32]]
+    r: Ranges,
+    components: Components,
+    exits: dict[str, int],
+    sets: Sequence[NDArray[np.int32]],
+    passing: NDArray[np.bool_] | None = None,
 ) -> Survey:
     """Sweep the graph, up to 56 recurrent components at a time.
 
@@ -107,6 +111,8 @@ def survey(
         Names and codes of the ways out.
     sets : sequence of ndarray
         Cells of each recurrent component.
+    passing : ndarray of bool, shape (k,), optional
+        Components known to hold no orbit for ever; none.
 
     Returns
     -------
@@ -132,7 +138,10 @@ def survey(
         for b in range(len(chunk)):
             order[:, begin + b] = seen >> np.uint64(b) & np.uint64(1)
             # An orbit may stay in a set that is not closed: where one can be reached, nothing is said.
-            names[b] = int(number[begin + b]) if attracting[begin + b] else codes.UNDECIDED
+            if attracting[begin + b]:
+                names[b] = int(number[begin + b])
+            elif passing is None or not passing[begin + b]:
+                names[b] = codes.UNDECIDED
         for e in range(len(exits)):
             out[:, e] = seen >> np.uint64(len(chunk) + e) & np.uint64(1)
         destination = _destinations(marks, names, destination)

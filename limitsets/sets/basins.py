@@ -12,8 +12,10 @@ from limitsets.cells import Grid
 from limitsets.errors import AnswerError
 from limitsets.graph import TransitionGraph
 from limitsets.graph.components import reach
+from limitsets.graph.survey import survey
 from limitsets.maps import codes
 from limitsets.sets.attractors import Attractor
+from limitsets.sets.passing import passing
 
 __all__ = ["Basins", "basins"]
 
@@ -74,8 +76,8 @@ def basins(graph: TransitionGraph, found: tuple[Attractor, ...]) -> Basins:
     >>> ls.basins(graph, ls.attractors(graph)).attractors
     (0.5, 0.5)
     """
-    known = graph.survey()
-    if any(a.cells.grid is not graph.grid for a in found) or len(found) != int(known.attracting.sum()):
+    attracting = graph.survey().attracting
+    if any(a.cells.grid is not graph.grid for a in found) or len(found) != int(attracting.sum()):
         raise AnswerError(
             "the attractors",
             f"{len(found)} of another graph",
@@ -84,7 +86,8 @@ def basins(graph: TransitionGraph, found: tuple[Attractor, ...]) -> Basins:
         )
     weight = graph.grid.measure
     total = float(weight.sum())
-    labels = known.destination
+    sets, through = graph.recurrent_components(), passing(graph)
+    labels = survey(graph.ranges, graph.components(), graph.exits, sets, through).destination
     lowest = min(codes.UNDECIDED, *graph.exits.values())
     share = np.bincount(labels - lowest, weights=weight, minlength=len(found) - lowest) / total
     by_code = {code: float(share[code - lowest]) for code in range(lowest, len(found))}
@@ -94,17 +97,16 @@ def basins(graph: TransitionGraph, found: tuple[Attractor, ...]) -> Basins:
         tuple(by_code[k] for k in range(len(found))),
         by_code[codes.UNDECIDED],
         {name: by_code[code] for name, code in graph.exits.items()},
-        _advice(graph),
+        _advice(graph, list(itertools.compress(sets, ~(attracting | through)))),
     )
 
 
-def _advice(graph: TransitionGraph) -> str | None:
+def _advice(graph: TransitionGraph, lasting: list[NDArray[np.int32]]) -> str | None:
     """Say from how many starts a recurrent set that is not closed can be reached, and what to do."""
-    attracting = graph.survey().attracting
-    if attracting.all():
+    if not lasting:
         return None
     marks = np.zeros(graph.n_cells, dtype=np.uint8)
-    for cells in itertools.compress(graph.recurrent_components(), ~attracting):
+    for cells in lasting:
         marks[cells] = 1
     weight = graph.grid.measure
     share = float(weight[reach(graph.ranges, graph.components(), marks) > 0].sum() / weight.sum())

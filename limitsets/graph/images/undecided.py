@@ -78,7 +78,7 @@ def _widen(params: Any, side: int, ends: Any, x: Any, code_after: Any) -> None:
     """Widen the images of the ends of pieces to the extreme values in between: [lo, hi], codes of exits met there."""
     here = on_side(params, side)
     for k in range(code_after.size):
-        lo, hi = min(x[k, 0], x[k, 1]), max(x[k, 0], x[k, 1])
+        lo, hi = x[k, 0], x[k, 1]
         for sign in (-1.0, 1.0):
             a, b = ends[k, 0], ends[k, 1]
             for _ in range(NARROWINGS):
@@ -105,7 +105,13 @@ def bent(after: NDArray[np.float64], to: NDArray[Any], code: NDArray[Any]) -> ND
     same = (code[1:] == code[:-1]) & (to[1:] == to[:-1]) & (code[1:] >= 0)
     with np.errstate(invalid="ignore"):  # infinity less infinity has no sign, which is other than any
         trend = np.where(same, np.sign(np.diff(after)), np.nan)
-    change = np.concatenate([[True], trend[1:] != trend[:-1], [True]])
+    return _beside_change(trend)
+
+
+def _beside_change(*rows: NDArray[Any]) -> NDArray[np.bool_]:
+    """Entries that differ from one next to them in any of the rows; the first and the last; nan differs from nan."""
+    differ = np.any([row[1:] != row[:-1] for row in rows], axis=0)
+    change = np.concatenate([[True], differ, [True]])
     found: NDArray[np.bool_] = change[1:] | change[:-1]
     return found
 
@@ -134,14 +140,19 @@ def split(params: Any, side: int, target: Target, samples: Samples, cells: NDArr
         more = _pieces(params, side, lo, hi, pieces, ends, x, to, code)
     owner = np.repeat(cells, PARTS * pieces)
     code, to, ends, x = code.reshape(-1), to.reshape(-1), ends.reshape(-1, 2), x.reshape(-1, 2)
-    real = np.flatnonzero(code >= 0)
-    met, image = code[real], x[real]
-    _widen(params, side, ends[real], image, met)
-    gone = (code < 0) & (code != codes.UNSETTLED)
+    there = code != codes.UNSETTLED
+    owner, code, to, ends, x = owner[there], code[there], to[there], ends[there], x[there]
+    with np.errstate(invalid="ignore"):
+        turns = (code >= 0) & _beside_change(np.sign(x[:, 1] - x[:, 0]), code, to)
+    x.sort(axis=1)
+    image, met = x[turns], code[turns]
+    _widen(params, side, ends[turns], image, met)
+    x[turns] = image
+    real, gone, holed = code >= 0, code < 0, met < 0
     return [
-        placed(target, owner[real], to[real], image[:, :1], image[:, 1:], samples.pad, inside=False),
-        leaving(target, owner[real[met < 0]], met[met < 0], 1),
+        placed(target, owner[real], to[real], x[real, :1], x[real, 1:], samples.pad, inside=False),
         leaving(target, owner[gone], code[gone], 1),
+        leaving(target, owner[turns][holed], met[holed], 1),
     ]
 
 
