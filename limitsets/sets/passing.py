@@ -19,7 +19,7 @@ from limitsets.maps import images
 __all__ = ["passing"]
 
 # Fine cells in all, beyond which nothing is looked at; parts of a cell along an axis, as many as these allow.
-MOST_CELLS, PARTS = 100_000, (8, 4, 2)
+MOST_CELLS, PARTS = 100_000, (64, 32, 16, 8, 4, 2)
 
 Integers = NDArray[np.int64]
 

@@ -2,7 +2,8 @@
 
 In one dimension such a cell is cut into equal parts and where the branch changes, and each piece gets its image, from
 its least value to its greatest.  Otherwise the cell gets the
-image of every branch that one of its points takes, from all its points: together with the closed cells that is the
+image of every branch that one of its points takes, from all its points and from the borders between two that do
+different things: together with the closed cells that is the
 closed relation, which holds the limits from both sides.  Ways out are taken from real images only; the image of a
 whole cell under a forced branch is clipped to the domain.
 """
@@ -19,7 +20,7 @@ from limitsets.graph.boxes import Boxes, leaving, placed
 from limitsets.graph.images.samples import Samples
 from limitsets.graph.target import Target
 from limitsets.jit import kernel
-from limitsets.maps import codes, images_on, kind_of
+from limitsets.maps import codes, images, images_on, kind_of
 from limitsets.maps.contract import on_side
 from limitsets.maps.drivers import step
 
@@ -31,6 +32,9 @@ FEW_PIECES, MOST_PIECES = 6, 1536
 # Equal parts of such a cell, so that a hole or a bend in it is met, and steps in search of a piece's extreme values:
 # each leaves two thirds of the piece.
 PARTS, NARROWINGS = 16, 25
+
+# Halvings between two points of a cell in search of the border between what they do: to the last digits.
+HALVINGS = 60
 
 # A forced image this close to a real one, relative to the domain's size, comes from the same branch.
 SAME_IMAGE = 1e-9
@@ -172,11 +176,20 @@ def every_branch(
     kind = kind_of(params)
     after, to, code = seen
     size = float(np.ptp(target.edges))
-    real = np.stack([values[numbers] for values in after], axis=-1)  # (cells, points, dimension)
+    starts = np.stack(samples.points(), axis=-1)[numbers]  # (cells, points, dimension)
+    real = np.stack([values[numbers] for values in after], axis=-1)
     to, code = to[numbers].astype(np.int64), code[numbers].astype(np.int64)
+    if not samples.scattered:
+        borders = _borders(params, side, starts, to, code)
+        met = images(params, _states(borders), side)
+        shape = borders.shape[:-1]
+        starts = np.concatenate([starts, borders], axis=1)
+        real = np.concatenate([real, met.x.reshape(borders.shape)], axis=1)
+        to = np.concatenate([to, met.side.reshape(shape)], axis=1)
+        code = np.concatenate([code, met.code.reshape(shape)], axis=1)
     landed = (code > codes.OUTSIDE_MODEL) & np.isfinite(real).all(axis=-1)
     found = []
-    owner = np.repeat(cells, numbers.shape[1])
+    owner = np.repeat(cells, code.shape[1])
     gone = ((code < 0) | ~landed).ravel()
     named = np.where(code < 0, code, codes.OUTSIDE).ravel()
     found.append(leaving(target, owner[gone], named[gone], real.shape[-1]))
@@ -186,28 +199,27 @@ def every_branch(
     alone = placed(target, owner[flat], to.ravel()[flat], points, points, 0, inside=False)
     found.append(Boxes(alone.cell[:0], alone.side[:0], alone.lo[:0], alone.hi[:0], alone.exits, 0.0))
     if kind.has_image_on:
-        starts = np.stack(samples.points(), axis=-1)[numbers].reshape(-1, real.shape[-1])
         for branch in range(len(kind.branches)):
-            forced, forced_to = images_on(
-                params, starts if real.shape[-1] > 1 else starts[:, 0], side, branch
-            )
+            forced, forced_to = images_on(params, _states(starts), side, branch)
             forced, forced_to = forced.reshape(real.shape), forced_to.reshape(to.shape)
+            finite = np.isfinite(forced).all(axis=-1)
             close = (np.abs(forced - real) <= SAME_IMAGE * size).all(axis=-1) & (forced_to == to)
             taken = ((code == branch) | ((code < 0) & landed & close)).any(axis=1)
-            taken &= np.isfinite(forced).all(axis=(1, 2))
-            hull = forced[taken]
+            taken &= finite.any(axis=1)  # the branch itself may have a hole
+            lo, hi = (np.where(finite[..., None], forced, end)[taken] for end in (np.inf, -np.inf))
             found.append(
                 placed(
                     target,
                     cells[taken],
                     forced_to[taken, 0],
-                    hull.min(axis=1),
-                    hull.max(axis=1),
+                    lo.min(axis=1),
+                    hi.max(axis=1),
                     samples.pad,
                     True,
                 )
             )
         return found
+    landed &= code >= 0
     for key in {(int(c), int(t)) for c, t in zip(code[landed], to[landed], strict=True)}:
         mine = landed & (code == key[0]) & (to == key[1])
         some = mine.any(axis=1)
@@ -216,3 +228,32 @@ def every_branch(
         sides = np.full(int(some.sum()), key[1])
         found.append(placed(target, cells[some], sides, lo, hi, samples.pad, True))
     return found
+
+
+def _states(points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Points as the drivers take them: shape (n, dimension), or (n,) in one dimension."""
+    flat = points.reshape(-1, points.shape[-1])
+    return flat if flat.shape[1] > 1 else flat[:, 0]
+
+
+def _borders(
+    params: Any, side: int, points: NDArray[np.float64], to: NDArray[np.int64], code: NDArray[np.int64]
+) -> NDArray[np.float64]:
+    """Where, between two points of a cell, the map begins to do something else: the last of one, the first after it.
+
+    Returns
+    -------
+    ndarray, shape (cells, 2 pairs, dimension)
+        The points themselves for pairs that do the same.
+    """
+    one, two = np.triu_indices(points.shape[1], 1)
+    a, b = points[:, one], points[:, two]
+    differ = (code[:, one] != code[:, two]) | (to[:, one] != to[:, two])
+    low, high, was_to, was_code = a[differ], b[differ], to[:, one][differ], code[:, one][differ]
+    for _ in range(HALVINGS):
+        middle = 0.5 * (low + high)
+        there = images(params, _states(middle), side)
+        same = ((there.code == was_code) & (there.side == was_to))[:, None]
+        low, high = np.where(same, middle, low), np.where(same, high, middle)
+    a[differ], b[differ] = low, high
+    return np.concatenate([a, b], axis=1)
