@@ -73,7 +73,7 @@ def _records(path: Trace) -> list[dict[str, Any]]:
             "displacement": _number(path.displacement[k]),
             "sides_turned": int(path.turned[k]),
             "other_vertex_first": bool(path.other_vertex_first[k]),
-            "reason": path.reason if path.code[k] == codes.OUTSIDE_MODEL else None,
+            **({"reason": path.reason} if path.code[k] == codes.OUTSIDE_MODEL else {}),
         }
         for k in range(path.code.size)
     ]

@@ -40,7 +40,10 @@ def trust(analysis: Analysis) -> str:
             (
                 "**Sampled, not proved.**",
                 f"The arm was cut into {cells[0]} cells per side, and the image of each was found from its ends.",
-                *(f"{percent(min(inside))} of the states of a long orbit lay in the cells of its limit set." for _ in inside[:1]),
+                *(
+                    f"{percent(min(inside))} of the states of a long orbit lay in the cells of its limit set."
+                    for _ in inside[:1]
+                ),
                 f"{percent(analysis.second_pass)} of the throws needed the slow, sure search for the impact.",
             )
         ),

@@ -111,6 +111,6 @@ def _advice(graph: TransitionGraph, lasting: list[NDArray[np.int32]]) -> str | N
     weight = graph.grid.measure
     share = float(weight[reach(graph.ranges, graph.components(), marks) > 0].sum() / weight.sum())
     return (
-        f"from {100 * share:.3g} % of the starts a recurrent set that is not closed can be reached, an unstable cycle or "
-        "an attractor in cells that are too coarse for it: they are undecided; ask for finer cells"
+        f"from {100 * share:.3g} % of the starts a recurrent set that is not closed can be reached, an unstable cycle "
+        "or an attractor in cells that are too coarse for it: they are undecided; ask for finer cells"
     )

@@ -1,8 +1,8 @@
 """Recurrent sets of cells in which no orbit stays: cells that meet their own image because they are coarse.
 
-Such a set is cut finer, by itself, with images that in more than one dimension are enlarged by a fine cell on every side.
-Where nothing recurs then, an orbit passes through, and what is said of the cells that lead there need not wait for more
-cells.
+Such a set is cut finer, by itself, with images that in more than one dimension are enlarged by a fine cell on every
+side.  Where nothing recurs then, an orbit passes through, and what is said of the cells that lead there need not wait
+for more cells.
 """
 
 from __future__ import annotations
@@ -78,7 +78,9 @@ def _recurring(graph: TransitionGraph, cells: Integers, component: Integers, par
     nodes, owners = np.concatenate(node), np.concatenate(owner)
     order = np.argsort(nodes)
     nodes, owners = nodes[order], owners[order]
-    source, target = (np.searchsorted(nodes, np.concatenate([*ends, nodes[:0]])) for ends in (sources, targets))
+    source, target = (
+        np.searchsorted(nodes, np.concatenate([*ends, nodes[:0]])) for ends in (sources, targets)
+    )
     edges = coo_array((np.ones(source.size), (source, target)), shape=(nodes.size, nodes.size))
     _, label = connected_components(edges.tocsr(), directed=True, connection="strong")
     several = np.bincount(label)[label] > 1
@@ -88,21 +90,19 @@ def _recurring(graph: TransitionGraph, cells: Integers, component: Integers, par
 
 def _hulls(graph: TransitionGraph, fine: Any, place: list[Integers], side: int) -> tuple[Any, ...]:
     """Boxes around the images of the corners of fine cells, their sides, and whether all corners agree."""
-    lo, hi, side_of, code_of, clear = None, None, None, None, None
+    found = []
     for corner in product((0, 1), repeat=len(place)):
         points = [edges[at + c] for edges, at, c in zip(fine.edges[side], place, corner, strict=True)]
-        there = images(graph.map, np.stack(points, axis=1), side)
-        x = there.x.reshape(-1, len(place))
-        real = (there.code >= 0) & np.isfinite(x).all(axis=1)
-        if clear is None:
-            lo, hi, side_of, code_of, clear = x, x, there.side, there.code, real
-        lo, hi = np.minimum(lo, x), np.maximum(hi, x)
-        clear = clear & real & (there.side == side_of) & (there.code == code_of)
-    return lo, hi, side_of, clear
+        found.append(images(graph.map, np.stack(points, axis=1), side))
+    x = np.stack([there.x.reshape(-1, len(place)) for there in found])
+    code, to = (np.stack([getattr(there, name) for there in found]) for name in ("code", "side"))
+    clear = (code == code[0]).all(axis=0) & (to == to[0]).all(axis=0) & (code[0] >= 0)
+    clear &= np.isfinite(x).all(axis=(0, 2))
+    return x.min(axis=0), x.max(axis=0), to[0], clear
 
 
 def _met(fine: Any, side: int, lo: Any, hi: Any) -> tuple[Integers, list[Integers]]:
-    """Fine cells of one side that boxes meet, in the plane with one more around: which box, and position on each axis."""
+    """Fine cells of one side that boxes meet, in the plane one more around: which box, position on each axis."""
     first, count, pad = [], [], int(lo.shape[1] > 1)
     for axis, edges in enumerate(fine.edges[side]):
         one = np.searchsorted(edges, lo[:, axis], side="left") - 1 - pad

@@ -173,7 +173,9 @@ def trace(params: Throw | FullThrow, x: float, side: int, count: int = 1) -> Tra
     phi[outside] = shift[outside] = math.nan
     other &= ~outside
     turned[outside] = 0
-    reason = _beyond_model(params, float(path.x[made - 1]), int(path.side[made - 1])) if outside.any() else None
+    reason = (
+        _beyond_model(params, float(path.x[made - 1]), int(path.side[made - 1])) if outside.any() else None
+    )
     return Trace(path.x, path.side, path.code, phi, shift, turned, other, path.stopped, reason)
 
 

@@ -114,7 +114,9 @@ def test_destinations_agree_with_networkx(graph):
     attractors = [
         set(cells.tolist()) for cells, good in zip(recurrent, found.attracting, strict=True) if good
     ]
-    left = {int(c) for cells, good in zip(recurrent, found.attracting, strict=True) if not good for c in cells}
+    left = {
+        int(c) for cells, good in zip(recurrent, found.attracting, strict=True) if not good for c in cells
+    }
     assert sorted(map(sorted, attractors)) == sorted(
         sorted(part)
         for part in ends
@@ -155,4 +157,6 @@ def test_more_components_than_one_sweep_holds(count):
     assert nx.dag_longest_path_length(morse) == count - 1
     assert morse.number_of_edges() == count - 1
     assert (graph.survey().destination[:2] == 0).all()
-    assert (graph.survey().destination[2:] == UNDECIDED).all()  # from there on an unstable cell can be reached
+    assert (
+        graph.survey().destination[2:] == UNDECIDED
+    ).all()  # from there on an unstable cell can be reached

@@ -143,18 +143,18 @@ def split(params: Any, side: int, target: Target, samples: Samples, cells: NDArr
         code: NDArray[np.int64] = np.full(shape, codes.UNSETTLED, np.int64)
         more = _pieces(params, side, lo, hi, pieces, ends, x, to, code)
     owner = np.repeat(cells, PARTS * pieces)
-    code, to, ends, x = code.reshape(-1), to.reshape(-1), ends.reshape(-1, 2), x.reshape(-1, 2)
-    there = code != codes.UNSETTLED
-    owner, code, to, ends, x = owner[there], code[there], to[there], ends[there], x[there]
-    with np.errstate(invalid="ignore"):
-        turns = (code >= 0) & _beside_change(np.sign(x[:, 1] - x[:, 0]), code, to)
-    x.sort(axis=1)
-    image, met = x[turns], code[turns]
-    _widen(params, side, ends[turns], image, met)
-    x[turns] = image
+    there = (code != codes.UNSETTLED).reshape(-1)
+    owner, code, to = owner[there], code.reshape(-1)[there], to.reshape(-1)[there]
+    image = x.reshape(-1, 2)[there]
+    with np.errstate(invalid="ignore"):  # as in `bent`
+        turns = (code >= 0) & _beside_change(np.sign(image[:, 1] - image[:, 0]), code, to)
+    image.sort(axis=1)
+    turning, met = image[turns], code[turns]
+    _widen(params, side, ends.reshape(-1, 2)[there][turns], turning, met)
+    image[turns] = turning
     real, gone, holed = code >= 0, code < 0, met < 0
     return [
-        placed(target, owner[real], to[real], x[real, :1], x[real, 1:], samples.pad, inside=False),
+        placed(target, owner[real], to[real], image[real, :1], image[real, 1:], samples.pad, inside=False),
         leaving(target, owner[gone], code[gone], 1),
         leaving(target, owner[turns][holed], met[holed], 1),
     ]
@@ -202,10 +202,11 @@ def every_branch(
         for branch in range(len(kind.branches)):
             forced, forced_to = images_on(params, _states(starts), side, branch)
             forced, forced_to = forced.reshape(real.shape), forced_to.reshape(to.shape)
-            finite = np.isfinite(forced).all(axis=-1)
-            close = (np.abs(forced - real) <= SAME_IMAGE * size).all(axis=-1) & (forced_to == to)
+            finite: NDArray[np.bool_] = np.isfinite(forced).all(axis=-1)
+            with np.errstate(invalid="ignore"):  # infinity less infinity is close to nothing
+                close = (np.abs(forced - real) <= SAME_IMAGE * size).all(axis=-1) & (forced_to == to)
             taken = ((code == branch) | ((code < 0) & landed & close)).any(axis=1)
-            taken &= finite.any(axis=1)  # the branch itself may have a hole
+            taken &= np.any(finite, axis=1)  # the branch itself may have a hole
             lo, hi = (np.where(finite[..., None], forced, end)[taken] for end in (np.inf, -np.inf))
             found.append(
                 placed(
