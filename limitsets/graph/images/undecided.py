@@ -202,7 +202,7 @@ def every_branch(
         for branch in range(len(kind.branches)):
             forced, forced_to = images_on(params, _states(starts), side, branch)
             forced, forced_to = forced.reshape(real.shape), forced_to.reshape(to.shape)
-            finite: NDArray[np.bool_] = np.isfinite(forced).all(axis=-1)
+            finite = np.all(np.isfinite(forced), axis=-1)
             with np.errstate(invalid="ignore"):  # infinity less infinity is close to nothing
                 close = (np.abs(forced - real) <= SAME_IMAGE * size).all(axis=-1) & (forced_to == to)
             taken = ((code == branch) | ((code < 0) & landed & close)).any(axis=1)
