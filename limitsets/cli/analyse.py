@@ -70,7 +70,9 @@ def _text(analysis: Analysis) -> None:
 
     unit = analysis.scene.unit
     if not analysis.attractors:
-        typer.echo("no start was found to stay on the arm")
+        undecided = analysis.basins.undecided_between
+        left = f"no limit set was found, and {percent(undecided)} of all starts are undecided"
+        typer.echo(left if undecided else "no start was found to stay on the arm")
     for k, (attractor, extents) in enumerate(zip(analysis.attractors, analysis.extents, strict=True)):
         typer.echo(f"limit set {k}: from {percent(analysis.basins.attractors[k])} of all starts")
         rows = [
@@ -78,6 +80,8 @@ def _text(analysis: Analysis) -> None:
             for side, parts in extents.items()
         ]
         table(["side", f"x [{unit}]", "jogs per visit"], rows)
+    for text in analysis.advice:
+        typer.echo(f"not settled: {text}")
     if analysis.goal is not None:
         void = void_of(analysis.goal, unit)
         typer.echo(

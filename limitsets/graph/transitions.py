@@ -54,8 +54,8 @@ def transitions(map: Any, grid: Grid, method: str | None = None, **options: Any)
     >>> import networkx as nx
     >>> scene = ls.load("paper-designed")
     >>> graph = ls.transitions(scene.map, ls.grid(scene.domain, cells=4096))
-    >>> nx.number_attracting_components(graph)  # the limit set, and the three sinks
-    4
+    >>> nx.number_attracting_components(graph)  # the limit set, and the four sinks
+    5
     """
     kind = kind_of(map)
     if kind.dimension != grid.dimension:

@@ -148,7 +148,7 @@ class MapKind:
     branches : tuple of str
         Names of the branches; the code of a step is an index into it.
     exits : dict of str to int
-        Names and codes of the ways out, in the order of the sinks of a graph.
+        Names and codes of the ways out, in the order of the sinks of a graph; "undefined" is the last.
     has_image_on, has_image_box, has_margin, has_displacement : bool
         Which of the optional kernels exist.
     """
@@ -192,7 +192,8 @@ def register(
         Build its values with `limitsets.maps.coerce`, or give floats and float64 arrays.
     image : callable
         ``image(params, x, side) -> (x', side', code)``; code is the index of the branch taken, or
-        `limitsets.maps.OUTSIDE` (-2).  A module-level function, not decorated.
+        `limitsets.maps.OUTSIDE` (-2).  A step to nan is `limitsets.maps.UNDEFINED` (-5), whatever code comes with it.
+        A module-level function, not decorated.
     image_on, image_box, on_side, on_side_box, fallback, fallback_box, margin, displacement : callable, optional
     scattered : callable, optional
         See this module's table.
@@ -201,7 +202,7 @@ def register(
     branches : tuple of str
         Names of the branches.
     exits : dict, optional
-        Names and codes of the ways out; default ``{"outside": -2}``.
+        Names and codes of the ways out; default ``{"outside": -2}``.  ``{"undefined": -5}`` is put behind them.
 
     Returns
     -------
@@ -272,7 +273,7 @@ def register(
         cls.__name__,
         dimension,
         tuple(branches),
-        dict(EXITS_OF_A_MAP if exits is None else exits),
+        {**(EXITS_OF_A_MAP if exits is None else exits), "undefined": codes.UNDEFINED},
         image_on is not None,
         image_box is not None,
         margin is not None,

@@ -633,7 +633,6 @@ def read_part(
     mass = part["mass"]
     if "plate_density" in mass:
         table(mass, "part.mass", "plate_density", "plate_thickness points")
-        require("vertices" in part or not mass.get("points"), "points of mass need vertices")
         start, rho2 = read_plate(mass, vertices, unit, length)
         (ex, ey), along, above, rho, own = (ONE, ZERO), ZERO, ZERO, rho2.sqrt(), -1
     else:

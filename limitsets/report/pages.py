@@ -60,9 +60,12 @@ def _summary(analysis: Analysis) -> str:
     basins, count = analysis.basins, len(analysis.attractors)
     if count == 0:
         leaving = ", ".join(f"{percent(share)} {name}" for name, share in basins.exits.items() if share)
-        return (
-            f"Thrown again and again, **no start was found to stay on the arm** ({leaving or 'undecided'})."
-        )
+        if basins.undecided_between:
+            leaving = ", ".join(filter(None, [f"{percent(basins.undecided_between)} undecided", leaving]))
+            return (
+                f"Thrown again and again, **no limit set was found**, and not all starts leave ({leaving})."
+            )
+        return f"Thrown again and again, **no start was found to stay on the arm** ({leaving})."
     where = "one limit set" if count == 1 else f"{count} limit sets"
     shares = " and ".join(percent(share) for share in basins.attractors)
     lines = [f"Thrown again and again, the part ends up in **{where}**, reached from {shares} of all starts."]
@@ -157,7 +160,9 @@ def _starts(analysis: Analysis, figures: Mapping[str, str]) -> str:
     basins = analysis.basins
     rows = [[f"limit set {k}", percent(share)] for k, share in enumerate(basins.attractors)]
     rows += [[f"leave: {name}", percent(share)] for name, share in basins.exits.items()]
-    rows.append(["undecided: cells whose paths end in different places", percent(basins.undecided_between)])
+    rows.append(
+        ["undecided: paths end in different places, or may stay elsewhere", percent(basins.undecided_between)]
+    )
     beyond = basins.exits.get("outside-model", 0.0) > 0.0
     return (
         "## From which starts\n\nShare of the starts (by length, over all sides, up to the arm's end):\n\n"

@@ -183,6 +183,13 @@ def test_nothing_stays(tmp_path):
     assert "no start was found to stay on the arm" in text
     assert "100 % inward" in text
     assert "This analysis cannot tell" in text
+    assert "of the states of a long orbit" not in text  # there was none
+
+
+def test_what_is_not_settled_is_said():
+    text = page(ls.analyse("paper-initial", 20), {})
+    assert "**Not settled:**" in text
+    assert "ended where their cells say" in page(analysed("paper-designed"), {})
 
 
 def test_bands_tell_which_sides_occur_where():
