@@ -184,21 +184,6 @@ def test_what_passes_once_closes_only_where_the_noise_brings_it_back():
     assert not closed(box, path, lambda x, side: (x > 20.0) & (side != 2)).states
 
 
-def test_two_basins_are_searched_for_what_attracts_in_the_other():
-    """A violation in one of two components refutes, whichever the search begins in (tests/proofs/test_goals.py)."""
-    from tests.proofs.test_goals import TWO_FIXED, part_of
-
-    scene = part_of(TWO_FIXED, {"oriented_beyond": {"x": "5 in", "side": 1}})
-    fixed = {side: float(ls.orbit(scene.map, x, side, 2000).x[-1]) for side, x in ((1, 9.18), (2, 8.9))}
-    for wanted, other in ((1, 2), (2, 1)):
-        goal = {"oriented_beyond": {"x": "5 in", "side": wanted}}
-        (claim,) = ls.certify(part_of(TWO_FIXED, goal), ["goal"]).claims
-        assert (claim.verdict, claim.starts) == ("refuted", "almost-every")
-        (side,) = {state.side for state in claim.counterexample}
-        assert side == other
-        assert claim.counterexample[0].lo <= fixed[other] <= claim.counterexample[0].hi
-
-
 def test_attracts_all_is_refuted_by_a_start_that_leaves_without_any_noise():
     """With h = -3 in every start leaves (docs/model.md)."""
     scene = scene_of(WIDE, arm={"surface_height": "-3 in", "length": "28 in"})
