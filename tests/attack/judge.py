@@ -1,0 +1,498 @@
+"""Each verdict about a scene against orbits: what is proved must hold on thousands, what is refuted must replay.
+
+A verdict is read from the JSON of `limitsets certify --json`, the cells of a `proved-on-cells` from the certificate's
+arrays. Orbits, digits, units and geometry are the code of this folder.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import json
+import tomllib
+import zipfile
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from mpmath import mp, mpf
+
+from limitsets.cli import main
+from tests.attack import digits
+from tests.attack import facts as model
+from tests.attack.generate import Case
+from tests.attack.throws import Orbits, changes
+
+ORBITS = 10_000
+
+
+@dataclass
+class Verdict:
+    """What was asked and answered, and where orbits say otherwise."""
+
+    case: Case
+    claims: list[dict[str, Any]] = field(default_factory=list)
+    recheck: dict[str, Any] = field(default_factory=dict)
+    faults: list[str] = field(default_factory=list)
+    doubts: list[str] = field(default_factory=list)
+
+    def fault(self, text: str) -> None:
+        self.faults.append(text)
+
+
+def command(*words: str) -> tuple[int, str, str]:
+    """The command line, within this process."""
+    out, err = io.StringIO(), io.StringIO()
+    with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
+        code = main(words)
+    return code, out.getvalue(), err.getvalue()
+
+
+def ask(case: Case, folder: Path, claims: tuple[str, ...]) -> tuple[int, list[dict[str, Any]], Path, str]:
+    """Certify a scene; exit code, claims, certificate, what went to stderr."""
+    scene, file = folder / "attacked.toml", folder / "attacked.proof.zip"
+    scene.write_text(case.text)
+    for old in folder.glob("attacked.proof*"):
+        old.unlink()
+    words = [word for claim in claims for word in ("--claim", claim)]
+    words += [word for name, by in case.noise.items() for word in ("--noise", f"{name}={by}")]
+    words += [word for name, by in case.tolerance.items() for word in ("--tolerance", f"{name}={by}")]
+    code, out, err = command("certify", str(scene), *words, "--json", "-o", str(file))
+    return code, json.loads(out) if out else [], file, err
+
+
+@dataclass(frozen=True)
+class Range:
+    """A scene within a tolerance, with its noise."""
+
+    facts: model.Facts
+    lo: float
+    hi: float
+    e: float
+
+    @property
+    def noisy(self) -> bool:
+        return self.hi > self.lo or self.e > 0
+
+
+def ranges(case: Case, rng: Any) -> list[Range]:
+    """The scene; with a tolerance its two ends, the middle and one in between."""
+    scene = tomllib.loads(case.text)
+    found = [scene]
+    for quantity, by in case.tolerance.items():
+        share = model.si(by)
+        shifts = [mpf(1), 1 - share, 1 + share, 1 + share * mpf(float(rng.uniform(-1, 1)))]
+        found = [model.moved(scene, quantity, mp.nstr(shift, 40)) for shift in shifts]
+    every = []
+    for each in found:
+        facts = model.read(each)
+        lo, hi = model.kappas(facts, scene, case.noise)
+        every.append(Range(facts, float(lo), float(hi), float(model.landing(facts, case.noise))))
+    return every
+
+
+def starts(facts: model.Facts, rng: Any, count: int) -> tuple[Any, Any, int]:
+    """Starts on the arm: first those spread evenly (their number is returned), then near joint and critical points."""
+    numbers = facts.floats()
+    a, arm = numbers[0], numbers[6]
+    even = int(0.8 * count)
+    i = rng.choice(a.size, count, p=np.maximum(arm - a, 0) / np.maximum(arm - a, 0).sum())
+    x = a[i] + (arm - a[i]) * (1 - rng.random(count))
+    near = np.arange(count) >= even
+    joint = near & (rng.random(count) < 0.3)
+    x[joint] = (a[i] + (arm - a[i]) * 10 ** rng.uniform(-7, 0, count))[joint]
+    for side in range(a.size):
+        places = np.append(changes(numbers, side), arm)
+        mine = near & ~joint & (i == side)
+        off = rng.choice((-1, 1), count) * 10 ** rng.uniform(-11, -1.5, count) * (arm - a[side])
+        x[mine] = np.clip(rng.choice(places, count) + off, np.nextafter(a[side], arm), arm)[mine]
+    return x, i, even
+
+
+def wrong(goal: dict[str, Any], facts: model.Facts, orbits: Orbits, throws: int) -> Any:
+    """Which orbits, from what was seen of them in this many throws, do not what the goal asks."""
+    unit = model.UNITS[facts.unit]
+    kind = next(key for key in goal if key != "from_anywhere")
+    left = orbits.code < 0
+    if kind == "oriented_beyond":
+        x, side = float(model.si(goal[kind]["x"]) / unit), goal[kind]["side"]
+        most = np.delete(orbits.most, side, axis=1).max(axis=1)
+        return left | (most > x * (1 + 1e-12))
+    if kind == "reaches":
+        x, side = float(model.si(goal[kind]["x"]) / unit), goal[kind]["side"]
+        return orbits.most[:, side] < x * (1 - 1e-12)
+    if kind == "flip_order":
+        order, n = goal[kind], len(facts.a)
+        if len(order) == 1:
+            others = np.delete(orbits.most, order[0], axis=1).max(axis=1)
+            return left | (others > -np.inf)
+        if len(order) != n or any((order[k - 1] + 1) % n != order[k] for k in range(n)):
+            return np.ones_like(left)
+        return left | (orbits.longest >= throws)
+    return left
+
+
+def creeping(facts: model.Facts, orbits: Orbits) -> Any:
+    """Which orbits are at the joint, or have crept to it as near as floats tell."""
+    numbers = facts.floats()
+    near = orbits.x - numbers[0][orbits.i] < 1e-5 * numbers[6]
+    return near & (facts.h > 0) & (orbits.code != -2)
+
+
+def sequence(rng: Any, within: Range, throws: int, style: int) -> tuple[Any, Any]:
+    """Noise of many throws, the same for all orbits: at random, at the ends, or an end kept for some throws."""
+    if style == 0:
+        return rng.uniform(within.lo, within.hi, throws), within.e * rng.uniform(-1, 1, throws)
+    signs = rng.choice((-1, 1), (2, throws))
+    if style == 2:
+        signs = np.repeat(rng.choice((-1, 1), (2, throws // 20 + 1)), 20, axis=1)[:, :throws]
+    if style == 3:
+        signs = np.full((2, throws), 1) * rng.choice((-1, 1), (2, 1))
+    return np.where(signs[0] > 0, within.hi, within.lo), within.e * signs[1]
+
+
+def move(orbits: Orbits, within: Range, throws: int, rng: Any, style: int) -> None:
+    """Throw on; style -1 is without noise, 4 chooses it for each orbit."""
+    if not within.noisy or style < 0:
+        orbits.fly(throws)
+    elif style == 4:
+        sides = orbits.numbers[0].size
+        weights = rng.normal(0, 1, (orbits.x.size, sides + 3)) * rng.choice((0, 1, 5), (orbits.x.size, sides + 3))
+        orbits.chase(throws, within.lo, within.hi, within.e, weights, int(rng.integers(1 << 31)))
+    else:
+        orbits.fly(throws, *sequence(rng, within, throws, style))
+
+
+def settle(goal: dict[str, Any], within: Range, x: Any, i: Any, rng: Any, style: int, least: int) -> Any:
+    """Which starts' orbits go on violating the goal however long one waits, and how each ended.
+
+    All orbits are watched in windows; those that did wrong in the last one are watched again in a longer one, up to
+    some ten thousand throws after as many: what is only on its way has time to arrive.
+    """
+    anywhere = goal.get("from_anywhere", False)
+    orbits = Orbits(within.facts.floats(), x, i)
+    bad = np.arange(orbits.x.size)
+    code, at, side = np.zeros(orbits.x.size, dtype=int), orbits.x.copy(), orbits.i.copy()
+    many = style == 4
+    windows = (300, 600) if many else (500, 1000, 4000, 16000)
+    for window in windows:
+        window = max(window, least)
+        if not anywhere:
+            move(orbits, within, window, rng, style)
+        if not anywhere or "reaches" not in goal:
+            orbits.look()
+        move(orbits, within, window, rng, style)
+        code[bad], at[bad], side[bad] = orbits.code, orbits.x, orbits.i
+        still = wrong(goal, within.facts, orbits, window)
+        bad = bad[still]
+        if not bad.size:
+            break
+        final = anywhere and "reaches" not in goal and "flip_order" not in goal
+        if final:
+            break
+        orbits = orbits.only(still) if not anywhere else _kept(orbits, still)
+    return bad, code, at, side
+
+
+def _kept(orbits: Orbits, which: Any) -> Orbits:
+    """The same orbits with what was seen of them."""
+    found = orbits.only(which)
+    found.most, found.least = orbits.most[which].copy(), orbits.least[which].copy()
+    found.longest = np.zeros_like(found.longest) if False else found.run.copy()
+    return found
+
+
+def cells_of(file: Path) -> list[tuple[Any, list[Any]]]:
+    """Per box the ranks and the borders of the cells of each side, from a certificate."""
+    with zipfile.ZipFile(file) as whole:
+        header = json.loads(whole.read("header.json"))
+        arrays = np.load(io.BytesIO(whole.read("arrays.npz")))
+        found = []
+        for box in header["boxes"]:
+            prefix = box["prefix"]
+            sides = [arrays[f"{prefix}edges.{k}"] for k in range(sum(f"{prefix}edges." in key for key in arrays))]
+            found.append((arrays[f"{prefix}rank"], sides))
+    return found
+
+
+def claimed(claim: dict[str, Any], file: Path, x: Any, i: Any) -> Any:
+    """Which starts a verdict speaks of."""
+    of = claim.get("starts")
+    if isinstance(of, dict):
+        first = np.full(int(i.max()) + 1, np.inf)
+        for side, value in of["from"].items():
+            if int(side) < first.size:
+                first[int(side)] = float.fromhex(value) if isinstance(value, str) else float(value)
+        return x > first[i]
+    if of == "cells":
+        allowed = np.ones(x.size, dtype=bool)
+        for rank, sides in cells_of(file):
+            base = 0
+            for side, borders in enumerate(sides):
+                mine = i == side
+                k = np.searchsorted(borders, x) - 1
+                inside = (k >= 0) & (k < borders.size - 1) & (x > borders[0]) & (x < borders[-1])
+                k = np.clip(k, 0, borders.size - 2)
+                allowed[mine] &= (inside & (rank[base + k] >= 0))[mine]
+                base += borders.size - 1
+        return allowed
+    return np.ones(x.size, dtype=bool)
+
+
+def shown(facts: model.Facts, x: Any, i: Any, k: Any) -> str:
+    return ", ".join(f"({float(x[j])!r} {facts.unit}, side {int(i[j])})" for j in k[:3])
+
+
+def proved_goal(found: Verdict, claim: dict[str, Any], within: list[Range], file: Path, rng: Any, count: int) -> None:
+    """No start that the verdict speaks of may go on violating the goal."""
+    goal = tomllib.loads(found.case.text)["goal"]
+    section = claim.get("section") or {}
+    thinned = claim.get("starts") in (None, "almost-every") or "thinning" in section
+    least = min(int(section.get("throws") or 0) + 1, 20_000)
+    least = max(least, min(int(section.get("jogs") or 0) + 2, 20_000))
+    for which, each in enumerate(within):
+        x, i, even = starts(each.facts, rng, count // len(within))
+        spoken = claimed(claim, file, x, i)
+        if claim["verdict"] == "proved" and claim.get("starts") == "every" and not spoken.all():
+            found.fault("every start, but not all")
+        styles = ([0, 1, 2, 3] if thinned else [0, 2, 4]) if each.noisy else [-1]
+        style = int(rng.choice(styles))
+        for now in {style, styles[-1]}:
+            bad, code, at, side = settle(goal, each, x, i, rng, now, least)
+            really = bad[spoken[bad]]
+            if really.size:
+                where = shown(each.facts, x, i, really)
+                ends = shown(each.facts, at, side, really)
+                found.fault(
+                    f"goal {claim['verdict']} of {claim.get('starts')}: {really.size} of {spoken.sum()} starts go on violating"
+                    f" it (variant {which}, noise {now}), e.g. {where} -> {ends}, codes {sorted(set(code[really].tolist()))}"
+                )
+            if now == 4:
+                continue
+            shares(found, claim, each, bad, code, at, side, even)
+
+
+def shares(found: Verdict, claim: dict[str, Any], within: Range, bad: Any, code: Any, at: Any, side: Any, even: int) -> None:
+    """The shares that are claimed against those of evenly spread starts."""
+    room = 4 * np.sqrt(0.25 / even) + 1e-3
+    good = 1 - (bad < even).sum() / even
+    left = (code[:even] < 0).mean()
+    said = {key: claim.get(key) for key in ("share", "leaves", "creeps", "open")}
+    if said["share"] is not None and said["share"] > good + room:
+        found.fault(f"share {said['share']} of starts is claimed, {good:.4f} of the samples hold it")
+    if said["leaves"] is not None and said["leaves"] > left + room:
+        found.fault(f"leaves {said['leaves']} is claimed, {left:.4f} of the samples leave")
+    if said["creeps"]:
+        numbers = within.facts.floats()
+        near = (at - numbers[0][side] < 0.2 * (numbers[6] - numbers[0][side]))[:even].mean()
+        if within.facts.h <= 0 or said["creeps"] > near + room:
+            found.fault(f"creeps {said['creeps']} is claimed, {near:.4f} of the samples end near the joint")
+    if all(isinstance(said[key], (int, float)) for key in ("share", "leaves", "open")):
+        total = said["share"] + said["leaves"] + (said["creeps"] or 0) + said["open"]
+        if not 1 - 1e-9 <= total <= 1 + 0.02:
+            found.doubts.append(f"shares add up to {total}")
+        if claim["verdict"] == "proved" and claim["starts"] in ("every", "almost-every") and said["share"] < 1 - 1e-9:
+            found.fault(f"proved of {claim['starts']} start with a share of {said['share']}")
+
+
+def attraction(found: Verdict, claim: dict[str, Any], within: list[Range], rng: Any, count: int) -> None:
+    """Every start has to come into the extents, as fast as it is said, and stay."""
+    extents = claim["extents"]
+    for which, each in enumerate(within):
+        numbers = each.facts.floats()
+        sides = numbers[0].size
+        pieces = max([1, *(len(parts) for parts in extents.values())])
+        ends = np.full((sides, pieces, 2), np.nan)
+        for key, parts in extents.items():
+            for k, (lo, hi) in enumerate(parts):
+                ends[int(key), k] = lo[0], hi[1]
+        x, i, _ = starts(each.facts, rng, count // len(within))
+        points = claim.get("jog_fixed_points")
+        beyond = np.ones(x.size, dtype=bool)
+        if points:
+            beyond = x > np.array([points[str(k)][1] for k in range(sides)])[i]
+            below = x < np.array([points[str(k)][0] for k in range(sides)])[i]
+            creep = Orbits(numbers, x[below], i[below])
+            move(creep, each, 2000, rng, 0 if each.noisy else -1)
+            far = (creep.i != i[below]) | (creep.code == -2) | (creep.x > x[below])
+            if far.any():
+                found.fault(f"attracts-all: starts below R* do not creep: {shown(each.facts, x[below], i[below], np.flatnonzero(far))}")
+        of = claim.get("starts")
+        if isinstance(of, dict):
+            beyond &= claimed(claim, Path(), x, i)
+        bound = claim.get("max_throws")
+        sharp = np.zeros(x.size, dtype=bool)
+        if bound:
+            sharp = beyond & (x >= np.array([bound["beyond"][str(k)] for k in range(sides)])[i])
+        style = 4 if each.noisy and of in (None, "every") else (0 if each.noisy else -1)
+        orbits = Orbits(numbers, x, i, ends)
+        window = int(min(bound["throws"], 3000)) if bound else 2000
+        move(orbits, each, window, rng, style)
+        if bound and window == bound["throws"]:
+            out = sharp & (orbits.code < 0)
+            late = sharp & ~out & ~_inside(orbits, ends)
+            if out.any() or late.any():
+                found.fault(f"attracts-all: not in the extents after {window} throws (variant {which}, noise {style}): {shown(each.facts, x, i, np.flatnonzero(out | late))}")
+        every = np.arange(x.size)[beyond]
+        orbits = orbits.only(beyond)
+        for _ in range(3):
+            move(orbits, each, 4 * window, rng, style)
+            orbits.look()
+            move(orbits, each, 300, rng, style)
+            bad = (orbits.code < 0) | (orbits.last_out >= 0)
+            every, orbits = every[bad], orbits.only(bad)
+            if not every.size:
+                break
+        if every.size:
+            found.fault(f"attracts-all {claim['verdict']}: {every.size} starts leave or stay outside (variant {which}, noise {style}): {shown(each.facts, x, i, every)} -> {shown(each.facts, orbits.x, orbits.i, np.arange(every.size))}")
+
+
+def _inside(orbits: Orbits, ends: Any) -> Any:
+    own = ends[orbits.i]
+    return ((own[:, :, 0] <= orbits.x[:, None]) & (orbits.x[:, None] <= own[:, :, 1])).any(axis=1)
+
+
+def thrown(case: Case, state: dict[str, Any]) -> tuple[model.Facts, mpf]:
+    """The scene that a state of a counterexample is thrown in, and the shift of its landing."""
+    scene = tomllib.loads(case.text)
+    said = state["parameters"] or {}
+    for name, value in said.items():
+        if name in ("throw.kappa", "landing.x", "gravity.tilt"):
+            continue
+        if name == "throw.speed" and "kappa" in scene["throw"]:
+            continue
+        pair = [value, value] if isinstance(value, str) else value
+        number = [mpf(each.split()[0]) for each in pair]
+        scene = model.moved(scene, name, to=f"{mp.nstr((number[0] + number[1]) / 2, 45)} {pair[0].split()[1]}")
+    facts = model.read(scene)
+    if "throw.kappa" in said:
+        stated = model.si(said["throw.kappa"]) / model.UNITS[facts.unit]
+        if abs(stated / facts.kappa - 1) > mpf("1e-14"):
+            facts = facts.with_kappa(stated)
+    shift = model.si(said["landing.x"]) / model.UNITS[facts.unit] if "landing.x" in said else mpf(0)
+    return facts, shift
+
+
+def refuted(found: Verdict, claim: dict[str, Any], within: list[Range]) -> None:
+    """The counterexample replays at 50 digits, throw by throw and from its start, within the noise, and shows it."""
+    states = claim["counterexample"]
+    case = found.case
+    if not states:
+        if "component" not in (claim.get("reason") or ""):
+            found.doubts.append(f"{claim['claim']} refuted without an orbit: {claim.get('reason')}")
+        return
+    arm = within[0].facts.arm
+    lo, hi, e = min(w.lo for w in within), max(w.hi for w in within), within[0].e
+    last: tuple[mpf, int, int] | None = None
+    x, i = mpf(states[0]["x"]), states[0]["side"]
+    chained = True
+    for k, state in enumerate(states):
+        if not isinstance(state.get("x"), (int, float)):
+            found.fault(f"{claim['claim']}: state {k} of the counterexample has no place")
+            return
+        w = mpf(state["between"][1]) - mpf(state["between"][0])
+        if state["side"] != i or not mpf(state["between"][0]) - arm * mpf("1e-13") <= x <= mpf(state["between"][1]) + arm * mpf("1e-13"):
+            chained = False
+        if last is not None:
+            step = abs(last[0] - mpf(state["x"]))
+            before = mpf(states[k - 1]["between"][1]) - mpf(states[k - 1]["between"][0])
+            if last[1] != state["side"] or step > w + 100 * before + arm * mpf("1e-10"):
+                found.fault(f"{claim['claim']} refuted: throw {k} of the counterexample lands at {mp.nstr(last[0], 20)} on side {last[1]}, not {state['x']} on {state['side']}")
+                return
+        if k == len(states) - 1 and state["parameters"] is None:
+            break
+        facts, shift = thrown(case, state)
+        if not lo * (1 - 1e-13) <= facts.kappa <= hi * (1 + 1e-13) or abs(shift) > e * (1 + 1e-13):
+            found.fault(f"{claim['claim']} refuted: throw {k} is outside the noise: kappa {mp.nstr(facts.kappa, 17)} in [{lo}, {hi}], landing {mp.nstr(shift, 10)}")
+            return
+        last = digits.throw(facts, mpf(state["x"]), state["side"], shift)
+        if chained:
+            x, i, _ = digits.throw(facts, x, i, shift)
+    if not chained:
+        found.doubts.append(f"{claim['claim']} refuted: from its start the orbit leaves its enclosures")
+    shows(found, claim, states, last, within[0].facts)
+
+
+def shows(found: Verdict, claim: dict[str, Any], states: list[dict[str, Any]], last: Any, facts: model.Facts) -> None:
+    """A replayed orbit has to violate what it refutes, and to recur where the goal speaks of what recurs."""
+    goal = tomllib.loads(found.case.text).get("goal", {})
+    kind = "attracts_all" if claim["claim"] == "attracts-all" else next(key for key in goal if key != "from_anywhere")
+    end = states[-1]
+    leaves = last is not None and last[2] < 0
+    unit = model.UNITS[facts.unit]
+    if leaves:
+        return
+    closes = any(
+        each["side"] == end["side"] and abs(each["x"] - end["x"]) < 1e-6 * float(facts.arm) for each in states[:-1]
+    )
+    if kind in ("attracts_all", "stays_on_arm"):
+        found.fault(f"{claim['claim']} refuted: the orbit does not leave the arm")
+    elif kind == "oriented_beyond":
+        x, side = float(model.si(goal[kind]["x"]) / unit), goal[kind]["side"]
+        seen = [s for s in states[1 if goal.get("from_anywhere") else 0 :] if s["side"] != side and s["between"][0] > x]
+        if not seen:
+            found.fault("goal refuted: no state of the orbit violates it")
+    elif kind == "reaches":
+        x, side = float(model.si(goal[kind]["x"]) / unit), goal[kind]["side"]
+        if any(s["side"] == side and s["between"][1] >= x for s in states):
+            found.fault("goal refuted: the orbit reaches the place")
+    if not goal.get("from_anywhere") and not closes:
+        found.fault(f"goal refuted of {claim.get('starts')}: the orbit neither leaves nor returns ({len(states)} states)")
+
+
+def contradictory(first: dict[str, Any], second: dict[str, Any]) -> bool:
+    """Whether one is proved of a set of starts of which the other is refuted."""
+    if {first["verdict"], second["verdict"]} != {"proved", "refuted"}:
+        return False
+    yes, no = (first, second) if first["verdict"] == "proved" else (second, first)
+    strength = {"every": 2, "almost-every": 1, None: 0}
+    return strength.get(yes.get("starts") if isinstance(yes.get("starts"), str) else None, 0) >= strength.get(no.get("starts"), 1)
+
+
+def judge(case: Case, folder: Path, count: int = ORBITS, recheck: bool = True) -> Verdict:
+    """Certify, recheck, and look."""
+    found = Verdict(case)
+    rng = np.random.default_rng([11, case.seed])
+    code, found.claims, file, err = ask(case, folder, case.claims)
+    if not found.claims:
+        found.fault(f"certify: exit {code}, no JSON: {err.strip().splitlines()[-1:]}")
+        return found
+    proved = all(claim["verdict"] == "proved" for claim in found.claims)
+    if (code == 0) != proved:
+        found.fault(f"exit {code} with {[claim['verdict'] for claim in found.claims]}")
+    for denied in folder.glob("*denied*"):
+        found.fault(f"the checker denied {denied.name}: {[c.get('reason') for c in found.claims]}")
+        denied.unlink()
+    if recheck and file.exists():
+        checked, out, err = command("recheck", str(file), "--json")
+        found.recheck = json.loads(out) if out else {}
+        said = found.recheck.get("verdict")
+        kept = {claim["verdict"] for claim in found.claims} & {"proved", "proved-on-cells"}
+        wanted = ("proved-on-cells",) if "proved-on-cells" in kept else ("proved",)
+        wanted += ("refuted",) if not kept else ()
+        if said not in wanted or (checked == 0) != (said == "proved"):
+            found.fault(f"recheck: exit {checked}, {said!r}: {found.recheck.get('reason')} {err.strip()[-300:]}")
+    within = ranges(case, rng)
+    for claim in found.claims:
+        if claim["verdict"] == "refuted":
+            refuted(found, claim, within)
+        elif claim["claim"] == "goal" and claim["verdict"] in ("proved", "proved-on-cells"):
+            proved_goal(found, claim, within, file, rng, count)
+        elif claim["claim"] == "attracts-all" and claim["verdict"] == "proved":
+            attraction(found, claim, within, rng, count)
+    again(found, folder)
+    return found
+
+
+def again(found: Verdict, folder: Path) -> None:
+    """Asked together with other claims, and so on other cells, the goal must not have the opposite verdict."""
+    case = found.case
+    if case.seed % 4:
+        return
+    other = ("goal",) if len(case.claims) > 1 else ("attracts-all", "invariant", "goal")
+    _, claims, _, _ = ask(case, folder, other)
+    for claim in found.claims:
+        for second in claims:
+            if claim["claim"] == second["claim"] and contradictory(claim, second):
+                found.fault(f"{claim['claim']} {claim['verdict']} of {claim.get('starts')}, and {second['verdict']} of {second.get('starts')}")
