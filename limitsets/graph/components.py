@@ -143,19 +143,22 @@ def _reach(r: Ranges, label: Any, order: Any, marks: Any) -> None:
 
 
 @kernel(entry=True)
-def _ranks(r: Ranges, label: Any, order: Any, size: Any, recurrent: Any, rank: Any) -> None:
-    for cell in order:
-        if recurrent[label[cell]]:
-            rank[cell] = 0
-    for cell in order:
-        highest = -1
-        for box in range(r.first[cell], r.first[cell + 1]):
-            for row in range(box_rows(r, box)):
-                begin = row_start(r, box, row)
-                for target in range(begin, begin + r.run[box]):
-                    highest = max(highest, rank[target])
-        if not recurrent[label[cell]]:
-            rank[cell] = highest + 1
+def _ranks(r: Ranges, label: Any, order: Any, settled: Any, rank: Any) -> None:
+    i = 0
+    while i < order.size:
+        c, j, highest = label[order[i]], i, -1
+        while j < order.size and label[order[j]] == c:
+            cell = order[j]
+            for box in range(r.first[cell], r.first[cell + 1]):
+                for row in range(box_rows(r, box)):
+                    begin = row_start(r, box, row)
+                    for target in range(begin, begin + r.run[box]):
+                        if label[target] != c:
+                            highest = max(highest, rank[target])
+            j += 1
+        for k in range(i, j):
+            rank[order[k]] = 0 if settled[c] else highest + 1
+        i = j
 
 
 @kernel(entry=True)
@@ -220,15 +223,29 @@ def reach(r: Ranges, components: Components, marks: NDArray[Any]) -> NDArray[Any
     return spread
 
 
-def ranks(r: Ranges, components: Components) -> NDArray[np.int32]:
-    """Longest path from each cell to a recurrent one: 0 on recurrent cells, falling strictly along edges elsewhere.
+def ranks(r: Ranges, components: Components, settled: NDArray[np.bool_]) -> NDArray[np.int32]:
+    """Longest path from each component to a settled one, counted in components.
 
-    Only where every recurrent component attracts is this a bound on the steps to an attractor.
+    Parameters
+    ----------
+    r : Ranges
+        The graph.
+    components : Components
+        Its strong components.
+    settled : ndarray of bool, shape (count,)
+        Components whose cells have rank 0.
+
+    Returns
+    -------
+    ndarray of int32, shape (n_cells,)
+        The same on all cells of a component, and falling strictly along edges from one component to another, but for
+        those that are settled.  Where every recurrent component is settled the rank bounds the steps until an orbit is
+        in one.
     """
     if wide.is_wide(r):
-        return wide.ranks(r, components.order, components.recurrent[components.label])
+        return wide.ranks(r, components.label, components.order, settled)
     rank = np.zeros(r.first.size - 1, dtype=np.int32)
-    _ranks(r, components.label, components.order, components.size, components.recurrent, rank)
+    _ranks(r, components.label, components.order, settled, rank)
     return rank
 
 

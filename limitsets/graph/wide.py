@@ -212,36 +212,43 @@ def reach(r: Ranges, label: NDArray[np.int32], order: NDArray[np.int32], marks: 
 
 
 @kernel(entry=True)
-def _ranks(r: Ranges, leaf: int, order: Any, recurrent: Any, tree: Any) -> None:
-    for cell in order:
-        highest = np.int32(-1)
-        for box in range(r.first[cell], r.first[cell + 1]):
-            left = leaf + np.int64(r.start[box])
-            right = left + np.int64(r.run[box])
-            while left < right:
-                if left & 1:
-                    highest = max(highest, tree[left])
-                    left += 1
-                if right & 1:
-                    right -= 1
-                    highest = max(highest, tree[right])
-                left >>= 1
-                right >>= 1
-        value = np.int32(0) if recurrent[cell] else np.int32(highest + 1)
-        node = leaf + np.int64(cell)
-        while node > 0 and tree[node] < value:
-            tree[node] = value
-            node >>= 1
-        if recurrent[cell] and tree[leaf + np.int64(cell)] < 0:
-            tree[leaf + np.int64(cell)] = 0
+def _ranks(r: Ranges, leaf: int, label: Any, order: Any, settled: Any, tree: Any) -> None:
+    """Fill the leaves of `tree`, whose nodes have the highest rank below them; -1 where none is known yet."""
+    i = 0
+    while i < order.size:
+        c, j, highest = label[order[i]], i, np.int32(-1)
+        while j < order.size and label[order[j]] == c:  # own cells are not known yet, and count for nothing
+            cell = order[j]
+            for box in range(r.first[cell], r.first[cell + 1]):
+                left = leaf + np.int64(r.start[box])
+                right = left + np.int64(r.run[box])
+                while left < right:
+                    if left & 1:
+                        highest = max(highest, tree[left])
+                        left += 1
+                    if right & 1:
+                        right -= 1
+                        highest = max(highest, tree[right])
+                    left >>= 1
+                    right >>= 1
+            j += 1
+        value = np.int32(0) if settled[c] else np.int32(highest + 1)
+        for k in range(i, j):
+            node: Any = leaf + np.int64(order[k])
+            while node > 0 and tree[node] < value:
+                tree[node] = value
+                node >>= 1
+        i = j
 
 
-def ranks(r: Ranges, order: NDArray[np.int32], recurrent: NDArray[np.bool_]) -> NDArray[np.int32]:
-    """As `components.ranks`; `recurrent` per cell."""
+def ranks(
+    r: Ranges, label: NDArray[np.int32], order: NDArray[np.int32], settled: NDArray[np.bool_]
+) -> NDArray[np.int32]:
+    """As `components.ranks`."""
     n = order.size
     leaf = leaves_of(n)
     tree = np.full(2 * leaf, -1, np.int32)
-    _ranks(r, leaf, order, recurrent, tree)
+    _ranks(r, leaf, label, order, settled, tree)
     return tree[leaf : leaf + n].copy()
 
 

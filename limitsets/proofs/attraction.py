@@ -7,17 +7,19 @@ of the same component only; neither needs the map to be continuous.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from limitsets.cells import CellSet
-from limitsets.graph.components import ranks
 from limitsets.graph.survey import attracting_of
+from limitsets.proofs.basin import ROUNDING, Basin, basin
 from limitsets.proofs.cover import Cover
 from limitsets.proofs.joint import NearJoint, near_joint
 
-__all__ = ["BELOW", "Attraction", "attraction"]
+__all__ = ["BELOW", "Attraction", "attraction", "near_section"]
 
 
 BELOW = "with the arm's surface above the joint, starts nearer to it than the fixed point of the jog go there"
@@ -33,8 +35,6 @@ class Attraction:
         Cells and images.
     component : ndarray of int32, shape (n_cells,)
         Number of the attracting component of each cell, -1 off them.
-    rank : ndarray of int32, shape (n_cells,)
-        Throws after which a start in the cell is in attracting cells, at most.
     joint : tuple of NearJoint
         The starts below the cells.
     proved : bool
@@ -47,7 +47,6 @@ class Attraction:
 
     cover: Cover
     component: NDArray[np.int32]
-    rank: NDArray[np.int32]
     joint: tuple[NearJoint, ...]
     proved: bool
     reason: str
@@ -63,10 +62,25 @@ class Attraction:
         """What is missing for every start on the arm, those next to the joint included; empty if nothing."""
         return self.reason or (BELOW if self.cover.points else "")
 
+    @cached_property
+    def basin(self) -> Basin:
+        """The starts that are proved to come to the attracting cells."""
+        return basin(self.cover, self.component, self.joint)
+
+    @property
+    def shares(self) -> dict[str, float]:
+        """Shares of the arm where only the starts in the attracting cells are claimed."""
+        lo, hi = self.cover.box.bare
+        total = float((hi.arm_length - lo.a).sum())
+        inside = sum(high - low for parts in self.cells.extents().values() for low, high in parts) / total
+        share = max(0.0, inside - ROUNDING)
+        others = self.basin.leaves + self.basin.creeps
+        return self.basin.shares | {"share": share, "open": max(0.0, 1.0 - share - others) + ROUNDING}
+
     @property
     def max_rank(self) -> int:
-        """Throws after which every start in the cells is in attracting ones, at most."""
-        return int(self.rank.max())
+        """Throws after which every start in the cells is in attracting ones, at most, where attraction is proved."""
+        return int(self.basin.rank.max())
 
 
 def attraction(found: Cover) -> Attraction:
@@ -94,7 +108,6 @@ def attraction(found: Cover) -> Attraction:
     return Attraction(
         found,
         component,
-        ranks(graph.ranges, parts),
         joint,
         *_verdict(found, component, unresolved, joint),
         unresolved,
@@ -105,24 +118,18 @@ def _verdict(
     found: Cover, component: NDArray[np.int32], unresolved: CellSet, joint: tuple[NearJoint, ...]
 ) -> tuple[bool, str]:
     """Whether attraction is proved, and the first thing that is missing."""
-
-    def place(cell: int) -> str:
-        side = int(found.grid.side_of(cell))
-        lo, hi = found.grid.boxes([cell], side)
-        return f"side {side}, x in [{lo[0, 0]:.6g}, {hi[0, 0]:.6g}]"
-
     lost = np.concatenate([images.lost for images in found.images])
     if lost.any():
-        return False, f"nothing is proved of the image of {place(int(np.flatnonzero(lost)[0]))}"
+        return False, f"nothing is proved of the image of {found.place(int(np.flatnonzero(lost)[0]))}"
     if found.box.landing > 0.0:
         return False, f"near the joint: {joint[0].reason}"
     leaving = np.flatnonzero(found.graph.ranges.exits)
     if leaving.size:
-        return False, f"the image of {place(int(leaving[0]))} may leave the cells"
+        return False, f"the image of {found.place(int(leaving[0]))} may leave the cells"
     if len(unresolved):
         return (
             False,
-            f"{len(unresolved)} recurrent cells do not attract: first {place(unresolved.numbers()[0])}",
+            f"{len(unresolved)} recurrent cells do not attract: first {found.place(unresolved.numbers()[0])}",
         )
     if not (component >= 0).any():
         return False, "there are no attracting cells"
@@ -130,3 +137,13 @@ def _verdict(
         if not near.proved:
             return False, f"near the joint on side {side}: {near.reason}"
     return True, ""
+
+
+def near_section(found: Attraction) -> dict[str, dict[str, Any]]:
+    """What a recheck needs of the starts below the cells: by side the factor, and the bracket of a fixed point."""
+    section: dict[str, dict[str, Any]] = {}
+    for side, near in enumerate(found.joint):
+        section[str(side)] = {"q": near.q.hex()}
+        if near.fixed_point is not None:
+            section[str(side)]["fixed_point"] = [end.hex() for end in near.fixed_point]
+    return section

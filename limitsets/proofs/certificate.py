@@ -21,12 +21,12 @@ from numpy.typing import NDArray
 
 from limitsets.files import replaced
 from limitsets.proofs.attraction import Attraction
-from limitsets.proofs.cover import Cover
+from limitsets.proofs.cover import Cover, targets
 from limitsets.thrower import Energy, Exact, Signed, SmallAngle, SmallAngle2
 
-__all__ = ["FORMAT", "VERSION", "arrays_of", "everywhere", "targets", "write"]
+__all__ = ["FORMAT", "VERSION", "arrays_of", "write"]
 
-FORMAT, VERSION = "limitsets-proof", 1
+FORMAT, VERSION = "limitsets-proof", 2
 
 # Brackets of the impact are widened by this share of the angle, so that another arithmetic can confirm them.
 SLACK = 2.0**-34
@@ -45,33 +45,6 @@ FORMULAS = [
 ]
 
 
-def everywhere(found: Cover) -> list[NDArray[np.int32]]:
-    """First and last target cells, as `targets`, of every branch and every number of sides that it turns."""
-    sides = found.grid.sides
-    keys = {((to - side) % sides, of) for side, images in enumerate(found.images) for to, of in images.hulls}
-    return [targets(found, branch, turned) for turned, branch in sorted(keys)]
-
-
-def targets(found: Cover, branch: int, turned: int | None = None) -> NDArray[np.int32]:
-    """First and last target cell of one branch, -1 -1 where it is impossible.
-
-    A branch that leads to several sides is asked for with the number of sides it turns.
-    """
-    grid = found.grid
-    out = np.full((grid.n_cells, 2), -1, dtype=np.int32)
-    for side, images in enumerate(found.images):
-        for (to, of_branch), (lo, hi) in images.hulls.items():
-            if of_branch != branch or (turned is not None and (to - side) % grid.sides != turned):
-                continue
-            edges = grid.edges[to][0]
-            some = lo <= hi
-            first = np.clip(np.searchsorted(edges, lo[some], side="right") - 1, 0, edges.size - 2)
-            last = np.clip(np.searchsorted(edges, hi[some], side="left") - 1, 0, edges.size - 2)
-            rows = grid.offset[side] + np.flatnonzero(some)
-            out[rows] = np.stack([first, last], axis=1) + grid.offset[to]
-    return out
-
-
 def arrays_of(proof: Attraction, prefix: str) -> dict[str, NDArray[Any]]:
     """Arrays of one box of parameters."""
     found = proof.cover
@@ -83,7 +56,7 @@ def arrays_of(proof: Attraction, prefix: str) -> dict[str, NDArray[Any]]:
         "jog": jog,
         "flip": flip,
         "branch": np.where(jogs & flips, 2, np.where(flips, 1, 0)).astype(np.int8),
-        "rank": proof.rank.astype(np.int32),
+        "rank": proof.basin.rank,
         "component": proof.component,
         "phi": np.stack([phi[:, 0] - slack[:, 0], phi[:, 1] + slack[:, 1]], axis=1),
     }

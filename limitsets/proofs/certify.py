@@ -14,7 +14,7 @@ from typing import Any
 from limitsets.errors import AnswerError
 from limitsets.proofs.asked import State, ask, borders
 from limitsets.proofs.asked.starts import leaving
-from limitsets.proofs.attraction import Attraction, attraction
+from limitsets.proofs.attraction import Attraction, attraction, near_section
 from limitsets.proofs.certificate import write
 from limitsets.proofs.cover import cover
 from limitsets.proofs.end_points import proved_ends
@@ -36,6 +36,9 @@ LADDER = (2048, 8192, 32768, 131072)
 # Pieces into which a tolerance may be cut, and cells that may be tried on them, before it is given up.
 MOST_PIECES, MOST_CELLS = 1024, 4_000_000
 
+# For which starts a goal holds: the fewer the later.
+STARTS = ("every", "almost-every", "from", "cells")
+
 Progress = Callable[[str, int, int], None]
 
 
@@ -48,17 +51,25 @@ class Claim:
     claim : str
         A word of `CLAIMS`.
     verdict : str
-        "proved", "refuted" or "undecided".
+        "proved", "refuted" or "undecided"; of a goal also "proved-on-cells", for the starts in some cells only.
     reason : str
         Why it is not proved: what is missing and where; empty if it is.
     section : dict
-        What a recheck needs, empty if it is not proved.
+        What a recheck needs, empty if nothing is proved.
     counterexample : tuple of State
         An orbit that refutes it, empty if none was found.
     fixed : dict of str to list of str
         The counterexample's values of what is fixed but unknown, as pairs of texts.
     final : bool
         Whether finer cells cannot change the verdict.
+    starts : str, dict or None
+        Of a goal that is proved, for which starts: "every", "almost-every", ``{"from": {"0": x}}`` or "cells"; of one that
+        is refuted, of which starts it is not true.  None for other claims.
+    shares : dict of str to float
+        Of a goal that is proved: shares of the arm for whose starts it is (`share`), whose starts are proved to leave
+        (`leaves`) or to creep to the joint (`creeps`), and of whose starts nothing is proved (`open`).
+    note : str
+        What a reader of a proved goal should know, empty if nothing.
     """
 
     claim: str
@@ -68,6 +79,14 @@ class Claim:
     counterexample: tuple[State, ...] = ()
     fixed: dict[str, list[str]] = field(default_factory=dict)
     final: bool = False
+    starts: Any = None
+    shares: dict[str, float] = field(default_factory=dict)
+    note: str = ""
+
+    @property
+    def written(self) -> bool:
+        """Whether a certificate may hold it."""
+        return self.verdict in ("proved", "proved-on-cells")
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,7 +158,7 @@ class Proof:
         good = [
             {"claim": claim.claim, "section": claim.section}
             for claim in self.claims
-            if claim.verdict == "proved"
+            if claim.written
         ]
         if not good:
             raise AnswerError(
@@ -169,12 +188,8 @@ def _attracts_all(found: Attraction, scene: Scene) -> Claim:
             verdict = "refuted" if orbit else "undecided"
             return Claim("attracts-all", verdict, found.reason, {}, orbit, final=noisy or bool(orbit))
         return _not_attracted(found, scene)
-    joint: dict[str, dict[str, Any]] = {}
-    for side, near in enumerate(found.joint):
-        joint[str(side)] = {"q": near.q.hex()}
-        if near.fixed_point is not None:
-            joint[str(side)]["fixed_point"] = [end.hex() for end in near.fixed_point]
-    return Claim("attracts-all", "proved", "", {"near_joint": joint, "max_rank": found.max_rank})
+    section = {"near_joint": near_section(found), "max_rank": found.max_rank}
+    return Claim("attracts-all", "proved", "", section)
 
 
 def _not_attracted(found: Attraction, scene: Scene) -> Claim:
@@ -231,6 +246,9 @@ def _goal(found: Attraction, scene: Scene) -> Claim:
         dict(answer.section),
         answer.counterexample,
         final=answer.final,
+        starts=answer.starts,
+        shares=dict(answer.shares),
+        note=answer.note,
     )
 
 
@@ -352,8 +370,8 @@ def certify(
     --------
     >>> import limitsets as ls
     >>> proof = ls.certify("paper-designed")
-    >>> [(claim.claim, claim.verdict) for claim in proof.claims]
-    [('attracts-all', 'proved'), ('goal', 'proved')]
+    >>> [(claim.claim, claim.verdict, claim.starts) for claim in proof.claims]
+    [('attracts-all', 'proved', None), ('goal', 'proved', 'every')]
     """
     asked = scene if isinstance(scene, Scene) else load(scene)
     wanted = _chosen(asked, claims)
@@ -383,7 +401,7 @@ def _attempt(
             progress(f"{cells} cells a side", step, len(ladder))
         found = attraction(cover(box, cells, cuts))
         answers = tuple(PROVERS[word](found, scene) for word in wanted)
-        if all(answer.verdict != "undecided" or answer.final for answer in answers):
+        if all(answer.verdict in ("proved", "refuted") or answer.final for answer in answers):
             break
     return found, answers
 
@@ -431,7 +449,7 @@ def _halved(
         box = parameter_box(scene, tree=part.tree(), noise=noise)
         one, answers = _attempt(scene, wanted, box, (cells,), None)
         tried += one.cover.grid.n_cells
-        missing = tuple(answer for answer in answers if answer.verdict != "proved")
+        missing = tuple(each for each in answers if not (each.written and (each.final or each.verdict == "proved")))
         refuted = tuple(replace(each, fixed=part.texts()) for each in missing if each.verdict == "refuted")
         if (
             noise
@@ -458,22 +476,38 @@ def _halved(
 
 
 def weakest_of(claims: Sequence[Claim]) -> Claim:
-    """Join one claim, proved on every piece: with the weakest of the numbers."""
+    """Join one claim, proved on every piece: with the weakest of the numbers, and for the fewest starts."""
     sections = [claim.section for claim in claims]
     section = dict(sections[0])
-    if "max_rank" in section:
-        section["max_rank"] = max(other["max_rank"] for other in sections)
-        section["near_joint"] = {
-            side: _weakest([other["near_joint"][side] for other in sections])
-            for side in section["near_joint"]
-        }
-    for count in ("throws", "jogs"):
+    near = [other["near_joint"] for other in sections if "near_joint" in other]
+    section.pop("near_joint", None)
+    if len(near) == len(sections):
+        section["near_joint"] = {side: _weakest([other[side] for other in near]) for side in near[0]}
+    for count in ("max_rank", "throws", "jogs", "thinning"):
         counts = [other[count] for other in sections if count in other]
         if counts:
             section[count] = max(counts)
     if "least_slope" in section:
         section["least_slope"] = min((other["least_slope"] for other in sections), key=float.fromhex)
-    return Claim(claims[0].claim, "proved", "", section)
+    if claims[0].starts is None:
+        return Claim(claims[0].claim, "proved", "", section)
+    weakest = max(claims, key=lambda claim: STARTS.index(claim.starts if isinstance(claim.starts, str) else "from"))
+    starts = weakest.starts
+    section.pop("lost", None)
+    if isinstance(starts, dict):
+        given = [claim.starts["from"] for claim in claims if isinstance(claim.starts, dict)]
+        starts = {"from": {side: max(each[side] for each in given) for side in given[0]}}
+        section["starts"] = {"from": {side: x.hex() for side, x in starts["from"].items()}}
+        lost = [other["lost"] for other in sections if "lost" in other]
+        if len(lost) == len(given) and lost:
+            section["lost"] = {side: min((each[side] for each in lost), key=float.fromhex) for side in lost[0]}
+    else:
+        section["starts"] = starts
+    least, most = {"share": min, "leaves": min, "creeps": min, "open": max}, [claim.shares for claim in claims]
+    shares = {key: pick(each[key] for each in most) for key, pick in least.items()}
+    notes = {claim.note for claim in claims}
+    note = notes.pop() if len(notes) == 1 else ""
+    return replace(weakest, section=section, counterexample=(), starts=starts, shares=shares, note=note)
 
 
 def _weakest(near: Sequence[dict[str, Any]]) -> dict[str, Any]:

@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 
 from limitsets.proofs.attraction import Attraction
 from limitsets.proofs.by_angle import FLIP, JOG, Formulas, Numbers, OneSide, angle, variable
-from limitsets.proofs.certificate import targets
+from limitsets.proofs.cover import targets
 from limitsets.proofs.intervals import Intervals
 from limitsets.proofs.parameters import ParameterBox, body_at, lengths_of
 from limitsets.scene import Scene

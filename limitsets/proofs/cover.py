@@ -23,7 +23,7 @@ from limitsets.maps import kind_of
 from limitsets.proofs.fixed_point import FixedPoint, fixed_points
 from limitsets.proofs.parameters import ParameterBox
 
-__all__ = ["Cover", "cover"]
+__all__ = ["Cover", "cover", "everywhere", "targets"]
 
 # Share of a side's extent that is left to the argument near the joint.
 NEAREST = 1e-6
@@ -59,6 +59,12 @@ class Cover:
     images: tuple[Enclosures, ...]
     graph: TransitionGraph
     points: tuple[FixedPoint, ...]
+
+    def place(self, cell: int) -> str:
+        """Name a cell for people."""
+        side = int(self.grid.side_of(cell))
+        lo, hi = self.grid.boxes([cell], side)
+        return f"side {side}, x in [{lo[0, 0]:.6g}, {hi[0, 0]:.6g}]"
 
 
 def _widened(found: Enclosures, edges: NDArray[np.float64], landing: float) -> Enclosures:
@@ -139,3 +145,30 @@ def _graph(box: ParameterBox, cells: Grid, found: Sequence[Enclosures]) -> Trans
             leaving[cells.of_side(side)] |= np.where(beyond, outward, 0).astype(np.uint8)
     ranges = build(cells, first, joined[0], joined[1], joined[2], leaving)
     return TransitionGraph(box.lo, cells, ranges, "boxes")
+
+
+def everywhere(found: Cover) -> list[NDArray[np.int32]]:
+    """First and last target cells, as `targets`, of every branch and every number of sides that it turns."""
+    sides = found.grid.sides
+    keys = {((to - side) % sides, of) for side, images in enumerate(found.images) for to, of in images.hulls}
+    return [targets(found, branch, turned) for turned, branch in sorted(keys)]
+
+
+def targets(found: Cover, branch: int, turned: int | None = None) -> NDArray[np.int32]:
+    """First and last target cell of one branch, -1 -1 where it is impossible.
+
+    A branch that leads to several sides is asked for with the number of sides it turns.
+    """
+    grid = found.grid
+    out = np.full((grid.n_cells, 2), -1, dtype=np.int32)
+    for side, images in enumerate(found.images):
+        for (to, of_branch), (lo, hi) in images.hulls.items():
+            if of_branch != branch or (turned is not None and (to - side) % grid.sides != turned):
+                continue
+            edges = grid.edges[to][0]
+            some = lo <= hi
+            first = np.clip(np.searchsorted(edges, lo[some], side="right") - 1, 0, edges.size - 2)
+            last = np.clip(np.searchsorted(edges, hi[some], side="left") - 1, 0, edges.size - 2)
+            rows = grid.offset[side] + np.flatnonzero(some)
+            out[rows] = np.stack([first, last], axis=1) + grid.offset[to]
+    return out

@@ -31,7 +31,7 @@ from limitsets.thrower.impact_box import decide_box, displacement_box, strike_bo
 from limitsets.thrower.motion_box import gather_full_box
 from limitsets.thrower.side_box import gather_box
 
-__all__ = ["NearJoint", "near_joint"]
+__all__ = ["SCATTERED", "NearJoint", "near_joint"]
 
 # q - 1 is lowered by this share, so that other arithmetic can confirm it where the parameters are wide.
 SLACK_OF_Q = 2.0**-26
@@ -159,7 +159,7 @@ def near_joint(found: Cover) -> tuple[NearJoint, ...]:
         q = 1.0 + (float(out[5]) - 1.0) * (1.0 - SLACK_OF_Q)
         good = [*(out[:5] > 0.0), q > 1.0]
         reason = "" if all(good) else REASONS[good.index(False)]
-        if found.box.landing > 0.0:
+        if found.box.landing > 0.0 and not reason:
             reason = SCATTERED
         rises, x, reach = bool(out[7] > 0.0), float(edges[0]), float(out[6])
         rolls = False
@@ -198,4 +198,5 @@ def _beyond(found: Cover, side: int, x: float) -> NearJoint:
         return NearJoint(x, np.nan, np.inf, False, False, point.reason)
     q, reason = leaves(found.box, side, point, x)
     reason = SCATTERED_BEYOND if found.box.landing > 0.0 else reason
-    return NearJoint(x, q, np.inf, False, not reason, reason, (point.lo, point.hi))
+    # R' grows with R there, by a factor of q at least
+    return NearJoint(x, q, np.inf, not reason, not reason, reason, (point.lo, point.hi))

@@ -1,6 +1,7 @@
 """The scene's goal, asked of what is proved: one file per kind of goal, and one line here.
 
-A file gives a `Kind`: how the goal is proved or refuted, how a proved one reads, and the borders that the cells need.
+A file gives a `Kind`: how the goal is proved of the attracting cells, how it is refuted, how a proved one reads, and the
+borders that the cells need.  For which starts it is proved is added here, for all kinds alike, from the proved basin.
 `limitsets/goals/ask.py` reads the same goals off samples; what each means is said there and in docs/certificates.md.
 """
 
@@ -12,11 +13,17 @@ from typing import Any
 from limitsets.goals import Goal
 from limitsets.proofs.asked import attracts_all, flip_order, oriented_beyond, predicate, reaches, stays_on_arm
 from limitsets.proofs.asked.kind import Answer, Kind
+from limitsets.proofs.asked.reaches import not_null
 from limitsets.proofs.asked.search import State
-from limitsets.proofs.attraction import Attraction
+from limitsets.proofs.attraction import Attraction, near_section
 from limitsets.scene import Scene
 
 __all__ = ["Answer", "State", "ask", "borders", "prove", "sentence"]
+
+# A goal of whose starts so small a share is open, while others leave, is not asked again with finer cells.
+LITTLE = 1e-3
+
+WHOLE = {"share": 1.0, "leaves": 0.0, "creeps": 0.0, "open": 0.0}
 
 KINDS: dict[str, Kind] = {
     "attracts_all": attracts_all.KIND,
@@ -28,23 +35,8 @@ KINDS: dict[str, Kind] = {
 }
 
 
-def ask(found: Attraction, scene: Scene, goal: Goal) -> Answer:
-    """Prove or refute a goal.
-
-    Parameters
-    ----------
-    found : Attraction
-        What is proved of where starts end.
-    scene : Scene
-        The scene.
-    goal : Goal
-        Its goal.
-    """
-    return KINDS[goal.kind].ask(found, scene, goal)
-
-
 def prove(found: Attraction, scene: Scene, goal: Goal) -> Answer:
-    """Prove a goal, or say what is missing; what refutes it is not searched for where that would take longer.
+    """Prove a goal, and say for which starts; or say what is missing.
 
     Parameters
     ----------
@@ -54,9 +46,60 @@ def prove(found: Attraction, scene: Scene, goal: Goal) -> Answer:
         The scene.
     goal : Goal
         What is asked.
+
+    Returns
+    -------
+    Answer
+        "proved" for every start, almost every start, or the starts from some x on; "proved-on-cells" where the goal is
+        proved for the starts in some cells only; else "undecided".
     """
     kind = KINDS[goal.kind]
-    return (kind.prove or kind.ask)(found, scene, goal)
+    answer = kind.prove(found, scene, goal)
+    if answer.verdict != "proved":
+        return answer
+    if goal.from_anywhere and goal.kind != "attracts_all":  # of every start, as its kind proves it
+        section = {**answer.section, "starts": "every"}
+        return answer._replace(section=section, starts="every", shares=WHOLE)
+    return _for_starts(found, answer, almost=kind.almost(goal))
+
+
+def ask(found: Attraction, scene: Scene, goal: Goal) -> Answer:
+    """Prove a goal, as `prove`; where it is not proved, search for what refutes it."""
+    answer = prove(found, scene, goal)
+    if answer.verdict == "proved":
+        return answer
+    against = KINDS[goal.kind].refute(found, scene, goal)
+    if against.verdict == "refuted":
+        return against._replace(reason=against.reason or answer.reason)
+    return answer
+
+
+def _for_starts(found: Attraction, answer: Answer, *, almost: bool) -> Answer:
+    """Say for which starts a goal holds that is proved of the attracting cells."""
+    basin, starts = found.basin, found.basin.starts
+    shares, missing = basin.shares, basin.missing
+    if almost:
+        starts = "almost-every" if starts == "every" else starts
+        flat = not_null(found) if starts != "cells" else ""
+        if starts == "cells" or flat:
+            starts, missing = "cells", missing or flat
+            shares = found.shares
+    section: dict[str, Any] = {**answer.section, "starts": starts}
+    if isinstance(starts, dict):
+        section["starts"] = {"from": {side: x.hex() for side, x in starts["from"].items()}}
+        if found.cover.box.landing > 0.0:
+            section["lost"] = {str(side): float(x).hex() for side, x in enumerate(basin.explained)}
+    if basin.thinning:
+        section["thinning"] = basin.thinning
+    if basin.near:
+        section["near_joint"] = near_section(found)
+    if starts != "cells":
+        return answer._replace(section=section, starts=starts, shares=shares)
+    # finer cells do not bring back starts that leave
+    final = basin.leaves > 0.0 and basin.open < LITTLE
+    return answer._replace(
+        verdict="proved-on-cells", reason=missing, section=section, starts=starts, shares=shares, final=final
+    )
 
 
 def borders(goal: Goal | None) -> Sequence[float]:
@@ -66,4 +109,16 @@ def borders(goal: Goal | None) -> Sequence[float]:
 
 def sentence(section: Mapping[str, Any]) -> str:
     """Put a proved goal in words for people, from its section of the certificate."""
-    return KINDS[section["kind"]].sentence(section)
+    said = KINDS[section["kind"]].sentence(section)
+    starts = section.get("starts")
+    if section.get("from_anywhere") or starts is None:
+        return said
+    if starts == "every":
+        return f"{said} Every start on the arm comes to the attracting cells."
+    if starts == "almost-every":
+        return f"{said} Every start on the arm comes to the attracting cells, but for starts of total length zero."
+    if starts == "cells":
+        return f"{said} Only some starts are proved to come to the attracting cells."
+    beyond = ", ".join(f"x > {float.fromhex(x):.6g} on side {side}" for side, x in starts["from"].items())
+    but = ", but for starts of total length zero" if "thinning" in section else ""
+    return f"{said} Every start with {beyond} comes to the attracting cells{but}."

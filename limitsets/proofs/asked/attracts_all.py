@@ -1,12 +1,15 @@
-"""One attracting component takes every start on the arm."""
+"""One attracting component takes every start."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from typing import Any
 
+import numpy as np
+
 from limitsets.goals import AttractsAll
-from limitsets.proofs.asked.kind import Answer, Kind, undecided
+from limitsets.proofs.asked.kind import Answer, Kind, common, undecided
+from limitsets.proofs.asked.search import State
 from limitsets.proofs.asked.starts import leaving
 from limitsets.proofs.attraction import Attraction
 from limitsets.scene import Scene
@@ -14,19 +17,36 @@ from limitsets.scene import Scene
 __all__ = ["KIND"]
 
 
-def _ask(found: Attraction, _: Scene, goal: AttractsAll) -> Answer:
+TWO_BASINS = "starts nearer to the joint than the fixed point of the jog tend to the joint: there are two basins"
+
+
+def _prove(found: Attraction, _: Scene, goal: AttractsAll) -> Answer:
     several = int(found.component.max(initial=-1)) + 1
     if several > 1:  # each is mapped into itself, however fine the cells are
         reason = f"{several} attracting components are each mapped into themselves: none takes every start"
         return undecided(reason, final=True)
-    if found.missing:
-        orbit = leaving(found)
-        return Answer("refuted" if orbit else "undecided", found.missing, {}, orbit)
+    missing = common(found, anywhere=False)
+    if missing:
+        return undecided(missing)
+    starts = found.basin.starts
+    if found.basin.creeps:
+        return undecided(TWO_BASINS, final=True)
+    if starts == "cells" or (goal.from_anywhere and starts != "every"):
+        return undecided(found.missing)
     return Answer("proved", "", {"kind": goal.kind})
 
 
+def _refute(found: Attraction, _: Scene, __: AttractsAll) -> Answer:
+    if found.basin.creeps:
+        side = int(np.argmax([point.lo for point in found.cover.points]))
+        x = 0.5 * (float(found.cover.box.bare[1].a[side]) + found.cover.points[side].lo)
+        return Answer("refuted", TWO_BASINS, {}, (State(x, x, side, None),), starts="almost-every")
+    orbit = leaving(found)
+    return Answer("refuted" if orbit else "undecided", found.missing, {}, orbit, starts="every" if orbit else None)
+
+
 def _sentence(_: Mapping[str, Any]) -> str:
-    return "From every position on the arm and every side, a part comes into the one component of attracting cells."
+    return "The attracting cells are one component."
 
 
-KIND = Kind(_ask, _sentence, lambda _: ())
+KIND = Kind(_prove, _refute, _sentence, lambda _: ())

@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 from limitsets.goals import FlipOrder
 from limitsets.maps import codes, orbit
 from limitsets.proofs.asked.cycling import cycle_that
-from limitsets.proofs.asked.kind import Answer, Kind, common, peeled, place, undecided
+from limitsets.proofs.asked.kind import Answer, Kind, common, peeled, undecided
 from limitsets.proofs.asked.search import Choice, Path, State, replayed, settled
 from limitsets.proofs.attraction import Attraction
-from limitsets.proofs.certificate import targets
+from limitsets.proofs.cover import targets
 from limitsets.scene import Scene
 
 __all__ = ["KIND"]
@@ -26,9 +26,10 @@ __all__ = ["KIND"]
 # Throws of the orbit in which a flip against the order is looked for, and how many of the last are shown.
 THROWS, SHOWN = 10_000, 20
 
+AGAINST = "a flip leads from each side to the one that is next in number, and the last one's to side 0"
 
-def _ask(found: Attraction, scene: Scene, goal: FlipOrder) -> Answer:
-    sides = found.cover.grid.sides
+
+def _prove(found: Attraction, _: Scene, goal: FlipOrder) -> Answer:
     missing = common(found, anywhere=False)
     if missing:
         return undecided(missing)
@@ -38,10 +39,8 @@ def _ask(found: Attraction, scene: Scene, goal: FlipOrder) -> Answer:
         here[found.cover.grid.of_side(goal.order[0])] = True
         if not (inside & ~here).any():
             return Answer("proved", "", {"kind": goal.kind, "order": list(goal.order), "jogs": 0})
-    if not _is_cycle(goal.order, sides):
-        against = _against(found, goal.order)
-        reason = "a flip leads from each side to the one that is next in number, and the last one's to side 0"
-        return Answer("refuted" if against else "undecided", reason, {}, against, True)
+    if not _is_cycle(goal.order, found.cover.grid.sides):
+        return undecided(AGAINST, final=True)
     if goal.from_anywhere and found.missing:
         return undecided(found.missing, final=found.cover.box.landing > 0.0)
     if any((ends[inside, 0] >= 0).any() for ends in _rolls(found)):
@@ -50,11 +49,19 @@ def _ask(found: Attraction, scene: Scene, goal: FlipOrder) -> Answer:
         )
     visits, left = peeled(found, inside, np.zeros_like(inside), (0,))
     if left.size:
-        stays = cycle_that(found, scene, lambda cycle: not cycle.branches.any())
-        reason = f"orbits may jog for ever on {place(found, int(left[0]))}"
-        return Answer("refuted" if stays else "undecided", reason, {}, stays)
+        return undecided(f"orbits may jog for ever on {found.cover.place(int(left[0]))}")
     section = {"kind": goal.kind, "order": list(goal.order), "jogs": max(visits - 1, 0)}
     return Answer("proved", "", section | ({"from_anywhere": True} if goal.from_anywhere else {}))
+
+
+def _refute(found: Attraction, scene: Scene, goal: FlipOrder) -> Answer:
+    if common(found, anywhere=False):
+        return undecided(common(found, anywhere=False))
+    if not _is_cycle(goal.order, found.cover.grid.sides):
+        reason, orbit = AGAINST, _against(found, goal.order)
+    else:
+        reason, orbit = "", cycle_that(found, scene, lambda cycle: not cycle.branches.any())
+    return Answer("refuted" if orbit else "undecided", reason, {}, orbit, starts="every" if orbit else None)
 
 
 def _rolls(found: Attraction) -> list[NDArray[np.int32]]:
@@ -95,4 +102,4 @@ def _sentence(section: Mapping[str, Any]) -> str:
     return f"{where}, parts come to lie on sides {order} in turn, again and again; {jogs}."
 
 
-KIND = Kind(_ask, _sentence, lambda _: ())
+KIND = Kind(_prove, _refute, _sentence, lambda _: ())

@@ -17,10 +17,10 @@ from numpy.typing import NDArray
 
 from limitsets.proofs.asked.search import State
 from limitsets.proofs.attraction import BELOW, Attraction
-from limitsets.proofs.certificate import everywhere, targets
+from limitsets.proofs.cover import everywhere, targets
 from limitsets.scene import Scene
 
-__all__ = ["Answer", "Kind", "above", "below", "common", "peeled", "place", "thrown_into", "undecided"]
+__all__ = ["Answer", "Kind", "above", "below", "common", "peeled", "thrown_into", "undecided"]
 
 Mask = NDArray[np.bool_]
 
@@ -33,6 +33,9 @@ class Answer(NamedTuple):
     section: Mapping[str, Any] = {}
     counterexample: tuple[State, ...] = ()
     final: bool = False
+    starts: Any = None
+    shares: Mapping[str, float] = {}
+    note: str = ""
 
 
 class Kind(NamedTuple):
@@ -40,20 +43,24 @@ class Kind(NamedTuple):
 
     Attributes
     ----------
-    ask : callable
-        From an `Attraction`, the scene and the goal to an `Answer`.
+    prove : callable
+        From an `Attraction`, the scene and the goal to an `Answer`, proved or undecided: of the attracting cells, or of
+        every start where the goal says `from_anywhere`.
+    refute : callable
+        As `prove`, to an `Answer` that is refuted or undecided.
     sentence : callable
-        From the section of a proved goal to a sentence.
+        From the section of a proved goal to a sentence about the attracting cells, or about every start.
     borders : callable
         From the goal to the borders of cells that it needs.
-    prove : callable or None
-        As `ask` without the search for what refutes, where that takes longer than the proof; None where it is `ask`.
+    almost : callable
+        From the goal to whether it speaks of almost every orbit only.
     """
 
-    ask: Callable[[Attraction, Scene, Any], Answer]
+    prove: Callable[[Attraction, Scene, Any], Answer]
+    refute: Callable[[Attraction, Scene, Any], Answer]
     sentence: Callable[[Mapping[str, Any]], str]
     borders: Callable[[Any], Sequence[float]]
-    prove: Callable[[Attraction, Scene, Any], Answer] | None = None
+    almost: Callable[[Any], bool] = lambda _: False
 
 
 def undecided(reason: str, *, final: bool = False) -> Answer:
@@ -71,14 +78,7 @@ def common(found: Attraction, *, anywhere: bool) -> str:
         if not near.proved:
             return f"near the joint on side {side}: {near.reason}"
     leaving = np.flatnonzero(found.cover.graph.ranges.exits)
-    return f"the image of {place(found, int(leaving[0]))} may leave the cells" if leaving.size else ""
-
-
-def place(found: Attraction, cell: int) -> str:
-    """Name a cell."""
-    side = int(found.cover.grid.side_of(cell))
-    lo, hi = found.cover.grid.boxes([cell], side)
-    return f"side {side}, x in [{lo[0, 0]:.6g}, {hi[0, 0]:.6g}]"
+    return f"the image of {found.cover.place(int(leaving[0]))} may leave the cells" if leaving.size else ""
 
 
 def thrown_into(found: Attraction, bad: Mask) -> str:
@@ -88,7 +88,7 @@ def thrown_into(found: Attraction, bad: Mask) -> str:
         cells = np.flatnonzero(ends[:, 0] >= 0)
         hit = cells[number[ends[cells, 1] + 1] > number[ends[cells, 0]]]
         if hit.size:
-            return place(found, int(hit[0]))
+            return found.cover.place(int(hit[0]))
     return ""
 
 

@@ -44,7 +44,10 @@ def _prove(found: Attraction, scene: Scene, goal: OrientedBeyond) -> Answer:
             reason, more = "", {"throws": 2}
     if reason:
         return undecided(reason)
-    return Answer("proved", "", section_of(goal, scene) | more)
+    ends = max(hi for parts in found.cells.extents().values() for _, hi in parts)
+    vacuous = f"the attracting cells end at x = {ends:.6g}, before x = {goal.x:g}: the goal asks nothing of them"
+    note = vacuous if ends <= goal.x and not goal.from_anywhere else ""
+    return Answer("proved", "", section_of(goal, scene) | more, note=note)
 
 
 def section_of(goal: OrientedBeyond, scene: Scene) -> dict[str, Any]:
@@ -53,21 +56,17 @@ def section_of(goal: OrientedBeyond, scene: Scene) -> dict[str, Any]:
     return section | ({"from_anywhere": True} if goal.from_anywhere else {})
 
 
-def _ask(found: Attraction, scene: Scene, goal: OrientedBeyond) -> Answer:
+def _refute(found: Attraction, scene: Scene, goal: OrientedBeyond) -> Answer:
     def wrong(x: Any, side: Any) -> Any:
         return (x > goal.x) & (side != goal.side)
 
-    answer = _prove(found, scene, goal)
-    if answer.verdict == "proved":
-        return answer
-    reason = answer.reason
+    reason = ""
     if goal.from_anywhere:
-        thrown = _thrown_there(found, goal, _exceptions(found, goal))
-        orbit = one_throw(found, wrong) if thrown else ()
-        reason = thrown if orbit else reason
+        reason = _thrown_there(found, goal, _exceptions(found, goal))
+        orbit = one_throw(found, wrong) if reason else ()
     else:
         orbit = from_attracting(found, wrong) if not common(found, anywhere=False) else ()
-    return Answer("refuted" if orbit else "undecided", reason, {}, orbit)
+    return Answer("refuted" if orbit else "undecided", reason, {}, orbit, starts="every" if orbit else None)
 
 
 def _thrown_there(found: Attraction, goal: OrientedBeyond, bad: NDArray[np.bool_]) -> str:
@@ -90,4 +89,4 @@ def _sentence(section: Mapping[str, Any]) -> str:
     return f"In the attracting cells, every part {beyond}"
 
 
-KIND = Kind(_ask, _sentence, lambda goal: [below(goal.x)], _prove)
+KIND = Kind(_prove, _refute, _sentence, lambda goal: [below(goal.x)])

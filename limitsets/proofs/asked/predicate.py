@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from limitsets.errors import AnswerError
 from limitsets.goals import Predicate
-from limitsets.proofs.asked.kind import Answer, Kind, common, place, thrown_into, undecided
+from limitsets.proofs.asked.kind import Answer, Kind, common, thrown_into, undecided
 from limitsets.proofs.asked.search import State, from_attracting
 from limitsets.proofs.asked.starts import one_throw
 from limitsets.proofs.attraction import Attraction
@@ -45,7 +45,7 @@ def _missing(found: Attraction, goal: Predicate) -> str:
     bad = _bad_cells(found, goal)
     if not goal.from_anywhere:
         wrong = np.flatnonzero(bad & (found.component >= 0))
-        return f"{goal.name}: not on {place(found, int(wrong[0]))}" if wrong.size else ""
+        return f"{goal.name}: not on {found.cover.place(int(wrong[0]))}" if wrong.size else ""
     start = thrown_into(found, bad)
     if start:
         return f"{goal.name}: not where a throw from {start} may land"
@@ -63,7 +63,7 @@ def _prove(found: Attraction, _: Scene, goal: Predicate) -> Answer:
     return undecided(reason) if reason else Answer("proved", "", {"kind": goal.kind, "name": goal.name})
 
 
-def _ask(found: Attraction, scene: Scene, goal: Predicate) -> Answer:
+def _refute(found: Attraction, _: Scene, goal: Predicate) -> Answer:
     def wrong(x: Any, side: Any) -> NDArray[np.bool_]:
         bad = np.zeros(x.shape, dtype=bool)
         for s in np.unique(side).tolist():
@@ -71,16 +71,13 @@ def _ask(found: Attraction, scene: Scene, goal: Predicate) -> Answer:
             bad[mine] = ~_good(goal, x[mine], x[mine], s)
         return bad
 
-    answer = _prove(found, scene, goal)
-    if answer.verdict == "proved":
-        return answer
     if goal.from_anywhere:
         orbit = one_throw(found, wrong)
     else:
         orbit = from_attracting(found, wrong) if not common(found, anywhere=False) else ()
     if orbit and _throughout(goal, orbit[-1]):
-        return Answer("refuted", answer.reason, {}, orbit)
-    return answer
+        return Answer("refuted", "", {}, orbit, starts="every")
+    return undecided("")
 
 
 def _throughout(goal: Predicate, last: State) -> bool:
@@ -92,4 +89,4 @@ def _sentence(section: Mapping[str, Any]) -> str:
     return f"In the attracting cells: {section['name']}, as its code says."
 
 
-KIND = Kind(_ask, _sentence, lambda goal: goal.cuts, _prove)
+KIND = Kind(_prove, _refute, _sentence, lambda goal: goal.cuts)

@@ -10,15 +10,15 @@ import numpy as np
 from limitsets.cells import CellSet
 from limitsets.goals import Reaches
 from limitsets.proofs.asked.cycling import cycle_that
-from limitsets.proofs.asked.kind import Answer, Kind, Mask, above, common, peeled, place, undecided
+from limitsets.proofs.asked.kind import Answer, Kind, Mask, above, common, peeled, undecided
 from limitsets.proofs.asked.search import State, long_orbit, replayed
-from limitsets.proofs.asked.thinning import thinned
 from limitsets.proofs.attraction import Attraction
 from limitsets.proofs.expansion import slopes
 from limitsets.proofs.orbits import ProvedCycle
+from limitsets.proofs.thinning import thinned
 from limitsets.scene import Scene
 
-__all__ = ["KIND"]
+__all__ = ["KIND", "not_null"]
 
 # Throws of the orbit that is shown of a component that does not get there.
 SHOWN = 20
@@ -32,18 +32,20 @@ def _wanted(found: Attraction, goal: Reaches) -> Mask:
     return wanted
 
 
-def _ask(found: Attraction, scene: Scene, goal: Reaches) -> Answer:
-    answer = _prove(found, scene, goal)
-    if answer.verdict != "undecided" or common(found, anywhere=False):
-        return answer
+def _refute(found: Attraction, scene: Scene, goal: Reaches) -> Answer:
+    if common(found, anywhere=False):
+        return undecided(common(found, anywhere=False))
+    short = _falls_short(found, goal)
+    if short is not None:
+        return short
     quiet = not found.cover.box.noise  # throws that differ may carry a part away from what attracts
+    never: tuple[State, ...] = ()
     if goal.every_orbit:
         never = cycle_that(found, scene, lambda cycle: not _arrives(cycle, goal))
-    elif quiet and not (_not_null(found) if goal.from_anywhere else ""):
+    elif quiet and not (not_null(found) if goal.from_anywhere else ""):
         never = cycle_that(found, scene, lambda cycle: cycle.attracts and not _arrives(cycle, goal))
-    else:
-        never = ()
-    return answer._replace(verdict="refuted", counterexample=never) if never else answer
+    of = "every" if goal.every_orbit else "almost-every"
+    return Answer("refuted" if never else "undecided", "", {}, never, starts=of if never else None)
 
 
 def _prove(found: Attraction, scene: Scene, goal: Reaches) -> Answer:
@@ -56,29 +58,28 @@ def _prove(found: Attraction, scene: Scene, goal: Reaches) -> Answer:
         return short
     if goal.every_orbit:
         return _every(found, scene, goal, wanted)
-    missing = _not_null(found) if goal.from_anywhere else ""
+    missing = (found.missing or not_null(found)) if goal.from_anywhere else ""
     if missing:
         return undecided(missing, final=found.cover.box.landing > 0.0)
-    throws, reason = thinned(found, inside, wanted)
+    throws, _, reason = thinned(found.cover, inside & ~wanted)
     if reason:
         return undecided(reason)
     # a little more, so that other arithmetic can confirm it
     return Answer("proved", "", _section(scene, goal, throws + throws // 8 + 1))
 
 
-def _not_null(found: Attraction) -> str:
-    """Say what is missing for this: almost every start on the arm comes to almost every place in the attracting cells.
+def not_null(found: Attraction) -> str:
+    """Say what is missing for this: almost no start of the basin comes to a given set of length zero.
 
     Where the slope is positive, what is thrown to a set of length zero has length zero.
     """
-    if found.missing:
-        return found.missing
+    basin = found.basin
     for side, near in enumerate(found.joint):
-        if not near.rises:
+        if basin.near and not near.rises:
             return f"near the joint on side {side}: the landing is not proved to rise with the start"
-    off = found.component < 0
+    off = (found.component < 0) & (basin.rank >= 0)
     flat = np.flatnonzero(off & ~(slopes(found.cover, CellSet(found.cover.grid, off)) > 0.0))
-    return f"the slope is not proved positive on {place(found, int(flat[0]))}" if flat.size else ""
+    return f"the slope is not proved positive on {found.cover.place(int(flat[0]))}" if flat.size else ""
 
 
 def _every(found: Attraction, scene: Scene, goal: Reaches, wanted: Mask) -> Answer:
@@ -86,7 +87,7 @@ def _every(found: Attraction, scene: Scene, goal: Reaches, wanted: Mask) -> Answ
     cells = np.ones_like(wanted) if goal.from_anywhere else found.component >= 0
     throws, left = peeled(found, cells, wanted)
     if left.size:
-        return undecided(f"an orbit from {place(found, int(left[0]))} may never get there")
+        return undecided(f"an orbit from {found.cover.place(int(left[0]))} may never get there")
     if missing:
         return undecided(missing, final=found.cover.box.landing > 0.0)
     return Answer("proved", "", _section(scene, goal, throws))
@@ -117,8 +118,9 @@ def _falls_short(found: Attraction, goal: Reaches) -> Answer | None:
         mine = found.component == number
         if not (mine & reach).any():
             orbit = _any_orbit(found, np.flatnonzero(mine))
-            reason = f"no orbit in the attracting component of {place(found, int(np.flatnonzero(mine)[0]))} gets there"
-            return Answer("refuted" if orbit else "undecided", reason, {}, orbit)
+            reason = f"no orbit in the attracting component of {found.cover.place(int(np.flatnonzero(mine)[0]))} gets there"
+            # the component has an interior: so many starts never get there
+            return Answer("refuted" if orbit else "undecided", reason, {}, orbit, starts="almost-every")
     return None
 
 
@@ -135,4 +137,4 @@ def _sentence(section: Mapping[str, Any]) -> str:
     return f"From every start {where}, but for starts of total length zero, a part {there}."
 
 
-KIND = Kind(_ask, _sentence, lambda goal: [above(goal.x)], _prove)
+KIND = Kind(_prove, _refute, _sentence, lambda goal: [above(goal.x)], lambda goal: not goal.every_orbit)

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from limitsets.goals import StaysOnArm
-from limitsets.proofs.asked.kind import Answer, Kind, common
+from limitsets.proofs.asked.kind import Answer, Kind, common, undecided
 from limitsets.proofs.asked.starts import leaving
 from limitsets.proofs.attraction import Attraction
 from limitsets.scene import Scene
@@ -14,13 +14,16 @@ from limitsets.scene import Scene
 __all__ = ["KIND"]
 
 
-def _ask(found: Attraction, _: Scene, goal: StaysOnArm) -> Answer:
+def _prove(found: Attraction, _: Scene, goal: StaysOnArm) -> Answer:
     missing = common(found, anywhere=goal.from_anywhere)
     if missing:
-        # of attracting cells nothing can leave: where there are none, the question is whether anything stays
-        orbit = leaving(found) if goal.from_anywhere else ()
-        return Answer("refuted" if orbit else "undecided", missing, {}, orbit)
+        return undecided(missing)
     return Answer("proved", "", {"kind": goal.kind} | ({"from_anywhere": True} if goal.from_anywhere else {}))
+
+
+def _refute(found: Attraction, _: Scene, __: StaysOnArm) -> Answer:
+    orbit = leaving(found)
+    return Answer("refuted" if orbit else "undecided", found.missing, {}, orbit, starts="every" if orbit else None)
 
 
 def _sentence(section: Mapping[str, Any]) -> str:
@@ -29,4 +32,4 @@ def _sentence(section: Mapping[str, Any]) -> str:
     return "No throw leads out of the attracting cells, so none leads off the arm."
 
 
-KIND = Kind(_ask, _sentence, lambda _: ())
+KIND = Kind(_prove, _refute, _sentence, lambda _: ())
