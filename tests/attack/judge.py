@@ -59,7 +59,10 @@ def ask(case: Case, folder: Path, claims: tuple[str, ...]) -> tuple[int, list[di
     words += [word for name, by in case.noise.items() for word in ("--noise", f"{name}={by}")]
     words += [word for name, by in case.tolerance.items() for word in ("--tolerance", f"{name}={by}")]
     code, out, err = command("certify", str(scene), *words, "--json", "-o", str(file))
-    return code, json.loads(out) if out else [], file, err
+    found = json.loads(out) if out else []
+    for claim in found:
+        claim.setdefault("starts", (claim.get("section") or {}).get("starts"))
+    return code, found, file, err
 
 
 @dataclass(frozen=True)
@@ -248,6 +251,9 @@ def proved_goal(found: Verdict, claim: dict[str, Any], within: list[Range], file
     """No start that the verdict speaks of may go on violating the goal."""
     goal = tomllib.loads(found.case.text)["goal"]
     section = claim.get("section") or {}
+    if claim.get("starts") == "cells" and not file.exists():
+        found.doubts.append("proved-on-cells without a certificate: the cells are not known")
+        return
     thinned = claim.get("starts") in (None, "almost-every") or "thinning" in section
     least = min(int(section.get("throws") or 0) + 1, 20_000)
     least = max(least, min(int(section.get("jogs") or 0) + 2, 20_000))
