@@ -21,6 +21,11 @@ __all__ = ["certify"]
 # States of a counterexample that are printed: the start, and the last of them.
 LAST = 8
 
+REFUTED = {
+    "every": "There are starts of which it is not true.",
+    "almost-every": "There are so many starts of which it is not true that they have a length.",
+}
+
 HELP_CLAIM = (
     "What to prove: attracts-all, invariant, trapping, end-points, cycles, expanding or goal; repeatable."
 )
@@ -57,7 +62,7 @@ def certify(
 
         with saved(file) as draft:
             proof = run(chosen, claim or None, noise=varying, tolerance=fixed, progress=tell)
-            written = any(each.verdict == "proved" for each in proof.claims) and not proof.effects
+            written = any(each.written for each in proof.claims) and not proof.effects
             if written:
                 proof.save(draft)
     if json:
@@ -78,13 +83,13 @@ def _text(proof: Proof, file: Path | None) -> None:
     if proof.effects:
         typer.echo(f"with the effects {', '.join(proof.effects)}")
     for claim in proof.claims:
-        typer.echo(f"\n{claim.claim}: {claim.verdict.upper()}")
+        typer.echo(f"\n{claim.claim}: {claim.verdict.upper().replace('-', ' ')}")
         for line in _words(proof, claim):
             typer.echo(f"  {line}")
         if claim.counterexample:
             _orbit(proof, claim)
     typer.echo("")
-    if proof.effects and any(each.verdict == "proved" for each in proof.claims):
+    if proof.effects and any(each.written for each in proof.claims):
         typer.echo("no certificate is written: nothing rechecks maps with effects")
     elif file is None:
         typer.echo("nothing is proved: no certificate is written")
@@ -101,15 +106,14 @@ def _short(text: str) -> str:
 
 def _words(proof: Proof, claim: Claim) -> list[str]:
     """Say a claim in words for people."""
-    if claim.verdict != "proved":
-        return [claim.reason[:1].upper() + claim.reason[1:] + "."]
+    if not claim.written:
+        of = REFUTED.get(claim.starts or "") if claim.verdict == "refuted" else None
+        return [*([of] if of else []), *([_sentence(claim.reason)] if claim.reason else [])]
     scene = proof.scene
     if claim.claim == "attracts-all":
         return _attraction(proof, claim)
     if claim.claim == "goal":
-        from limitsets.proofs.asked import sentence
-
-        return [sentence(claim.section)]
+        return _goal(proof, claim)
     if claim.claim == "expanding":
         slope = float.fromhex(claim.section["least_slope"])
         entropy = "" if proof.noise else f"; topological entropy {_down(math.log(slope), 5)} at least"
@@ -134,6 +138,42 @@ def _words(proof: Proof, claim: Claim) -> list[str]:
     if claim.claim == "trapping":
         return ["The attracting cells are thrown into their interior: small errors do not carry a part out."]
     return ["No throw leads out of the attracting cells."]
+
+
+def _goal(proof: Proof, claim: Claim) -> list[str]:
+    """Say a goal that is proved, for which starts, and what becomes of the others."""
+    from limitsets.proofs.asked import sentence
+
+    shares = claim.shares
+    lines = [sentence(claim.section)]
+    if claim.note:
+        lines.append(_sentence(claim.note))
+    if shares["share"] < 1.0:
+        worst = " under the worst noise" if "landing.x" in proof.noise else ""
+        others = [
+            (f"{_percent(shares['leaves'])} are proved to leave the arm{worst}", shares["leaves"]),
+            (
+                f"{_percent(shares['creeps'])} are proved to creep to the joint, and stay on the arm",
+                shares["creeps"],
+            ),
+            (f"of {_percent(shares['open'])} nothing is proved", shares["open"]),
+        ]
+        told = "; ".join(text for text, share in others if share > 0.0)
+        lines.append(f"These are {_percent(shares['share'])} of all starts on the arm; {told}.")
+    if "starts" in claim.section and proof.noise and "thinning" in claim.section:
+        lines.append("Which starts are excepted may depend on the sequence of the noise.")
+    if claim.verdict != "proved":
+        lines.append(f"Missing for all of them: {claim.reason}.")
+    return lines
+
+
+def _sentence(text: str) -> str:
+    return f"{text[:1].upper()}{text[1:]}."
+
+
+def _percent(share: float) -> str:
+    """Write a share with three digits."""
+    return f"{100.0 * share:.3g} %"
 
 
 def _attraction(proof: Proof, claim: Claim) -> list[str]:

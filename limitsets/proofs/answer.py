@@ -17,7 +17,10 @@ if TYPE_CHECKING:
     from limitsets.proofs.attraction import Attraction
     from limitsets.proofs.certify import Claim, Proof
 
-__all__ = ["jog_fixed_points", "max_throws", "outer_extents", "thrown", "to_json", "values"]
+__all__ = ["SHARES", "jog_fixed_points", "max_throws", "outer_extents", "thrown", "to_json", "values"]
+
+
+SHARES = ("share", "leaves", "creeps", "open")
 
 
 def to_json(proof: Proof) -> list[dict[str, Any]]:
@@ -37,11 +40,14 @@ def to_json(proof: Proof) -> list[dict[str, Any]]:
 
 
 def _claim(proof: Proof, claim: Claim) -> dict[str, Any]:
-    proved = claim.verdict == "proved"
+    proved = claim.written
     slope = float.fromhex(claim.section["least_slope"]) if "least_slope" in claim.section else None
     return {
         "claim": claim.claim,
         "verdict": claim.verdict,
+        "starts": claim.starts,
+        **{word: claim.shares.get(word) for word in SHARES},
+        "note": claim.note or None,
         "reason": claim.reason or None,
         "counterexample": [_state(proof, claim, state) for state in claim.counterexample] or None,
         "parameters": dict(values(proof)),

@@ -140,7 +140,7 @@ def _verdict(
 
 
 def near_section(found: Attraction) -> dict[str, dict[str, Any]]:
-    """What a recheck needs of the starts below the cells: by side the factor, and the bracket of a fixed point."""
+    """Write what a recheck needs of the starts below the cells: by side the factor, the bracket of a fixed point."""
     section: dict[str, dict[str, Any]] = {}
     for side, near in enumerate(found.joint):
         section[str(side)] = {"q": near.q.hex()}

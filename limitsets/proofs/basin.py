@@ -24,7 +24,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-import limitsets.interval as iv
 from limitsets.cells import CellSet
 from limitsets.graph.components import ranks, reach
 from limitsets.jit import proof_kernel
@@ -115,9 +114,9 @@ class Basin:
 
 @proof_kernel(entry=True)
 def _shifts(lo_map: Any, hi_map: Any, side: int, lo: Any, hi: Any, out: Any) -> None:
-    """Bounds of the displacement of a jog from each cell for all kappa, its upper bound for the largest, and the decision.
+    """Bound the displacement of a jog from each cell.
 
-    `out`: rows of least displacement, largest displacement at the largest kappa, and 1 where that one is a decided jog.
+    `out`: rows of the least for all kappa, the largest for the largest kappa, and 1 where that one is a decided jog.
     """
     whole = gather_box(lo_map, hi_map, side)
     slow = with_kappa(whole, whole.kappa[1], whole.kappa[1])
@@ -201,12 +200,23 @@ def basin(found: Cover, component: NDArray[np.int32], joint: Sequence[NearJoint]
         (thick, "orbits are not proved to leave the recurrent cells at {}, which do not attract"),
         (flat, "the slope is not proved positive on {}"),
     )
-    missing = next((text.format(found.place(int(np.argmax(mask)))) for mask, text in reasons if mask.any()), "")
+    missing = next(
+        (text.format(found.place(int(np.argmax(mask)))) for mask, text in reasons if mask.any()), ""
+    )
     if not missing and not near:
-        missing = next((f"near the joint on side {side}: {each.reason}" for side, each in enumerate(joint) if each.reason), "")
+        missing = next(
+            (
+                f"near the joint on side {side}: {each.reason}"
+                for side, each in enumerate(joint)
+                if each.reason
+            ),
+            "",
+        )
     # a little more, so that other arithmetic can confirm it
     throws = throws + throws // 8 + 1 if thin.any() else 0
-    return Basin(rank, throws, near, start, explained, *_shares(found, joint, shut, near, start, explained), missing)
+    return Basin(
+        rank, throws, near, start, explained, *_shares(found, joint, shut, near, start, explained), missing
+    )
 
 
 def _reaching(found: Cover, cells: Mask) -> Mask:
@@ -222,7 +232,7 @@ def _passing(found: Cover, displaced: Sequence[Floats]) -> Mask:
     if found.box.effects:  # another vertex may land, elsewhere
         return np.zeros(found.grid.n_cells, dtype=bool)
     least = np.concatenate([each[:, 0] for each in displaced])
-    return least - found.box.landing > ROOM * np.abs(least)
+    return np.greater(least - found.box.landing, ROOM * np.abs(least))
 
 
 def _near(found: Cover, joint: Sequence[NearJoint], shut: Mask, *, thin: bool) -> bool:
@@ -256,7 +266,7 @@ def _start(
 def _shares(
     found: Cover, joint: Sequence[NearJoint], shut: Mask, near: bool, start: Floats, explained: Floats
 ) -> tuple[float, float, float, float, bool]:
-    """Shares of the arm that are claimed, leave, creep and are open; and whether the starts beyond `start` are claimed."""
+    """Shares of the arm that are claimed, leave, creep and are open; whether all beyond `start` is claimed."""
     lo, hi = found.box.bare
     total = float((lo.arm_length - hi.a).sum())
     wide = float((hi.arm_length - lo.a).sum())

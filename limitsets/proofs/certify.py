@@ -63,8 +63,8 @@ class Claim:
     final : bool
         Whether finer cells cannot change the verdict.
     starts : str, dict or None
-        Of a goal that is proved, for which starts: "every", "almost-every", ``{"from": {"0": x}}`` or "cells"; of one that
-        is refuted, of which starts it is not true.  None for other claims.
+        Of a goal that is proved, for which starts: "every", "almost-every", ``{"from": {"0": x}}`` or "cells"; of one
+        that is refuted, of which starts it is not true.  None for other claims.
     shares : dict of str to float
         Of a goal that is proved: shares of the arm for whose starts it is (`share`), whose starts are proved to leave
         (`leaves`) or to creep to the joint (`creeps`), and of whose starts nothing is proved (`open`).
@@ -155,11 +155,7 @@ class Proof:
                 "the minimal model, and noise",
                 "nothing rechecks other maps; the proof stands in .claims and .to_json()",
             )
-        good = [
-            {"claim": claim.claim, "section": claim.section}
-            for claim in self.claims
-            if claim.written
-        ]
+        good = [{"claim": claim.claim, "section": claim.section} for claim in self.claims if claim.written]
         if not good:
             raise AnswerError(
                 "the certificate", "without a proved claim", "at least one", "see the reasons in .claims"
@@ -449,7 +445,9 @@ def _halved(
         box = parameter_box(scene, tree=part.tree(), noise=noise)
         one, answers = _attempt(scene, wanted, box, (cells,), None)
         tried += one.cover.grid.n_cells
-        missing = tuple(each for each in answers if not (each.written and (each.final or each.verdict == "proved")))
+        missing = tuple(
+            each for each in answers if not (each.written and (each.final or each.verdict == "proved"))
+        )
         refuted = tuple(replace(each, fixed=part.texts()) for each in missing if each.verdict == "refuted")
         if (
             noise
@@ -491,7 +489,9 @@ def weakest_of(claims: Sequence[Claim]) -> Claim:
         section["least_slope"] = min((other["least_slope"] for other in sections), key=float.fromhex)
     if claims[0].starts is None:
         return Claim(claims[0].claim, "proved", "", section)
-    weakest = max(claims, key=lambda claim: STARTS.index(claim.starts if isinstance(claim.starts, str) else "from"))
+    weakest = max(
+        claims, key=lambda claim: STARTS.index(claim.starts if isinstance(claim.starts, str) else "from")
+    )
     starts = weakest.starts
     section.pop("lost", None)
     if isinstance(starts, dict):
@@ -500,10 +500,15 @@ def weakest_of(claims: Sequence[Claim]) -> Claim:
         section["starts"] = {"from": {side: x.hex() for side, x in starts["from"].items()}}
         lost = [other["lost"] for other in sections if "lost" in other]
         if len(lost) == len(given) and lost:
-            section["lost"] = {side: min((each[side] for each in lost), key=float.fromhex) for side in lost[0]}
+            section["lost"] = {
+                side: min((each[side] for each in lost), key=float.fromhex) for side in lost[0]
+            }
     else:
         section["starts"] = starts
-    least, most = {"share": min, "leaves": min, "creeps": min, "open": max}, [claim.shares for claim in claims]
+    least, most = (
+        {"share": min, "leaves": min, "creeps": min, "open": max},
+        [claim.shares for claim in claims],
+    )
     shares = {key: pick(each[key] for each in most) for key, pick in least.items()}
     notes = {claim.note for claim in claims}
     note = notes.pop() if len(notes) == 1 else ""

@@ -94,9 +94,7 @@ def thinned(found: Cover, cells: Mask, group: NDArray[np.int32] | None = None) -
     return Thinning(throws, cells & thick[of], reason)
 
 
-def _rounds(
-    found: Cover, left: Mask, steep: NDArray[np.float64], of: NDArray[np.int64], thick: Mask
-) -> int:
+def _rounds(found: Cover, left: Mask, steep: NDArray[np.float64], of: NDArray[np.int64], thick: Mask) -> int:
     """Bound the densities throw by throw; mark the groups that do not thin out, and count the throws of the others."""
     source, first, count = _groups(found, left, of)
     factor = (1.0 + SLACK) / steep[source]

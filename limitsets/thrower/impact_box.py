@@ -42,10 +42,11 @@ def _exact_strike(flight: Any, b: SideBox, x: Interval, phi: Interval) -> tuple[
     falling = iv.sub(x, iv.mul(b.kappa, phi))
     turning = iv.add(iv.mul(right, falling), iv.mul(above, iv.add(b.h, b.d)))
     omega = iv.div(iv.add(b.rho2, turning), b.inertia)
-    # X |X| / (ell + H) = sgn(X) (ell - H).  With H > 0 proved it is tight; otherwise |.| <= ell - H with the sign of X.
+    # X |X| / (ell + H) = sgn(X) (ell - H).  The first is tight where H > 0 is proved; below the vertex it cancels.
     near = iv.div(_signed_square(right), iv.add(b.ell, above))
     rest = iv.sub(b.ell, above)
-    far = (-max(rest[1], 0.0) if right[0] < 0.0 else 0.0), (max(rest[1], 0.0) if right[1] > 0.0 else 0.0)
+    least, most = max(rest[0], 0.0), max(rest[1], 0.0)
+    far = (-most if right[0] < 0.0 else least), (most if right[1] > 0.0 else -least)
     upright = above[0] > 0.0
     barrier = iv.mul(b.kappa, (near[0] if upright else far[0], near[1] if upright else far[1]))
     return omega, barrier

@@ -1,7 +1,7 @@
 """The scene's goal, asked of what is proved: one file per kind of goal, and one line here.
 
-A file gives a `Kind`: how the goal is proved of the attracting cells, how it is refuted, how a proved one reads, and the
-borders that the cells need.  For which starts it is proved is added here, for all kinds alike, from the proved basin.
+A file gives a `Kind`: how the goal is proved of the attracting cells, how it is refuted, how a proved one reads, and
+the borders that the cells need.  For which starts it is proved is added here, for all kinds alike, from the basin.
 `limitsets/goals/ask.py` reads the same goals off samples; what each means is said there and in docs/certificates.md.
 """
 

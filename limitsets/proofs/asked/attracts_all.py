@@ -17,7 +17,9 @@ from limitsets.scene import Scene
 __all__ = ["KIND"]
 
 
-TWO_BASINS = "starts nearer to the joint than the fixed point of the jog tend to the joint: there are two basins"
+TWO_BASINS = (
+    "starts nearer to the joint than the fixed point of the jog tend to the joint: there are two basins"
+)
 
 
 def _prove(found: Attraction, _: Scene, goal: AttractsAll) -> Answer:
@@ -42,7 +44,9 @@ def _refute(found: Attraction, _: Scene, __: AttractsAll) -> Answer:
         x = 0.5 * (float(found.cover.box.bare[1].a[side]) + found.cover.points[side].lo)
         return Answer("refuted", TWO_BASINS, {}, (State(x, x, side, None),), starts="almost-every")
     orbit = leaving(found)
-    return Answer("refuted" if orbit else "undecided", found.missing, {}, orbit, starts="every" if orbit else None)
+    return Answer(
+        "refuted" if orbit else "undecided", found.missing, {}, orbit, starts="every" if orbit else None
+    )
 
 
 def _sentence(_: Mapping[str, Any]) -> str:

@@ -45,7 +45,9 @@ def _prove(found: Attraction, scene: Scene, goal: OrientedBeyond) -> Answer:
     if reason:
         return undecided(reason)
     ends = max(hi for parts in found.cells.extents().values() for _, hi in parts)
-    vacuous = f"the attracting cells end at x = {ends:.6g}, before x = {goal.x:g}: the goal asks nothing of them"
+    vacuous = (
+        f"the attracting cells end at x = {ends:.6g}, before x = {goal.x:g}: the goal asks nothing of them"
+    )
     note = vacuous if ends <= goal.x and not goal.from_anywhere else ""
     return Answer("proved", "", section_of(goal, scene) | more, note=note)
 

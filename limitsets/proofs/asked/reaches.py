@@ -118,7 +118,8 @@ def _falls_short(found: Attraction, goal: Reaches) -> Answer | None:
         mine = found.component == number
         if not (mine & reach).any():
             orbit = _any_orbit(found, np.flatnonzero(mine))
-            reason = f"no orbit in the attracting component of {found.cover.place(int(np.flatnonzero(mine)[0]))} gets there"
+            where = found.cover.place(int(np.flatnonzero(mine)[0]))
+            reason = f"no orbit in the attracting component of {where} gets there"
             # the component has an interior: so many starts never get there
             return Answer("refuted" if orbit else "undecided", reason, {}, orbit, starts="almost-every")
     return None

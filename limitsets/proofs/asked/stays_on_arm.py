@@ -23,7 +23,9 @@ def _prove(found: Attraction, _: Scene, goal: StaysOnArm) -> Answer:
 
 def _refute(found: Attraction, _: Scene, __: StaysOnArm) -> Answer:
     orbit = leaving(found)
-    return Answer("refuted" if orbit else "undecided", found.missing, {}, orbit, starts="every" if orbit else None)
+    return Answer(
+        "refuted" if orbit else "undecided", found.missing, {}, orbit, starts="every" if orbit else None
+    )
 
 
 def _sentence(section: Mapping[str, Any]) -> str:
