@@ -38,6 +38,7 @@ def one(seed: int, limit: int, orbits: int, recheck: bool) -> dict[str, Any]:
         with tempfile.TemporaryDirectory() as folder:
             found = judge(given, Path(folder), orbits, recheck)
         row |= {"faults": found.faults, "doubts": found.doubts, "recheck": found.recheck.get("verdict")}
+        row["parts"] = {key: round(value, 1) for key, value in found.seconds.items()}
         row["verdicts"] = [
             {key: claim.get(key) for key in ("claim", "verdict", "starts", "share", "leaves", "creeps", "open", "reason", "timings")}
             for claim in found.claims

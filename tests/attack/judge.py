@@ -9,6 +9,7 @@ from __future__ import annotations
 import contextlib
 import io
 import json
+import time
 import tomllib
 import zipfile
 from dataclasses import dataclass, field
@@ -34,6 +35,7 @@ class Verdict:
     case: Case
     claims: list[dict[str, Any]] = field(default_factory=list)
     recheck: dict[str, Any] = field(default_factory=dict)
+    seconds: dict[str, float] = field(default_factory=dict)
     faults: list[str] = field(default_factory=list)
     doubts: list[str] = field(default_factory=list)
 
@@ -276,14 +278,24 @@ def proved_goal(found: Verdict, claim: dict[str, Any], within: list[Range], file
                 )
             if now == 4:
                 continue
-            shares(found, claim, each, bad, code, at, side, even)
+            shares(found, claim, each, x, i, bad, code, at, side, even)
 
 
-def shares(found: Verdict, claim: dict[str, Any], within: Range, bad: Any, code: Any, at: Any, side: Any, even: int) -> None:
+def _lost(within: Range, kappa: float, x: Any, i: Any) -> float:
+    orbits = Orbits(within.facts.floats(), x, i)
+    orbits.fly(3000, np.full(3000, kappa), np.full(3000, -within.e))
+    return float((orbits.code < 0).mean())
+
+
+def shares(
+    found: Verdict, claim: dict[str, Any], within: Range, x: Any, i: Any, bad: Any, code: Any, at: Any, side: Any, even: int
+) -> None:
     """The shares that are claimed against those of evenly spread starts."""
     room = 4 * np.sqrt(0.25 / even) + 1e-3
     good = 1 - (bad < even).sum() / even
     left = (code[:even] < 0).mean()
+    if within.e > 0:  # with noise it is what can be lost: the landing always short, each kappa kept
+        left = max(_lost(within, kappa, x[:even], i[:even]) for kappa in (within.lo, within.hi))
     said = {key: claim.get(key) for key in ("share", "leaves", "creeps", "open")}
     if said["share"] is not None and said["share"] > good + room:
         found.fault(f"share {said['share']} of starts is claimed, {good:.4f} of the samples hold it")
@@ -460,7 +472,9 @@ def judge(case: Case, folder: Path, count: int = ORBITS, recheck: bool = True) -
     """Certify, recheck, and look."""
     found = Verdict(case)
     rng = np.random.default_rng([11, case.seed])
+    clock = time.monotonic()
     code, found.claims, file, err = ask(case, folder, case.claims)
+    found.seconds["certify"] = time.monotonic() - clock
     if not found.claims:
         found.fault(f"certify: exit {code}, no JSON: {err.strip().splitlines()[-1:]}")
         return found
@@ -479,6 +493,7 @@ def judge(case: Case, folder: Path, count: int = ORBITS, recheck: bool = True) -
         wanted += ("refuted",) if not kept else ()
         if said not in wanted or (checked == 0) != (said == "proved"):
             found.fault(f"recheck: exit {checked}, {said!r}: {found.recheck.get('reason')} {err.strip()[-300:]}")
+    found.seconds["recheck"] = time.monotonic() - clock - found.seconds["certify"]
     within = ranges(case, rng)
     for claim in found.claims:
         if claim["verdict"] == "refuted":
@@ -487,6 +502,7 @@ def judge(case: Case, folder: Path, count: int = ORBITS, recheck: bool = True) -
             proved_goal(found, claim, within, file, rng, count)
         elif claim["claim"] == "attracts-all" and claim["verdict"] == "proved":
             attraction(found, claim, within, rng, count)
+    found.seconds["orbits"] = time.monotonic() - clock - sum(found.seconds.values())
     again(found, folder)
     return found
 
