@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -33,6 +34,7 @@ HELP_TOLERANCE = "A quantity that is fixed but unknown, like throw.speed='0.7 %'
 HELP_NOISE = (
     "What differs at every throw: throw.speed, gravity.tilt, landing.x, like throw.speed='0.3 %'; repeatable."
 )
+HELP_NO_RECHECK = "Write the certificate without checking it first."
 
 
 def certify(
@@ -47,8 +49,9 @@ def certify(
         typer.Option("--out", "-o", metavar="FILE", help="The certificate, ./NAME.proof.zip by default."),
     ] = None,
     json: Json = False,
+    no_recheck: Annotated[bool, typer.Option("--no-recheck", help=HELP_NO_RECHECK)] = False,
 ) -> None:
-    """Prove where the throws lead, and write a certificate that `limitsets recheck` verifies.
+    """Prove where the throws lead, and write a certificate that `limitsets recheck` verifies; it is checked first.
 
     Exit 1 where a claim is not proved.
     """
@@ -59,20 +62,31 @@ def certify(
         chosen = load(scene)
         file = out if out is not None else Path(f"{chosen.name}.proof.zip")
         from limitsets.proofs import certify as run
+        from limitsets.proofs.confirm import DeniedError
 
         with saved(file) as draft:
             proof = run(chosen, claim or None, noise=varying, tolerance=fixed, progress=tell)
             written = any(each.written for each in proof.claims) and not proof.effects
+            begin = time.perf_counter()
+            kept = ""
             if written:
-                proof.save(draft)
+                tell("recheck", 0, 1)
+                try:
+                    proof.save(draft, recheck=not no_recheck, workers=None)
+                except DeniedError as error:
+                    proof, kept = proof.denied(error.claims), str(file.with_name(Path(error.file or "").name))
+            seconds = None if no_recheck or not written else time.perf_counter() - begin
     if json:
-        print(as_json(proof.to_json()), end="")
+        print(
+            as_json([each | {"timings": each["timings"] | {"recheck": seconds}} for each in proof.to_json()]),
+            end="",
+        )
     else:
-        _text(proof, file if written else None)
+        _text(proof, file if written else None, kept, seconds)
     raise typer.Exit(0 if proof.proved else 1)
 
 
-def _text(proof: Proof, file: Path | None) -> None:
+def _text(proof: Proof, file: Path | None, kept: str, seconds: float | None) -> None:
     cells = sum(found.cover.grid.n_cells for found in proof.attractions)
     typer.echo(f"{proof.scene.name}: {cells} cells, {proof.seconds:.2g} s")
     for name, (lo, hi) in proof.spans.items():
@@ -93,9 +107,14 @@ def _text(proof: Proof, file: Path | None) -> None:
         typer.echo("no certificate is written: nothing rechecks maps with effects")
     elif file is None:
         typer.echo("nothing is proved: no certificate is written")
+    elif kept:
+        typer.echo(
+            f"the checker denies the certificate: it is kept as {kept}, and what it denies is undecided"
+        )
     else:
         left = "" if proof.proved else ", of what is proved only"
-        typer.echo(f"certificate: {file}{left} (check it: limitsets recheck {file})")
+        done = "not rechecked" if seconds is None else f"rechecked in {seconds:.2g} s"
+        typer.echo(f"certificate: {file}{left}, {done} (check it: limitsets recheck {file})")
 
 
 def _short(text: str) -> str:

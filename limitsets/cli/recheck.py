@@ -12,8 +12,6 @@ from limitsets.cli.output import Json, Out, answer, progress
 
 __all__ = ["recheck"]
 
-CODES = {"proved": 0, "failed": 1, "bad file": 2}
-
 
 def recheck(
     file: Annotated[Path, typer.Argument(metavar="FILE", help="A certificate, NAME.proof.zip.")],
@@ -22,7 +20,7 @@ def recheck(
 ) -> None:
     """Check a certificate by other code and in other arithmetic than those that made it.
 
-    Exit 1 where it fails.
+    Exit 0 where every claim is proved; 1 where one fails or is proved of some starts only, or is a refutation.
     """
     with progress() as tell:
         from limitsets.proofs.confirm import recheck as check
@@ -33,10 +31,10 @@ def recheck(
 
         raise AnswerError("the certificate", str(file), "one that limitsets certify wrote", report.reason)
 
-    def text() -> None:
-        from limitsets.proofs.recheck import show
+    from limitsets.proofs.recheck import EXITS, show
 
+    def text() -> None:
         show(report, str(file))
 
     answer(asdict(report), json, out, text)
-    raise typer.Exit(CODES[report.verdict])
+    raise typer.Exit(EXITS[report.verdict])

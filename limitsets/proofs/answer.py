@@ -49,6 +49,7 @@ def _claim(proof: Proof, claim: Claim) -> dict[str, Any]:
         **{word: claim.shares.get(word) for word in SHARES},
         "note": claim.note or None,
         "reason": claim.reason or None,
+        "recurs": claim.recurs or None,
         "counterexample": [_state(proof, claim, state) for state in claim.counterexample] or None,
         "parameters": dict(values(proof)),
         "effects": list(proof.effects) or None,

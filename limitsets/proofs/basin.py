@@ -291,35 +291,17 @@ def _shares(
 
 
 def _leaving(found: Cover) -> float:
-    """Total length of the cells all of whose orbits are proved to leave the arm."""
-    lo, hi = found.box.bare
-    n = found.grid.n_cells
-    gone = np.zeros(n, dtype=bool)
-    blocked = np.concatenate([images.lost for images in found.images])
-    ways = []
+    """Total length of the cells all of whose orbits are proved to leave the arm.
+
+    From these no recurrent cell can be reached, and no cell whose image may lie, in part, between the foot
+    and the cells.
+    """
+    foot, parts = found.box.bare[0].a, found.graph.components()
+    stays = parts.recurrent[parts.label] | np.concatenate([images.lost for images in found.images])
     for side, images in enumerate(found.images):
+        own = stays[found.grid.of_side(side)]
         for (to, _), (low, high) in images.hulls.items():
-            edges = found.grid.edges[to][0]
-            cell = np.flatnonzero(low <= high)
-            low, high = low[cell], high[cell]
-            off = (low > hi.arm_length) | (high <= lo.a[to])
-            blocked[found.grid.offset[side] + cell[~off & (low < edges[0])]] = True
-            first = np.clip(np.searchsorted(edges, low, side="right") - 1, 0, edges.size - 2)
-            last = np.clip(np.searchsorted(edges, high, side="left") - 1, 0, edges.size - 2)
-            ends = np.stack([first, last], axis=1) + found.grid.offset[to]
-            rows = np.full((n, 2), -1)
-            rows[found.grid.offset[side] + cell[~off]] = ends[~off]
-            ways.append(rows)
-    left = np.flatnonzero(~blocked)
-    while left.size:
-        staying = np.concatenate([[0], np.cumsum(~gone)])
-        goes = np.ones(left.size, dtype=bool)
-        for rows in ways:
-            first, last = rows[left, 0], rows[left, 1]
-            goes &= (first < 0) | (staying[last + 1] == staying[first])
-        if not goes.any():
-            break
-        gone[left[goes]] = True
-        left = left[~goes]
+            own |= (low <= high) & (low < found.grid.edges[to][0][0]) & (high > foot[to])
+    gone = ~_reaching(found, stays)
     widths = np.concatenate([np.diff(edges) for (edges,) in found.grid.edges])
     return float(widths[gone].sum())

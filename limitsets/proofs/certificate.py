@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from limitsets.files import replaced
 from limitsets.proofs.attraction import Attraction
+from limitsets.proofs.confirm import DeniedError, require_confirmed
 from limitsets.proofs.cover import Cover, targets
 from limitsets.thrower import Energy, Exact, Signed, SmallAngle, SmallAngle2
 
@@ -109,8 +110,10 @@ def write(
     tolerance: Mapping[str, str] | None,
     unit: str,
     producer: Mapping[str, str],
-) -> None:
-    """Write a certificate, replacing an older file whole.
+    recheck: bool = True,
+    workers: int | None = 1,
+) -> float | None:
+    """Write a certificate, replacing an older file whole; it gets its name once the checker has confirmed it.
 
     Parameters
     ----------
@@ -119,13 +122,27 @@ def write(
     proofs : sequence of Attraction
         One per box of parameters.
     claims : sequence of mapping
-        ``{"claim": ..., "section": {...}}`` each.
+        ``{"claim": ..., "section": {...}}`` each, and the ``verdict`` where it is not "proved".
     noise, tolerance : mapping or None
         What the parameters were allowed to do.
     unit : str
         Unit of length.
     producer : mapping
         Versions, for information.
+    recheck : bool
+        Whether to check it first.
+    workers : int, optional
+        Processes that check it, None for all processors.
+
+    Returns
+    -------
+    float or None
+        Seconds that the check took.
+
+    Raises
+    ------
+    DeniedError
+        The checker does not confirm it: it is kept as NAME.denied.zip.
     """
     arrays: dict[str, NDArray[Any]] = {}
     boxes = []
@@ -149,7 +166,7 @@ def write(
         "noise": dict(noise) if noise else None,
         "tolerance": dict(tolerance) if tolerance else None,
         "boxes": boxes,
-        "claims": list(claims),
+        "claims": [{"claim": each["claim"], "section": each["section"]} for each in claims],
         "arrays": {
             name: {
                 "sha256": hashlib.sha256(value.tobytes()).hexdigest(),
@@ -162,10 +179,20 @@ def write(
     }
     packed = io.BytesIO()
     np.savez(packed, **arrays)  # type: ignore[arg-type]  # arrays by name
-    target = Path(path)
-    with (
-        replaced(target.parent) as draft,
-        zipfile.ZipFile(draft / target.name, "w", zipfile.ZIP_STORED) as file,
-    ):
-        file.writestr("header.json", json.dumps(header, indent=1))
-        file.writestr("arrays.npz", packed.getvalue())
+    target, seconds, denied = Path(path), None, None
+    with replaced(target.parent) as draft:
+        written = draft / target.name
+        with zipfile.ZipFile(written, "w", zipfile.ZIP_STORED) as file:
+            file.writestr("header.json", json.dumps(header, indent=1))
+            file.writestr("arrays.npz", packed.getvalue())
+        if recheck:
+            kept = target.with_name(target.name.removesuffix(".zip").removesuffix(".proof") + ".denied.zip")
+            verdicts = {each["claim"]: each.get("verdict", "proved") for each in claims}
+            try:
+                seconds = require_confirmed(written, kept, verdicts, workers)
+            except DeniedError as error:
+                denied = error
+                written.rename(draft / kept.name)
+    if denied is not None:
+        raise denied
+    return seconds

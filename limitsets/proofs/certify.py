@@ -70,6 +70,8 @@ class Claim:
         (`leaves`) or to creep to the joint (`creeps`), and of whose starts nothing is proved (`open`).
     note : str
         What a reader of a proved goal should know, empty if nothing.
+    recurs : dict
+        Why the orbit that refutes comes back, or that it need not: as in `limitsets.proofs.asked.recurring.Refutation`.
     """
 
     claim: str
@@ -82,6 +84,7 @@ class Claim:
     starts: Any = None
     shares: dict[str, float] = field(default_factory=dict)
     note: str = ""
+    recurs: dict[str, Any] = field(default_factory=dict)
 
     @property
     def written(self) -> bool:
@@ -135,18 +138,24 @@ class Proof:
 
         return to_json(self)
 
-    def save(self, path: str | Path) -> Path:
-        """Write the certificate of the claims that are proved.
+    def save(self, path: str | Path, *, recheck: bool = True, workers: int | None = 1) -> Path:
+        """Write the certificate of the claims that are proved; it gets its name once `recheck` has confirmed it.
 
         Parameters
         ----------
         path : str or Path
             The file, replaced whole.
+        recheck : bool
+            Whether to have it checked first.
+        workers : int, optional
+            Processes that check it, as in `limitsets.recheck`.
 
         Raises
         ------
         AnswerError
             Nothing is proved, or it is proved of a map that no recheck knows.
+        DeniedError
+            The checker does not confirm it: it is kept as NAME.denied.zip, and what it denies is undecided.
         """
         if self.effects:
             raise AnswerError(
@@ -155,7 +164,11 @@ class Proof:
                 "the minimal model, and noise",
                 "nothing rechecks other maps; the proof stands in .claims and .to_json()",
             )
-        good = [{"claim": claim.claim, "section": claim.section} for claim in self.claims if claim.written]
+        good = [
+            {"claim": claim.claim, "section": claim.section, "verdict": claim.verdict}
+            for claim in self.claims
+            if claim.written
+        ]
         if not good:
             raise AnswerError(
                 "the certificate", "without a proved claim", "at least one", "see the reasons in .claims"
@@ -172,17 +185,37 @@ class Proof:
             tolerance=self.tolerance,
             unit=self.scene.unit,
             producer=producer,
+            recheck=recheck,
+            workers=workers,
         )
         return Path(path)
+
+    def denied(self, claims: Mapping[str, str]) -> Proof:
+        """Return what is left of it where the checker denies some claims: these are undecided."""
+        left = tuple(
+            replace(
+                each,
+                verdict="undecided",
+                reason=f"the checker denies it: {claims[each.claim]}",
+                section={},
+                starts=None,
+            )
+            if each.claim in claims
+            else each
+            for each in self.claims
+        )
+        return replace(self, claims=left)
 
 
 def _attracts_all(found: Attraction, scene: Scene) -> Claim:
     if not found.proved:
-        noisy, may = found.cover.box.landing > 0.0, found.cover.graph.ranges.exits.any()
-        if (noisy or (found.cover.box.effects and may)) and not found.cover.points:
-            orbit = leaving(found)
-            verdict = "refuted" if orbit else "undecided"
-            return Claim("attracts-all", verdict, found.reason, {}, orbit, final=noisy or bool(orbit))
+        noisy = found.cover.box.landing > 0.0 and not found.cover.points
+        orbit = leaving(found) if noisy or found.cover.graph.ranges.exits.any() else ()
+        if orbit:
+            once = {"once": True}
+            return Claim("attracts-all", "refuted", found.reason, {}, orbit, final=True, recurs=once)
+        if noisy:
+            return Claim("attracts-all", "undecided", found.reason, {}, final=True)
         return _not_attracted(found, scene)
     section = {"near_joint": near_section(found), "max_rank": found.max_rank}
     return Claim("attracts-all", "proved", "", section)
@@ -245,6 +278,7 @@ def _goal(found: Attraction, scene: Scene) -> Claim:
         starts=answer.starts,
         shares=dict(answer.shares),
         note=answer.note,
+        recurs=dict(answer.recurs),
     )
 
 

@@ -1,11 +1,11 @@
-"""`limitsets.recheck`: the lone checker of `recheck.py`, called from Python.
+"""`limitsets.recheck`: the lone checker of `recheck.py`, called from Python; whoever writes a certificate asks it too.
 
 The checker needs python-flint, which only it needs, so nothing else imports it.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -15,7 +15,69 @@ from limitsets.errors import AnswerError
 if TYPE_CHECKING:
     from limitsets.proofs.recheck import Report
 
-__all__ = ["recheck"]
+__all__ = ["DeniedError", "recheck", "require_confirmed"]
+
+
+class DeniedError(AnswerError):
+    """The checker does not confirm a certificate that was just written.
+
+    Attributes
+    ----------
+    file : str
+        Where it is kept, NAME.denied.zip.
+    claims : dict of str to str
+        The claims that are not confirmed, and why.
+    """
+
+    claims: dict[str, str]
+
+    @classmethod
+    def of(cls, file: Path, claims: dict[str, str]) -> DeniedError:
+        """Name the first claim that is not confirmed."""
+        name, why = next(iter(claims.items()))
+        remedy = "report it; the claim is undecided"
+        error = cls(
+            f"the certificate's claim {name}",
+            f"denied: {why}",
+            "what the checker confirms",
+            remedy,
+            file=str(file),
+        )
+        error.claims = claims
+        return error
+
+
+def require_confirmed(file: Path, kept: Path, verdicts: Mapping[str, str], workers: int | None = 1) -> float:
+    """Recheck a certificate before it gets its name; the seconds that it took.
+
+    Parameters
+    ----------
+    file : Path
+        The draft.
+    kept : Path
+        Where its writer keeps it if it is denied.
+    verdicts : mapping of str to str
+        What has to become of each claim: "proved", "proved-on-cells" or "refuted".
+    workers : int, optional
+        As in `recheck`.
+
+    Raises
+    ------
+    DeniedError
+        The checker comes to another verdict.
+    """
+    report = recheck(file, workers=workers)
+    states = {claim: (state, why) for claim, state, why in report.claims}
+    denied = {
+        claim: why or f"it is {state}, not {verdicts[claim]}"
+        for claim, (state, why) in states.items()
+        if state != verdicts[claim]
+    }
+    if report.verdict == "bad file":
+        denied = dict.fromkeys(verdicts, report.reason)
+    if denied:
+        raise DeniedError.of(kept, denied)
+    return report.seconds
 
 
 def recheck(
@@ -36,8 +98,10 @@ def recheck(
     Returns
     -------
     Report
-        Its `verdict` is "proved", "failed" or "bad file"; `reason` says what fails first; `statement`, `parameters` and
-        `relied_on` say what was claimed, of which scenes, and what that rests on.
+        Its `verdict` is "proved", "proved-on-cells" (a goal, of the starts in some cells only), "refuted" (an orbit
+        that violates the goal is confirmed), "failed" or "bad file"; `reason` says what fails first; `statement`,
+        `parameters` and `relied_on` say what was claimed, of which scenes, and what that rests on; `starts` and
+        `share`, for which starts the goal is proved and what share of the arm they are.
 
     Raises
     ------
@@ -57,7 +121,7 @@ def recheck(
             "the arithmetic of the recheck",
             "not installed",
             "python-flint",
-            "pip install 'limitsets[proofs]', or pip install python-flint",
+            "pip install python-flint",
         )
     from limitsets.proofs.recheck import recheck as check
 

@@ -32,8 +32,10 @@ def write_refutation(
     states: Sequence[State],
     within: Mapping[str, str],
     scene: Scene,
+    *,
+    recheck: bool = True,
 ) -> None:
-    """Write it, replacing an older file whole.
+    """Write it, replacing an older file whole; it gets its name once the checker has confirmed it.
 
     Parameters
     ----------
@@ -49,6 +51,8 @@ def write_refutation(
         Deviations from the nominal scene that its own do not exceed, by quantity.
     scene : Scene
         The nominal scene.
+    recheck : bool
+        Whether to check it first.
     """
     box = found.cover.box
     section = {
@@ -67,9 +71,10 @@ def write_refutation(
     write(
         path,
         [found],
-        [{"claim": "refuted", "section": section}],
+        [{"claim": "refuted", "section": section, "verdict": "refuted"}],
         noise=box.noise or None,
         tolerance=None,
         unit=scene.unit,
         producer={},
+        recheck=recheck,
     )

@@ -1,4 +1,8 @@
-"""Orbits replayed in interval arithmetic: every decision proved, every state enclosed."""
+"""Orbits replayed in interval arithmetic: every decision proved, every state enclosed.
+
+Every start of an interval, and every kappa, goes one and the same way: where the impact is the one root of a concave
+function, kappa > sqrt(a^2 + d^2), the last state is a continuous function of both.
+"""
 
 from __future__ import annotations
 
@@ -11,10 +15,11 @@ import limitsets.interval as iv
 from limitsets.jit import proof_kernel
 from limitsets.maps import codes
 from limitsets.proofs.parameters import ParameterBox
-from limitsets.thrower.full_box import full_ways
+from limitsets.thrower.arrival_box import landed
 from limitsets.thrower.motion_box import gather_full_box
+from limitsets.thrower.roll_box import rested_one_way
 from limitsets.thrower.side_box import gather_box, with_kappa
-from limitsets.thrower.throw_box import sure_throw_box, throw_box
+from limitsets.thrower.throw_box import NOTHING, sure_throw_box, throw_box
 
 __all__ = ["replay"]
 
@@ -42,7 +47,10 @@ def _replay_full(lo_map: Any, hi_map: Any, kappa: Any, landing: Any, lo: Any, hi
     for k in range(lo.size - 1):
         part = gather_full_box(lo_map, hi_map, side[k], (kappa[0, k], kappa[1, k]))
         state, jog, phi, _, _ = sure_throw_box(part.own, lo[k], hi[k])
-        ways = full_ways(part, (lo[k], hi[k]), state, phi, jog)
+        if state == NOTHING:
+            return k
+        x = (lo[k], hi[k])
+        ways = rested_one_way(part.effects.roll, part, landed(part.effects.landing, part, x, phi, jog))
         if ways.number != 1:
             return k
         lo[k + 1], hi[k + 1] = iv.add((ways.first.lo, ways.first.hi), (landing[k], landing[k]))
@@ -51,7 +59,11 @@ def _replay_full(lo_map: Any, hi_map: Any, kappa: Any, landing: Any, lo: Any, hi
 
 
 def replay(
-    box: ParameterBox, x: float, side: int, kappa: NDArray[np.float64], landing: NDArray[np.float64]
+    box: ParameterBox,
+    start: tuple[float, float],
+    side: int,
+    kappa: NDArray[np.float64],
+    landing: NDArray[np.float64],
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]]:
     """Enclose an orbit.
 
@@ -59,8 +71,8 @@ def replay(
     ----------
     box : ParameterBox
         The scene's parameters.
-    x : float
-        Start.
+    start : (float, float)
+        Least and largest start.
     side : int
         Its side.
     kappa : ndarray, shape (2, throws)
@@ -77,7 +89,7 @@ def replay(
     """
     throws = kappa.shape[1]
     lo, hi, sides = np.empty(throws + 1), np.empty(throws + 1), np.empty(throws + 1, np.int64)
-    lo[0], hi[0], sides[0] = x, x, side
+    lo[0], hi[0], sides[0] = *start, side
     follow = _replay_full if box.effects else _replay
     made = follow(box.lo, box.hi, np.ascontiguousarray(kappa), landing, lo, hi, sides)
     return lo[: made + 1], hi[: made + 1], sides[: made + 1]

@@ -14,7 +14,7 @@ import limitsets.interval as iv
 from limitsets.jit import proof_kernel
 from limitsets.thrower.motion_box import NOTHING, ROOM, FullSideBox, Ways, box_of, no_way, put, wait
 
-__all__ = ["rested"]
+__all__ = ["rested", "rested_one_way"]
 
 # Strikes of one cell, in all its ways, after which it is given up.
 MOST_STRIKES = 512
@@ -38,6 +38,23 @@ def rested(roll: Any, part: FullSideBox, count: int) -> Ways:
         ways, count = _strike(part, ways, count)
         strikes += 1
     return ways if count == 0 else Ways(NOTHING, ways.first, ways.second)
+
+
+@proof_kernel
+def rested_one_way(roll: Any, part: FullSideBox, count: int) -> Ways:
+    """As `rested`, if one side came down and it is decided at every strike what comes next; no way otherwise."""
+    ways = no_way()
+    none = Ways(NOTHING, ways.first, ways.second)
+    if count != 1:
+        return none
+    if roll is None:
+        row = part.waiting[0]
+        return put(ways, int(row[0]) - part.own.side, False, (row[5], row[6]))
+    strikes = 0 if part.own.flip.sign > 0.0 else MOST_STRIKES
+    while (count == 1) & (ways.number == 0) & (strikes < MOST_STRIKES):
+        ways, count = _strike(part, ways, 0)
+        strikes += 1
+    return ways if count == 0 else none
 
 
 @proof_kernel

@@ -207,6 +207,38 @@ def near_joint(m: Plain, i: int, begin: float, edge: float) -> dict:
     }
 
 
+def starts_of(m: Plain, edges: list, rank: np.ndarray, near: dict, landing: float) -> dict:
+    """For which starts a goal is claimed: every one; beyond the fixed points; or from where landings do not matter."""
+    near = copy.deepcopy(near)
+    if not landing:
+        if m.h < 0:
+            return {"starts": "every", "near_joint": near}
+        return {
+            "starts": {"from": {i: each["fixed_point"][1] for i, each in near.items()}},
+            "near_joint": near,
+        }
+    begins, lost, at = {}, {}, 0
+    for i, own in enumerate(edges):
+        unclaimed = np.flatnonzero(rank[at : at + len(own) - 1] < 0)
+        begins[str(i)] = float(own[unclaimed[-1] + 1] if len(unclaimed) else own[0]).hex()
+        at += len(own) - 1
+        x = np.linspace(m.a[i] + 1e-6, m.a[i] + 2, 4001)
+        lost[str(i)] = float(x[np.argmax(m.jog(i, x, m.k_hi) - x > 0.999 * landing)]).hex()
+    return {"starts": {"from": begins}, "lost": lost}
+
+
+def first_version(f: "Forged") -> "Forged":
+    """The same certificate as version 1 of the format had it."""
+    f = f.copy()
+    f.header["version"] = 1
+    for claim in f.header["claims"]:
+        for key in ("starts", "thinning", "near_joint", "lost") if claim["claim"] == "goal" else ():
+            claim["section"].pop(key, None)
+    for name in [name for name in f.arrays if name.endswith("rank")]:
+        f.arrays[name] = np.maximum(f.arrays[name], 0)
+    return f.seal()
+
+
 def forge(
     model: str,
     *,
@@ -218,7 +250,7 @@ def forge(
 ) -> Forged:
     """A certificate with all claims that are known; noise is a share of the speed, landing of the landing place.
 
-    With scattered landings some cells lead off the arm: of them the certificate says too little, and no rank is right.
+    With scattered landings some cells lead off the arm: of them, and of those that lead there, nothing is claimed.
     """
     data = scene(model)
     m = Plain(data, noise)
@@ -265,14 +297,17 @@ def forge(
         for first_cell, last_cell in (jog[cell], flip[cell]):
             graph.add_edges_from((cell, t) for t in range(first_cell, last_cell + 1) if t >= 0)
     graph.add_edges_from((cell, -1) for cell in leaving)  # -1: off the arm
-    component, rank = np.full(n, -1, np.int32), np.zeros(n, np.int32)
+    component, rank = np.full(n, -1, np.int32), np.full(n, -1, np.int32)
     last = [c for c in nx.strongly_connected_components(graph) if all(t in c for v in c for t in graph[v])]
     last = [c for c in last if -1 not in c]
     for number, cells in enumerate(last):
-        component[list(cells)] = number
-    outside = graph.subgraph(np.flatnonzero(component < 0).tolist())
-    for cell in [] if landing else reversed(list(nx.topological_sort(outside))):
-        rank[cell] = 1 + max(rank[t] for t in graph[cell])
+        component[list(cells)], rank[list(cells)] = number, 0
+    parts = nx.condensation(graph)
+    for part in reversed(list(nx.topological_sort(parts))):
+        cells = list(parts.nodes[part]["members"])
+        after = [rank[t] if t >= 0 else -1 for cell in cells for t in graph[cell] if t not in cells]
+        if -1 not in cells and component[cells[0]] < 0 and after and min(after) >= 0:
+            rank[cells] = 1 + max(after)
 
     inside = component >= 0
     slopes = []
@@ -293,9 +328,10 @@ def forge(
         {"claim": "expanding", "section": {"least_slope": float(1 + (min(slopes) - 1) * 0.7).hex()}},
         {"claim": "goal", "section": {"kind": "oriented_beyond", "x": "20 in", "side": 2}},
     ]
+    claims[4]["section"] |= starts_of(m, edges, rank, claims[0]["section"]["near_joint"], landing)
     header = {
         "format": "limitsets-proof",
-        "version": 1,
+        "version": 2,
         "map": {
             "name": "throw",
             "version": 1,
@@ -304,7 +340,11 @@ def forge(
             "formulas": [],
         },
         "state": "x of the centre of mass at rest, and the side it rests on",
-        "noise": {"throw.speed": f"{noise * 100!r} %"} if noise else None,
+        "noise": {
+            **({"throw.speed": f"{noise * 100:.6g} %"} if noise else {}),
+            **({"landing.x": f"{landing!r} in"} if landing else {}),
+        }
+        or None,
         "tolerance": None,
         "boxes": [
             {

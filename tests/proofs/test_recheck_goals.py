@@ -21,8 +21,10 @@ def good():
 
 
 def with_goal(good, section, **header):
+    """The goal alone, claimed of every start unless it says another thing."""
     f = good.copy()
-    f.header["claims"] = [{"claim": "goal", "section": section}]
+    own = {key: f.header["claims"][4]["section"][key] for key in ("starts", "near_joint")}
+    f.header["claims"] = [{"claim": "goal", "section": own | section}]
     f.header |= header
     return f
 
@@ -53,8 +55,27 @@ def test_a_right_goal_is_proved(good, tmp_path, section):
     report = verdict(with_goal(good, section), tmp_path)
     assert (report.verdict, report.reason) == ("proved", "")
     assert report.claims == [("goal", "proved", "")]
+    assert "every start a_i < x <= arm.length" in report.statement[0]
+    assert (report.starts, report.share, report.open) == ("every", 1.0, 0.0)
+
+
+@pytest.mark.parametrize("section", TRUE, ids=str)
+def test_a_goal_of_the_first_version_is_of_every_start_if_these_are_attracted(good, tmp_path, section):
+    f = with_goal(good, section)
+    attracts = good.header["claims"][0]
+    old = forge.first_version(f)
+    report = verdict(old, tmp_path)
     everywhere = section.get("from_anywhere") or section["kind"] == "attracts_all"
-    assert ("every start a_i < x <= arm.length" in report.statement[0]) == bool(everywhere)
+    assert report.verdict == ("proved" if everywhere else "proved-on-cells")
+    assert report.starts == ("every" if everywhere else "cells")
+    assert 0.2 < report.share <= 1.0
+    old.header["claims"].append(attracts)
+    report = verdict(old, tmp_path)
+    assert (report.verdict, report.reason, report.starts) == ("proved", "", "every")
+    old.arrays["0.rank"][np.argmax(old.arrays["0.rank"])] = 0
+    report = verdict(old.seal(), tmp_path)
+    assert report.verdict == "failed"
+    assert report.claims[0][1] != "proved" or everywhere
 
 
 # Landings from 28 in reach some 26 in on other sides; the limit set ends at 23.3832 in on side 2; an orbit of period 13
@@ -117,9 +138,12 @@ def test_a_goal_about_all_starts_needs_all_cells_and_the_joint(good, tmp_path, s
         for ends in pair if isinstance(pair[0], list) else [pair]:
             ends[:] = [(-1e3).hex(), (1e3).hex()]
     assert "near the joint" in verdict(f, tmp_path).reason
-    inner = with_goal(good, {"kind": "stays_on_arm"})
+    inner = with_goal(good, {"kind": "stays_on_arm", "starts": "cells"})
+    del inner.header["claims"][0]["section"]["near_joint"]
     inner.arrays["0.phi"][off[len(off) // 2], 1] *= 0.999
-    assert verdict(inner.seal(), tmp_path).verdict == "proved"
+    inner.arrays["0.rank"][off] = -1
+    report = verdict(inner.seal(), tmp_path)
+    assert (report.verdict, report.starts) == ("proved-on-cells", "cells")
 
 
 def test_components_are_not_joined_by_their_number(good, tmp_path):
@@ -144,23 +168,38 @@ def test_components_are_not_joined_by_their_number(good, tmp_path):
 def test_scattered_landings_are_added_to_every_image(tmp_path):
     """A certificate made for 0.02 in is proved for it and for less, and never for much more, nor near the joint."""
     f = forge.forge("designed", landing=0.02, **COARSE)
-    goal = {"kind": "oriented_beyond", "x": "20.6 in", "side": 2}  # the cells are coarse
+    goal = f.header["claims"][4]["section"] | {"x": "20.6 in"}  # the cells are coarse
     f.header["claims"] = [{"claim": "invariant", "section": {}}, {"claim": "goal", "section": goal}]
-    for dev in ("0.02 in", "0.508 mm", "0.01 in"):
+    for dev in ("0.02 in", "0.508 mm"):
         f.header["noise"] = {"landing.x": dev}
         report = verdict(f, tmp_path)
         assert (report.verdict, report.reason) == ("proved", "")
+        assert list(report.starts) == ["from"]
+        assert 0.96 < report.share < report.share + report.explained < 1
+    f.header["noise"] = {"landing.x": "0.01 in"}  # less noise does not lose so much
+    assert "falls short is not proved" in verdict(f, tmp_path).reason
+    lost = goal.pop("lost")  # what becomes of the starts nearer to the joint is not said
+    report = verdict(f, tmp_path)
+    assert report.verdict == "proved-on-cells"
+    assert report.open > 0.02
     f.header["noise"] = {"landing.x": "0.2 in"}
     assert verdict(f, tmp_path).verdict == "failed"
     f.header["noise"] = {"landing.x": "0.02 in"}
-    for section in ({"kind": "stays_on_arm"} | ANYWHERE, {"kind": "attracts_all"}):
+    starts = {"starts": goal["starts"], "lost": lost}
+    for section, want in (
+        ({"kind": "stays_on_arm"} | ANYWHERE | {"starts": "every"}, "failed"),
+        ({"kind": "stays_on_arm"} | ANYWHERE | starts, "bad file"),
+        ({"kind": "stays_on_arm"} | starts, "proved"),
+        ({"kind": "attracts_all"} | starts, "proved"),
+    ):
         g = f.copy()
         g.header["claims"] = [{"claim": "goal", "section": section}]
-        assert verdict(g, tmp_path).verdict == "failed"
+        assert verdict(g, tmp_path).verdict == want
 
 
 def test_images_without_scatter_do_not_hold_with_it(good, tmp_path):
-    f = with_goal(good, {"kind": "stays_on_arm"}, noise={"landing.x": "0.2 in"})
+    f = with_goal(good, {"kind": "stays_on_arm", "starts": "cells"}, noise={"landing.x": "0.2 in"})
+    del f.header["claims"][0]["section"]["near_joint"]
     report = verdict(f, tmp_path)
     assert report.verdict == "failed"
     assert "is not proved to lie in" in report.reason

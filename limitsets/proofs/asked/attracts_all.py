@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 
 from limitsets.goals import AttractsAll
-from limitsets.proofs.asked.kind import Answer, Kind, common, undecided
+from limitsets.proofs.asked.kind import Answer, Kind, against, common, once, undecided
+from limitsets.proofs.asked.recurring import Refutation
 from limitsets.proofs.asked.search import State
 from limitsets.proofs.asked.starts import leaving
 from limitsets.proofs.attraction import Attraction
@@ -42,11 +43,8 @@ def _refute(found: Attraction, _: Scene, __: AttractsAll) -> Answer:
     if found.basin.creeps:
         side = int(np.argmax([point.lo for point in found.cover.points]))
         x = 0.5 * (float(found.cover.box.bare[1].a[side]) + found.cover.points[side].lo)
-        return Answer("refuted", TWO_BASINS, {}, (State(x, x, side, None),), starts="almost-every")
-    orbit = leaving(found)
-    return Answer(
-        "refuted" if orbit else "undecided", found.missing, {}, orbit, starts="every" if orbit else None
-    )
+        return against(Refutation((State(x, x, side, None),), "almost-every"), TWO_BASINS)
+    return once(leaving(found), found.missing)
 
 
 def _sentence(_: Mapping[str, Any]) -> str:

@@ -13,18 +13,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from limitsets.goals import FlipOrder
-from limitsets.maps import codes, orbit
-from limitsets.proofs.asked.cycling import cycle_that
-from limitsets.proofs.asked.kind import Answer, Kind, common, peeled, undecided
-from limitsets.proofs.asked.search import Choice, Path, State, replayed, settled
+from limitsets.maps import codes
+from limitsets.proofs.asked.kind import Answer, Kind, against, common, peeled, undecided
+from limitsets.proofs.asked.recurring import Loop, cycle_that
 from limitsets.proofs.attraction import Attraction
 from limitsets.proofs.cover import targets
 from limitsets.scene import Scene
 
 __all__ = ["KIND"]
-
-# Throws of the orbit in which a flip against the order is looked for, and how many of the last are shown.
-THROWS, SHOWN = 10_000, 20
 
 AGAINST = "a flip leads from each side to the one that is next in number, and the last one's to side 0"
 
@@ -58,10 +54,8 @@ def _refute(found: Attraction, scene: Scene, goal: FlipOrder) -> Answer:
     if common(found, anywhere=False):
         return undecided(common(found, anywhere=False))
     if not _is_cycle(goal.order, found.cover.grid.sides):
-        reason, orbit = AGAINST, _against(found, goal.order)
-    else:
-        reason, orbit = "", cycle_that(found, scene, lambda cycle: not cycle.branches.any())
-    return Answer("refuted" if orbit else "undecided", reason, {}, orbit, starts="every" if orbit else None)
+        return against(cycle_that(found, scene, lambda loop: _flips_otherwise(loop, goal.order)), AGAINST)
+    return against(cycle_that(found, scene, lambda loop: not loop.branches.any()))
 
 
 def _rolls(found: Attraction) -> list[NDArray[np.int32]]:
@@ -77,20 +71,11 @@ def _is_cycle(order: tuple[int, ...], sides: int) -> bool:
     )
 
 
-def _against(found: Attraction, order: tuple[int, ...]) -> tuple[State, ...]:
-    """Find an orbit in the attracting cells with a flip that the order has not, and prove it."""
-    box = found.cover.box
-    choice = Choice(box.middle_kappa, 0.0)
-    start, on = settled(found)
-    path = orbit(box.at_kappa(choice.kappa), start, on, THROWS)
+def _flips_otherwise(loop: Loop, order: tuple[int, ...]) -> bool:
+    """Whether a periodic orbit has a flip that the order has not."""
     allowed = set(zip(order, (*order[1:], order[0]), strict=True))
-    pairs = list(zip(path.side[:-1].tolist(), path.side[1:].tolist(), strict=True))
-    bad = [k + 1 for k, (a, b) in enumerate(pairs) if a != b and (a, b) not in allowed]
-    if not bad:
-        return ()
-    begin = max(0, bad[0] - SHOWN)
-    cut = slice(begin, bad[0] + 1)
-    return replayed(box, Path(path.x[cut].tolist(), path.side[cut].tolist(), [choice] * (bad[0] - begin)))
+    pairs = zip(loop.side.tolist(), np.roll(loop.side, -1).tolist(), strict=True)
+    return any(a != b and (a, b) not in allowed for a, b in pairs)
 
 
 def _sentence(section: Mapping[str, Any]) -> str:

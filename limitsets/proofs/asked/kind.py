@@ -15,12 +15,24 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from limitsets.proofs.asked.recurring import Refutation
 from limitsets.proofs.asked.search import State
 from limitsets.proofs.attraction import BELOW, Attraction
 from limitsets.proofs.cover import everywhere, targets
 from limitsets.scene import Scene
 
-__all__ = ["Answer", "Kind", "above", "below", "common", "peeled", "thrown_into", "undecided"]
+__all__ = [
+    "Answer",
+    "Kind",
+    "above",
+    "against",
+    "below",
+    "common",
+    "once",
+    "peeled",
+    "thrown_into",
+    "undecided",
+]
 
 Mask = NDArray[np.bool_]
 
@@ -36,6 +48,7 @@ class Answer(NamedTuple):
     starts: Any = None
     shares: Mapping[str, float] = {}
     note: str = ""
+    recurs: Mapping[str, Any] = {}
 
 
 class Kind(NamedTuple):
@@ -66,6 +79,19 @@ class Kind(NamedTuple):
 def undecided(reason: str, *, final: bool = False) -> Answer:
     """Answer that nothing is proved."""
     return Answer("undecided", reason, final=final)
+
+
+def against(refutation: Refutation, reason: str = "") -> Answer:
+    """Answer by a refutation: `starts` of which it is not true; undecided if it is empty."""
+    if not refutation.of:
+        return undecided(reason)
+    states, of, recurs = refutation
+    return Answer("refuted", reason, {}, states, starts=of, recurs=recurs)
+
+
+def once(orbit: tuple[State, ...], reason: str = "") -> Answer:
+    """Answer by one passage, which refutes what is asked of every start on the arm; undecided without one."""
+    return against(Refutation(orbit, "every", {"once": True}) if orbit else Refutation(), reason)
 
 
 def common(found: Attraction, *, anywhere: bool) -> str:

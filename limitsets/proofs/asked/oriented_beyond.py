@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from limitsets.goals import OrientedBeyond
-from limitsets.proofs.asked.kind import Answer, Kind, below, common, thrown_into, undecided
-from limitsets.proofs.asked.search import from_attracting
+from limitsets.proofs.asked.kind import Answer, Kind, against, below, common, once, thrown_into, undecided
+from limitsets.proofs.asked.recurring import recurrent_violation
 from limitsets.proofs.asked.starts import one_throw
 from limitsets.proofs.attraction import Attraction
 from limitsets.proofs.chains import stays_below
@@ -62,13 +62,10 @@ def _refute(found: Attraction, scene: Scene, goal: OrientedBeyond) -> Answer:
     def wrong(x: Any, side: Any) -> Any:
         return (x > goal.x) & (side != goal.side)
 
-    reason = ""
-    if goal.from_anywhere:
-        reason = _thrown_there(found, goal, _exceptions(found, goal))
-        orbit = one_throw(found, wrong) if reason else ()
-    else:
-        orbit = from_attracting(found, wrong) if not common(found, anywhere=False) else ()
-    return Answer("refuted" if orbit else "undecided", reason, {}, orbit, starts="every" if orbit else None)
+    if not goal.from_anywhere:
+        return against(recurrent_violation(found, scene, wrong))
+    reason = _thrown_there(found, goal, _exceptions(found, goal))
+    return once(one_throw(found, wrong) if reason else (), reason)
 
 
 def _thrown_there(found: Attraction, goal: OrientedBeyond, bad: NDArray[np.bool_]) -> str:

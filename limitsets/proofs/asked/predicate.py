@@ -14,8 +14,9 @@ from numpy.typing import NDArray
 
 from limitsets.errors import AnswerError
 from limitsets.goals import Predicate
-from limitsets.proofs.asked.kind import Answer, Kind, common, thrown_into, undecided
-from limitsets.proofs.asked.search import State, from_attracting
+from limitsets.proofs.asked.kind import Answer, Kind, against, common, once, thrown_into, undecided
+from limitsets.proofs.asked.recurring import recurrent_violation
+from limitsets.proofs.asked.search import State
 from limitsets.proofs.asked.starts import one_throw
 from limitsets.proofs.attraction import Attraction
 from limitsets.scene import Scene
@@ -63,7 +64,7 @@ def _prove(found: Attraction, _: Scene, goal: Predicate) -> Answer:
     return undecided(reason) if reason else Answer("proved", "", {"kind": goal.kind, "name": goal.name})
 
 
-def _refute(found: Attraction, _: Scene, goal: Predicate) -> Answer:
+def _refute(found: Attraction, scene: Scene, goal: Predicate) -> Answer:
     def wrong(x: Any, side: Any) -> NDArray[np.bool_]:
         bad = np.zeros(x.shape, dtype=bool)
         for s in np.unique(side).tolist():
@@ -71,13 +72,10 @@ def _refute(found: Attraction, _: Scene, goal: Predicate) -> Answer:
             bad[mine] = ~_good(goal, x[mine], x[mine], s)
         return bad
 
-    if goal.from_anywhere:
-        orbit = one_throw(found, wrong)
-    else:
-        orbit = from_attracting(found, wrong) if not common(found, anywhere=False) else ()
-    if orbit and _throughout(goal, orbit[-1]):
-        return Answer("refuted", "", {}, orbit, starts="every")
-    return undecided("")
+    if not goal.from_anywhere:
+        return against(recurrent_violation(found, scene, wrong))
+    orbit = one_throw(found, wrong)
+    return once(orbit if orbit and _throughout(goal, orbit[-1]) else ())
 
 
 def _throughout(goal: Predicate, last: State) -> bool:

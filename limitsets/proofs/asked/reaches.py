@@ -9,19 +9,15 @@ import numpy as np
 
 from limitsets.cells import CellSet
 from limitsets.goals import Reaches
-from limitsets.proofs.asked.cycling import cycle_that
-from limitsets.proofs.asked.kind import Answer, Kind, Mask, above, common, peeled, undecided
-from limitsets.proofs.asked.search import State, long_orbit, replayed
+from limitsets.proofs.asked.kind import Answer, Kind, Mask, above, against, below, common, peeled, undecided
+from limitsets.proofs.asked.recurring import Loop, Refutation, cycle_that
+from limitsets.proofs.asked.search import passing
 from limitsets.proofs.attraction import Attraction
 from limitsets.proofs.expansion import slopes
-from limitsets.proofs.orbits import ProvedCycle
 from limitsets.proofs.thinning import thinned
 from limitsets.scene import Scene
 
 __all__ = ["KIND", "not_null"]
-
-# Throws of the orbit that is shown of a component that does not get there.
-SHOWN = 20
 
 
 def _wanted(found: Attraction, goal: Reaches) -> Mask:
@@ -33,19 +29,12 @@ def _wanted(found: Attraction, goal: Reaches) -> Mask:
 
 
 def _refute(found: Attraction, scene: Scene, goal: Reaches) -> Answer:
-    if common(found, anywhere=False):
-        return undecided(common(found, anywhere=False))
+    every = goal.every_orbit
+    never = cycle_that(found, scene, lambda loop: (every or loop.attracts) and not _arrives(loop, goal))
     short = _falls_short(found, goal)
-    if short is not None:
-        return short
-    quiet = not found.cover.box.noise  # throws that differ may carry a part away from what attracts
-    never: tuple[State, ...] = ()
-    if goal.every_orbit:
-        never = cycle_that(found, scene, lambda cycle: not _arrives(cycle, goal))
-    elif quiet and not (not_null(found) if goal.from_anywhere else ""):
-        never = cycle_that(found, scene, lambda cycle: cycle.attracts and not _arrives(cycle, goal))
-    of = "every" if goal.every_orbit else "almost-every"
-    return Answer("refuted" if never else "undecided", "", {}, never, starts=of if never else None)
+    if short is None:
+        return against(never)
+    return short._replace(counterexample=never.states) if never.states else short
 
 
 def _prove(found: Attraction, scene: Scene, goal: Reaches) -> Answer:
@@ -104,30 +93,26 @@ def _section(scene: Scene, goal: Reaches, throws: int) -> dict[str, Any]:
     return section | ({"from_anywhere": True} if goal.from_anywhere else {})
 
 
-def _arrives(cycle: ProvedCycle, goal: Reaches) -> bool:
+def _arrives(loop: Loop, goal: Reaches) -> bool:
     """Whether it is not excluded that a periodic orbit gets there."""
-    return bool(((cycle.side == goal.side) & (cycle.hi >= goal.x)).any())
+    return bool(((loop.side == goal.side) & (loop.hi >= below(goal.x))).any())
 
 
 def _falls_short(found: Attraction, goal: Reaches) -> Answer | None:
-    """Refute the goal by an attracting component that ends below x: no orbit in it gets there."""
+    """Refute the goal by an attracting component that ends below x: no orbit in it gets there.
+
+    It is mapped into itself and has an interior: so many starts never get there.  The orbit is shown, not needed.
+    """
     edges = found.cover.grid.edges[goal.side][0]
     reach = np.zeros(found.component.size, dtype=bool)
-    reach[found.cover.grid.of_side(goal.side)] = edges[1:] >= goal.x
-    for number in range(int(found.component.max()) + 1):
+    reach[found.cover.grid.of_side(goal.side)] = edges[1:] >= below(goal.x)
+    for number in range(int(found.component.max(initial=-1)) + 1):
         mine = found.component == number
         if not (mine & reach).any():
-            orbit = _any_orbit(found, np.flatnonzero(mine))
-            where = found.cover.place(int(np.flatnonzero(mine)[0]))
-            reason = f"no orbit in the attracting component of {where} gets there"
-            # the component has an interior: so many starts never get there
-            return Answer("refuted" if orbit else "undecided", reason, {}, orbit, starts="almost-every")
+            reason = f"no orbit in the attracting component of {found.cover.place(int(np.flatnonzero(mine)[0]))} gets there"
+            refutation = Refutation(passing(found, np.flatnonzero(mine)), "almost-every", {"component": number})
+            return against(refutation, reason)
     return None
-
-
-def _any_orbit(found: Attraction, cells: Any) -> tuple[State, ...]:
-    path = long_orbit(found, lambda x, _: np.arange(x.size) == x.size - 1, cells, SHOWN)
-    return () if path is None else replayed(found.cover.box, path)
 
 
 def _sentence(section: Mapping[str, Any]) -> str:

@@ -26,12 +26,11 @@ __all__ = [
     "State",
     "Wrong",
     "choices",
-    "from_attracting",
-    "long_orbit",
     "middle",
+    "passing",
     "proved_wrong",
-    "proved_wrong_inside",
     "replayed",
+    "searched",
     "settled",
     "throws",
     "violation",
@@ -46,7 +45,7 @@ CHOICES = 33
 # Throws from the start at which the search gives up.
 MOST_THROWS = 2000
 
-# Without a choice: throws of the orbit that is searched, and how many of the last are shown and replayed.
+# Without a choice: throws of the orbit that is searched, and of one that is only shown.
 SEARCHED, SHOWN = 200_000, 20
 
 # Throws that bring an orbit from the attracting cells to the limit set, before a violation counts.
@@ -201,8 +200,8 @@ def settled(found: Attraction) -> tuple[float, int]:
     return float(path.x[-1]), int(path.side[-1])
 
 
-def _search(found: Attraction, wrong: Wrong) -> Path | None:
-    """Breadth first from an attracting cell, one state per cell, until a state violates the goal."""
+def searched(found: Attraction, wrong: Wrong) -> Path | None:
+    """Breadth first from an attracting cell, one state per cell and the noise chosen, until a state violates the goal."""
     grid: Grid = found.cover.grid
     start, on = settled(found)
     x, side = np.array([start]), np.array([on])
@@ -228,57 +227,12 @@ def _search(found: Attraction, wrong: Wrong) -> Path | None:
     return None
 
 
-def long_orbit(
-    found: Attraction, wrong: Wrong, cells: NDArray[np.int64] | None = None, throws: int = SEARCHED
-) -> Path | None:
-    """Last throws of one long orbit of the scene without noise, up to the first state that violates the goal.
-
-    Parameters
-    ----------
-    found : Attraction
-        Cells and images.
-    wrong : callable
-        From places and sides to whether each violates the goal.
-    cells : ndarray of int64, optional
-        Where it begins; default, where an orbit from the attracting cells settles.
-    throws : int
-        Length at most.
-    """
-    start, on = settled(found) if cells is None else middle(found, cells)
-    choice = Choice(found.cover.box.middle_kappa, 0.0)
-    path = orbit(found.cover.box.at_kappa(choice.kappa), start, on, throws)
-    bad = np.flatnonzero(wrong(path.x * MORE_THAN_ROUNDING, path.side))
-    if not bad.size:
-        return None
-    k = int(bad[0])
-    begin = k - min(SHOWN, k)
-    return Path(path.x[begin : k + 1].tolist(), path.side[begin : k + 1].tolist(), [choice] * (k - begin))
-
-
-def from_attracting(found: Attraction, wrong: Wrong) -> tuple[State, ...]:
-    """Find an orbit in the attracting cells that comes to violate the goal, and prove it.
-
-    Parameters
-    ----------
-    found : Attraction
-        Cells and images.
-    wrong : callable
-        From places and sides to whether each violates the goal: it has to do so of all larger places, too.
-
-    Returns
-    -------
-    tuple of State
-        The orbit, enclosed; empty if the search finds none.
-    """
-    path = _search(found, wrong) if found.cover.box.noise else long_orbit(found, wrong)
-    return () if path is None else proved_wrong_inside(found, path, wrong)
-
-
-def proved_wrong_inside(found: Attraction, path: Path, wrong: Wrong) -> tuple[State, ...]:
-    """Prove an orbit as `proved_wrong`, and that it begins in the attracting cells; empty if it cannot be."""
-    (cell,) = found.cover.grid.index([path.x[0]], path.side[0])
-    inside = cell >= 0 and found.component[cell] >= 0
-    return proved_wrong(found.cover.box, path, wrong) if inside else ()
+def passing(found: Attraction, cells: NDArray[np.int64]) -> tuple[State, ...]:
+    """Prove some throws from the middle of some cells, to be shown."""
+    box = found.cover.box
+    choice = Choice(box.middle_kappa, 0.0)
+    path = orbit(box.at_kappa(choice.kappa), *middle(found, cells), SHOWN)
+    return replayed(box, Path(path.x.tolist(), path.side.tolist(), [choice] * path.code.size))
 
 
 def proved_wrong(box: ParameterBox, path: Path, wrong: Wrong) -> tuple[State, ...]:
@@ -302,7 +256,7 @@ def replayed(box: ParameterBox, path: Path) -> tuple[State, ...]:
     ends = [[t.kappa, t.kappa] if box.kappa_varies else [box.lo.kappa, box.hi.kappa] for t in path.thrown]
     bounds = np.array(ends, dtype=float).reshape(-1, 2).T
     shifts = np.array([t.landing for t in path.thrown], dtype=float)
-    lo, hi, sides = replay(box, path.x[0], path.side[0], bounds, shifts)
+    lo, hi, sides = replay(box, (path.x[0], path.x[0]), path.side[0], bounds, shifts)
     if lo.size < len(path.x) or not (hi[:-1] <= box.lo.arm_length).all():
         return ()
     thrown = [(t.kappa, t.landing if box.landing > 0.0 else None) for t in path.thrown]

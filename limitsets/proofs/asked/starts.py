@@ -71,7 +71,7 @@ def _starts(found: Attraction) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     box, x, side = found.cover.box, [], []
     for s, (edges,) in enumerate(found.cover.grid.edges):
         centres = 0.5 * (edges[:-1] + edges[1:])
-        near = [box.hi.a[s] + 0.125 * box.landing] if box.landing > 0.0 else []
+        near = [box.hi.a[s] + 0.125 * box.landing] if box.landing > 0.0 and not found.cover.points else []
         x.append(np.concatenate([near, centres[:: max(1, centres.size // STARTS)]]))
         side.append(np.full(x[-1].size, s))
     return np.concatenate(x), np.concatenate(side)

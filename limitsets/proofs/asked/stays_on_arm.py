@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from limitsets.goals import StaysOnArm
-from limitsets.proofs.asked.kind import Answer, Kind, common, undecided
+from limitsets.proofs.asked.kind import Answer, Kind, common, once, undecided
 from limitsets.proofs.asked.starts import leaving
 from limitsets.proofs.attraction import Attraction
 from limitsets.scene import Scene
@@ -22,10 +22,7 @@ def _prove(found: Attraction, _: Scene, goal: StaysOnArm) -> Answer:
 
 
 def _refute(found: Attraction, _: Scene, __: StaysOnArm) -> Answer:
-    orbit = leaving(found)
-    return Answer(
-        "refuted" if orbit else "undecided", found.missing, {}, orbit, starts="every" if orbit else None
-    )
+    return once(leaving(found), found.missing)
 
 
 def _sentence(section: Mapping[str, Any]) -> str:

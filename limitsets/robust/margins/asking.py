@@ -14,6 +14,7 @@ import numpy as np
 from limitsets.errors import AnswerError
 from limitsets.goals import Goal, OrientedBeyond, Predicate, Reaches
 from limitsets.proofs.asked import Answer, ask, borders, prove
+from limitsets.proofs.asked.kind import against
 from limitsets.proofs.attraction import Attraction, attraction
 from limitsets.proofs.cover import cover
 from limitsets.proofs.parameters import ParameterBox, parameter_box
@@ -45,7 +46,7 @@ class Asked:
     found : Attraction or None
         The cells that prove it.
     answers : tuple of Answer
-        One per goal, where all are proved.
+        One per goal, where all are proved; what refutes one, where one is refuted.
     refuted : Goal or None
         The goal that is refuted.
     counterexample : tuple of State
@@ -191,7 +192,7 @@ class Question:
         for goal in self.goals:
             answer = self._against(found, goal)
             if answer.verdict == "refuted":
-                return Asked("refuted", answer.reason, found, (), goal, answer.counterexample, piece, noise)
+                return Asked("refuted", answer.reason, found, (answer,), goal, answer.counterexample, piece, noise)
             reason = answer.reason or reason
         return Asked("undecided", reason, found, piece=piece, noise=noise)
 
@@ -204,8 +205,9 @@ class Question:
         if wrong is None or not found.cover.box.noise or goal.from_anywhere:
             return ask(found, self.scene, goal)
         answer = prove(found, self.scene, goal)
-        orbit = worst_orbit(found, wrong) if (found.component >= 0).any() else ()
-        return answer._replace(verdict="refuted" if orbit else answer.verdict, counterexample=orbit)
+        if not (found.component >= 0).any():
+            return answer
+        return against(worst_orbit(found, wrong), answer.reason)
 
 
 def _said(error: AnswerError) -> str:

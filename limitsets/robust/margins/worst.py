@@ -11,14 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from limitsets.maps import Orbit, orbit
+from limitsets.proofs.asked.recurring import Refutation, closed
 from limitsets.proofs.asked.search import (
     Choice,
     Path,
     Reached,
-    State,
     Wrong,
     choices,
-    proved_wrong_inside,
     settled,
     throws,
     violation,
@@ -30,8 +29,8 @@ __all__ = ["worst_orbit"]
 # Places of the raster, values of kappa at a throw, throws back from the violation, throws of the orbit, states kept.
 PLACES, KAPPAS, BACK, LENGTH, KEPT = 120_000, 9, 4, 200_000, 4000
 
-# Throws of the long orbit that are shown before the noise begins.
-SHOWN = 12
+# Throws of the long orbit before the noise begins: the closed orbit may begin at each of them.
+BEFORE = 12
 
 Array = NDArray[np.float64]
 Sides = NDArray[np.int64]
@@ -76,8 +75,8 @@ def _beside(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
     return wide
 
 
-def worst_orbit(found: Attraction, wrong: Wrong) -> tuple[State, ...]:
-    """Find an orbit from the limit set that violates a goal, with the noise chosen at every throw, and prove it.
+def worst_orbit(found: Attraction, wrong: Wrong) -> Refutation:
+    """Find a closed orbit that violates a goal, with the noise chosen at every throw, and prove it.
 
     Parameters
     ----------
@@ -88,8 +87,8 @@ def worst_orbit(found: Attraction, wrong: Wrong) -> tuple[State, ...]:
 
     Returns
     -------
-    tuple of State
-        The orbit, enclosed; empty if none is found.
+    Refutation
+        Empty if none is found.
     """
     box, options = found.cover.box, choices(found.cover.box, KAPPAS)
     raster = _Raster(found)
@@ -108,11 +107,11 @@ def worst_orbit(found: Attraction, wrong: Wrong) -> tuple[State, ...]:
         levels.append(_beside(good))
         known |= good
         begin = np.flatnonzero((here >= 0) & levels[back][here])
-        begin = begin[begin >= SHOWN][:KEPT]
-        states = _followed(found, wrong, raster, levels, path, begin, options)
-        if states:
-            return states
-    return ()
+        begin = begin[begin >= BEFORE][:KEPT]
+        refutation = _followed(found, wrong, raster, levels, path, begin, options)
+        if refutation.states:
+            return refutation
+    return Refutation()
 
 
 def _followed(
@@ -123,10 +122,10 @@ def _followed(
     path: Orbit,
     begin: Sides,
     options: list[Choice],
-) -> tuple[State, ...]:
-    """Throw on from states of the long orbit along the levels, and prove what then violates the goal."""
+) -> Refutation:
+    """Throw on from states of the long orbit along the levels, and close and prove what then violates the goal."""
     if not begin.size:
-        return ()
+        return Refutation()
     reached = Reached.of(path.x[begin], path.side[begin].astype(np.int64))
     for back, level in reversed(list(enumerate(levels[:-1]))):
         thrown = throws(found.cover.box, reached.x[-1], reached.side[-1], options)
@@ -137,21 +136,16 @@ def _followed(
             keep = np.flatnonzero((to >= 0) & level[to] & thrown.stays)
             keep = keep[:: max(1, keep.size // KEPT)]
         if not keep.size:
-            return ()
+            return Refutation()
         reached.add(thrown, keep)
     tail = reached.path(0, options)
     same = (path.x[begin] == tail.x[0]) & (path.side[begin] == tail.side[0])
     first = int(begin[np.flatnonzero(same)[0]])
-    return _proved(found, wrong, path, first, tail)
-
-
-def _proved(found: Attraction, wrong: Wrong, path: Orbit, first: int, tail: Path) -> tuple[State, ...]:
-    """Prove the orbit, with some throws of the long one before; empty if it cannot be."""
-    before = slice(first - SHOWN, first)
+    before = slice(first - BEFORE, first)
     usual = Choice(found.cover.box.middle_kappa, 0.0)
     whole = Path(
         [*path.x[before].tolist(), *tail.x],
         [*path.side[before].tolist(), *tail.side],
-        [*([usual] * SHOWN), *tail.thrown],
+        [*([usual] * BEFORE), *tail.thrown],
     )
-    return proved_wrong_inside(found, whole, wrong)
+    return closed(found.cover.box, whole, wrong)
