@@ -180,7 +180,7 @@ def settle(goal: dict[str, Any], within: Range, x: Any, i: Any, rng: Any, style:
     bad = np.arange(orbits.x.size)
     code, at, side = np.zeros(orbits.x.size, dtype=int), orbits.x.copy(), orbits.i.copy()
     many = style == 4
-    windows = (300, 600) if many else (500, 1000, 4000, 16000)
+    windows = (200, 500, 2000) if many else (500, 1000, 4000, 16000)
     for window in windows:
         window = max(window, least)
         if not anywhere:
@@ -218,6 +218,33 @@ def cells_of(file: Path) -> list[tuple[Any, list[Any]]]:
             prefix = box["prefix"]
             sides = [arrays[f"{prefix}edges.{k}"] for k in range(sum(f"{prefix}edges." in key for key in arrays))]
             found.append((arrays[f"{prefix}rank"], sides))
+    return found
+
+
+def cycles(facts: model.Facts, grid: int = 4000, longest: int = 10) -> list[tuple[float, int, int]]:
+    """Periodic orbits, repelling ones too: x, side and period, wherever neighbours of a grid of one itinerary change order."""
+    numbers = facts.floats()
+    a, arm = numbers[0], numbers[6]
+    x = np.concatenate([near + (arm - near) * (np.arange(grid) + 0.5) / grid for near in a])
+    i = np.repeat(np.arange(a.size), grid)
+    orbits, word, found = Orbits(numbers, x, i), np.ones(x.size, dtype=np.int64), []
+    for period in range(1, longest + 1):
+        orbits.fly(1)
+        word = 2 * word + orbits.code
+        back = (orbits.code >= 0) & (orbits.i == i)
+        gap = orbits.x - x
+        k = np.flatnonzero(back[1:] & back[:-1] & (word[1:] == word[:-1]) & (i[1:] == i[:-1]) & (gap[1:] * gap[:-1] < 0))
+        lo, hi = x[k].copy(), x[k + 1].copy()
+        for _ in range(60):
+            middle = Orbits(numbers, 0.5 * (lo + hi), i[k])
+            start = middle.x.copy()
+            middle.fly(period)
+            same = (middle.x > start) == (gap[k] > 0)
+            lo, hi = np.where(same, start, lo), np.where(same, hi, start)
+        there = Orbits(numbers, lo, i[k])
+        there.fly(period)
+        good = (there.code >= 0) & (there.i == i[k]) & (np.abs(there.x - lo) < 1e-6 * arm)
+        found += [(float(at), int(on), period) for at, on in zip(lo[good], i[k][good], strict=True)]
     return found
 
 
@@ -259,6 +286,12 @@ def proved_goal(found: Verdict, claim: dict[str, Any], within: list[Range], file
     thinned = claim.get("starts") in (None, "almost-every") or "thinning" in section
     least = min(int(section.get("throws") or 0) + 1, 20_000)
     least = max(least, min(int(section.get("jogs") or 0) + 2, 20_000))
+    for each in within if not thinned else []:
+        for at, on, period in cycles(each.facts):
+            once = Orbits(each.facts.floats(), [at], [on])
+            once.fly(2 * period)
+            if claimed(claim, file, np.array([at]), np.array([on]))[0] and wrong(goal, each.facts, once, 2 * period)[0]:
+                found.fault(f"goal {claim['verdict']} of {claim.get('starts')}: a cycle of {period} throws from {at!r} on side {on} violates it")
     for which, each in enumerate(within):
         x, i, even = starts(each.facts, rng, count // len(within))
         spoken = claimed(claim, file, x, i)
@@ -267,6 +300,9 @@ def proved_goal(found: Verdict, claim: dict[str, Any], within: list[Range], file
         styles = ([0, 1, 2, 3] if thinned else [0, 2, 4]) if each.noisy else [-1]
         style = int(rng.choice(styles))
         for now in {style, styles[-1]}:
+            if now == 4:  # five throws for each: fewer starts
+                few = rng.choice(x.size, max(count // 20, 100))
+                x, i, spoken = x[few], i[few], spoken[few]
             bad, code, at, side = settle(goal, each, x, i, rng, now, least)
             really = bad[spoken[bad]]
             if really.size:
@@ -332,7 +368,7 @@ def attraction(found: Verdict, claim: dict[str, Any], within: list[Range], rng: 
             beyond = x > np.array([points[str(k)][1] for k in range(sides)])[i]
             below = x < np.array([points[str(k)][0] for k in range(sides)])[i]
             creep = Orbits(numbers, x[below], i[below])
-            move(creep, each, 2000, rng, 0 if each.noisy else -1)
+            move(creep, each, 500, rng, 0 if each.noisy else -1)
             far = (creep.i != i[below]) | (creep.code == -2) | (creep.x > x[below])
             if far.any():
                 found.fault(f"attracts-all: starts below R* do not creep: {shown(each.facts, x[below], i[below], np.flatnonzero(far))}")
@@ -343,27 +379,35 @@ def attraction(found: Verdict, claim: dict[str, Any], within: list[Range], rng: 
         sharp = np.zeros(x.size, dtype=bool)
         if bound:
             sharp = beyond & (x >= np.array([bound["beyond"][str(k)] for k in range(sides)])[i])
-        style = 4 if each.noisy and of in (None, "every") else (0 if each.noisy else -1)
-        orbits = Orbits(numbers, x, i, ends)
+        for at, on, period in cycles(each.facts) if of in (None, "every") or isinstance(of, dict) else []:
+            first = points[str(on)][1] if points else of["from"][str(on)] if isinstance(of, dict) else 0.0
+            once = Orbits(numbers, [at], [on])
+            if at > first + 1e-6 * numbers[6] and not _inside(once, ends + 1e-6 * numbers[6] * np.array((-1, 1)))[0]:
+                found.fault(f"attracts-all proved: a cycle of {period} throws from {at!r} on side {on} is outside the extents")
         window = int(min(bound["throws"], 3000)) if bound else 2000
-        move(orbits, each, window, rng, style)
-        if bound and window == bound["throws"]:
-            out = sharp & (orbits.code < 0)
-            late = sharp & ~out & ~_inside(orbits, ends)
-            if out.any() or late.any():
-                found.fault(f"attracts-all: not in the extents after {window} throws (variant {which}, noise {style}): {shown(each.facts, x, i, np.flatnonzero(out | late))}")
-        every = np.arange(x.size)[beyond]
-        orbits = orbits.only(beyond)
-        for _ in range(3):
-            move(orbits, each, 4 * window, rng, style)
-            orbits.look()
-            move(orbits, each, 300, rng, style)
-            bad = (orbits.code < 0) | (orbits.last_out >= 0)
-            every, orbits = every[bad], orbits.only(bad)
-            if not every.size:
-                break
-        if every.size:
-            found.fault(f"attracts-all {claim['verdict']}: {every.size} starts leave or stay outside (variant {which}, noise {style}): {shown(each.facts, x, i, every)} -> {shown(each.facts, orbits.x, orbits.i, np.arange(every.size))}")
+        for style in (0, 4) if each.noisy else (-1,):
+            if style == 4:
+                few = rng.choice(x.size, max(count // 20, 100))
+                x, i, sharp, beyond = x[few], i[few], sharp[few], beyond[few]
+            orbits = Orbits(numbers, x, i, ends)
+            move(orbits, each, window, rng, style)
+            out = sharp & ((orbits.code < 0) | ~_inside(orbits, ends))
+            if bound and window == bound["throws"] and out.any():
+                where = shown(each.facts, x, i, np.flatnonzero(out))
+                found.fault(f"attracts-all: not there after {window} throws (variant {which}, noise {style}): {where}")
+            every, orbits = np.flatnonzero(beyond), orbits.only(beyond)
+            for more in (1, 4, 16):
+                if more > 1:
+                    move(orbits, each, more * min(window, 1000), rng, style)
+                orbits.look()
+                move(orbits, each, 200, rng, style)
+                bad = (orbits.code < 0) | (orbits.last_out >= 0)
+                every, orbits = every[bad], orbits.only(bad)
+                if not every.size:
+                    break
+            if every.size:
+                where = f"{shown(each.facts, x, i, every)} -> {shown(each.facts, orbits.x, orbits.i, range(every.size))}"
+                found.fault(f"attracts-all proved: {every.size} starts leave or stay outside (variant {which}, noise {style}): {where}")
 
 
 def _inside(orbits: Orbits, ends: Any) -> Any:
@@ -452,6 +496,9 @@ def refuted(found: Verdict, claim: dict[str, Any], within: list[Range]) -> None:
     flips = sum(p[1] != q[1] for p, q in zip(points, points[1:], strict=False))
     if "cycle" in recurs:
         points, flips = cycle(found, claim, recurs["cycle"], facts, word)
+    elif "component" in recurs:
+        component(found, goal, kind, points, within, word)
+        return
     elif not goal.get("from_anywhere"):
         if claim.get("starts") == "almost-every":
             found.fault(f"{word}, but no cycle that attracts is named")
@@ -467,6 +514,21 @@ def refuted(found: Verdict, claim: dict[str, Any], within: list[Range]) -> None:
             found.fault(f"{word}: the orbit neither leaves nor returns ({len(states)} states, gap {mp.nstr(gap, 5)}, {recurs})")
     if not violates(goal, kind, points, flips, facts):
         found.fault(f"{word}: the orbit does not violate it")
+
+
+def component(found: Verdict, goal: dict[str, Any], kind: str, points: list[Any], within: list[Range], word: str) -> None:
+    """Refuted by cells that keep their orbits: none that begins there may do what is asked, whatever the noise."""
+    rng = np.random.default_rng(found.case.seed)
+    if kind != "reaches":
+        found.fault(f"{word} by a component of cells, a goal of kind {kind}")
+        return
+    for style in (0, 1, 4) if within[0].noisy else (-1,):
+        which = rng.integers(0, len(points), 500)
+        x = np.array([float(points[k][0]) for k in which])
+        orbits = Orbits(within[0].facts.floats(), x, np.array([points[k][1] for k in which]))
+        move(orbits, within[0], 2000, rng, style)
+        if not wrong(goal, within[0].facts, orbits, 2000).all():
+            found.fault(f"{word}: orbits from the cells that never get there do get there (noise {style})")
 
 
 def _before(states: list[dict[str, Any]]) -> dict[str, Any]:

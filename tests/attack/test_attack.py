@@ -100,6 +100,19 @@ def test_first_throws_of_the_reference_sheet():
     assert found == pytest.approx([8.262013, 8.557124, 8.891802], abs=6e-7)
 
 
+def test_cycles_are_found_whether_they_attract_or_repel():
+    """The reference sheet: on the limit set of the designed scene one of period 13 never exceeds 20.103; all repel."""
+    facts = scene(*DESIGNED)
+    found = judge.cycles(facts, longest=13)
+    lowest = np.inf
+    for x, side, period in found:
+        around = Orbits(facts.floats(), [x], [side])
+        around.fly(period)
+        lowest = min(lowest, around.most.max())
+    assert lowest == pytest.approx(20.1023, abs=1e-3)
+    assert {period for _, _, period in found} == set(range(7, 14))
+
+
 @pytest.mark.parametrize("seed", range(0, 60, 5))
 def test_floats_agree_with_50_digits(seed):
     """Kappa below ell, several roots and grazing included; side by side unless a decision is within rounding."""
