@@ -36,7 +36,7 @@ def impact(facts: Facts, x: mpf, i: int) -> mpf | None:
         return phi
 
 
-def throw(facts: Facts, x: mpf, i: int, shift: mpf = mpf(0)) -> tuple[mpf, int, int]:
+def throw(facts: Facts, x: mpf, i: int, shift: mpf | int = 0) -> tuple[mpf, int, int]:
     """Where the part comes to rest, on which side, and the code (jog 0, flip 1, inward -1, outward -2, outside -3)."""
     phi = impact(facts, x, i)
     if phi is None:

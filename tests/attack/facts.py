@@ -173,7 +173,9 @@ def landing(facts: Facts, noise: dict[str, str]) -> mpf:
     return si(noise["landing.x"]) / UNITS[facts.unit] if "landing.x" in noise else mpf(0)
 
 
-def moved(scene: dict[str, Any], quantity: str, shift: str | None = None, to: str | None = None) -> dict[str, Any]:
+def moved(
+    scene: dict[str, Any], quantity: str, shift: str | None = None, to: str | None = None
+) -> dict[str, Any]:
     """Give the scene with one quantity set to a text, or multiplied by a decimal."""
     found = copy.deepcopy(scene)
     if quantity == "throw.speed" and "kappa" in found["throw"]:

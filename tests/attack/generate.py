@@ -72,7 +72,10 @@ def part(rng: Any, size: float, unit: str) -> dict[str, Any]:
             "along": text(float(along @ (inside - q)), unit, of),
             "above": text(float(away @ (inside - q)), unit, of),
         }
-        found["mass"] = {"center": center, "radius_of_gyration": text(size * rng.uniform(0.25, 0.6), unit, of)}
+        found["mass"] = {
+            "center": center,
+            "radius_of_gyration": text(size * rng.uniform(0.25, 0.6), unit, of),
+        }
         return found
     found["mass"] = {"plate_density": f"{rng.integers(1, 9)} kg/m^2"}
     if rng.random() < 0.75:
@@ -94,7 +97,9 @@ def part(rng: Any, size: float, unit: str) -> dict[str, Any]:
 
 def rests(facts: model.Facts) -> bool:
     """Whether the part rests on every side, not on a knife's edge."""
-    return all(0.04 < a / s < 0.96 and d > 0.04 * s for a, d, s in zip(facts.a, facts.d, facts.side, strict=True))
+    return all(
+        0.04 < a / s < 0.96 and d > 0.04 * s for a, d, s in zip(facts.a, facts.d, facts.side, strict=True)
+    )
 
 
 def draft(rng: Any) -> tuple[dict[str, Any], model.Facts, str]:
@@ -105,7 +110,8 @@ def draft(rng: Any) -> tuple[dict[str, Any], model.Facts, str]:
     kappa = size * np.exp(rng.uniform(np.log(0.9), np.log(16)))
     flight = str(rng.choice(model.FLIGHTS, p=(0.66, 0.17, 0.17)))
     scene: dict[str, Any] = {"name": "attacked", "part": part(rng, size, own)}
-    h = size * 10 ** rng.uniform(-2.2, -0.5) * (1 if rng.random() < (0.3 if flight == "exact" else 0.12) else -1)
+    h = size * 10 ** rng.uniform(-2.2, -0.5)
+    h *= 1 if rng.random() < (0.3 if flight == "exact" else 0.12) else -1
     length = (kappa * rng.uniform(0.5, 1.1) + 2.5 * size) * rng.uniform(0.8, 1.8)
     scene["arm"] = {"surface_height": text(h, own, "mm", 5), "length": text(length, unit, "mm", 5)}
     if rng.random() < 0.5:
@@ -123,7 +129,11 @@ def draft(rng: Any) -> tuple[dict[str, Any], model.Facts, str]:
         scene["throw"] = {"speed": text(speed, "deg/s" if rng.random() < 0.7 else "rad/s", "rad/s", 5)}
     scene["model"] = {"flight": flight, "flip": "energy" if rng.random() < 0.5 else "signed"}
     facts = model.read(scene)
-    ok = rests(facts) and facts.arm > 1.2 * max(facts.a) and (flight != "small-angle-2" or facts.kappa > max(facts.d))
+    ok = (
+        rests(facts)
+        and facts.arm > 1.2 * max(facts.a)
+        and (flight != "small-angle-2" or facts.kappa > max(facts.d))
+    )
     return (scene, facts, unit) if ok else draft(rng)
 
 
@@ -152,13 +162,18 @@ def goal(rng: Any, facts: model.Facts, seen: Orbits, unit: str) -> dict[str, Any
     if kind == "oriented_beyond":
         others = np.delete(most, best)
         x = max(others.max(), float(min(facts.a))) + width * rng.choice((-0.03, -0.002, 0.002, 0.01, 0.05))
-        found: dict[str, Any] = {"x": text(min(max(x, 0.001 * width), 0.999 * float(facts.arm)), unit, facts.unit), "side": best}
+        found: dict[str, Any] = {
+            "x": text(min(max(x, 0.001 * width), 0.999 * float(facts.arm)), unit, facts.unit),
+            "side": best,
+        }
     elif kind.startswith("reaches"):
         side = best if rng.random() < 0.6 else int(rng.integers(n))
         low = np.where(np.isfinite(seen.most[:, side]), seen.most[:, side], np.nan)
         x = float(facts.a[side]) + 0.3 * width
         if np.isfinite(low).any():
-            x = float(np.nanquantile(low, rng.choice((0.0, 0.5, 1.0)))) - width * rng.choice((-0.01, 0.002, 0.02, 0.1))
+            x = float(np.nanquantile(low, rng.choice((0.0, 0.5, 1.0)))) - width * rng.choice(
+                (-0.01, 0.002, 0.02, 0.1)
+            )
         x = min(max(x, float(facts.a[side]) * 1.02), 0.999 * float(facts.arm))
         found = {"x": text(x, unit, facts.unit), "side": side, "every_orbit": kind == "reaches"}
     elif kind == "flip_order":
@@ -182,7 +197,12 @@ def deviations(rng: Any, scene: dict[str, Any], facts: model.Facts) -> tuple[dic
     if what < 0.62:
         return {}, {}
     if what < 0.82:
-        names = ["throw.speed", "landing.x", "both"] + (["gravity.tilt"] if "tilt" in scene.get("gravity", {}) else [])
+        names = [
+            "throw.speed",
+            "landing.x",
+            "both",
+            *(["gravity.tilt"] if "tilt" in scene.get("gravity", {}) else []),
+        ]
         name = str(rng.choice(names))
         noise = {}
         if name in ("throw.speed", "gravity.tilt", "both"):

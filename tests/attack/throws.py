@@ -18,7 +18,7 @@ TURN = 2 * math.pi
 
 
 @njit(cache=True)
-def height(x, a, d, kappa, phi):  # noqa: ANN001, ANN201
+def height(x, a, d, kappa, phi):
     """Height of the left vertex and its two derivatives, without cancellation at small angles."""
     s, half = math.sin(phi), math.sin(0.5 * phi)
     gone = 2 * half * half
@@ -27,7 +27,7 @@ def height(x, a, d, kappa, phi):  # noqa: ANN001, ANN201
 
 
 @njit(cache=True)
-def late(phi, s):  # noqa: ANN001, ANN201
+def late(phi, s):
     """Return phi - sin(phi)."""
     if phi > 0.3:
         return phi - s
@@ -36,12 +36,13 @@ def late(phi, s):  # noqa: ANN001, ANN201
 
 
 @njit(cache=True)
-def impact(x, a, d, kappa):  # noqa: ANN001, ANN201
+def impact(x, a, d, kappa):
     """Angle at which the left vertex lands; nan if not within a full turn."""
     if not x > a:
         return math.nan
     bend = math.hypot(a, d) + kappa
-    if kappa > bend - kappa:  # concave: what is down at a falling slope is the only root, however it was found
+    if kappa > bend - kappa:
+        # concave: where it is down at a falling slope is the only root, however it was found
         phi = 2 * (x - a) / (kappa - d)
         for _ in range(8):
             f, slope, curve = height(x, a, d, kappa, phi)
@@ -67,7 +68,7 @@ def impact(x, a, d, kappa):  # noqa: ANN001, ANN201
 
 
 @njit(cache=True)
-def throw(x, i, a, d, side, rho, kappa, h, arm, flight, flip, shift):  # noqa: ANN001, ANN201
+def throw(x, i, a, d, side, rho, kappa, h, arm, flight, flip, shift):
     """One throw: where the part comes to rest, on which side, and the code."""
     A, D = a[i], d[i]
     if flight == 0:
@@ -111,7 +112,7 @@ def throw(x, i, a, d, side, rho, kappa, h, arm, flight, flip, shift):  # noqa: A
 
 
 @njit(cache=True)
-def fly(numbers, x, i, code, throws, kappa, shift, ends, most, least, run, longest, last_out):  # noqa: ANN001, ANN201
+def fly(numbers, x, i, code, throws, kappa, shift, ends, most, least, run, longest, last_out):
     """Move all orbits on by some throws, all with the same kappa and shift at the same throw.
 
     code : 0 or 1 where an orbit is on the arm, else how it left; it is not moved then.
@@ -147,13 +148,18 @@ def fly(numbers, x, i, code, throws, kappa, shift, ends, most, least, run, longe
 
 
 @njit(cache=True)
-def chase(numbers, x, i, code, throws, lo, hi, e, weights, ends, most, least, run, longest, last_out, seed):  # noqa: ANN001, ANN201
+def luck():
+    return np.random.random()  # noqa: NPY002 - what numba has
+
+
+@njit(cache=True)
+def chase(numbers, x, i, code, throws, lo, hi, e, weights, ends, most, least, run, longest, last_out, seed):
     """As `fly`, with noise chosen anew at every throw and for every orbit, each by a taste of its own.
 
     Of five throws within the noise (its corners and one at random) the orbit follows the one that scores best by its
-    weights: far out, a flip, on each side. What the four others do is looked at as well: they may leave, or lie outside.
+    weights: far out, a flip, on each side. What the others do is looked at as well: they may leave, or lie outside.
     """
-    np.random.seed(seed)
+    np.random.seed(seed)  # noqa: NPY002 - what numba has
     a, d, side, rho, _, h, arm, flight, flip = numbers
     for k in range(x.size):
         at, on, how, jogs = x[k], i[k], code[k], run[k]
@@ -165,7 +171,7 @@ def chase(numbers, x, i, code, throws, lo, hi, e, weights, ends, most, least, ru
                 kappa = lo if c < 2 else hi
                 off = e if c % 2 == 0 else -e
                 if c == 4:
-                    kappa, off = lo + (hi - lo) * np.random.random(), e * (2 * np.random.random() - 1)
+                    kappa, off = lo + (hi - lo) * luck(), e * (2 * luck() - 1)
                 y, j, seen = throw(at, on, a, d, side, rho, kappa, h, arm, flight, flip, off)
                 if seen < 0:
                     best, to, there, what = math.inf, y, j, seen
@@ -180,7 +186,7 @@ def chase(numbers, x, i, code, throws, lo, hi, e, weights, ends, most, least, ru
                 if not inside:
                     last_out[k] = n
                 score = weights[k, 0] * y / arm + weights[k, 1] * seen + weights[k, 2 + j]
-                score += weights[k, 2 + a.size] * np.random.random()
+                score += weights[k, 2 + a.size] * luck()
                 if score > best:
                     best, to, there, what = score, y, j, seen
             at, on, how = to, there, what
@@ -231,15 +237,14 @@ class Orbits:
 
 
 @njit(cache=True)
-def decisions(numbers, x, i):  # noqa: ANN001, ANN201
+def decisions(numbers, x, i):
     """Whether a part at each x on one side flips: 0, 1, -3 where it is outside the model."""
     a, d, side, rho, kappa, h, _, flight, flip = numbers
     found = np.empty(x.size, dtype=np.int64)
-    low = np.full_like(a, -1e300)
     for k in range(x.size):
         j = i
         if x[k] > a[i]:
-            to, j, code = throw(x[k], i, a, d, side, rho, kappa, h, 1e300, flight, flip, 0.0)
+            _, j, code = throw(x[k], i, a, d, side, rho, kappa, h, 1e300, flight, flip, 0.0)
             found[k] = OUTSIDE if code == OUTSIDE else (1 if j != i else 0)
         else:
             found[k] = OUTSIDE
