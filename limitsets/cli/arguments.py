@@ -11,7 +11,9 @@ from limitsets.errors import LimitsetsError
 if TYPE_CHECKING:
     from limitsets.scene import Scene
 
-__all__ = ["Ends", "deviations", "ends_of", "number", "place", "position"]
+__all__ = ["HELP_NO_RECHECK", "Ends", "deviations", "ends_of", "number", "place", "position"]
+
+HELP_NO_RECHECK = "Write certificates without checking them first."
 
 _BARE = re.compile(r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]{1,3})?")
 

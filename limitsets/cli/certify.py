@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from limitsets.cli.arguments import deviations
+from limitsets.cli.arguments import HELP_NO_RECHECK, deviations
 from limitsets.cli.output import Json, Scene, progress, saved, table
 from limitsets.files import as_json
 
@@ -34,7 +34,6 @@ HELP_TOLERANCE = "A quantity that is fixed but unknown, like throw.speed='0.7 %'
 HELP_NOISE = (
     "What differs at every throw: throw.speed, gravity.tilt, landing.x, like throw.speed='0.3 %'; repeatable."
 )
-HELP_NO_RECHECK = "Write the certificate without checking it first."
 
 
 def certify(

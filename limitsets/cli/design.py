@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from limitsets.cli.arguments import ends_of, number
+from limitsets.cli.arguments import HELP_NO_RECHECK, ends_of, number
 from limitsets.cli.output import Json, Scene, progress, saved, table
 from limitsets.errors import LimitsetsError
 from limitsets.files import as_json
@@ -80,6 +80,9 @@ def design(
         ),
     ] = None,
     json: Json = False,
+    no_recheck: Annotated[
+        bool, typer.Option("--no-recheck", help=f"With --robust: {HELP_NO_RECHECK}")
+    ] = False,
 ) -> None:
     """Find a scene whose critical points are where they are wanted, or that is fed in spite of large deviations.
 
@@ -96,7 +99,8 @@ def design(
     if critical_points is None:
         from limitsets.cli.design_robust import run_robust
 
-        raise typer.Exit(run_robust(scene, names, ends_of(bounds), evaluations, seconds, out, json=json))
+        told = {"json": json, "recheck": not no_recheck}
+        raise typer.Exit(run_robust(scene, names, ends_of(bounds), evaluations, seconds, out, **told))
     with progress() as tell:
         from limitsets.inverse import design as run
         from limitsets.scene import load

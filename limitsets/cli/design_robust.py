@@ -31,6 +31,7 @@ def run_robust(
     out: Path | None,
     *,
     json: bool,
+    recheck: bool,
 ) -> int:
     """Search, prove, write and print; the exit code."""
     with progress() as tell:
@@ -48,7 +49,7 @@ def run_robust(
             prove=seconds,
             progress=tell,
         )
-        files = [] if out is None else _written(found, out)
+        found, files = (found, []) if out is None else _written(found, out, recheck=recheck)
     if json:
         print(as_json(found.to_json()), end="")
     else:
@@ -78,19 +79,21 @@ def _ends(scene: Scene, name: str, ends: Ends) -> tuple[float, float]:
     return in_units(scene, name, lo, key="--bounds"), in_units(scene, name, hi, key="--bounds")
 
 
-def _written(found: RobustDesign, out: Path) -> list[Path]:
-    """Write the scene, or a folder: scene, answer, certificates, figure."""
+def _written(found: RobustDesign, out: Path, *, recheck: bool) -> tuple[RobustDesign, list[Path]]:
+    """Write the scene, or a folder: scene, answer, certificates, figure; the design without what the checker denies."""
     if out.suffix == ".toml":
-        return save_scene(found.scene, out)
+        return found, save_scene(found.scene, out)
     from limitsets import plot
+    from limitsets.inverse.margin.answer import save
     from limitsets.report.writing import DPI, filled
 
     with filled(out) as folder:
-        names = [path.name for path in found.save(folder)]
+        found, paths = save(found, folder, recheck=recheck)
+        names = [path.name for path in paths]
         if found.front:
             plot.robust_design(found).savefig(folder / "front.png", dpi=DPI)
             names.append("front.png")
-    return [out / name for name in names]
+    return found, [out / name for name in names]
 
 
 def _text(found: RobustDesign, files: list[Path]) -> None:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from limitsets.cli.arguments import place
+from limitsets.cli.arguments import HELP_NO_RECHECK, place
 from limitsets.cli.output import Json, Scene, progress, table
 from limitsets.errors import LimitsetsError
 from limitsets.files import as_json
@@ -42,6 +42,7 @@ def margin(
         ),
     ] = None,
     json: Json = False,
+    no_recheck: Annotated[bool, typer.Option("--no-recheck", help=HELP_NO_RECHECK)] = False,
 ) -> None:
     """Bracket how much each quantity may deviate before the goal fails: proved below, refuted above.
 
@@ -61,11 +62,11 @@ def margin(
         records = [each.to_json() for each in found]
         if out is not None:
             tell("files", len(found), len(found) + 1)
-            _write(found, records, out)
+            found, records = _write(found, out, recheck=not no_recheck)
     if json:
         print(as_json(records), end="")
     else:
-        _text(found, out)
+        _text(found, out, no_recheck=no_recheck)
     raise typer.Exit(
         0 if all(each.proved > 0 and (each.closed or each.refuted is None) for each in found) else 1
     )
@@ -87,16 +88,23 @@ def _goal_at(scene: Any, text: str) -> Any:
     return replace(scene.goal, x=x)
 
 
-def _write(found: tuple[Margin, ...], records: list[dict[str, Any]], out: Path) -> None:
+def _write(
+    given: tuple[Margin, ...], out: Path, *, recheck: bool
+) -> tuple[tuple[Margin, ...], list[dict[str, Any]]]:
+    """Write the files; the margins and their JSON without what the checker denies."""
     from limitsets.errors import AnswerError
     from limitsets.plot.margins import tolerance_box, tornado
     from limitsets.report.writing import DPI, filled
+    from limitsets.robust.margins.answer import settled
 
-    for each, record in zip(found, records, strict=True):
+    found, records = [], []
+    for each in given:
         try:
-            record["certificate"] = [path.name for path in each.save(out)] or None
+            left, paths = settled(each, out, recheck=recheck)
         except AnswerError:  # effects: nothing rechecks them, the margin stands
-            record["certificate"] = None
+            left, paths = each, ()
+        found.append(left)
+        records.append(left.to_json() | {"certificate": [path.name for path in paths] or None})
     with filled(out) as draft:
         (draft / "margins.json").write_text(as_json(records), encoding="utf-8", newline="\n")
         single = [each for each in found if each.reading != "tolerance"]
@@ -105,9 +113,10 @@ def _write(found: tuple[Margin, ...], records: list[dict[str, Any]], out: Path) 
         for each in found:
             if each.reading == "tolerance":
                 tolerance_box(each).savefig(draft / "joint.png", dpi=DPI)
+    return tuple(found), records
 
 
-def _text(found: tuple[Margin, ...], out: Path | None) -> None:
+def _text(found: tuple[Margin, ...], out: Path | None, *, no_recheck: bool) -> None:
     from limitsets.report.questions import question_of
     from limitsets.report.robust_pages import READINGS
     from limitsets.robust.margins.words import bound
@@ -125,5 +134,6 @@ def _text(found: tuple[Margin, ...], out: Path | None) -> None:
             typer.echo(f"{each.quantity}: {each.reason}")
     if out is not None:
         typer.echo(
-            f"written to {out}: margins.json, figures, certificates (check them: limitsets recheck FILE)"
+            f"written to {out}: margins.json, figures, certificates"
+            f" ({'not rechecked' if no_recheck else 'rechecked'}; again: limitsets recheck FILE)"
         )

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from limitsets.cli.arguments import deviations
+from limitsets.cli.arguments import HELP_NO_RECHECK, deviations
 from limitsets.cli.output import Json, Scene, progress, table
 from limitsets.files import as_json
 
@@ -55,6 +55,7 @@ def robustness(
         ),
     ] = None,
     json: Json = False,
+    no_recheck: Annotated[bool, typer.Option("--no-recheck", help=HELP_NO_RECHECK)] = False,
 ) -> None:
     """Say how far each quantity may drift before the goal fails, and write report.md, figures and certificates.
 
@@ -83,6 +84,7 @@ def robustness(
             cells=cells,
             leave_out=without or (),
             folder=folder,
+            recheck=not no_recheck,
             progress=tell,
         )
         from limitsets.report import write_robustness

@@ -4,8 +4,8 @@ Every start in a cell of the basin either comes to the attracting cells, by rank
 length zero.  Off the attracting cells a cell of the basin is of one of three kinds:
 
 * *falling*: every image lies in cells of smaller rank;
-* *passing*: besides in such cells it may lie in the cell itself again, and a jog from the cell is proved to go outward
-  by more than the noise of the landing place, so that an orbit leaves the cell after finitely many throws;
+* *passing*: besides in such cells it may lie in the cell itself again, and jogs from the cell are proved to go one way,
+  all outward or all inward, by more than the noise of the landing place: an orbit leaves the cell after finitely many;
 * *thin*: the rank does not rise, and almost every start leaves the cells of that rank (`thinning.py`).
 
 Ranks do not rise along any image, so an orbit that does not come to the attracting cells stays in thin cells of one
@@ -116,13 +116,14 @@ class Basin:
 def _shifts(lo_map: Any, hi_map: Any, side: int, lo: Any, hi: Any, out: Any) -> None:
     """Bound the displacement of a jog from each cell.
 
-    `out`: rows of the least for all kappa, the largest for the largest kappa, and 1 where that one is a decided jog.
+    `out`: rows of the least for all kappa, the largest for the largest kappa, 1 where that one is a decided jog, the
+    largest for all kappa.
     """
     whole = gather_box(lo_map, hi_map, side)
     slow = with_kappa(whole, whole.kappa[1], whole.kappa[1])
     for k in range(lo.size):
         _, _, phi, _, _ = throw_box(whole, lo[k], hi[k])
-        out[k, 0] = _ends(whole, phi)[0]
+        out[k, 0], out[k, 3] = _ends(whole, phi)
         state, _, phi, _, _ = throw_box(slow, lo[k], hi[k])
         out[k, 1] = _ends(slow, phi)[1]
         out[k, 2] = 1.0 if state == 0 else 0.0
@@ -142,7 +143,7 @@ def _displacements(found: Cover) -> list[Floats]:
     """Per side, what `_shifts` says of its cells."""
     answers = []
     for side, (edges,) in enumerate(found.grid.edges):
-        out = np.full((edges.size - 1, 3), np.nan)
+        out = np.full((edges.size - 1, 4), np.nan)
         lo, hi = np.ascontiguousarray(edges[:-1]), np.ascontiguousarray(edges[1:])
         _shifts(*found.box.bare, side, lo, hi, out)
         answers.append(out)
@@ -228,11 +229,12 @@ def _reaching(found: Cover, cells: Mask) -> Mask:
 
 
 def _passing(found: Cover, displaced: Sequence[Floats]) -> Mask:
-    """Cells from which a jog is proved to go outward by more than the noise of the landing place, where it is one."""
+    """Cells from which jogs are proved to go one way by more than the noise of the landing place."""
     if found.box.effects:  # another vertex may land, elsewhere
         return np.zeros(found.grid.n_cells, dtype=bool)
-    least = np.concatenate([each[:, 0] for each in displaced])
-    return np.greater(least - found.box.landing, ROOM * np.abs(least))
+    least, most = (np.concatenate([each[:, k] for each in displaced]) for k in (0, 3))
+    by = np.maximum(least, -most)
+    return np.greater(by - found.box.landing, ROOM * by)
 
 
 def _near(found: Cover, joint: Sequence[NearJoint], shut: Mask, *, thin: bool) -> bool:

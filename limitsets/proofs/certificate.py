@@ -101,6 +101,15 @@ def _parameters(found: Cover) -> dict[str, Any]:
     }
 
 
+def _tidy(table: Any) -> Any:
+    """Write the texts of a scene with single blanks."""
+    if isinstance(table, Mapping):
+        return {key: _tidy(value) for key, value in table.items()}
+    if isinstance(table, list):
+        return [_tidy(value) for value in table]
+    return " ".join(table.split()) if isinstance(table, str) else table
+
+
 def write(
     path: str | Path,
     proofs: Sequence[Attraction],
@@ -149,9 +158,11 @@ def write(
     for number, proof in enumerate(proofs):
         arrays |= arrays_of(proof, f"{number}.")
         found = proof.cover
-        # what is left of the effects here is noise, which the header has; a scene may leave the model to its defaults
-        scene = {word: table for word, table in found.box.scene.items() if word != "effects"}
+        # what is left of the effects here is a spread; a scene may leave the model to its defaults
+        scene = {word: _tidy(table) for word, table in found.box.scene.items() if word != "effects"}
         scene["model"] = _model(found)
+        if found.box.scene.get("effects", {}).get("spread"):
+            scene["effects"] = {"spread": found.box.scene["effects"]["spread"]}
         boxes.append({"scene": scene, "parameters": _parameters(found), "prefix": f"{number}."})
     header = {
         "format": FORMAT,

@@ -305,12 +305,12 @@ def quantity(value: object, kinds: str, where: str) -> Quantity:
     require(len(pair) == 2, f"{where}: an interval has two ends")
     read = []
     for text in pair:
-        short = isinstance(text, str) and len(text) <= LONGEST_TEXT and text == " ".join(text.split())
+        words = text if isinstance(text, str) and len(text) <= LONGEST_TEXT else ""
+        tidy = words == " ".join(words.split()) != ""
         require(
-            short,
-            f"{where}: {plain(text)} is not a quantity of at most {LONGEST_TEXT} signs, with single blanks",
+            tidy, f"{where}: {plain(text)} is not text of at most {LONGEST_TEXT} signs, with single blanks"
         )
-        found = NUMBER.fullmatch(text)
+        found = NUMBER.fullmatch(words)
         require(found is not None, f"{where}: {plain(text)} is not a decimal number and a unit")
         assert found is not None
         size = abs(Fraction(found[1]))
@@ -960,15 +960,19 @@ def guess_root(floats: tuple[float, float, float], exact: bool, x: float, kappa:
     a, d, small = floats
     if not exact:
         return 2.0 * (x - a) / (kappa - small)
-    for _ in range(12):
+    last = math.inf
+    for k in range(
+        100
+    ):  # next to the joint the angle is far smaller than where it begins, and is halved at first
         sin, cos = math.sin(p), math.cos(p)
         slope = x - a * cos + d * sin - kappa * p
         if slope >= 0.0:
             return math.nan
         step = ((x - 0.5 * kappa * p) * p + d - a * sin - d * cos) / slope
         p -= step
-        if abs(step) < 1e-14 * p:
+        if abs(step) < 1e-14 * p or (k > 12 and abs(step) > 0.75 * last):
             break
+        last = abs(step)
     return p
 
 
@@ -1526,19 +1530,23 @@ def beside_root(s: Side, x: Arb, kappa: Arb, before: bool) -> Angle:
     x0, k = float(x), float(kappa)
     right = (x0 + math.sqrt(x0 * x0 + 2 * k * (d + math.hypot(a, d)))) / k  # f < 0 there
     p = arb(guess_root(s.floats, s.exact, x0, k, right) if 0 < right < 1e3 else math.nan)
-    for _ in range(2):
+    for tried in range(8):  # two will do, but where the floats are poor: next to the joint
         f = flight(x, kappa, at_angle(s, p))
         sin, cos = p.sin_cos()
         p = (p - f / (x - s.a * cos + s.d * sin - kappa * p)).mid()
-    at = at_angle(s, (p * (ONE - ROOT if before else ONE + ROOT)).mid())
-    f = flight(x, kappa, at)
-    # x > a and f concave: positive up to its one positive root and negative from there on
-    right_side = bool(f > 0 if before else f < 0) and bool(at.p > 0 and at.p < FULL_TURN)
+        root = ROOT if tried < 6 else WIDER_ROOT
+        at = at_angle(s, (p * (ONE - root if before else ONE + root)).mid())
+        f = flight(x, kappa, at)
+        # x > a and f concave: positive up to its one positive root and negative from there on
+        right_side = bool(f > 0 if before else f < 0) and bool(at.p > 0 and at.p < FULL_TURN)
+        if right_side or not p.is_finite():
+            break
     prove(right_side and s.concave and bool(x > s.a), f"the impact is not bracketed at x = {x0!r}")
     return at
 
 
-ROOT = arb(2) ** -70  # brackets of the impact are so narrow, relative to the angle
+# Brackets of the impact are so narrow, relative to the angle; or so where R - a is less than a millionth of a.
+ROOT, WIDER_ROOT = arb(2) ** -70, arb(2) ** -45
 
 
 class Throws:
@@ -1787,16 +1795,17 @@ def follow(throws: Throws, orbit: Orbit, x0: Arb, x1: Arb) -> Followed:
     return Followed(states, slope)
 
 
-def prove_orbit(throws: Throws, cells: Union, orbit: Orbit) -> Followed:
+def prove_orbit(throws: Throws, cells: Union | None, orbit: Orbit) -> Followed:
     """Prove one periodic orbit: with G the throws along the itinerary, G(R) - R changes sign in the interval.
 
     Along the interval all decisions are those of the itinerary and f is concave, so that G is the map and continuous.
-    |G'| > 1 or < 1 on it: G(R) - R is monotone and the orbit alone.  The attracting cells are invariant: one point of
-    the orbit in them is enough.
+    |G'| > 1 or < 1 on it: G(R) - R is monotone and the orbit alone.  The attracting cells, if it has to lie in them,
+    are invariant: one point of the orbit in them is enough.
     """
-    here: Union = [[] for _ in cells]
-    here[orbit.side] = [(orbit.lo, orbit.hi)]
-    prove(not first_outside(here, cells), "not in the attracting cells")
+    if cells is not None:
+        here: Union = [[] for _ in cells]
+        here[orbit.side] = [(orbit.lo, orbit.hi)]
+        prove(not first_outside(here, cells), "not in the attracting cells")
     lo, hi = arb(orbit.lo), arb(orbit.hi)
     first, last = (follow(throws, orbit, x, x).states[-1] for x in (lo, hi))
     prove(first[0] == orbit.side, "it ends on another side")
@@ -1840,7 +1849,7 @@ def check_orbits(scene: Scene, c: Cells, section: dict[str, Any]) -> str:
 
 def check_sets(scene: Scene, c: Cells, claims: dict[str, dict[str, Any]]) -> Iterator[tuple[list[str], str]]:
     """Check end points and periodic orbits of attracting cells that are proved; yields what fails."""
-    for name, check in (("end-points", check_ends), ("cycles", check_orbits), ("refuted", check_refuted)):
+    for name, check in (("end-points", check_ends), ("cycles", check_orbits)):
         bad = check(scene, c, claims[name]) if name in claims else ""
         if bad:
             yield [name], bad
@@ -1853,46 +1862,91 @@ INSIDE = (
 )  # a stated kappa keeps this share of it from the ends of its noise: these are known to 100 bits
 
 
+RECURS = (
+    "cycle",
+    "closed",
+    "once",
+)  # why an orbit refutes: it is periodic, it closes with noise, once is enough
+BROKEN = {  # keys of a goal that an orbit may refute, besides from_anywhere, and what is said of the orbit
+    "oriented_beyond": ("kind x side", "comes to lie beyond x = {text} on another side than {side}"),
+    "reaches": ("kind x side every_orbit", "never comes to rest on side {side} at x >= {text}"),
+    "flip_order": ("kind order", "does not follow the order {order} of sides"),
+    "stays_on_arm": ("kind", "leaves the arm"),
+    "attracts_all": ("kind", "leaves the arm"),
+}
+
+
 def read_refutation(section: dict[str, Any], n_sides: int) -> dict[str, Any]:
-    """Read an orbit that refutes a goal: its start and what each throw was like."""
-    goal = table(section["goal"], "refuted.goal", "kind x side", "from_anywhere")
-    require(goal["kind"] == "oriented_beyond", "refuted.goal: not a kind that an orbit refutes")
-    start = table(section["start"], "refuted.start", "x side")
-    throws = []
-    for each in rows(section["throws"], "refuted.throws", 1, 100_000):
-        one = table(each, "a throw", "kappa landing")
-        numbers = (
-            None if one[key] is None else arb(hex_float(one[key], key)) for key in ("kappa", "landing")
-        )
-        throws.append(tuple(numbers))
+    """Read an orbit that refutes a goal: its start, what each throw was like, and why it comes back; or a cycle."""
+    goal = section["goal"]
+    kind = goal.get("kind") if isinstance(goal, dict) else None
+    require(isinstance(kind, str) and kind in BROKEN, "refuted.goal: not a kind that an orbit refutes")
+    goal = table(goal, "refuted.goal", BROKEN[str(kind)][0], "from_anywhere")
+    goal = {"throws": 0} | goal if kind == "reaches" else {"jogs": 0} | goal if kind == "flip_order" else goal
     nominal, tolerance = section["nominal"], section["tolerance"]
     same = isinstance(nominal, dict) and isinstance(tolerance, dict) and set(nominal) == set(tolerance)
     require(
         same and len(nominal) <= 64, "refuted: nominal values and tolerance do not name the same quantities"
     )
-    return {
-        "goal": read_goal(goal, n_sides),
-        "x": hex_float(start["x"], "refuted.start.x"),
-        "side": read_side(start["side"], n_sides),
-        "throws": throws,
-        "nominal": nominal,
-        "tolerance": tolerance,
-    }
+    found = {"goal": read_goal(goal, n_sides), "nominal": nominal, "tolerance": tolerance, "why": ""}
+    if "recurs" in section:
+        recurs = table(section["recurs"], "refuted.recurs", "", " ".join(RECURS))
+        require(len(recurs) == 1, "refuted.recurs is not one of cycle, closed and once")
+        (found["why"],) = recurs
+        if found["why"] == "cycle":
+            require(not {"start", "throws"} & set(section), "refuted: a cycle has no start and no throws")
+            (orbit,) = read_orbits({"cycles": [recurs["cycle"]], "complete": False}, n_sides)["orbits"]
+            return found | {"orbit": orbit}
+        require(recurs[found["why"]] is True, "refuted.recurs is not true")
+    require({"start", "throws"} <= set(section), "refuted: start or throws are missing")
+    start = table(section["start"], "refuted.start", "x side")
+    throws = [read_throw(each) for each in rows(section["throws"], "refuted.throws", 1, 100_000)]
+    spans = [number for number, (kappa, _) in enumerate(throws) if isinstance(kappa, tuple)]
+    last = not spans or (found["why"] == "closed" and spans == [len(throws) - 1])
+    require(last, "two values of kappa are those of the throw that closes an orbit")
+    x, side = hex_float(start["x"], "refuted.start.x"), read_side(start["side"], n_sides)
+    return found | {"x": x, "side": side, "throws": throws}
+
+
+def read_throw(value: object) -> tuple[Any, Any]:
+    """Read what a throw was like: kappa, two values between which it lies, or None; how far off it landed, or None."""
+    one = table(value, "a throw", "kappa landing")
+    kappa, landing = one["kappa"], one["landing"]
+    if isinstance(kappa, list):
+        low, high = (hex_float(end, "kappa") for end in rows(kappa, "kappa", 2, 2))
+        require(low < high, "kappa is an empty interval")
+        kappa = arb(low), arb(high)
+    elif kappa is not None:
+        kappa = arb(hex_float(kappa, "kappa"))
+    return kappa, None if landing is None else arb(hex_float(landing, "landing"))
 
 
 def statement_of_refutation(section: dict[str, Any]) -> str:
     """Put it in words."""
+    kinds = "length angle speed acceleration mass density share"
     near = ", ".join(
-        f"{plain(name)} within {plain(dev)} of {plain(section['nominal'][name])}"
+        f"{plain(name)} within {quantity(dev, kinds, 'tolerance')} of"
+        f" {quantity(section['nominal'][name], kinds, 'nominal')}"
         for name, dev in section["tolerance"].items()
     )
     goal = section["goal"]
-    where = "on the arm" if goal["anywhere"] else "in the attracting cells"
-    return (
-        f"refuted: the orbit from x = {section['x']!r} on side {section['side']}, {where}, of"
-        f" {len(section['throws'])} throws ends beyond x = {plain(goal['text'])} on another side than {goal['side']}"
-        + (f"; {near}" if near else "")
-    )
+    order = " ".join(map(str, goal.get("order", ())))
+    broken = BROKEN[goal["kind"]][1].format(text=goal.get("text"), side=goal.get("side"), order=order)
+    if section["why"] == "cycle":
+        o = section["orbit"]
+        of = "almost every start" if o.attracts else "every start"
+        orbit = f"a periodic orbit, of {len(o.word)} throws, with a place x in [{o.lo!r}, {o.hi!r}] on side {o.side}"
+        what = f"not from {of}: {orbit}, which {'attracts' if o.attracts else 'repels'}, {broken}"
+    else:
+        start = f"x = {section['x']!r} on side {section['side']}"
+        number = f"{len(section['throws'])} throws"
+        if section["why"] == "closed":
+            what = (
+                f"not for every sequence of throws: an orbit of {number} from {start} back to there {broken}"
+            )
+        else:
+            what = f"not from every start on the arm: the orbit from {start}, of {number}, {broken}"
+    return f"refuted: {what}" + (f"; {near}" if near else "")
 
 
 def check_deviations(scene: Scene, section: dict[str, Any]) -> str:
@@ -1921,41 +1975,118 @@ def check_deviations(scene: Scene, section: dict[str, Any]) -> str:
     return ""
 
 
-def check_refuted(scene: Scene, c: Cells, section: dict[str, Any]) -> str:
-    """Throw the orbit again in balls, given that the attracting cells are what they say; "" or what fails."""
+def check_refuted(scene: Scene, section: dict[str, Any]) -> str:
+    """Throw the orbit again in balls, whatever the cells are; "" or what fails."""
+    why, goal = section["why"], section["goal"]
+    if not why:
+        return "it shows a passing orbit only: a goal is refuted by one that comes back"
     bad = check_deviations(scene, section)
     if bad:
         return bad
-    goal, side, x = section["goal"], section["side"], arb(section["x"])
-    inside = any(lo <= section["x"] <= hi for lo, hi in attracting(c)[side])
-    if not (inside or goal["anywhere"]):
-        return "the orbit does not start in the attracting cells"
-    throws, fixed = Throws(scene), scene.k_lo.union(scene.k_hi)
-    varies = isinstance(scene.noise, dict) and bool({"throw.speed", "gravity.tilt"} & set(scene.noise))
+    once = goal["kind"] in ("stays_on_arm", "attracts_all")
+    if once or (goal["kind"] == "oriented_beyond" and goal["anywhere"]):
+        if why != "once":
+            return "an orbit that comes back is not what refutes this goal"
+    elif why == "once":
+        return "once is not enough: the goal does not speak of every throw from every start"
     try:
-        for number, (kappa, landing) in enumerate(section["throws"]):
-            s = scene.sides[side]
-            prove(bool(x > s.a and x <= s.arm), f"the part does not lie on the arm before throw {number + 1}")
-            if kappa is None:
-                prove(not varies, f"throw {number + 1} does not say its kappa")
-            else:
-                within = kappa > scene.k_lo * (1 + INSIDE) and kappa < scene.k_hi * (1 - INSIDE)
-                prove(varies and bool(within), f"the kappa of throw {number + 1} is not within the noise")
-            k, shift = fixed if kappa is None else kappa, ZERO if landing is None else landing
-            prove(
-                bool(abs(shift) <= s.landing), f"throw {number + 1} lands farther off than the noise allows"
-            )
-            thrown = throws.box(side, x.lower(), x.upper(), k.lower(), k.upper())
-            prove(thrown.decision != 2, f"the decision of throw {number + 1} is not settled")
-            x = thrown.lo.union(thrown.hi) + shift
-            if thrown.decision == 1:
-                x, side = x - s.shift, (side + 1) % len(scene.sides)
+        states = periodic(scene, section["orbit"]) if why == "cycle" else thrown_again(scene, section)
+        if why == "once":
+            return left_or_beyond(scene, goal, states[-1])
+        prove(breaks(scene, goal, states), "no state of the orbit violates the goal")
     except UnprovedError as error:
         return str(error)
-    s, end = scene.sides[side], goal["x"].ball() / exact(LENGTHS[scene.unit])
-    if not (side != goal["side"] and x > end and x <= s.arm):
-        return f"the orbit ends on side {side} at x = {x.str(12)}, which the goal allows"
+    if goal["kind"] == "reaches" and not goal["every"] and not (why == "cycle" and section["orbit"].attracts):
+        return "the goal speaks of almost every start, and the orbit is not proved to attract"
     return ""
+
+
+State = tuple[int, Arb, Arb]  # side, and bounds of x
+
+
+def periodic(scene: Scene, orbit: Orbit) -> list[State]:
+    """Prove a periodic orbit of the scene without noise, which is one of the sequences allowed; its states."""
+    quiet = read_scene({**scene.raw, "effects": {}}, None)
+    prove(all(s.concave for s in quiet.sides), "kappa > ell is not proved")
+    states = prove_orbit(Throws(quiet), None, orbit).states
+    for side, lo, hi in states:
+        s = quiet.sides[side]
+        prove(bool(lo > s.a and hi <= s.arm), "a point of the periodic orbit is not proved to lie on the arm")
+    return states
+
+
+def thrown_again(scene: Scene, section: dict[str, Any]) -> list[State]:
+    """Prove every throw of an orbit, and that it comes back exactly to its start where that is said; its states."""
+    side, x = section["side"], arb(section["x"])
+    throws, fixed = Throws(scene), scene.k_lo.union(scene.k_hi)
+    varies = isinstance(scene.noise, dict) and bool({"throw.speed", "gravity.tilt"} & set(scene.noise))
+    states = [(side, x, x)]
+    for number, (said, landing) in enumerate(section["throws"], 1):
+        s = scene.sides[side]
+        prove(bool(x > s.a and x <= s.arm), f"the part does not lie on the arm before throw {number}")
+        kappa = said if isinstance(said, tuple) else () if said is None else (said,)
+        prove(varies or not kappa, f"the kappa of throw {number} is not within the noise: it is known")
+        prove(bool(kappa) or not varies, f"throw {number} does not say its kappa")
+        for k in kappa:
+            within = k > scene.k_lo * (1 + INSIDE) and k < scene.k_hi * (1 - INSIDE)
+            prove(bool(within), f"the kappa of throw {number} is not within the noise")
+        shift = ZERO if landing is None else landing
+        prove(bool(abs(shift) <= s.landing), f"throw {number} lands farther off than the noise allows")
+        images = []
+        for k in (kappa[0].union(kappa[1]), *kappa) if len(kappa) > 1 else kappa or (fixed,):
+            thrown = throws.box(side, x.lower(), x.upper(), k.lower(), k.upper())
+            prove(thrown.decision != 2, f"the decision of throw {number} is not settled")
+            turned = s.shift if thrown.decision == 1 else ZERO
+            images.append(thrown.lo.union(thrown.hi) + shift - turned)
+        if number == len(section["throws"]) and section["why"] == "closed":
+            to = states[0][0]
+            prove((side + thrown.decision) % len(scene.sides) == to, "the last throw ends on another side")
+            prove(
+                comes_back(scene, states[0][1], images, landing),
+                "that the last throw comes back is not proved",
+            )
+            return states
+        x, side = images[0], (side + thrown.decision) % len(scene.sides)
+        states.append((side, x.lower(), x.upper()))
+    return states
+
+
+def comes_back(scene: Scene, start: Arb, images: list[Arb], landing: Arb | None) -> bool:
+    """Whether a throw can land exactly on the start.
+
+    By the noise of the landing, if it spans the distance from all of the enclosed place; or between two values of kappa
+    whose places lie on either side: f being concave the place moves continuously with kappa.
+    """
+    if len(images) == 1:
+        return landing is None and bool(abs(images[0] - start) <= scene.sides[0].landing.lower())
+    _, first, last = images
+    parted = bool(first < start and last > start) or bool(first > start and last < start)
+    return parted and all(s.concave for s in scene.sides)
+
+
+def breaks(scene: Scene, goal: dict[str, Any], states: list[State]) -> bool:
+    """Whether an orbit that comes back to its first state violates a goal, whichever number each ball stands for."""
+    if goal["kind"] == "flip_order":
+        order, sides = goal["order"], [side for side, _, _ in states]
+        allowed = set(zip(order, [*order[1:], order[0]], strict=True))
+        flips = [(a, b) for a, b in itertools.pairwise([*sides, sides[0]]) if a != b]
+        return bool(set(flips) - allowed) or (not flips and len(set(order)) > 1)
+    x = goal["x"].ball() / exact(LENGTHS[scene.unit])
+    if goal["kind"] == "oriented_beyond":
+        return any(side != goal["side"] and bool(lo > x) for side, lo, _ in states)
+    return all(side != goal["side"] or bool(hi < x) for side, _, hi in states)
+
+
+def left_or_beyond(scene: Scene, goal: dict[str, Any], last: State) -> str:
+    """Check that a state is off the arm, or beyond x on another side; "" or what fails."""
+    side, lo, hi = last
+    s = scene.sides[side]
+    if goal["kind"] != "oriented_beyond":
+        off = bool(hi <= s.a or lo > s.arm)
+        return "" if off else f"the orbit ends on side {side} at x = {lo.union(hi).str(12)}, on the arm"
+    if breaks(scene, goal, [last]) and hi <= s.arm:
+        return ""
+    return f"the orbit ends on side {side} at x = {lo.union(hi).str(12)}, which the goal allows"
 
 
 # --------------------------------------------------------------------------------------------------- near the joint
@@ -2173,9 +2304,9 @@ SECTIONS = {  # the claims that are known, and the keys of their sections
     "expanding": "least_slope",
     "end-points": "images ends pieces",
     "cycles": "cycles complete",
-    "refuted": "goal start throws nominal tolerance",
+    "refuted": "goal nominal tolerance",
 }
-MORE_KEYS: dict[str, str] = {}  # that a section may have besides
+MORE_KEYS = {"refuted": "recurs start throws"}  # that a section may have besides
 WORDS = {  # of a verdict, in JSON and for people
     "proved": "PROVED",
     "proved-on-cells": "PROVED ON CELLS",
@@ -2623,7 +2754,7 @@ def check_starts(c: Cells, scene: Scene, goal: dict[str, Any], starts: Starts) -
 
     Let G be the cells with a rank.  No orbit leaves them, and off the components the rank never rises: so in the end it
     stays what it is.  It cannot where it falls along every target; nor for ever in a cell that only leads to itself and
-    to lower ranks, while each jog from it moves the part outward by more than the landing scatters.  What is left, Z,
+    to lower ranks, while each jog from it moves the part one way by more than the landing scatters.  What is left, Z,
     has to thin out, rank by rank; and starts of length zero have to come from starts of length zero only.
     """
     inside, claimed = c.component >= 0, c.rank >= 0
@@ -2693,15 +2824,16 @@ def level_cells(c: Cells, scene: Scene) -> tuple[Array, str]:
 
 
 def check_passing(scene: Scene, side: int, phi: list[float]) -> str:
-    """Check that jogs with angles in the bracket move outward by more than the landing scatters; "" or not."""
+    """Check that jogs with angles in the bracket all move one way by more than the landing scatters; "" or not."""
     s = scene.sides[side]
     low, high = at_angle(s, arb(phi[0])), at_angle(s, arb(phi[1]))
     rise = -s.h
     if s.exact:
         sin, cos = sine_cosine(low.p.union(high.p))
         rise = s.a * sin - s.d * (1 - cos) - s.h
-    moved = low.D if rise > 0 else low.D + rise * ZERO.union(high.p - low.p)
-    return "" if moved > s.landing else "a jog is not proved to move it outward"
+    moved = low.D.union(high.D) if rise > 0 else low.D + rise * ZERO.union(high.p - low.p)
+    one_way = moved > s.landing or moved < -s.landing
+    return "" if one_way else "a jog is not proved to move it one way"
 
 
 def leading_to(c: Cells, cells: Array) -> Array:
@@ -3250,6 +3382,13 @@ def check_box_claims(
     Images are proved to lie strictly inside the union of their target cells (or at most at the arm's length), so
     that "invariant" already gives "trapping".
     """
+    if "refuted" in claims:
+        bad = check_refuted(scene, claims["refuted"])
+        if bad:
+            yield ["refuted"], bad
+        claims = {name: section for name, section in claims.items() if name != "refuted"}
+        if not claims:
+            return
     everything = list(claims)
     first_version = claims.get("goal", {}).get("starts", "") is None
     bad = check_structure(c, scene, 0 if first_version else -1) or check_components(c)
@@ -3393,8 +3532,9 @@ def check_certificate(
             claims["goal"].pop("found", None)
         tell_starts(report, claims["goal"], scenes, cells)
     report.statement = [statement_of(name, section, noise is not None) for name, section in claims.items()]
-    first = " (first box)" if len(cells) > 1 else ""
-    report.statement.append(f"attracting cells: {extents(cells[0])}{first}")
+    which = " (first box)" if len(cells) > 1 else ""
+    if set(claims) - {"refuted"}:  # which does not speak of them: they are not checked for it
+        report.statement.append(f"attracting cells: {extents(cells[0])}{which}")
     if own is not None and not {"goal", "refuted"} & set(claims):
         report.statement.append("of the scene's own goal nothing is claimed")
     for name in claims:

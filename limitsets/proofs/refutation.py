@@ -1,23 +1,28 @@
 """Writing an orbit that refutes a goal, so that a stranger can throw it again.
 
-A certificate with the one claim "refuted": the attracting cells, which are checked as for "invariant"; a start in them;
-what each throw was like; and within which deviations of which nominal values the scene lies.
+A certificate with the one claim "refuted": the goal; an orbit that comes back, or that refutes by one passage; and
+within which deviations of which nominal values the scene lies.  The scene's cells are in the file as in every other.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import asdict
 from pathlib import Path
+from typing import Any
 
-from limitsets.goals import OrientedBeyond
+from limitsets.errors import AnswerError
+from limitsets.goals import Goal, Predicate
 from limitsets.proofs.asked import State
-from limitsets.proofs.asked.oriented_beyond import section_of
 from limitsets.proofs.attraction import Attraction
 from limitsets.proofs.certificate import write
 from limitsets.scene import Scene
 from limitsets.scene.quantities import text_at
 
-__all__ = ["write_refutation"]
+__all__ = ["KINDS", "write_refutation"]
+
+KINDS = ("cycle", "closed", "once")
+"""Why an orbit refutes, where a certificate can say it."""
 
 
 def _nominal(scene: Scene, name: str) -> str:
@@ -25,11 +30,39 @@ def _nominal(scene: Scene, name: str) -> str:
     return str(text_at(scene.text, "throw.kappa" if by_kappa else name))
 
 
+def _goal(goal: Goal, scene: Scene) -> dict[str, Any]:
+    words: dict[str, Any] = {"kind": goal.kind} | asdict(goal)
+    if "x" in words:
+        words["x"] = f"{words['x']!r} {scene.unit}"
+    if "order" in words:
+        words["order"] = list(words["order"])
+    return words
+
+
+def _throws(states: Sequence[State], recurs: Mapping[str, Any], varies: bool) -> dict[str, Any]:
+    """Give the start and the throws, of a closed orbit from its exact state on."""
+    states = list(states)
+    throws = [
+        {
+            "kappa": float(state.kappa).hex() if varies and state.kappa is not None else None,
+            "landing": float(state.landing).hex() if state.landing else None,
+        }
+        for state in states[:-1]
+    ]
+    first = 0
+    if "closed" in recurs:
+        first = next(k for k, state in enumerate(states) if state.lo == state.hi)
+        throws = [*throws[first:], *throws[:first]]
+        throws[-1] = {"kappa": recurs.get("kappa", throws[-1]["kappa"]), "landing": None}
+    return {"start": {"x": float(states[first].lo).hex(), "side": states[first].side}, "throws": throws}
+
+
 def write_refutation(
     path: str | Path,
     found: Attraction,
-    goal: OrientedBeyond,
+    goal: Goal,
     states: Sequence[State],
+    recurs: Mapping[str, Any],
     within: Mapping[str, str],
     scene: Scene,
     *,
@@ -43,31 +76,41 @@ def write_refutation(
         The file.
     found : Attraction
         The cells, of the scene that refutes and its noise.
-    goal : OrientedBeyond
+    goal : Goal
         What is refuted.
     states : sequence of State
         The orbit.
+    recurs : mapping
+        Why it refutes: `limitsets.proofs.asked.recurring.Refutation`.
     within : mapping of str to str
         Deviations from the nominal scene that its own do not exceed, by quantity.
     scene : Scene
         The nominal scene.
     recheck : bool
         Whether to check it first.
+
+    Raises
+    ------
+    AnswerError
+        A goal of the caller's code, or an orbit that no certificate can show.
     """
+    kind = next((word for word in KINDS if word in recurs), None)
+    if isinstance(goal, Predicate) or kind is None:
+        raise AnswerError(
+            "the refutation",
+            goal.kind,
+            "by an orbit that comes back, of a goal that a scene can name",
+            "leave it",
+        )
     box = found.cover.box
     section = {
-        "goal": section_of(goal, scene),
-        "start": {"x": float(states[0].lo).hex(), "side": states[0].side},
-        "throws": [
-            {
-                "kappa": float(state.kappa).hex() if box.kappa_varies and state.kappa is not None else None,
-                "landing": float(state.landing).hex() if state.landing else None,
-            }
-            for state in states[:-1]
-        ],
+        "goal": _goal(goal, scene),
+        "recurs": {kind: recurs[kind]},
         "nominal": {name: _nominal(scene, name) for name in within},
         "tolerance": dict(within),
     }
+    if kind != "cycle":
+        section |= _throws(states, recurs, box.kappa_varies)
     write(
         path,
         [found],

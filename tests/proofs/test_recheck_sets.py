@@ -19,6 +19,7 @@ from flint import arb
 import limitsets as ls
 from limitsets.proofs.certify import certify
 from tests.proofs import forge
+from tests.proofs.random_scenes import case
 from tests.proofs.test_end_points import CONTRACTING
 from tests.proofs.test_recheck import COARSE, checker, parts, verdict, whole
 from tests.sets.part import Part
@@ -527,3 +528,25 @@ def test_where_there_may_be_several_impacts_nothing_is_proved(good, tmp_path):
     ends, cycles = sections(f)
     assert "several impacts" in checker.check_ends(scene, cells, checker.read_ends(ends, 3))
     assert "kappa > ell" in checker.check_orbits(scene, cells, checker.read_orbits(cycles, 3))
+
+
+def test_the_impact_is_bracketed_next_to_the_joint():
+    """Angles a thousand times smaller than where the search begins: half of these were denied."""
+
+    rng, tried = random.Random(3), 0
+    for seed in range(60):
+        raw = case(seed).scene
+        try:
+            scene = checker.read_scene(raw, None)
+        except checker.BadFileError:  # the part does not rest on all of its sides
+            continue
+        for s in scene.sides:
+            x = arb(float(s.a) + float(s.arm - s.a) * 10 ** rng.uniform(-7, -2))
+            if not (s.exact and s.concave and x > s.a):
+                continue
+            low, high = (checker.beside_root(s, x, scene.k_lo, before) for before in (True, False))
+            assert checker.flight(x, scene.k_lo, low) > 0
+            assert checker.flight(x, scene.k_lo, high) < 0
+            assert high.p - low.p < low.p * arb(2) ** -44
+            tried += 1
+    assert tried > 40

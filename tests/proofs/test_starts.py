@@ -187,7 +187,10 @@ def test_pieces_of_a_tolerance_claim_the_fewest_starts():
 
     near = {"0": {"q": (1.5).hex()}}
     far = {"0": {"q": (1.25).hex()}}
-    every, almost = claim("every", 1.0, near_joint=near), claim("almost-every", 1.0, thinning=7, near_joint=far)
+    every, almost = (
+        claim("every", 1.0, near_joint=near),
+        claim("almost-every", 1.0, thinning=7, near_joint=far),
+    )
     joined = weakest_of([every, almost])
     assert joined.starts == joined.section["starts"] == "almost-every"
     assert joined.section["thinning"] == 7

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from limitsets.files import as_json
+from limitsets.robust.margins.answer import settled
 from limitsets.scene import Scene, dump
 
 if TYPE_CHECKING:
@@ -73,11 +75,12 @@ def to_json(found: RobustDesign) -> dict[str, Any]:
     }
 
 
-def save(found: RobustDesign, folder: Path) -> tuple[Path, ...]:
-    """Write the scene, the answer, and what `limitsets.recheck` checks; the files."""
+def save(found: RobustDesign, folder: Path, *, recheck: bool = True) -> tuple[RobustDesign, tuple[Path, ...]]:
+    """Write scene, answer, and what `limitsets.recheck` checks; return the design without what it denies, the files."""
     folder.mkdir(parents=True, exist_ok=True)
     scene, answer = folder / f"{found.scene.name}.toml", folder / "design.json"
     dump(found.scene, scene)
-    answer.write_text(as_json(to_json(found)), encoding="utf-8", newline="\n")
-    certificates = [path for one in found.margins for path in one.save(folder)]
-    return (scene, answer, *certificates)
+    margins = [settled(one, folder, recheck=recheck) for one in found.margins]
+    left = replace(found, margins=tuple(one for one, _ in margins))
+    answer.write_text(as_json(to_json(left)), encoding="utf-8", newline="\n")
+    return left, (scene, answer, *(path for _, paths in margins for path in paths))

@@ -122,10 +122,10 @@ class RobustDesign:
         return to_json(self)
 
     def save(self, folder: str | Path) -> tuple[Path, ...]:
-        """Write the scene, the answer as JSON, and what `limitsets.recheck` checks of the margin."""
+        """Write the scene, the answer as JSON, and what `limitsets.recheck` checks of the margin; checked before."""
         from limitsets.inverse.margin.answer import save
 
-        return save(self, Path(folder))
+        return save(self, Path(folder))[1]
 
 
 def fed_at(x: float, side: int) -> tuple[Goal, Goal]:

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from fractions import Fraction
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -30,6 +29,7 @@ __all__ = [
     "common",
     "once",
     "peeled",
+    "place_text",
     "thrown_into",
     "undecided",
 ]
@@ -118,14 +118,22 @@ def thrown_into(found: Attraction, bad: Mask) -> str:
     return ""
 
 
+def place_text(goal: Any, scene: Scene) -> str:
+    """Write the x of a goal as a certificate has it: the scene's own words where it is the scene's own goal."""
+    own = scene.text.get("goal", {}).get(goal.kind)
+    if goal == scene.goal and isinstance(own, Mapping):
+        return " ".join(str(own["x"]).split())
+    return f"{goal.x!r} {scene.unit}"
+
+
 def below(x: float) -> float:
-    """Largest float that is not above the decimal that a certificate has for x."""
-    return x if Fraction(x) <= Fraction(repr(x)) else math.nextafter(x, -math.inf)
+    """Return a float that is not above the decimal that a certificate has for x, which x is next to."""
+    return math.nextafter(x, -math.inf)
 
 
 def above(x: float) -> float:
-    """Smallest float that is not below the decimal that a certificate has for x."""
-    return x if Fraction(x) >= Fraction(repr(x)) else math.nextafter(x, math.inf)
+    """Return a float that is not below the decimal that a certificate has for x, which x is next to."""
+    return math.nextafter(x, math.inf)
 
 
 def peeled(

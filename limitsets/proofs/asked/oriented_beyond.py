@@ -9,7 +9,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from limitsets.goals import OrientedBeyond
-from limitsets.proofs.asked.kind import Answer, Kind, against, below, common, once, thrown_into, undecided
+from limitsets.proofs.asked.kind import (
+    Answer,
+    Kind,
+    against,
+    below,
+    common,
+    once,
+    place_text,
+    thrown_into,
+    undecided,
+)
 from limitsets.proofs.asked.recurring import recurrent_violation
 from limitsets.proofs.asked.starts import one_throw
 from limitsets.proofs.attraction import Attraction
@@ -54,7 +64,7 @@ def _prove(found: Attraction, scene: Scene, goal: OrientedBeyond) -> Answer:
 
 def section_of(goal: OrientedBeyond, scene: Scene) -> dict[str, Any]:
     """Write the goal as a certificate has it."""
-    section = {"kind": goal.kind, "x": f"{goal.x!r} {scene.unit}", "side": goal.side}
+    section = {"kind": goal.kind, "x": place_text(goal, scene), "side": goal.side}
     return section | ({"from_anywhere": True} if goal.from_anywhere else {})
 
 

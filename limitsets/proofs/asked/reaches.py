@@ -9,7 +9,18 @@ import numpy as np
 
 from limitsets.cells import CellSet
 from limitsets.goals import Reaches
-from limitsets.proofs.asked.kind import Answer, Kind, Mask, above, against, below, common, peeled, undecided
+from limitsets.proofs.asked.kind import (
+    Answer,
+    Kind,
+    Mask,
+    above,
+    against,
+    below,
+    common,
+    peeled,
+    place_text,
+    undecided,
+)
 from limitsets.proofs.asked.recurring import Loop, Refutation, cycle_that
 from limitsets.proofs.asked.search import passing
 from limitsets.proofs.attraction import Attraction
@@ -30,7 +41,11 @@ def _wanted(found: Attraction, goal: Reaches) -> Mask:
 
 def _refute(found: Attraction, scene: Scene, goal: Reaches) -> Answer:
     every = goal.every_orbit
-    never = cycle_that(found, scene, lambda loop: (every or loop.attracts) and not _arrives(loop, goal))
+
+    def refutes(loop: Loop) -> bool:
+        return (every or loop.attracts) and not _arrives(loop, goal)
+
+    never = cycle_that(found, scene, refutes, attracting=not every)
     short = _falls_short(found, goal)
     if short is None:
         return against(never)
@@ -85,7 +100,7 @@ def _every(found: Attraction, scene: Scene, goal: Reaches, wanted: Mask) -> Answ
 def _section(scene: Scene, goal: Reaches, throws: int) -> dict[str, Any]:
     section = {
         "kind": goal.kind,
-        "x": f"{goal.x!r} {scene.unit}",
+        "x": place_text(goal, scene),
         "side": goal.side,
         "every_orbit": goal.every_orbit,
         "throws": throws,
@@ -109,9 +124,9 @@ def _falls_short(found: Attraction, goal: Reaches) -> Answer | None:
     for number in range(int(found.component.max(initial=-1)) + 1):
         mine = found.component == number
         if not (mine & reach).any():
-            reason = f"no orbit in the attracting component of {found.cover.place(int(np.flatnonzero(mine)[0]))} gets there"
-            refutation = Refutation(passing(found, np.flatnonzero(mine)), "almost-every", {"component": number})
-            return against(refutation, reason)
+            cells = np.flatnonzero(mine)
+            reason = f"no orbit in the attracting component of {found.cover.place(int(cells[0]))} gets there"
+            return against(Refutation(passing(found, cells), "almost-every", {"component": number}), reason)
     return None
 
 

@@ -1,13 +1,13 @@
 """Orbits that refute a goal because they come back: what passes once on its way to where it ends refutes nothing.
 
 Without noise they are *periodic*.  A long orbit shows where a goal is violated; from such a place on its itinerary is
-followed until it comes near again, and the periodic orbit of that itinerary lies nearer still, by the slope of all these
-throws.  It is proved in intervals, with a point on it that violates the goal.  One that repels refutes "from every
-start", one that attracts "from almost every start".
-With noise they are *closed*: from a violating place on the throws are steered back, one state per place of a raster, until
-one more can land exactly on an earlier place of the same orbit, by the scatter of the landing or, where kappa alone
-differs, between two values of it that land on either side.  From there on the same throws lead to the violation again.
-No noise at all is one of the sequences allowed.
+followed until it comes near again, and the periodic orbit of that itinerary lies nearer still, by the slope of all
+these throws.  It is proved in intervals, with a point on it that violates the goal.  One that repels refutes "from
+every start", one that attracts "from almost every start".
+With noise they are *closed*: from a violating place on the throws are steered back, one state per place of a raster,
+until one more can land exactly on an earlier place of the same orbit, by the scatter of the landing or, where kappa
+alone differs, between two values of it that land on either side.  From there on the same throws lead to the violation
+again.  No noise at all is one of the sequences allowed.
 """
 
 from __future__ import annotations
@@ -47,13 +47,16 @@ __all__ = ["Loop", "Refutation", "closed", "cycle_near", "cycle_that", "recurren
 # Places of an orbit from which it is followed back to them, and throws until it has to have come back.
 TRIED, LONGEST = 48, 80
 
+# Places from which orbits are followed that refute a goal by what they never do: any place on them will do.
+FEW = 12
+
 # A periodic orbit is looked for this near to a place, relative to x; beyond such a slope floats do not resolve it.
 NEAR, STEEPEST = 1e-3, 1e10
 
 # Starts per side, besides those in the attracting cells, and throws of theirs that are searched.
 OTHERS, SHORT = 12, 2000
 
-# Steering back: places of the raster along the arm, values of kappa tried, throws at most, ways to close that are tried.
+# Steering back: places of the raster along the arm, values of kappa, throws at most, ways to close that are tried.
 PLACES, KAPPAS, BACK, CLOSINGS = 20_000, 5, 60, 20
 
 # An exact landing between two values of kappa: so near to it, as shares of the way to the ends of the noise.
@@ -83,7 +86,7 @@ class Refutation(NamedTuple):
 
 
 class Loop(NamedTuple):
-    """A periodic orbit that is proved to exist, each point enclosed; `recurs` is empty where no recheck knows the map."""
+    """A periodic orbit that is proved, each point enclosed; `recurs` is empty where no recheck knows the map."""
 
     lo: Array
     hi: Array
@@ -123,7 +126,12 @@ def recurrent_violation(found: Attraction, scene: Scene, wrong: Wrong) -> Refuta
 
 
 def cycle_that(
-    found: Attraction, scene: Scene, refutes: Callable[[Loop], bool], longest: int = PERIODS[0]
+    found: Attraction,
+    scene: Scene,
+    refutes: Callable[[Loop], bool],
+    longest: int = PERIODS[0],
+    *,
+    attracting: bool = False,
 ) -> Refutation:
     """Find a periodic orbit that refutes a goal as a whole, by what it never does, and prove it.
 
@@ -137,6 +145,8 @@ def cycle_that(
         From a proved orbit to whether it is such a one.
     longest : int
         Largest period searched in the attracting cells.
+    attracting : bool
+        Look for orbits that attract only.
 
     Returns
     -------
@@ -146,34 +156,46 @@ def cycle_that(
     box = _quiet(found, scene)
     if not box.effects:
         quiet = replace(found, cover=replace(found.cover, box=box))
-        for cycle in proved_cycles(quiet, longest).cycles:
+        for cycle in () if attracting else proved_cycles(quiet, longest).cycles:
             loop = _loop(cycle)
             if refutes(loop):
                 return _of(loop, box, found)
     for path in _paths(found, box):
         ends = np.arange(max(path.x.size - 1 - 2 * LONGEST, 0), path.x.size)
-        best = cycle_near(box, path, ends, refutes)
+        best = cycle_near(box, path, ends, refutes, most=FEW, steepest=1.0 if attracting else STEEPEST)
         if best is not None:
             return _of(best, box, found)
     return Refutation()
 
 
 def _quiet(found: Attraction, scene: Scene) -> ParameterBox:
-    """The scene's parameters without noise."""
+    """Return the scene's parameters without noise."""
     box = found.cover.box
     return parameter_box(scene, tree=box.scene) if box.noise else box
 
 
 def _paths(found: Attraction, box: ParameterBox) -> Iterator[Orbit]:
-    """Long orbits where starts end: in the attracting cells, and wherever else those on the arm do."""
-    map_now = box.at_kappa(box.middle_kappa)
+    """Long orbits where starts end: one in each attracting component that is met, and wherever else starts end."""
+    map_now, met = box.at_kappa(box.middle_kappa), set()
     if (found.component >= 0).any():
-        yield orbit(map_now, *settled(found), SEARCHED)
+        first = settled(found)
+        met.add(_component(found, *first))
+        yield orbit(map_now, *first, SEARCHED)
     for side, (edges,) in enumerate(found.cover.grid.edges):
         for x in np.linspace(edges[0], edges[-1], OTHERS + 2)[1:-1].tolist():
             path = orbit(map_now, x, side, SETTLING)
-            if path.stopped is None:
-                yield orbit(map_now, float(path.x[-1]), int(path.side[-1]), SHORT)
+            last = float(path.x[-1]), int(path.side[-1])
+            if path.stopped is not None or _component(found, *last) in met:
+                continue
+            met.add(_component(found, *last))
+            met.discard(-1)  # off the attracting cells any two may end in different places
+            yield orbit(map_now, *last, SHORT)
+
+
+def _component(found: Attraction, x: float, side: int) -> int:
+    """Return the number of the attracting component in which a place lies, -1 if in none."""
+    (cell,) = found.cover.grid.index([x], side)
+    return int(found.component[cell]) if cell >= 0 else -1
 
 
 def _violates(wrong: Wrong, lo: float, hi: float, side: int) -> bool:
@@ -184,7 +206,15 @@ def _violates(wrong: Wrong, lo: float, hi: float, side: int) -> bool:
 # ---------------------------------------------------------------- periodic orbits
 
 
-def cycle_near(box: ParameterBox, path: Orbit, at: Ints, refutes: Callable[[Loop], bool]) -> Loop | None:
+def cycle_near(
+    box: ParameterBox,
+    path: Orbit,
+    at: Ints,
+    refutes: Callable[[Loop], bool],
+    *,
+    most: int = TRIED,
+    steepest: float = STEEPEST,
+) -> Loop | None:
     """Find a periodic orbit through, nearly, one of some places of a long orbit, and prove it.
 
     Parameters
@@ -197,6 +227,10 @@ def cycle_near(box: ParameterBox, path: Orbit, at: Ints, refutes: Callable[[Loop
         Numbers of the places.
     refutes : callable
         From a proved orbit, which begins near the place, to whether it is wanted.
+    most : int
+        Places tried.
+    steepest : float
+        Orbits with larger slopes are not looked for.
 
     Returns
     -------
@@ -204,15 +238,15 @@ def cycle_near(box: ParameterBox, path: Orbit, at: Ints, refutes: Callable[[Loop
         The first one found, the places tried from the largest x on.
     """
     order = at[np.argsort(-path.x[at], kind="stable")]
-    for k in order[:: max(1, order.size // TRIED)].tolist():
-        for loop in _returns(box, path, k):
+    for k in order[:: max(1, order.size // most)].tolist():
+        for loop in _returns(box, path, k, steepest):
             on_arm = (loop.lo > box.hi.a[loop.side]).all() and (loop.hi <= box.lo.arm_length).all()
             if on_arm and refutes(loop):
                 return loop
     return None
 
 
-def _returns(box: ParameterBox, path: Orbit, k: int) -> Iterator[Loop]:
+def _returns(box: ParameterBox, path: Orbit, k: int, steepest: float) -> Iterator[Loop]:
     """Periodic orbits near place k, by itineraries of growing length."""
     map_now = box.at_kappa(box.middle_kappa)
     for period in range(1, min(LONGEST, path.code.size - k) + 1):
@@ -221,7 +255,7 @@ def _returns(box: ParameterBox, path: Orbit, k: int) -> Iterator[Loop]:
         x, steep = (_root_on_orbit if box.effects else _root)(map_now, path, k, period)
         if abs(steep) > STEEPEST:
             return
-        if not abs(x - path.x[k]) <= NEAR * abs(path.x[k]):
+        if not (abs(x - path.x[k]) <= NEAR * abs(path.x[k]) and abs(steep) <= steepest):
             continue
         around = orbit(map_now, x, int(path.side[k]), period)
         if around.code.size < period or (around.side != path.side[k : k + period + 1]).any():
@@ -265,13 +299,11 @@ def _root_on_orbit(map_now: Any, path: Orbit, k: int, period: int) -> tuple[floa
 
 
 def _loop(cycle: ProvedCycle) -> Loop:
-    return Loop(
-        cycle.lo, cycle.hi, cycle.side, cycle.branches, cycle.attracts, {"cycle": cycle.section()}
-    )
+    return Loop(cycle.lo, cycle.hi, cycle.side, cycle.branches, cycle.attracts, {"cycle": cycle.section()})
 
 
 def _enclosed(box: ParameterBox, around: Orbit) -> Loop | None:
-    """Prove a periodic orbit of a map with effects: all of an interval goes one way, and its ends part or come nearer."""
+    """Prove a periodic orbit of a map with effects: an interval goes one way, and its ends part or come nearer."""
     if not _continuous(box):
         return None
     x, side, period = float(around.x[0]), int(around.side[0]), around.code.size
@@ -363,7 +395,7 @@ def _ends(box: ParameterBox) -> tuple[float, float]:
 
 
 def _within_reach(box: ParameterBox, path: Path, x: Array, side: Ints) -> Ints:
-    """Pairs of one of these states and a place of the path where one throw from it can land, the latest places first."""
+    """Pairs of one of these states and a place of the path where a throw from it can land, the latest first."""
     bounds, sides = np.full((2, x.size), np.nan), np.full((2, x.size), -1)
     for row, kappa in enumerate(_ends(box)):
         thrown = throws(box, x, side, [Choice(kappa, 0.0)])
@@ -422,15 +454,11 @@ def _kappa_to(box: ParameterBox, x: float, side: int, to: float, on: int) -> flo
 
 def _landed(box: ParameterBox, state: State, kappa: tuple[float, float]) -> tuple[float, float, int]:
     """Enclose one throw from a state, with every kappa from one to another: bounds and side; nan where not decided."""
-    lo, hi, side = replay(
-        box, (state.lo, state.hi), state.side, np.array(kappa).reshape(2, 1), np.zeros(1)
-    )
+    lo, hi, side = replay(box, (state.lo, state.hi), state.side, np.array(kappa).reshape(2, 1), np.zeros(1))
     return (float(lo[1]), float(hi[1]), int(side[1])) if lo.size > 1 else (np.nan, np.nan, -1)
 
 
-def _closing(
-    box: ParameterBox, state: State, kappa: float, to: float, on: int
-) -> tuple[float, float] | None:
+def _closing(box: ParameterBox, state: State, kappa: float, to: float, on: int) -> tuple[float, float] | None:
     """Bounds of kappa between which the throw lands exactly there, whatever the rounding; None if it is not proved."""
     if box.landing > 0.0:
         only = (kappa, kappa) if box.kappa_varies else (box.lo.kappa, box.hi.kappa)

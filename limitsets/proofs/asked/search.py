@@ -201,7 +201,7 @@ def settled(found: Attraction) -> tuple[float, int]:
 
 
 def searched(found: Attraction, wrong: Wrong) -> Path | None:
-    """Breadth first from an attracting cell, one state per cell and the noise chosen, until a state violates the goal."""
+    """Breadth first from an attracting cell, one state per cell, until a state violates the goal."""
     grid: Grid = found.cover.grid
     start, on = settled(found)
     x, side = np.array([start]), np.array([on])

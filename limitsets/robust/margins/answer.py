@@ -3,20 +3,21 @@
 from __future__ import annotations
 
 import re
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from limitsets.errors import AnswerError
-from limitsets.goals import Goal, OrientedBeyond, Predicate
+from limitsets.goals import Goal, Predicate
 from limitsets.proofs.asked import State
 from limitsets.proofs.certify import Claim, Proof, weakest_of
-from limitsets.proofs.refutation import write_refutation
+from limitsets.proofs.confirm import DeniedError
+from limitsets.proofs.refutation import KINDS, write_refutation
 
 if TYPE_CHECKING:
     from limitsets.robust.margins.finding import Margin
 
-__all__ = ["file_stem", "goal_table", "save", "to_json"]
+__all__ = ["file_stem", "goal_table", "save", "settled", "to_json"]
 
 
 def goal_table(goal: Goal, unit: str) -> dict[str, Any]:
@@ -98,7 +99,19 @@ def _require_checkable(margin: Margin) -> None:
             )
 
 
-def save(margin: Margin, folder: Path) -> tuple[Path, ...]:
+def settled(margin: Margin, folder: Path, *, recheck: bool = True) -> tuple[Margin, tuple[Path, ...]]:
+    """Write a margin's files; the margin without what the checker denies, for that is undecided."""
+    try:
+        return margin, save(margin, folder, recheck=recheck)
+    except DeniedError as error:
+        reason = f"{error}"
+        left = replace(margin, proved=0.0, pieces=(), closed=False, reason=reason)
+        if "refuted" in error.claims:
+            left = replace(margin, refuted=None, against=None, closed=False, reason=reason)
+        return settled(left, folder, recheck=recheck)
+
+
+def save(margin: Margin, folder: Path, *, recheck: bool = True) -> tuple[Path, ...]:
     """Write the certificates of what is proved, one per goal, and the orbit that refutes (`Margin.save`)."""
     _require_checkable(margin)
     folder.mkdir(parents=True, exist_ok=True)
@@ -110,13 +123,21 @@ def save(margin: Margin, folder: Path) -> tuple[Path, ...]:
             margin.scene, margin.noise, margin.deviations, found, (weakest_of(claims),), margin.seconds
         )
         last = f"-{goal.kind.replace('_', '-')}" if len(margin.goals) > 1 else ""
-        written.append(proof.save(folder / f"{stem}{last}.proof.zip"))
+        written.append(proof.save(folder / f"{stem}{last}.proof.zip", recheck=recheck))
     against = margin.against
-    # what refutes the other goals is no single place
-    if against is not None and against.found is not None and isinstance(against.refuted, OrientedBeyond):
-        path = folder / f"{stem}.refuted.zip"
-        write_refutation(
-            path, against.found, against.refuted, against.counterexample, against.within, margin.scene
-        )
-        written.append(path)
+    if against is not None and against.found is not None and against.refuted is not None:
+        states, recurs = against.counterexample, against.answers[0].recurs
+        if any(word in recurs for word in KINDS):
+            path = folder / f"{stem}.refuted.zip"
+            write_refutation(
+                path,
+                against.found,
+                against.refuted,
+                states,
+                recurs,
+                against.within,
+                margin.scene,
+                recheck=recheck,
+            )
+            written.append(path)
     return tuple(written)

@@ -192,7 +192,9 @@ class Question:
         for goal in self.goals:
             answer = self._against(found, goal)
             if answer.verdict == "refuted":
-                return Asked("refuted", answer.reason, found, (answer,), goal, answer.counterexample, piece, noise)
+                return Asked(
+                    "refuted", answer.reason, found, (answer,), goal, answer.counterexample, piece, noise
+                )
             reason = answer.reason or reason
         return Asked("undecided", reason, found, piece=piece, noise=noise)
 

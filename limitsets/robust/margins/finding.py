@@ -95,22 +95,26 @@ class Margin:
 
         return to_json(self)
 
-    def save(self, folder: str | Path) -> tuple[Path, ...]:
+    def save(self, folder: str | Path, *, recheck: bool = True) -> tuple[Path, ...]:
         """Write what `limitsets.recheck` checks: a certificate for each goal, and the orbit that refutes one.
 
         Parameters
         ----------
         folder : str or Path
             Where; it is made.
+        recheck : bool
+            Whether to have each checked before it gets its name.
 
         Raises
         ------
         AnswerError
             Effects are on, which no recheck knows, or a goal is a function of the caller's.
+        DeniedError
+            The checker does not confirm one: it is kept as NAME.denied.zip.
         """
         from limitsets.robust.margins.answer import save
 
-        return save(self, Path(folder))
+        return save(self, Path(folder), recheck=recheck)
 
 
 def goals_of(scene: Scene, goal: GoalLike | Sequence[GoalLike] | None) -> tuple[Goal, ...]:

@@ -203,6 +203,7 @@ def robustness(
     cells: int = CELLS,
     leave_out: Sequence[str] = (),
     folder: str | Path | None = None,
+    recheck: bool = True,
     progress: Progress | None = None,
 ) -> Robustness:
     """Say how far a scene may drift before its goal fails, and what noise does to it.
@@ -229,6 +230,8 @@ def robustness(
         Which of "margins", "joint", "curve", "noise" and "audit" not to do.
     folder : str or Path, optional
         Margins are written there as they are found, with their certificates, and found again by the next run.
+    recheck : bool
+        Whether certificates are checked before they get their names.
     progress : callable, optional
         Called with what is done, how much of it, and of how much.
 
@@ -262,7 +265,7 @@ def robustness(
     if vector:
         Tolerance.of(question.scene, vector)  # refuses what the scene does not give
     noise, law = noise_of(given, scatter)
-    kept = Kept(None if folder is None else Path(folder), asked, goals, vector, width)
+    kept = Kept(None if folder is None else Path(folder), asked, goals, vector, width, recheck=recheck)
     sheet = _Gathering(asked, goals, todo, vector, kept, progress or (lambda step, done, of: None))
     return _filled(sheet, given, noise, law, width, cells, frozenset(leave_out), begin)
 

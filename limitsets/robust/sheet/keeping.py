@@ -16,7 +16,7 @@ from typing import Any
 from limitsets.errors import AnswerError
 from limitsets.files import as_json, replaced
 from limitsets.goals import Goal, Predicate
-from limitsets.robust.margins.answer import goal_table
+from limitsets.robust.margins.answer import goal_table, settled
 from limitsets.robust.margins.finding import Margin
 from limitsets.robust.sheet.entries import Entry
 from limitsets.scene import Scene
@@ -54,6 +54,8 @@ class Kept:
         Of the joint margin.
     width : float
         Of the brackets.
+    recheck : bool
+        Whether certificates are checked before they get their names.
     """
 
     def __init__(
@@ -63,10 +65,12 @@ class Kept:
         goals: tuple[Goal, ...],
         tolerance: Mapping[str, str],
         width: float,
+        *,
+        recheck: bool = True,
     ) -> None:
-        self.folder, self.scene, self.again = folder, scene, 0
+        self.folder, self.scene, self.again, self.recheck = folder, scene, 0, recheck
         tables = {word: scene.text[word] for word in THROWN if word in scene.text}
-        single = digest_of(tables, [goal_table(goal, scene.unit) for goal in goals], width)
+        single = digest_of(tables, [goal_table(goal, scene.unit) for goal in goals], width, recheck)
         self.digests = {"single": single, "joint": digest_of(single, dict(tolerance))}
         # code of the caller's has no digest
         known = folder is not None and not any(isinstance(goal, Predicate) for goal in goals)
@@ -116,7 +120,8 @@ class Kept:
         """Write a margin's files, and it into the record."""
         if self.folder is None:
             return Entry.of(margin)
-        entry = Entry.of(margin, self._files(margin))
+        left, files = self._files(margin)
+        entry = Entry.of(left, files)
         self.entries[entry.key] = entry
         self._write()
         return entry
@@ -139,11 +144,11 @@ class Kept:
         with replaced(self.folder) as draft:
             (draft / RECORD).write_text(as_json(record), encoding="utf-8", newline="\n")
 
-    def _files(self, margin: Margin) -> list[str]:
-        """Write the proof and the counterexample; their names, seen from the folder of the report."""
+    def _files(self, margin: Margin) -> tuple[Margin, list[str]]:
+        """Write the proof and the counterexample; what the checker confirms, and the names from the report's folder."""
         assert self.folder is not None
         try:
-            written = margin.save(self.folder / CERTIFICATES)
+            left, written = settled(margin, self.folder / CERTIFICATES, recheck=self.recheck)
         except AnswerError:  # effects are on, or a goal is code: nothing rechecks it, the margin stands
-            return []
-        return [f"{CERTIFICATES}/{path.name}" for path in written]
+            return margin, []
+        return left, [f"{CERTIFICATES}/{path.name}" for path in written]
