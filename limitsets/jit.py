@@ -28,6 +28,7 @@ import hashlib
 import inspect
 import os
 import pickle
+import re
 import shutil
 import sys
 import types as python_types
@@ -37,9 +38,22 @@ from typing import Any, ParamSpec, Protocol, TypeVar, overload
 
 import numba
 import numpy as np
+from llvmlite import ir
 from numba import extending, types
+from numba.core.errors import NumbaError
+from numba.core.registry import cpu_target
 
-__all__ = ["cover_foreign_class", "generic", "kernel", "named_tuple_class", "proof_kernel"]
+from limitsets.errors import LimitsetsError, MapError
+
+__all__ = [
+    "cover_foreign_class",
+    "generic",
+    "kernel",
+    "mark_undefined",
+    "named_tuple_class",
+    "proof_kernel",
+    "take_mark",
+]
 
 F = TypeVar("F", bound=Callable[..., Any])
 P = ParamSpec("P")
@@ -120,6 +134,10 @@ _FOREIGN: dict[type, str | None] = {}
 _NAMED: dict[type, set[type]] = {}
 
 
+# Packages that numba, or this file, compiles by itself.
+_COMPILED = {"numpy", "math", "numba", "limitsets"}
+
+
 class _UnknownSourceError(Exception):
     """Something a kernel reaches has no source or no value that could be digested."""
 
@@ -130,7 +148,7 @@ def _reached(function: Callable[..., Any], seen: dict[str, bytes], named: set[ty
     if not isinstance(function, python_types.FunctionType):
         raise _UnknownSourceError
     module = function.__module__ or ""
-    if module.split(".")[0] in {"numpy", "math", "numba", "limitsets"}:
+    if module.split(".")[0] in _COMPILED:
         return
     if hasattr(function, "methods"):  # a generic function: more methods may come
         raise _UnknownSourceError
@@ -141,17 +159,23 @@ def _reached(function: Callable[..., Any], seen: dict[str, bytes], named: set[ty
     if mark in seen:
         return
     seen[mark] = Path(file).read_bytes()
+    names = _names_in(function)
+    scope = {name: function.__globals__[name] for name in names if name in function.__globals__}
+    for name, cell in zip(function.__code__.co_freevars, function.__closure__ or (), strict=True):
+        scope[name] = cell.cell_contents
+    for name, value in sorted(scope.items()):
+        _reached_value(f"{mark}:{name}", value, names, seen, named)
+
+
+def _names_in(function: Callable[..., Any]) -> set[str]:
+    """Global names and attributes that a function names."""
     names: set[str] = set()
     codes = [function.__code__]
     while codes:
         code = codes.pop()
         names.update(code.co_names)
         codes.extend(const for const in code.co_consts if isinstance(const, python_types.CodeType))
-    scope = {name: function.__globals__[name] for name in names if name in function.__globals__}
-    for name, cell in zip(function.__code__.co_freevars, function.__closure__ or (), strict=True):
-        scope[name] = cell.cell_contents
-    for name, value in sorted(scope.items()):
-        _reached_value(f"{mark}:{name}", value, names, seen, named)
+    return names
 
 
 def _reached_value(mark: str, value: Any, names: set[str], seen: dict[str, bytes], named: set[type]) -> None:
@@ -164,7 +188,7 @@ def _reached_value(mark: str, value: Any, names: set[str], seen: dict[str, bytes
         for k, entry in enumerate(value):
             _reached_value(f"{mark}[{k}]", entry, names, seen, named)
     elif isinstance(value, python_types.ModuleType):
-        if value.__name__.split(".")[0] in {"numpy", "math", "numba", "limitsets"}:
+        if value.__name__.split(".")[0] in _COMPILED:
             return
         for name in sorted(names & set(vars(value))):
             _reached_value(f"{mark}.{name}", vars(value)[name], names, seen, named)
@@ -215,21 +239,94 @@ def cover_foreign_class(cls: type, functions: list[Callable[..., Any]]) -> None:
     _FOREIGN[cls] = digest.hexdigest()[:24]
 
 
-def _signature_key(signature: Any) -> str | None:
-    """Sub-folder for one signature: '' for the package's own classes, None where nothing may be cached."""
+# Plain functions that kernels from outside call, compiled: (function, whether for proofs) -> what stands in its place.
+_HELPERS: dict[tuple[Any, bool], Any] = {}
+
+
+def _is_plain(value: Any) -> bool:
+    """Whether a value is a function that numba knows nothing of."""
+    if not isinstance(value, python_types.FunctionType) or hasattr(value, "methods"):
+        return False
+    if (value.__module__ or "").split(".")[0] in _COMPILED:
+        return False
+    cpu_target.typing_context.refresh()
+    try:
+        cpu_target.typing_context.resolve_value_type(value)
+    except (NumbaError, ValueError):
+        return True
+    return False
+
+
+def _compiled_helpers(function: Callable[..., Any], proof: bool) -> dict[str, Any]:
+    """Names by which a function calls plain ones -> those compiled, and so for all that they call."""
+    scope, names = function.__globals__, _names_in(function)
+    return _compiled_values({name: scope[name] for name in names & scope.keys()}, names, proof)
+
+
+def _compiled_values(values: dict[str, Any], names: set[str], proof: bool) -> dict[str, Any]:
+    """Those of the values in whose place another one has to stand."""
+    found = {}
+    for name, value in values.items():
+        if _is_plain(value):
+            found[name] = _helper(value, proof)
+        elif isinstance(value, python_types.ModuleType) and value.__name__.split(".")[0] not in _COMPILED:
+            own = vars(value)
+            inside = _compiled_values({key: own[key] for key in names & own.keys()}, names, proof)
+            if inside:
+                found[name] = python_types.ModuleType(value.__name__)
+                vars(found[name]).update(own, **inside)
+    return found
+
+
+def _in_scope(function: Callable[..., Any], scope: dict[str, Any]) -> Any:
+    """Return the function with other globals."""
+    code, defaults, cells = function.__code__, function.__defaults__, function.__closure__
+    copy = python_types.FunctionType(code, scope, function.__name__, defaults, cells)
+    copy.__qualname__, copy.__kwdefaults__ = function.__qualname__, function.__kwdefaults__
+    return copy
+
+
+def _helper(function: Callable[..., Any], proof: bool) -> Any:
+    if (function, proof) not in _HELPERS:
+        scope = dict(function.__globals__)
+        _HELPERS[function, proof] = _compile(
+            _in_scope(function, scope), _PROOF if proof else _ESTIMATE, False
+        )
+        scope.update(_compiled_helpers(function, proof))  # last: a helper may call itself
+    return _HELPERS[function, proof]
+
+
+def _with_helpers(function: Callable[..., Any], proof: bool) -> Callable[..., Any]:
+    """Return a kernel whose plain helpers are compiled; itself where it has none, as all of the package."""
+    if (function.__module__ or "").split(".")[0] == "limitsets":
+        return function
+    found = _compiled_helpers(function, proof)
+    return _in_scope(function, {**function.__globals__, **found}) if found else function
+
+
+def _classes(signature: Any) -> set[type] | None:
+    """Classes of NamedTuples in a signature; None where it holds a function."""
     classes: set[type] = set()
     waiting = list(signature)
     while waiting:
         item = waiting.pop()
         cls = getattr(item, "instance_class", None)
         if cls is not None:
-            if cls not in _FOREIGN and cls.__module__.split(".")[0] != "limitsets":
-                return None
             classes.add(cls)
         if isinstance(item, types.BaseTuple):
             waiting.extend(item)
         elif isinstance(item, types.Function | types.Dispatcher):
             return None
+    return classes
+
+
+def _signature_key(signature: Any) -> str | None:
+    """Sub-folder for one signature: '' for the package's own classes, None where nothing may be cached."""
+    classes = _classes(signature)
+    if classes is None:
+        return None
+    if any(cls not in _FOREIGN and cls.__module__.split(".")[0] != "limitsets" for cls in classes):
+        return None
     digests: set[str] = set()
     waiting, done = list(classes), set()
     while waiting:
@@ -324,6 +421,52 @@ _folder = _open_cache()
 _CACHE = _source_cache(_folder) if _folder is not None else None
 
 
+# What numba says around the cause of a failure.
+_AROUND = re.compile(
+    r"Failed in nopython|No implementation of|>>>|There (is|are) |- Of which|Overload in|With argument|Rejected as"
+    r"|TypingError: Failed|File |During:|raised from|def |<source elided>|\^|$"
+)
+_KERNEL = re.compile(
+    r"\b(image|image_on|image_box|on_side|on_side_box|fallback_box|margin|displacement|scattered)\("
+)
+
+
+def _explained(error: Exception, cls: type) -> MapError:
+    """Say in one line why the kernels of a class from outside do not compile."""
+    lines = [line.strip() for line in str(error).splitlines()]
+    cause = next((line for line in lines if not _AROUND.match(line)), type(error).__name__)
+    cause = re.sub(r", defined at .*", "", cause.removeprefix("TypingError: "))
+    named = next((found for line in lines if (found := _KERNEL.search(line))), None)
+    kernel = f"the kernel {named[1]} of {cls.__name__}" if named else f"a kernel of {cls.__name__}"
+    places = (re.match(r'File "(.*)", line (\d+)', line) for line in lines)
+    place = next(
+        (
+            f"{Path(at[1]).name}, line {at[2]}"
+            for at in places
+            if at and PACKAGE not in Path(at[1]).resolve().parents
+        ),
+        "",
+    )
+    where = f"correct {place}" if place else "correct the kernel"
+    if field := re.match(r"Unknown attribute '(\w+)' of type", cause):
+        fields = ", ".join(getattr(cls, "_fields", ()))
+        return MapError(
+            f"a field that {kernel} reads", field[1], f"a field of its parameters ({fields})", where
+        )
+    if count := re.search(r"wrong tuple length .*expected (\d+), got (\d+)", cause):
+        return MapError(
+            f"what {kernel} returns",
+            f"{count[2]} values",
+            f"{count[1]} values",
+            f"see `limitsets.maps.contract`; {where}",
+        )
+    if single := re.match(r"failed to unpack (.*)", cause):
+        return MapError(
+            f"what {kernel} returns", single[1], "a tuple", f"see `limitsets.maps.contract`; {where}"
+        )
+    return MapError(kernel, cause, "what numba compiles", where)
+
+
 # Loops over whole arrays run two vectors side by side: one throw is a chain of dependent operations several times
 # longer than the processor looks ahead, and LLVM on its own sees no reason to interleave so long a loop.
 INTERLEAVE = 2
@@ -339,6 +482,13 @@ def _interleaved(dispatcher: Any) -> None:
         binding.set_option("limitsets", f"-force-vector-interleave={INTERLEAVE}")
         try:
             return plain(*args)
+        except LimitsetsError:
+            raise
+        except Exception as error:
+            cls = next((cls for cls in _classes(args[0]) or () if cls in _FOREIGN), None)
+            if cls is None:
+                raise
+            raise _explained(error, cls) from None
         finally:
             binding.set_option("limitsets", "-force-vector-interleave=0")
 
@@ -403,6 +553,47 @@ def proof_kernel(function: Any = None, *, entry: bool = False) -> Any:
     if function is None:
         return lambda f: _compile(f, _PROOF, entry)
     return _compile(function, _PROOF, entry)
+
+
+# ---------------------------------------------------------------- the mark of what is not defined
+
+# Compiled code notes here that a function was asked beyond where it is defined.  A proof kernel gives back bare
+# intervals, which cannot say it: the loop that asked it takes the mark afterwards.
+_MARK, _BYTE = "limitsets_mark", ir.IntType(8)
+
+
+def _mark_of(builder: Any) -> Any:
+    """Return the byte of the mark, one for all that is linked together."""
+    found = builder.module.globals.get(_MARK)
+    if found is None:
+        found = ir.GlobalVariable(builder.module, _BYTE, _MARK)
+        found.linkage, found.initializer = "linkonce_odr", ir.Constant(_BYTE, 0)
+    return found
+
+
+@extending.intrinsic  # type: ignore[untyped-decorator]  # numba has no types
+def mark_undefined(typing: Any, wrong: Any) -> Any:
+    """Set the mark where `wrong` is true, in compiled code."""
+
+    def store(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        mark = _mark_of(builder)
+        builder.store(builder.or_(builder.load(mark), builder.zext(args[0], _BYTE)), mark)
+        return context.get_dummy_value()
+
+    return types.none(types.boolean), store
+
+
+@extending.intrinsic  # type: ignore[untyped-decorator]  # numba has no types
+def take_mark(typing: Any) -> Any:
+    """Whether the mark was set since it was taken last, in compiled code; it no longer is."""
+
+    def take(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        mark = _mark_of(builder)
+        was = builder.icmp_unsigned("!=", builder.load(mark), _BYTE(0))
+        builder.store(_BYTE(0), mark)
+        return was
+
+    return types.boolean(), take
 
 
 def named_tuple_class(numba_type: Any) -> type | None:
@@ -479,7 +670,7 @@ def _generic(stub: Any, proof: bool, inlined: bool, default: Callable[..., Any] 
     extending.overload(stub, jit_options=options, strict=False)(choose)
 
     def on(key: type | int, method: Callable[..., Any]) -> None:
-        methods[key] = getattr(method, "py_func", method)
+        methods[key] = _with_helpers(getattr(method, "py_func", method), proof)
 
     stub.on = on
     stub.methods = methods

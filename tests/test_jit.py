@@ -49,6 +49,31 @@ from limitsets.jit import kernel
 def push(params, x):
     return x + params.size
 """,
+    # Helpers without a decorator: one in this file, one elsewhere that calls two more in another file.
+    "with_plain": """
+from typing import NamedTuple
+import limitsets as ls
+from plain import push
+class WithPlain(NamedTuple):
+    size: float
+def twice(x):
+    return 2.0 * x
+def image(params, x, side):
+    return push(params, twice(x)), side, 0
+ls.register(WithPlain, image=image)
+""",
+    "plain": """
+import deeper
+def push(params, x):
+    return deeper.shift(x, params.size)
+""",
+    "deeper": """
+STEP = 1.0
+def scale(size):
+    return 10.0 * size
+def shift(x, size):
+    return x + scale(size) if x > 0.0 else shift(x + STEP, size)
+""",
     "with_constant": """
 from typing import NamedTuple
 import limitsets as ls
@@ -143,6 +168,7 @@ EVERYTHING = (
     HEAD
     + """
 from with_helper import WithHelper
+from with_plain import WithPlain
 from with_constant import WithConstant
 from with_fields import WithFields
 from with_part import WithPart
@@ -155,8 +181,9 @@ def image(params, x, side):
 ls.register(InScript, image=image)
 
 run(
-    leslie=leslie, henon=henon, helper=(WithHelper(1.0), 2.0), constant=(WithConstant(1.0), 2.0),
-    fields=(WithFields(push=1.0, pull=5.0), 2.0), part=(WithPart(5.0), 2.0), generic=(WithGeneric(1.0), 2.0),
+    leslie=leslie, henon=henon, helper=(WithHelper(1.0), 2.0), plain=(WithPlain(1.0), 2.0),
+    constant=(WithConstant(1.0), 2.0), fields=(WithFields(push=1.0, pull=5.0), 2.0),
+    part=(WithPart(5.0), 2.0), generic=(WithGeneric(1.0), 2.0),
     script=(InScript(1.0), 2.0),
 )
 """
@@ -166,6 +193,7 @@ ANSWERS = {
     "leslie": [2.0 + 2.0 * 3.0, 1.0],  # exp 0 = 1
     "henon": [1.0 - 0.5 * 2.0**2 + 10.0, 8.0],
     "helper": 3.0,
+    "plain": 2.0 * 2.0 + 10.0 * 1.0,
     "constant": 5.0,
     "fields": 3.0,
     "part": 10.0,
@@ -178,6 +206,7 @@ EDITS = [
     ("maps", "textbook/exponential.py", EXP, EXP.replace("1.0", "3.0")),
     ("maps", "textbook/henon.py", "    a: float = 1.4\n    b: float", "    b: float = 1.4\n    a: float"),
     ("user", "helper.py", "x + params.size", "x - params.size"),
+    ("user", "deeper.py", "10.0 * size", "20.0 * size"),
     ("user", "constants.py", "2.0", "3.0"),
     ("user", "fields.py", "    push: float\n    pull: float", "    pull: float\n    push: float"),
     ("user", "part_kernel.py", "x * params.size", "x + params.size"),
@@ -187,6 +216,7 @@ ANSWERS_AFTER = {
     **ANSWERS,  # swapped fields are no other map
     "leslie": [3.0 * 8.0, 1.0],
     "helper": 1.0,
+    "plain": 2.0 * 2.0 + 20.0 * 1.0,
     "constant": 7.0,
     "part": 7.0,
     "generic": 1.0,
@@ -390,6 +420,25 @@ def test_a_generic_for_proofs_stays_uncontracted_inside_an_estimate() -> None:
     assert bool(FUSED.search(machine_code(estimate))) == bool(
         FUSED.search(machine_code(_compiled_estimate())),
     )
+
+
+def _plain_sum(a: float, b: float, c: float) -> float:
+    return a * b + c
+
+
+def _calls_a_plain_one(params: Weight, x: float, y: float) -> float:
+    return _plain_sum(x, y, params.size)
+
+
+def test_a_plain_helper_is_compiled_as_its_kernel_is() -> None:
+    # As above: one rounding keeps what two lose.
+    e = 2.0**-30
+    exact, estimate = (limitsets.jit._helper(_plain_sum, proof) for proof in (True, False))
+    assert exact is not estimate
+    assert limitsets.jit._helper(_plain_sum, True) is exact
+    assert limitsets.jit._compiled_helpers(_calls_a_plain_one, True) == {"_plain_sum": exact}
+    assert exact(1.0 + e, 1.0 - e, -1.0) == 0.0
+    assert estimate(2.0, 3.0, 4.0) == 10.0
 
 
 def _compiled_estimate() -> Any:

@@ -8,6 +8,7 @@ from limitsets.analysis.accuracy import Accuracy, Plan, plan_for
 from limitsets.analysis.asked import Answered
 from limitsets.analysis.flags import other_vertex_first, overlap
 from limitsets.analysis.run import Analysis, analyse
+from limitsets.analysis.starts import Starts
 from limitsets.analysis.words import scene_of, to_json
 
 __all__ = [
@@ -15,6 +16,7 @@ __all__ = [
     "Analysis",
     "Answered",
     "Plan",
+    "Starts",
     "analyse",
     "other_vertex_first",
     "overlap",

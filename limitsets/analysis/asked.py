@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from limitsets.goals import Goal, OrientedBeyond, Reaches, Verdict, evaluate
+from limitsets.goals import Goal, OrientedBeyond, Predicate, Reaches, Verdict, evaluate
 
 if TYPE_CHECKING:
     from limitsets.graph import TransitionGraph
@@ -34,12 +34,22 @@ class Answered:
         Where the goal begins or ceases to hold, see `limitsets.goals.Verdict`; None where there is no such number.
     how : str
         "sampled": read off sampled cells, no proof.
+    reach : tuple of float
+        The largest x of each limit set, or, where the goal says `from_anywhere`, of all landings [scene's unit].
     """
 
     goal: Goal
     holds: bool | None
     threshold: float | None
     how: str = "sampled"
+    reach: tuple[float, ...] = ()
+
+    @property
+    def vacuous(self) -> bool:
+        """Whether it holds only because nothing gets to where it is asked."""
+        if not (isinstance(self.goal, OrientedBeyond) and self.holds and self.reach):
+            return False
+        return max(self.reach) <= self.goal.x
 
 
 def _may_leave(graph: TransitionGraph) -> float:
@@ -120,14 +130,17 @@ def answer(
     # A part beyond x, and an orbit that gets there: the first goal asks for all limit sets, the second for each.
     verdict = max(asked, key=_threshold) if isinstance(goal, OrientedBeyond) else min(asked, key=_threshold)
     holds = verdict.holds
-    if isinstance(goal, OrientedBeyond) and not any(wanted):
+    if isinstance(goal, OrientedBeyond | Predicate) and not any(wanted):
         holds = None  # nothing stays on the arm: the sentence would hold of nothing
     if isinstance(goal, Reaches) and holds and not goal.from_anywhere and _may_leave(graph) > 0:
         holds = None  # some starts leave before they get there
     threshold = (
         verdict.threshold if verdict.threshold is not None and math.isfinite(verdict.threshold) else None
     )
-    return Answered(goal, holds, threshold)
+    reach = tuple(
+        max((hi for parts in each.values() for _, hi in parts), default=-math.inf) for each in wanted
+    )
+    return Answered(goal, holds, threshold, reach=reach)
 
 
 def _threshold(verdict: Verdict) -> float:

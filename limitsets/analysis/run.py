@@ -5,14 +5,15 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from limitsets.analysis.accuracy import CELLS as BY_CELLS
 from limitsets.analysis.accuracy import Accuracy, Plan, left_to_cells, limit_of, plan_for, require_error
 from limitsets.analysis.asked import Answered, answer
 from limitsets.analysis.flags import other_vertex_first
+from limitsets.analysis.starts import Starts, against_starts
 from limitsets.analysis.verifying import verified
 from limitsets.errors import AnswerError
 
@@ -34,6 +35,9 @@ Progress = Callable[[str, int, int], None]
 # 512 to 2048 cells per side are where the last set of spurious cells goes in the paper's four scenes; twice that.
 CELLS = 4096
 
+# Where random starts go astray, so many times as many cells are tried, up to the last, as long as that helps.
+FINER, MOST_CELLS = 4, 65_536
+
 
 @dataclass(frozen=True, eq=False)
 class Analysis:
@@ -53,6 +57,8 @@ class Analysis:
         Where the throws lead.
     basins : Basins
         From which starts.
+    starts : Starts or None
+        What a thousand random starts say to it; None where throws scatter, which cells do not.
     limit_sets : tuple of LimitSet
         One per attractor: its end points.
     critical_points : dict of int to tuple of CriticalPoint
@@ -79,6 +85,7 @@ class Analysis:
     graph: TransitionGraph
     attractors: tuple[Attractor, ...]
     basins: Basins
+    starts: Starts | None
     limit_sets: tuple[LimitSet, ...]
     critical_points: dict[int, tuple[CriticalPoint, ...]]
     cycles: tuple[Cycle, ...]
@@ -107,11 +114,47 @@ class Analysis:
         """Per attractor what `extents` are: "end points" or "cells"."""
         return tuple("end points" if limit.converged else "cells" for limit in self.limit_sets)
 
+    @property
+    def advice(self) -> tuple[str, ...]:
+        """What cells have not settled, and what to do."""
+        said = (self.basins.advice, None if self.starts is None else self.starts.advice)
+        return tuple(text for text in said if text is not None)
+
     def to_json(self) -> dict[str, Any]:
         """Give it as plain tables for JSON (`limitsets.analysis.to_json`)."""
         from limitsets.analysis.words import to_json
 
         return to_json(self)
+
+
+class _Found(NamedTuple):
+    """What one grid gives."""
+
+    graph: TransitionGraph
+    attractors: tuple[Attractor, ...]
+    basins: Basins
+    starts: Starts | None
+
+
+def _found(scene: Scene, cells: int, throws: int, steps: _Steps) -> _Found:
+    """Look at one grid."""
+    from limitsets.cells import grid
+    from limitsets.graph import transitions
+    from limitsets.sets import attractors, basins
+
+    with steps.step("transitions"):
+        graph = transitions(scene.map, grid(scene.domain, cells=cells))
+    with steps.step("attractors"):
+        found = attractors(graph, throws=throws)
+    with steps.step("basins"):
+        shares = basins(graph, found)
+    with steps.step("random starts"):
+        starts = None if scene.effects.spread else against_starts(graph, found, shares)
+    return _Found(graph, found, shares, starts)
+
+
+def _missed(found: _Found) -> float:
+    return 0.0 if found.starts is None else found.starts.missed
 
 
 class _Steps:
@@ -126,7 +169,7 @@ class _Steps:
             self.progress(name, len(self.timings), self.count)
         begin = time.perf_counter()
         yield
-        self.timings[name] = time.perf_counter() - begin
+        self.timings[name] = self.timings.get(name, 0.0) + time.perf_counter() - begin
 
 
 def analyse(
@@ -146,7 +189,8 @@ def analyse(
     scene : str, Path, mapping or Scene
         A scene, or what `limitsets.load` reads.
     cells : int, optional
-        Cells per side, 4096 by default; they shrink towards the inner end of each side.
+        Cells per side, which shrink towards the inner end of each side.  By default 4096, and up to 65 536 where a
+        thousand random starts show that these miss something.
     error : float, optional
         Instead of `cells`: the largest error of the limit sets' ends [scene's unit].  The cheapest method that meets
         it is picked, and the error reached is verified (`Analysis.accuracy`); one that cannot be met is told there.
@@ -182,19 +226,18 @@ def analyse(
     (True, 19.753)
     """
     from limitsets.auditing import choose
-    from limitsets.cells import grid
-    from limitsets.graph import morse_graph, transitions
+    from limitsets.graph import morse_graph
     from limitsets.maps import critical_points
     from limitsets.scene import Scene, load
-    from limitsets.sets import attractors, basins, spurious
     from limitsets.sets import cycles as cycles_of
+    from limitsets.sets import spurious
 
     if cycles < 0:
         raise AnswerError("the longest period", cycles, "an integer from 0", "pass cycles=0 for none")
     if cells is not None and error is not None:
         raise AnswerError("the cells", cells, "none beside an error", "give cells or error, not both")
     asked_error = None if error is None else require_error(error)
-    steps = _Steps(9 + (cycles > 0) + 2 * (asked_error is not None), progress)
+    steps = _Steps(10 + (cycles > 0) + 2 * (asked_error is not None), progress)
     with steps.step("scene"):
         choice = choose(scene if isinstance(scene, Scene) else load(scene))
         chosen = choice.scene
@@ -205,12 +248,13 @@ def analyse(
         if announce is not None:
             announce(plan)
     count = plan.chosen.cells if plan is not None else CELLS if cells is None else cells
-    with steps.step("transitions"):
-        graph = transitions(chosen.map, grid(chosen.domain, cells=count))
-    with steps.step("attractors"):
-        found = attractors(graph, throws=throws)
-    with steps.step("basins"):
-        shares = basins(graph, found)
+    seen = _found(chosen, count, throws, steps)
+    while cells is None and _missed(seen) > 0.0 and (count := FINER * count) <= MOST_CELLS:
+        finer = _found(chosen, count, throws, steps)
+        if _missed(finer) >= _missed(seen):
+            break
+        seen = finer
+    graph, found, shares, starts = seen
     with steps.step("limit sets"):
         skip = plan is not None and plan.chosen.method == BY_CELLS
         limits = tuple(left_to_cells() if skip else limit_of(graph, each) for each in found)
@@ -229,6 +273,8 @@ def analyse(
             for limit, each in zip(limits, found, strict=True)
         ]
         asked = None if chosen.goal is None else answer(chosen.goal, graph, found, shares, extents)
+        if asked is not None and asked.holds and starts is not None and starts.elsewhere:
+            asked = replace(asked, holds=None)  # some starts stay where nothing is known
     with steps.step("assumptions"):
         flags = other_vertex_first(chosen)
     accuracy = None
@@ -243,6 +289,7 @@ def analyse(
         graph,
         found,
         shares,
+        starts,
         limits,
         critical,
         orbits,

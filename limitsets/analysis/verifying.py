@@ -121,7 +121,7 @@ def verified(
     Accuracy
     """
     if not attractors:
-        return Accuracy(plan, seconds, None, "nothing stays", "there are no ends: every start leaves the arm")
+        return Accuracy(plan, seconds, None, "nothing stays", "there are no ends: no limit set was found")
     if plan.chosen.method == CELLS or not all(limit.converged for limit in limits):
         reached = max(_from_inside(scene, each, plan.asked) for each in attractors)
         enough = reached <= plan.asked

@@ -59,6 +59,8 @@ def to_json(analysis: Analysis) -> dict[str, Any]:
             "undecided_between": _number(basins.undecided_between),
             **{name.replace("-", "_"): _number(share) for name, share in basins.exits.items()},
         },
+        "starts": None if analysis.starts is None else analysis.starts.to_json(),
+        "advice": list(analysis.advice),
         "cycles": [
             {
                 "period": cycle.period,
@@ -77,6 +79,7 @@ def to_json(analysis: Analysis) -> dict[str, Any]:
             "threshold": _number(goal.threshold),
             "how": goal.how,
         },
+        "goal_vacuous": None if goal is None else goal.vacuous,
         "effects": analysis.choice.to_json(),
         "other_vertex_first": _extents(analysis.other_vertex_first),
         "spurious": [

@@ -65,11 +65,14 @@ def _announce(plan: Plan) -> None:
 
 
 def _text(analysis: Analysis) -> None:
+    from limitsets.report.questions import verdict_of, void_of
     from limitsets.report.tables import count, intervals, percent
 
     unit = analysis.scene.unit
     if not analysis.attractors:
-        typer.echo("no start was found to stay on the arm")
+        undecided = analysis.basins.undecided_between
+        left = f"no limit set was found, and {percent(undecided)} of all starts are undecided"
+        typer.echo(left if undecided else "no start was found to stay on the arm")
     for k, (attractor, extents) in enumerate(zip(analysis.attractors, analysis.extents, strict=True)):
         typer.echo(f"limit set {k}: from {percent(analysis.basins.attractors[k])} of all starts")
         rows = [
@@ -77,9 +80,14 @@ def _text(analysis: Analysis) -> None:
             for side, parts in extents.items()
         ]
         table(["side", f"x [{unit}]", "jogs per visit"], rows)
+    for text in analysis.advice:
+        typer.echo(f"not settled: {text}")
     if analysis.goal is not None:
-        verdict = {True: "holds", False: "does not hold", None: "not decided"}[analysis.goal.holds]
-        typer.echo(f"goal {analysis.goal.goal.kind}: {verdict} ({analysis.goal.how}, not proved)")
+        void = void_of(analysis.goal, unit)
+        typer.echo(
+            f"goal {analysis.goal.goal.kind}: {verdict_of(analysis.goal)} ({analysis.goal.how}, not proved)"
+            + (f"; but {void}" if void else "")
+        )
     found = analysis.accuracy
     if found is not None and found.reached is not None:
         typer.echo(f"error of the ends: {found.reached:.2g} {unit} ({found.how})")

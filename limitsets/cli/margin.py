@@ -119,7 +119,7 @@ def _write(
 def _text(found: tuple[Margin, ...], out: Path | None, *, no_recheck: bool) -> None:
     from limitsets.report.questions import question_of
     from limitsets.report.robust_pages import READINGS
-    from limitsets.robust.margins.words import bound
+    from limitsets.robust.margins.words import bound, reach_of, void_of
 
     rows = []
     for each in found:
@@ -130,6 +130,9 @@ def _text(found: tuple[Margin, ...], out: Path | None, *, no_recheck: bool) -> N
     typer.echo(f"{scene.name}: {' and '.join(question_of(goal, scene.unit) for goal in found[0].goals)}")
     table(HEADS, rows)
     for each in found:
+        void = void_of(each.goals, reach_of(each.pieces), scene.unit)
+        if void:
+            typer.echo(f"{each.quantity}: what is proved holds vacuously, {void}")
         if each.reason:
             typer.echo(f"{each.quantity}: {each.reason}")
     if out is not None:

@@ -49,6 +49,8 @@ def throw(
             + (", ".join(chosen.effects.on()) or "no effects"),
             err=True,
         )
+    if path.reason is not None:
+        typer.echo(f"limitsets: outside-model: {path.reason}", err=True)
     if path.stopped == "stalled":
         typer.echo(
             "limitsets: stalled: the displacement is too small to change x any more; no fixed point", err=True
@@ -71,6 +73,7 @@ def _records(path: Trace) -> list[dict[str, Any]]:
             "displacement": _number(path.displacement[k]),
             "sides_turned": int(path.turned[k]),
             "other_vertex_first": bool(path.other_vertex_first[k]),
+            **({"reason": path.reason} if path.code[k] == codes.OUTSIDE_MODEL else {}),
         }
         for k in range(path.code.size)
     ]

@@ -44,7 +44,8 @@ def slides_back(stage: Stage, velocity: Any, rate: float, friction: float) -> bo
     """Whether Routh's path stops the sliding of the vertex that strikes now and then sets it sliding the other way.
 
     Signorini's and Coulomb's laws for the whole impulse, which the engine solves, have friction against the last
-    sliding alone.  Notation of docs/model.md: A, B, C say what an impulse at the vertex does to its velocity.
+    sliding alone; where the impulse that stops the vertex lies in the cone, there it stops.  Notation of docs/model.md:
+    A, B, C say what an impulse at the vertex does to its velocity.
     """
     body = stage.body
     arms = [body.position - body.local_to_world(corner) for corner in stage.corners]
@@ -52,9 +53,6 @@ def slides_back(stage: Stage, velocity: Any, rate: float, friction: float) -> bo
     off, right, high = min((velocity.y - rate * arm.x, arm.x, arm.y) for arm in arms if arm.y > low)
     along, rho2 = velocity.x + rate * high, float(body.moment)
     a, b, c = 1.0 + high * high / rho2, -right * high / rho2, 1.0 + right * right / rho2
-    push = (b * along / a - off) / (c - b * b / a)
-    if push > 0.0 and abs(along + b * push) <= friction * a * push:  # friction can hold the vertex
-        return False
     stop = abs(along) / (friction * a + abs(b))
     return abs(b) > friction * a and along * b < 0.0 and off + (c + friction * abs(b)) * stop < 0.0
 

@@ -5,7 +5,16 @@ elsewhere; it knows no map and no graph.
 """
 
 from limitsets.goals.ask import Verdict, evaluate
-from limitsets.goals.kinds import AttractsAll, FlipOrder, Goal, OrientedBeyond, Predicate, Reaches, StaysOnArm
+from limitsets.goals.kinds import (
+    AttractsAll,
+    FlipOrder,
+    Goal,
+    OrientedBeyond,
+    Predicate,
+    Reaches,
+    StaysOnArm,
+    unknown_goal,
+)
 
 __all__ = [
     "AttractsAll",
@@ -17,4 +26,5 @@ __all__ = [
     "StaysOnArm",
     "Verdict",
     "evaluate",
+    "unknown_goal",
 ]

@@ -8,7 +8,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from limitsets.goals.kinds import AttractsAll, FlipOrder, Goal, OrientedBeyond, Predicate, Reaches
+from limitsets.goals.kinds import (
+    AttractsAll,
+    FlipOrder,
+    Goal,
+    OrientedBeyond,
+    Predicate,
+    Reaches,
+    StaysOnArm,
+    unknown_goal,
+)
 
 __all__ = ["Verdict", "evaluate"]
 
@@ -63,6 +72,11 @@ def evaluate(
     -------
     Verdict
 
+    Raises
+    ------
+    AnswerError
+        No goal of `limitsets.goals`.
+
     Examples
     --------
     >>> found = {0: [(15.2, 19.75)], 1: [(12.6, 17.4)], 2: [(8.9, 23.4)]}
@@ -84,7 +98,9 @@ def evaluate(
         return Verdict(all(np.all(goal.holds(span[:, 0], span[:, 1], side)) for side, span in parts), None)
     if isinstance(goal, FlipOrder):
         return Verdict(flip_order is not None and _same_cycle(tuple(flip_order), goal.order), None)
-    return Verdict(leaving <= 0, None)
+    if isinstance(goal, StaysOnArm):
+        return Verdict(leaving <= 0, None)
+    raise unknown_goal(goal)
 
 
 def _same_cycle(found: tuple[int, ...], asked: tuple[int, ...]) -> bool:

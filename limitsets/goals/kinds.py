@@ -4,9 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, ClassVar, TypeAlias
+from typing import Any, ClassVar, TypeAlias, get_args
 
-__all__ = ["AttractsAll", "FlipOrder", "Goal", "OrientedBeyond", "Predicate", "Reaches", "StaysOnArm"]
+from limitsets.errors import AnswerError
+
+__all__ = [
+    "AttractsAll",
+    "FlipOrder",
+    "Goal",
+    "OrientedBeyond",
+    "Predicate",
+    "Reaches",
+    "StaysOnArm",
+    "unknown_goal",
+]
 
 
 @dataclass(frozen=True)
@@ -110,3 +121,14 @@ class Predicate:
 
 
 Goal: TypeAlias = OrientedBeyond | Reaches | AttractsAll | FlipOrder | StaysOnArm | Predicate
+
+
+def unknown_goal(goal: object) -> AnswerError:
+    """Build the error for what is no goal of these: nothing else has a rule and words of its own."""
+    kinds = ", ".join(kind.__name__ for kind in get_args(Goal))
+    return AnswerError(
+        "the goal",
+        type(goal).__name__,
+        f"a goal of limitsets.goals: {kinds}",
+        "say it as a function of places: limitsets.goals.Predicate",
+    )

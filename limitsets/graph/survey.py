@@ -35,7 +35,8 @@ class Survey:
         It leads nowhere else.
     destination : ndarray of int32, shape (n_cells,)
         What every path from the cell ends in: attractor number (0 for the first attracting component) or the code
-        of an exit; `UNDECIDED` (-4) where paths end in different places.
+        of an exit; `UNDECIDED` (-4) where paths end in different places, or may stay in a recurrent component that
+        is not attracting.
     """
 
     order: NDArray[np.bool_]
@@ -92,7 +93,11 @@ def attracting_of(r: Ranges, components: Components, sets: Sequence[NDArray[np.i
 
 
 def survey(
-    r: Ranges, components: Components, exits: dict[str, int], sets: Sequence[NDArray[np.int32]]
+    r: Ranges,
+    components: Components,
+    exits: dict[str, int],
+    sets: Sequence[NDArray[np.int32]],
+    passing: NDArray[np.bool_] | None = None,
 ) -> Survey:
     """Sweep the graph, up to 56 recurrent components at a time.
 
@@ -106,6 +111,8 @@ def survey(
         Names and codes of the ways out.
     sets : sequence of ndarray
         Cells of each recurrent component.
+    passing : ndarray of bool, shape (k,), optional
+        Components known to hold no orbit for ever; none.
 
     Returns
     -------
@@ -130,8 +137,11 @@ def survey(
         names = {len(chunk) + e: code for e, code in enumerate(exits.values())}
         for b in range(len(chunk)):
             order[:, begin + b] = seen >> np.uint64(b) & np.uint64(1)
+            # An orbit may stay in a set that is not closed: where one can be reached, nothing is said.
             if attracting[begin + b]:
                 names[b] = int(number[begin + b])
+            elif passing is None or not passing[begin + b]:
+                names[b] = codes.UNDECIDED
         for e in range(len(exits)):
             out[:, e] = seen >> np.uint64(len(chunk) + e) & np.uint64(1)
         destination = _destinations(marks, names, destination)

@@ -104,4 +104,10 @@ def place(
         last -= 1
     if last >= first:
         first, last = max(first - pad, 0), min(last + pad, n - 1)
+    elif pad > 0:  # beside the grid: an enlarged box may still meet it
+        bottom, top = target.edges[begin], target.edges[begin + n]
+        if (hi < bottom) & (hi + pad * (target.edges[begin + 1] - bottom) >= bottom):
+            first, last = 0, 0
+        elif (lo > top) & (lo - pad * (top - target.edges[begin + n - 1]) <= top):
+            first, last = n - 1, n - 1
     return first, last, leaves

@@ -8,8 +8,10 @@ import numpy as np
 
 from limitsets.cells import Grid
 from limitsets.errors import AnswerError
+from limitsets.graph.agreement import require_agreement
 from limitsets.graph.graph import TransitionGraph
 from limitsets.graph.images import METHODS
+from limitsets.graph.memory import require_memory
 from limitsets.graph.ranges import build
 from limitsets.graph.target import Target
 from limitsets.maps import kind_of
@@ -41,9 +43,10 @@ def transitions(map: Any, grid: Grid, method: str | None = None, **options: Any)
     Raises
     ------
     AnswerError
-        For a method that is none, or does not fit the map, or an image on a side that the grid has not.
+        For a method that is none, or does not fit the map, an image on a side that the grid has not, or more cells
+        than memory has room for.
     MapError
-        For a grid of more sides than the map's.
+        For a grid of more sides than the map's, or a map of your own whose kernels contradict each other.
 
     Examples
     --------
@@ -51,8 +54,8 @@ def transitions(map: Any, grid: Grid, method: str | None = None, **options: Any)
     >>> import networkx as nx
     >>> scene = ls.load("paper-designed")
     >>> graph = ls.transitions(scene.map, ls.grid(scene.domain, cells=4096))
-    >>> nx.number_attracting_components(graph)  # the limit set, and the three sinks
-    4
+    >>> nx.number_attracting_components(graph)  # the limit set, and the four sinks
+    5
     """
     kind = kind_of(map)
     if kind.dimension != grid.dimension:
@@ -66,6 +69,8 @@ def transitions(map: Any, grid: Grid, method: str | None = None, **options: Any)
     chosen = method or ("end-points" if grid.dimension == 1 else "corners-padded")
     if chosen not in METHODS:
         raise AnswerError("the image method", chosen, ", ".join(METHODS), "correct the word")
+    require_memory(grid, chosen, options.get("samples", 16))
+    require_agreement(map, grid, chosen == "boxes")
     target = Target.of(grid, kind.exits)
     parts = [METHODS[chosen](map, grid, side, target, **options) for side in range(grid.sides)]
     if len(parts) == 1:

@@ -5,10 +5,24 @@ by arithmetic, so that the exact result of every choice of points lies inside.  
 directions of the processor and needs no change of its state; the family of such formulas is due to Rump, Zimmermann,
 Boldo and Melquiond (BIT 49, 2009, doi 10.1007/s10543-009-0218-z).
 
-Intervals are finite and below 1e150 in size.  There are no decorations: a result is to be accepted only on a
-comparison that is true, so that a nan, which an impossible operation returns, rejects.  Sine, cosine and exponential
-are our own, with error bounds that tests prove in exact rationals; libm may only propose numbers, which are then
-verified.
+The contract, for every operand:
+
+* An interval is a set of real numbers, all those from lo to hi; either end may be infinite.
+* 0 times an infinite end is 0.  What overflows has an infinite end.
+* The empty set is ``(nan, nan)``.  Every operation on it gives it again; `hull` gives the other operand.  Half a nan
+  never occurs: what is done with a pair that has one nan is done with the empty set.
+* Divided by an interval that holds 0, anything is all numbers.
+* `sqrt` and `log` enclose the part that is defined, the empty set where there is none.
+
+There are no decorations.  A result is to be accepted only on a comparison that is true, so that a nan rejects.  That
+a function was asked beyond where it is defined is marked beside the intervals instead, by `sqrt` and `log` of an
+interval that is only partly defined, and by `sin` and `cos` of one that is not bounded (plain numbers give nan there):
+the cell whose image is then being computed counts as one of which nothing is proved, whatever a kernel makes of
+the number.  So does a cell whose image has an infinite or a nan end.  A kernel for which that is not meant, because
+only rounding carries an operand below 0, takes ``maximum(a, (0.0, 0.0))`` first.
+
+Sine, cosine and exponential are our own, with error bounds that tests prove in exact rationals, and the logarithm is
+summed in intervals; libm may only propose numbers, which are then verified.
 """
 
 from limitsets.interval.arithmetic import (
@@ -29,6 +43,7 @@ from limitsets.interval.arithmetic import (
 from limitsets.interval.elementary import atan2, cos, sin
 from limitsets.interval.exponential import exp
 from limitsets.interval.guard import guard, rounding_is_sound
+from limitsets.interval.logarithm import log
 
 __all__ = [
     "absolute",
@@ -40,6 +55,7 @@ __all__ = [
     "exp",
     "guard",
     "hull",
+    "log",
     "maximum",
     "minimum",
     "mul",

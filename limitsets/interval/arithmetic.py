@@ -8,8 +8,8 @@ from __future__ import annotations
 import math
 from typing import TypeAlias
 
-from limitsets.interval.rounding import down, up
-from limitsets.jit import proof_kernel
+from limitsets.interval.rounding import above, above_sum, below, below_sum
+from limitsets.jit import mark_undefined, proof_kernel
 
 __all__ = [
     "Interval",
@@ -17,11 +17,13 @@ __all__ = [
     "add",
     "contains",
     "div",
+    "holds",
     "hull",
     "maximum",
     "minimum",
     "mul",
     "neg",
+    "or_empty",
     "point",
     "sqr",
     "sqrt",
@@ -29,7 +31,7 @@ __all__ = [
 ]
 
 Interval: TypeAlias = tuple[float, float]
-"""``(lo, hi)`` with lo <= hi, both finite."""
+"""``(lo, hi)`` with lo <= hi, either of which may be infinite; (nan, nan) is the empty set."""
 
 
 @proof_kernel
@@ -45,63 +47,88 @@ def contains(a: Interval, x: float) -> bool:
 
 
 @proof_kernel
+def holds(a: Interval) -> bool:
+    """Whether a is an interval; False for the empty set, and for any other pair with a nan or the wrong way round."""
+    return a[0] <= a[1]
+
+
+@proof_kernel
+def or_empty(good: bool, lo: float, hi: float) -> Interval:
+    """(lo, hi), or the empty set: never half of it."""
+    return lo if good else math.nan, hi if good else math.nan
+
+
+@proof_kernel
+def _number(y: float) -> float:
+    """Product or quotient of two ends: 0 times an infinite end is 0."""
+    return y if y == y else 0.0  # nan alone is unequal to itself
+
+
+@proof_kernel
 def hull(a: Interval, b: Interval) -> Interval:
-    """Return the smallest interval that holds both."""
-    return min(a[0], b[0]), max(a[1], b[1])
+    """Return the smallest interval that holds both; of the empty set and b, b."""
+    one, two = holds(a), holds(b)
+    lo = min(a[0] if one else math.inf, b[0] if two else math.inf)
+    hi = max(a[1] if one else -math.inf, b[1] if two else -math.inf)
+    return or_empty(one | two, lo, hi)
 
 
 @proof_kernel
 def neg(a: Interval) -> Interval:
     """Return -a, exactly."""
-    return -a[1], -a[0]
+    return or_empty(holds(a), -a[1], -a[0])
 
 
 @proof_kernel
 def absolute(a: Interval) -> Interval:
     """Return |a|, exactly."""
     lo = max(max(a[0], -a[1]), 0.0)
-    return lo, max(-a[0], a[1])
+    return or_empty(holds(a), lo, max(-a[0], a[1]))
 
 
 @proof_kernel
 def minimum(a: Interval, b: Interval) -> Interval:
     """Smaller of the two, exactly."""
-    return min(a[0], b[0]), min(a[1], b[1])
+    return or_empty(holds(a) & holds(b), min(a[0], b[0]), min(a[1], b[1]))
 
 
 @proof_kernel
 def maximum(a: Interval, b: Interval) -> Interval:
     """Larger of the two, exactly."""
-    return max(a[0], b[0]), max(a[1], b[1])
+    return or_empty(holds(a) & holds(b), max(a[0], b[0]), max(a[1], b[1]))
 
 
 @proof_kernel
 def add(a: Interval, b: Interval) -> Interval:
     """Return a + b."""
-    return down(a[0] + b[0]), up(a[1] + b[1])
+    lo, hi = a[0] + b[0], a[1] + b[1]
+    return or_empty(lo <= hi, below_sum(lo), above_sum(hi))
 
 
 @proof_kernel
 def sub(a: Interval, b: Interval) -> Interval:
     """Return a - b."""
-    return down(a[0] - b[1]), up(a[1] - b[0])
+    lo, hi = a[0] - b[1], a[1] - b[0]
+    return or_empty(lo <= hi, below_sum(lo), above_sum(hi))
 
 
 @proof_kernel
 def mul(a: Interval, b: Interval) -> Interval:
     """Return a b."""
-    p, q, r, s = a[0] * b[0], a[0] * b[1], a[1] * b[0], a[1] * b[1]
-    return down(min(min(p, q), min(r, s))), up(max(max(p, q), max(r, s)))
+    p, q = _number(a[0] * b[0]), _number(a[0] * b[1])
+    r, s = _number(a[1] * b[0]), _number(a[1] * b[1])
+    lo, hi = min(min(p, q), min(r, s)), max(max(p, q), max(r, s))
+    return or_empty(holds(a) & holds(b), below(lo), above(hi))
 
 
 @proof_kernel
 def div(a: Interval, b: Interval) -> Interval:
     """Return a / b; all numbers where b holds 0."""
-    p, q, r, s = a[0] / b[0], a[0] / b[1], a[1] / b[0], a[1] / b[1]
+    p, q = _number(a[0] / b[0]), _number(a[0] / b[1])
+    r, s = _number(a[1] / b[0]), _number(a[1] / b[1])
     safe = (b[0] > 0.0) | (b[1] < 0.0)
-    lo = down(min(min(p, q), min(r, s)))
-    hi = up(max(max(p, q), max(r, s)))
-    return lo if safe else -math.inf, hi if safe else math.inf
+    lo, hi = below(min(min(p, q), min(r, s))), above(max(max(p, q), max(r, s)))
+    return or_empty(holds(a) & holds(b), lo if safe else -math.inf, hi if safe else math.inf)
 
 
 @proof_kernel
@@ -109,11 +136,15 @@ def sqr(a: Interval) -> Interval:
     """a^2, with both factors the same number."""
     p, q = a[0] * a[0], a[1] * a[1]
     across = (a[0] <= 0.0) & (a[1] >= 0.0)
-    return 0.0 if across else max(down(min(p, q)), 0.0), up(max(p, q))
+    return or_empty(holds(a), 0.0 if across else max(below(min(p, q)), 0.0), above(max(p, q)))
 
 
 @proof_kernel
 def sqrt(a: Interval) -> Interval:
-    """Square root of the part of a that is not negative; nan where there is none."""
-    lo = math.sqrt(max(a[0], 0.0))
-    return max(down(lo), 0.0), up(math.sqrt(a[1]))
+    """Square root of the part of a that is not negative; the empty set where there is none.
+
+    Where another part is negative the cell whose image is computed is undecided, see `limitsets.interval`.
+    """
+    mark_undefined(a[0] < 0.0)
+    lo, hi = math.sqrt(max(a[0], 0.0)), math.sqrt(max(a[1], 0.0))
+    return or_empty(holds(a) & (a[1] >= 0.0), max(below(lo), 0.0), above(hi))

@@ -13,9 +13,9 @@ from __future__ import annotations
 
 import math
 
-from limitsets.interval.arithmetic import Interval
+from limitsets.interval.arithmetic import Interval, holds, or_empty
 from limitsets.interval.rounding import down, up
-from limitsets.jit import proof_kernel
+from limitsets.jit import mark_undefined, proof_kernel
 
 __all__ = ["COSINE", "LARGEST", "NEAR", "PARTS", "RELATIVE", "SINE", "atan2", "cos", "sin", "sin_cos"]
 
@@ -56,20 +56,25 @@ def sin_cos(x: float) -> tuple[float, float, float]:
 
 
 @proof_kernel
+def _reduced(x: float) -> float:
+    """X moved to the nearer end of the range; no nan, for what is made an integer must be a number."""
+    x = x if x > -LARGEST else -LARGEST
+    return x if x < LARGEST else LARGEST
+
+
+@proof_kernel
 def _sine(x: float) -> Interval:
-    """Enclosure of sin at one double."""
+    """Enclosure of sin at one double of the range."""
     s, _, n = sin_cos(x)
     error = RELATIVE * abs(s) if n == 0.0 else NEAR
-    lo, hi = max(down(s - error), -1.0), min(up(s + error), 1.0)
-    return (lo, hi) if abs(x) <= LARGEST else (-1.0, 1.0)
+    return max(down(s - error), -1.0), min(up(s + error), 1.0)
 
 
 @proof_kernel
 def _cosine(x: float) -> Interval:
-    """Enclosure of cos at one double."""
+    """Enclosure of cos at one double of the range."""
     _, c, _ = sin_cos(x)
-    lo, hi = max(down(c - NEAR), -1.0), min(up(c + NEAR), 1.0)
-    return (lo, hi) if abs(x) <= LARGEST else (-1.0, 1.0)
+    return max(down(c - NEAR), -1.0), min(up(c + NEAR), 1.0)
 
 
 @proof_kernel
@@ -84,21 +89,27 @@ def _meets(lo: float, hi: float, offset: float) -> bool:
 
 
 @proof_kernel
+def _waves(a: Interval, u: Interval, v: Interval, bottom: float, top: float) -> Interval:
+    """Range of sine or cosine, whose values at the ends are u and v, lowest and highest at that many quarter turns."""
+    far = (a[0] < -LARGEST) | (a[1] > LARGEST)
+    # A sine of an infinite end is a nan in plain numbers, so that what leads here is not defined on all of the cell.
+    mark_undefined((a[0] == -math.inf) | (a[1] == math.inf))
+    x, y = _reduced(a[0]), _reduced(a[1])
+    lo = -1.0 if far | _meets(x, y, bottom) else min(u[0], v[0])
+    hi = 1.0 if far | _meets(x, y, top) else max(u[1], v[1])
+    return or_empty(holds(a), lo, hi)
+
+
+@proof_kernel
 def sin(a: Interval) -> Interval:
     """Sine of an interval."""
-    u, v = _sine(a[0]), _sine(a[1])
-    lo = -1.0 if _meets(a[0], a[1], 3.0) else min(u[0], v[0])
-    hi = 1.0 if _meets(a[0], a[1], 1.0) else max(u[1], v[1])
-    return lo, hi
+    return _waves(a, _sine(_reduced(a[0])), _sine(_reduced(a[1])), 3.0, 1.0)
 
 
 @proof_kernel
 def cos(a: Interval) -> Interval:
     """Cosine of an interval."""
-    u, v = _cosine(a[0]), _cosine(a[1])
-    lo = -1.0 if _meets(a[0], a[1], 2.0) else min(u[0], v[0])
-    hi = 1.0 if _meets(a[0], a[1], 0.0) else max(u[1], v[1])
-    return lo, hi
+    return _waves(a, _cosine(_reduced(a[0])), _cosine(_reduced(a[1])), 2.0, 0.0)
 
 
 PI_ABOVE = math.nextafter(math.pi, 4.0)
@@ -118,27 +129,40 @@ def _not_beyond(angle: float, y: float, x: float) -> bool:
 
 @proof_kernel
 def _angle(y: float, x: float) -> Interval:
-    """Enclosure of the angle of one vector: libm proposes, signs of sines decide.
+    """Enclosure of the angle of one vector of finite size: libm proposes, signs of sines decide.
 
-    Scaled to size 1 by a power of two; the candidates are 2^-44 to either side, far above libm's error and the slack.
+    Very large and very small vectors are scaled by a power of two; the candidates are 2^-44 to either side, far above
+    libm's error and the slack.
     """
     size = max(abs(x), abs(y))
-    scale = 2.0 ** -math.floor(math.log2(size))
+    scale = 2.0**560 if size < 2.0**-500 else (2.0**-560 if size > 2.0**500 else 1.0)
     u, v = x * scale, y * scale
     guess = math.atan2(v, u)
     lo, hi = guess - 2.0**-44, guess + 2.0**-44
     low = _not_beyond(lo, v, u)
     high = _not_beyond(-hi, -v, u)
-    lo, hi = max(lo, -PI_ABOVE) if low else -PI_ABOVE, min(hi, PI_ABOVE) if high else PI_ABOVE
-    return lo, hi
+    return max(lo, -PI_ABOVE) if low else -PI_ABOVE, min(hi, PI_ABOVE) if high else PI_ABOVE
+
+
+@proof_kernel
+def _angles(y: float, x: float) -> Interval:
+    """Angles at one corner of a box.  Where a coordinate is infinite the vectors turn to its axis, or to both axes."""
+    tall, long = abs(y) == math.inf, abs(x) == math.inf
+    up_or_down = _angle(math.copysign(1.0, y), 0.0)
+    left_or_right = _angle(math.copysign(0.0, y), math.copysign(1.0, x))
+    plain = _angle(0.0 if tall else y, 1.0 if long else x)
+    one = up_or_down if tall else (left_or_right if long else plain)
+    two = left_or_right if long else one
+    return min(one[0], two[0]), max(one[1], two[1])
 
 
 @proof_kernel
 def atan2(y: Interval, x: Interval) -> Interval:
     """Angle of the vectors of a box, in (-pi, pi]; everything where the box holds the origin or meets the cut."""
-    if (y[0] <= 0.0) & (y[1] >= 0.0) & (x[0] <= 0.0):
-        return -PI_ABOVE, PI_ABOVE
+    everything = (y[0] <= 0.0) & (y[1] >= 0.0) & (x[0] <= 0.0)
     # Away from the origin the angle is monotone along each border of the box, so the corners span it.
-    p, q = _angle(y[0], x[0]), _angle(y[0], x[1])
-    r, s = _angle(y[1], x[0]), _angle(y[1], x[1])
-    return min(min(p[0], q[0]), min(r[0], s[0])), max(max(p[1], q[1]), max(r[1], s[1]))
+    p, q = _angles(y[0], x[0]), _angles(y[0], x[1])
+    r, s = _angles(y[1], x[0]), _angles(y[1], x[1])
+    lo = -PI_ABOVE if everything else min(min(p[0], q[0]), min(r[0], s[0]))
+    hi = PI_ABOVE if everything else max(max(p[1], q[1]), max(r[1], s[1]))
+    return or_empty(holds(y) & holds(x), lo, hi)

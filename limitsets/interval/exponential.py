@@ -15,7 +15,7 @@ import math
 
 import numpy as np
 
-from limitsets.interval.arithmetic import Interval
+from limitsets.interval.arithmetic import Interval, holds, or_empty
 from limitsets.interval.rounding import down, up
 from limitsets.jit import proof_kernel
 
@@ -50,9 +50,9 @@ def exponential(x: float) -> float:
 
 @proof_kernel
 def _clamped(x: float) -> float:
-    """X moved to the nearer end of the range; nan stays nan."""
-    x = -LARGEST if x < -LARGEST else x
-    return LARGEST if x > LARGEST else x
+    """X moved to the nearer end of the range; no nan, for what is made an integer must be a number."""
+    x = x if x > -LARGEST else -LARGEST
+    return x if x < LARGEST else LARGEST
 
 
 @proof_kernel
@@ -60,4 +60,4 @@ def exp(a: Interval) -> Interval:
     """Exponential of an interval."""
     y, z = exponential(_clamped(a[0])), exponential(_clamped(a[1]))
     lo, hi = down(y - RELATIVE * y), up(z + RELATIVE * z)
-    return 0.0 if a[0] < -LARGEST else lo, math.inf if a[1] > LARGEST else hi
+    return or_empty(holds(a), 0.0 if a[0] < -LARGEST else lo, math.inf if a[1] > LARGEST else hi)

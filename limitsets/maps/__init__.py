@@ -12,6 +12,7 @@ from limitsets.maps.codes import (
     OUTWARD,
     ROLL,
     UNDECIDED,
+    UNDEFINED,
 )
 from limitsets.maps.contract import MapKind, coerce, kind_of, register
 from limitsets.maps.critical import CriticalPoint, critical_points
@@ -44,6 +45,7 @@ __all__ = [
     "OUTWARD",
     "ROLL",
     "UNDECIDED",
+    "UNDEFINED",
     "CriticalPoint",
     "Images",
     "Lyapunov",

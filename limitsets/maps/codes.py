@@ -16,6 +16,7 @@ __all__ = [
     "OUTWARD",
     "ROLL",
     "UNDECIDED",
+    "UNDEFINED",
     "UNSETTLED",
 ]
 
@@ -30,11 +31,13 @@ INWARD = -1
 OUTWARD = -2
 """Lands beyond the arm's end."""
 OUTSIDE = -2
-"""Leaves the domain: the one exit of a map other than the throw."""
+"""Leaves the domain: the exit of a map other than the throw, beside `UNDEFINED`."""
 OUTSIDE_MODEL = -3
 """Nothing the model speaks of: a start with R <= a, or no impact within a full turn."""
 UNDECIDED = -4
 """Cells only: parts of the cell do different things."""
+UNDEFINED = -5
+"""The map gave nan: the last exit of every map."""
 UNSETTLED = -128
 """Inside the drivers only: the fast kernel could not vouch for its answer, the sure one is asked."""
 
@@ -46,4 +49,5 @@ NAMES = {
     OUTWARD: "outward",
     OUTSIDE_MODEL: "outside-model",
     UNDECIDED: "undecided",
+    UNDEFINED: "undefined",
 }

@@ -21,16 +21,22 @@ written once, here and in the rooms above, and know maps only through these func
                                         they differ at every step; asked by orbits, not by the images of cells
 ======================================  =============================================================================
 
+`image_box` is written with `limitsets.interval`.  A cell counts as one of which nothing is proved where its image is
+nan or unbounded, and where a function was asked beyond where it is defined (the contract of that room), whatever count
+the kernel gives.
+
 In two and three dimensions x is a tuple and the slope a tuple of rows.
 """
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from limitsets.errors import MapError
 from limitsets.jit import cover_foreign_class, generic
@@ -50,6 +56,7 @@ __all__ = [
     "on_side",
     "on_side_box",
     "register",
+    "require_codes",
     "require_sides",
     "scattered",
 ]
@@ -141,7 +148,7 @@ class MapKind:
     branches : tuple of str
         Names of the branches; the code of a step is an index into it.
     exits : dict of str to int
-        Names and codes of the ways out, in the order of the sinks of a graph.
+        Names and codes of the ways out, in the order of the sinks of a graph; "undefined" is the last.
     has_image_on, has_image_box, has_margin, has_displacement : bool
         Which of the optional kernels exist.
     """
@@ -185,7 +192,8 @@ def register(
         Build its values with `limitsets.maps.coerce`, or give floats and float64 arrays.
     image : callable
         ``image(params, x, side) -> (x', side', code)``; code is the index of the branch taken, or
-        `limitsets.maps.OUTSIDE` (-2).  A module-level function, not decorated.
+        `limitsets.maps.OUTSIDE` (-2).  A step to nan is `limitsets.maps.UNDEFINED` (-5), whatever code comes with it.
+        A module-level function, not decorated.
     image_on, image_box, on_side, on_side_box, fallback, fallback_box, margin, displacement : callable, optional
     scattered : callable, optional
         See this module's table.
@@ -194,7 +202,7 @@ def register(
     branches : tuple of str
         Names of the branches.
     exits : dict, optional
-        Names and codes of the ways out; default ``{"outside": -2}``.
+        Names and codes of the ways out; default ``{"outside": -2}``.  ``{"undefined": -5}`` is put behind them.
 
     Returns
     -------
@@ -257,6 +265,7 @@ def register(
                 "a function defined at module level",
                 "move it out of the function",
             )
+        _require_arguments(cls, name, plain)
     cover_foreign_class(cls, list(kernels.values()))
     for name, function in kernels.items():
         globals()[name].on(cls, function)
@@ -264,13 +273,58 @@ def register(
         cls.__name__,
         dimension,
         tuple(branches),
-        dict(EXITS_OF_A_MAP if exits is None else exits),
+        {**(EXITS_OF_A_MAP if exits is None else exits), "undefined": codes.UNDEFINED},
         image_on is not None,
         image_box is not None,
         margin is not None,
         displacement is not None,
     )
     return cls
+
+
+# Arguments of each kernel, as the table of this module has them.
+ARGUMENTS = {
+    "image": ("params", "x", "side"),
+    "image_on": ("params", "x", "side", "branch"),
+    "image_box": ("params_lo", "params_hi", "lo", "hi", "side"),
+    "fallback_box": ("params_lo", "params_hi", "lo", "hi", "side"),
+    "on_side": ("params", "side"),
+    "on_side_box": ("params_lo", "params_hi", "side"),
+    "fallback": ("params", "x", "side"),
+    "margin": ("params", "x", "side"),
+    "displacement": ("params", "x", "side"),
+    "scattered": ("params", "start", "step"),
+}
+
+
+def _require_arguments(cls: type, name: str, function: Callable[..., Any]) -> None:
+    """Refuse a kernel that cannot be called with its arguments."""
+    signature, wanted = inspect.signature(function), ARGUMENTS[name]
+    try:
+        signature.bind(*wanted)
+    except TypeError:
+        raise MapError(
+            f"the arguments of the kernel {name} of {cls.__name__}",
+            f"{function.__name__}{signature}",
+            f"{len(wanted)} of them ({', '.join(wanted)})",
+            "correct its first line",
+        ) from None
+
+
+def require_codes(params: Any, code: NDArray[np.int64]) -> None:
+    """Refuse codes of steps that the map's registration does not name."""
+    kind = kind_of(params)
+    known = [*range(len(kind.branches)), *kind.exits.values(), codes.OUTSIDE_MODEL]
+    wrong = code[~np.isin(code, known)]
+    if wrong.size:
+        branches = ", ".join(f"{k} {name}" for k, name in enumerate(kind.branches))
+        exits = ", ".join(f"{number} {name}" for name, number in kind.exits.items())
+        raise MapError(
+            f"the code that the kernel image of {kind.name} gives",
+            int(wrong[0]),
+            f"a branch ({branches}) or an exit ({exits})",
+            "correct the kernel, or name every branch in register(..., branches=(...))",
+        )
 
 
 def kind_of(params: Any) -> MapKind:

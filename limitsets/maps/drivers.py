@@ -22,6 +22,7 @@ from limitsets.maps.contract import (
     image_on,
     kind_of,
     on_side,
+    require_codes,
     require_sides,
     scattered,
 )
@@ -80,12 +81,18 @@ for _n, _get, _set in ((1, _pick1, _put1), (2, _pick2, _put2), (3, _pick3, _put3
 
 
 @kernel
+def judged(x: Any, code: Any) -> Any:
+    """Code of a step to x: `UNDEFINED` where a coordinate is nan, for no comparison with it is true."""
+    return codes.UNDEFINED if (x != x) & (code != codes.UNSETTLED) else code
+
+
+@kernel
 def step(params: Any, x: Any, side: Any) -> Any:
     """One step of any map, the sure way where the fast one cannot vouch for its answer."""
     after, side_after, code = image(params, x, side)
     if code == codes.UNSETTLED:
         after, side_after, code = fallback(params, x, side)
-    return after, side_after, code
+    return after, side_after, judged(after, code)
 
 
 @kernel(entry=True)
@@ -95,14 +102,14 @@ def _images(params: Any, side: int, xs: Any, after: Any, side_after: Any, code_a
         x, to, code = image(here, pick(xs, k), side)
         put(after, k, x)
         side_after[k] = to
-        code_after[k] = code
+        code_after[k] = judged(x, code)
     again = 0
     for k in range(xs[0].size):
         if code_after[k] == codes.UNSETTLED:
             x, to, code = fallback(here, pick(xs, k), side)
             put(after, k, x)
             side_after[k] = to
-            code_after[k] = code
+            code_after[k] = judged(x, code)
             again += 1
     return again
 
@@ -316,6 +323,7 @@ def orbit(params: Any, x: Any, side: int, count: int) -> Orbit:
     sides, code = np.empty(count + 1, np.int64), np.empty(count, np.int64)
     sides[0] = side
     made = _orbit(params, 0, xs, sides, code)
+    require_codes(params, code[:made])
     stopped = None
     if made and code[made - 1] < 0:
         stopped = next(name for name, exit_code in kind.exits.items() if exit_code == code[made - 1])

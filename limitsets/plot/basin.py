@@ -33,6 +33,7 @@ OUT: dict[int, tuple[str, str, str]] = {
     codes.OUTWARD: ("#3A3A3A", "", "leaves outward"),
     codes.OUTSIDE_MODEL: ("#A8A8A8", "***", "outside the model"),
     codes.UNDECIDED: ("#FFFFFF", "|||||", "undecided"),
+    codes.UNDEFINED: ("#E4D7C5", "ooo...", "the map is undefined"),
 }
 
 
@@ -146,7 +147,7 @@ def _legend(shares: Basins, bars: bool) -> list[Patch]:
         text = f"to attractor {k}: {_percent(share)} of all starts"
         handles.append(Patch(facecolor=face, hatch=hatch if hatched else "", label=text, **EDGE))
     parts = {codes.UNDECIDED: shares.undecided_between}
-    names = {"inward": codes.INWARD, "outward": codes.OUTWARD, "outside-model": codes.OUTSIDE_MODEL}
+    names = {name: code for code, name in codes.NAMES.items()}
     parts |= {names.get(name, codes.OUTSIDE): share for name, share in shares.exits.items()}
     for label, share in sorted(parts.items(), reverse=True):
         if label in present:

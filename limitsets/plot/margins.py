@@ -12,6 +12,7 @@ from matplotlib.patches import Patch
 from limitsets.errors import AnswerError
 from limitsets.plot import style
 from limitsets.robust.margins.words import bound
+from limitsets.scene.quantities import parsed_deviation
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -170,7 +171,8 @@ def tolerance_box(margin: Margin) -> Figure:
     texts = {**margin.tolerance}
     figure, (axes,) = style.canvas(6.8, 0.4 * len(texts) + 1.6)
     for row, (name, text) in enumerate(texts.items()):
-        size, unit = float(text.split()[0]), text.split()[1]
+        given = parsed_deviation(text, name)
+        size, unit = float(given.number), given.unit
         axes.barh(row, 2 * margin.proved, left=-margin.proved, height=0.6, gid="proved", zorder=2, **SAFE)
         words = f"± {bound(margin.proved * size, unit)}" + (", every throw" if name == "landing.x" else "")
         axes.annotate(words, (0, row), ha="center", va="center", fontsize=style.SMALL, zorder=4)

@@ -234,7 +234,8 @@ def _passing(found: Cover, displaced: Sequence[Floats]) -> Mask:
         return np.zeros(found.grid.n_cells, dtype=bool)
     least, most = (np.concatenate([each[:, k] for each in displaced]) for k in (0, 3))
     by = np.maximum(least, -most)
-    return np.greater(by - found.box.landing, ROOM * by)
+    passing: Mask = by - found.box.landing > ROOM * by
+    return passing
 
 
 def _near(found: Cover, joint: Sequence[NearJoint], shut: Mask, *, thin: bool) -> bool:

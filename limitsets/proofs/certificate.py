@@ -23,6 +23,7 @@ from limitsets.files import replaced
 from limitsets.proofs.attraction import Attraction
 from limitsets.proofs.confirm import DeniedError, require_confirmed
 from limitsets.proofs.cover import Cover, targets
+from limitsets.scene.units import spelled_plainly
 from limitsets.thrower import Energy, Exact, Signed, SmallAngle, SmallAngle2
 
 __all__ = ["FORMAT", "VERSION", "arrays_of", "write"]
@@ -174,10 +175,10 @@ def write(
             "formulas": FORMULAS,
         },
         "state": f"x [{unit}]: centre of mass along the arm; side: the one the part rests on, in flip order",
-        "noise": dict(noise) if noise else None,
-        "tolerance": dict(tolerance) if tolerance else None,
-        "boxes": boxes,
-        "claims": [{"claim": each["claim"], "section": each["section"]} for each in claims],
+        "noise": spelled_plainly(noise) if noise else None,
+        "tolerance": spelled_plainly(tolerance) if tolerance else None,
+        "boxes": spelled_plainly(boxes),
+        "claims": spelled_plainly([{"claim": each["claim"], "section": each["section"]} for each in claims]),
         "arrays": {
             name: {
                 "sha256": hashlib.sha256(value.tobytes()).hexdigest(),

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from limitsets.errors import AnswerError
-from limitsets.proofs.asked import State, ask, borders
+from limitsets.proofs.asked import State, ask, borders, prove
 from limitsets.proofs.asked.starts import leaving
 from limitsets.proofs.attraction import Attraction, attraction, near_section
 from limitsets.proofs.certificate import write
@@ -35,6 +35,9 @@ LADDER = (2048, 8192, 32768, 131072)
 
 # Pieces into which a tolerance may be cut, and cells that may be tried on them, before it is given up.
 MOST_PIECES, MOST_CELLS = 1024, 4_000_000
+
+# Of the pieces so many, the widest, are searched for an orbit that refutes the goal, besides the corners.
+MOST_SEARCHED = 8
 
 # For which starts a goal holds: the fewer the later.
 STARTS = ("every", "almost-every", "from", "cells")
@@ -261,13 +264,14 @@ def _expanding(found: Attraction, _: Scene) -> Claim:
     return Claim("expanding", "proved", "", {"least_slope": stated.hex()})
 
 
-def _goal(found: Attraction, scene: Scene) -> Claim:
+def _goal(found: Attraction, scene: Scene, *, search: bool = True) -> Claim:
+    """Prove the goal; where it is not proved, search for what refutes it if asked to."""
     goal = scene.goal
     if goal is None:
         raise AnswerError(
             "the goal", None, "a scene with [goal]", "give the scene one, or leave this claim out"
         )
-    answer = ask(found, scene, goal)
+    answer = (ask if search else prove)(found, scene, goal)
     return Claim(
         "goal",
         answer.verdict,
@@ -423,14 +427,23 @@ def _attempt(
     box: ParameterBox,
     ladder: Sequence[int],
     progress: Progress | None,
+    *,
+    search: bool = True,
 ) -> tuple[Attraction, tuple[Claim, ...]]:
-    """Refine the cells until every claim is proved or refuted for one box of parameters, or the ladder ends."""
+    """Refine the cells until every claim is proved or refuted for one box of parameters, or the ladder ends.
+
+    What refutes the goal is searched for with the first cells and with the last: it hardly depends on them.
+    """
     cuts = {side: borders(scene.goal) for side in range(box.lo.a.size)}
     for step, cells in enumerate(ladder):
         if progress is not None:
             progress(f"{cells} cells a side", step, len(ladder))
         found = attraction(cover(box, cells, cuts))
-        answers = tuple(PROVERS[word](found, scene) for word in wanted)
+        now = search and step in (0, len(ladder) - 1)
+        answers = tuple(
+            _goal(found, scene, search=now) if word == "goal" else PROVERS[word](found, scene)
+            for word in wanted
+        )
         if all(answer.verdict in ("proved", "refuted") or answer.final for answer in answers):
             break
     return found, answers
@@ -470,15 +483,15 @@ def _halved(
 ) -> tuple[tuple[Attraction, ...], tuple[Claim, ...]]:
     """Prove all of the claims, halving the box of quantities as needed; or give up some of them, with the reason."""
     scales = {name: max(span.hi - span.lo, Fraction(1, 10**30)) for name, span in piece.spans.items()}
-    waiting, tried = [(piece, LADDER[0])], 0
+    waiting, tried, looked = [(piece, LADDER[0])], 0, 0
     proved: list[tuple[Attraction, tuple[Claim, ...]]] = []
     while waiting:
         if progress is not None:
             progress("pieces of the tolerance", len(proved), len(proved) + len(waiting))
         part, cells = waiting.pop()
         box = parameter_box(scene, tree=part.tree(), noise=noise)
-        one, answers = _attempt(scene, wanted, box, (cells,), None)
-        tried += one.cover.grid.n_cells
+        one, answers = _attempt(scene, wanted, box, (cells,), None, search=looked < MOST_SEARCHED)
+        tried, looked = tried + one.cover.grid.n_cells, looked + 1
         missing = tuple(
             each for each in answers if not (each.written and (each.final or each.verdict == "proved"))
         )

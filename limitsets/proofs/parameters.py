@@ -23,7 +23,7 @@ from limitsets.proofs.simulated import simulated
 from limitsets.scene import Scene
 from limitsets.scene.body import Shape, shape_of
 from limitsets.scene.quantities import STANDARD_GRAVITY, base_unit, find, text_at, texts
-from limitsets.scene.units import exact_factor, parse
+from limitsets.scene.units import exact_factor, parse, share_of_pi
 from limitsets.thrower import Throw
 from limitsets.thrower.motion import FullThrow, Outline
 
@@ -107,9 +107,9 @@ class _Reader:
     def one(self, text: str, dimension: str) -> Span:
         quantity = parse(text, dimension)
         number = Fraction(quantity.number)
-        if dimension in ("angle", "angular speed"):
-            turn = pi() / 180 if quantity.unit.startswith("deg") else Span.of(Fraction(1))
-            return turn * Span.of(number)
+        share = share_of_pi(quantity.unit)
+        if share is not None:
+            return pi() * Span.of(share * number)
         return Span.of(number * exact_factor(quantity.unit, base_unit(dimension, self.unit)))
 
     def deviation(self, name: str, noise: Mapping[str, str]) -> tuple[Span, Span]:

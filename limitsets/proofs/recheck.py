@@ -221,16 +221,27 @@ def open_certificate(path: str | os.PathLike[str]) -> tuple[dict[str, Any], dict
 DECIMAL = r"[+-]?(?:[0-9]{1,100}(?:\.[0-9]{0,100})?|\.[0-9]{1,100})(?:[eE][+-]?[0-9]{1,3})?"
 NUMBER = re.compile(rf" *({DECIMAL})(?: +|(?=%))([a-z%/^0-9]{{1,8}}) *")  # as a scene may be written
 INCH = Fraction(254, 10_000)
-LENGTHS = {"m": Fraction(1), "cm": Fraction(1, 100), "mm": Fraction(1, 1000), "in": INCH, "ft": 12 * INCH}
+METRIC = {"m": Fraction(1), "cm": Fraction(1, 100), "mm": Fraction(1, 1000), "um": Fraction(1, 10**6)}
+LENGTHS = {**METRIC, "in": INCH, "ft": 12 * INCH}
+POUND = Fraction(45359237, 10**8)
 UNITS: dict[str, dict[str, Fraction]] = {
     "length": LENGTHS,
     "angle": {"rad": Fraction(1), "deg": Fraction(1, 180)},  # degrees as multiples of pi
-    "speed": {"rad/s": Fraction(1), "deg/s": Fraction(1, 180)},
+    "speed": {"rad/s": Fraction(1), "deg/s": Fraction(1, 180), "rpm": Fraction(1, 30)},
     "acceleration": {f"{unit}/s^2": factor for unit, factor in LENGTHS.items()},
-    "mass": {"kg": Fraction(1), "g": Fraction(1, 1000), "lb": Fraction(45359237, 100_000_000)},
-    "density": {"kg/m^2": Fraction(1)},
+    "mass": {
+        "t": Fraction(1000),
+        "kg": Fraction(1),
+        "g": Fraction(1, 1000),
+        "mg": Fraction(1, 10**6),
+        "lb": POUND,
+    },
+    "density": {"kg/m^2": Fraction(1), "g/cm^2": Fraction(10)},  # of a plate's area; and of its volume:
+    "bulk": {"kg/m^3": Fraction(1), "g/cm^3": Fraction(1000)},
     "share": {"%": Fraction(1, 100)},
 }
+KINDS = " ".join(UNITS)
+BY_PI = ("deg", "deg/s", "rpm")
 G0 = Fraction(980665, 100_000)
 LONGEST_TEXT = (
     64  # of a quantity: what is longer is not read, so that nothing has to be cut where it is shown
@@ -320,9 +331,9 @@ def quantity(value: object, kinds: str, where: str) -> Quantity:
         require(len(factors) == 1, f"{where}: {plain(found[2])} is not a unit of {kinds}")
         read.append((Fraction(found[1]) * factors[0], found[2]))
     (lo, unit), (hi, other) = read
-    require(unit.startswith("deg") == other.startswith("deg"), f"{where}: mixes degrees and radians")
+    require((unit in BY_PI) == (other in BY_PI), f"{where}: mixes degrees and radians")
     require(lo <= hi, f"{where}: the interval is empty")
-    return Quantity(lo, hi, unit.startswith("deg"), unit)
+    return Quantity(lo, hi, unit in BY_PI, unit)
 
 
 def table(value: object, where: str, needed: str, optional: str = "") -> dict[str, Any]:
@@ -427,7 +438,7 @@ def halved(raw: dict[str, Any], name: str) -> Iterator[dict[str, Any]]:
         raise KeyError(name)
 
     node, at = place(raw)
-    q = quantity(node[at], "length angle speed acceleration mass density share", name)
+    q = quantity(node[at], KINDS, name)
     middle = (q.lo + q.hi) / 2
     for half in (q._replace(hi=middle), q._replace(lo=middle)):
         tree = copy.deepcopy(raw)
@@ -621,8 +632,7 @@ def read_part(
     n = len(vertices)
     mass = part["mass"]
     if "plate_density" in mass:
-        table(mass, "part.mass", "plate_density", "points")
-        require("vertices" in part or not mass.get("points"), "points of mass need vertices")
+        table(mass, "part.mass", "plate_density", "plate_thickness points")
         start, rho2 = read_plate(mass, vertices, unit, length)
         (ex, ey), along, above, rho, own = (ONE, ZERO), ZERO, ZERO, rho2.sqrt(), -1
     else:
@@ -701,8 +711,13 @@ def read_plate(
         sx += (x0 + x1) * cross / 6
         sy += (y0 + y1) * cross / 6
         second += (x0 * x0 + x0 * x1 + x1 * x1 + y0 * y0 + y0 * y1 + y1 * y1) * cross / 12
-    density = quantity(mass["plate_density"], "density", "part.mass.plate_density")
+    thick = "plate_thickness" in mass
+    density = quantity(mass["plate_density"], "bulk" if thick else "density", "part.mass.plate_density")
     weight = density.ball() * exact(unit) ** 2
+    if thick:
+        thickness = quantity(mass["plate_thickness"], "length", "part.mass.plate_thickness")
+        require(thickness.lo > 0, "part.mass.plate_thickness is not positive")
+        weight = weight * thickness.ball()
     total, sx, sy, second = weight * area, weight * sx, weight * sy, weight * second
     for point in rows(mass.get("points", []), "part.mass.points", 0, 1000):
         table(point, "part.mass.points", "x y mass")
@@ -1863,7 +1878,7 @@ def check_orbits(scene: Scene, c: Cells, section: dict[str, Any]) -> str:
 
 def check_sets(scene: Scene, c: Cells, claims: dict[str, dict[str, Any]]) -> Iterator[tuple[list[str], str]]:
     """Check end points and periodic orbits of attracting cells that are proved; yields what fails."""
-    for name, check in (("end-points", check_ends), ("cycles", check_orbits), ("refuted", check_refuted)):
+    for name, check in (("end-points", check_ends), ("cycles", check_orbits)):
         bad = check(scene, c, claims[name]) if name in claims else ""
         if bad:
             yield [name], bad
@@ -1916,7 +1931,8 @@ def read_refutation(section: dict[str, Any], n_sides: int) -> dict[str, Any]:
     start = table(section["start"], "refuted.start", "x side")
     throws = [read_throw(each) for each in rows(section["throws"], "refuted.throws", 1, 100_000)]
     spans = [number for number, (kappa, _) in enumerate(throws) if isinstance(kappa, tuple)]
-    last = not spans or (found["why"] == "closed" and spans == [len(throws) - 1])
+    closes = found["why"] == "closed" and spans == [len(throws) - 1]
+    last = not spans or not found["why"] or closes
     require(last, "two values of kappa are those of the throw that closes an orbit")
     x, side = hex_float(start["x"], "refuted.start.x"), read_side(start["side"], n_sides)
     return found | {"x": x, "side": side, "throws": throws}
@@ -1937,10 +1953,9 @@ def read_throw(value: object) -> tuple[Any, Any]:
 
 def statement_of_refutation(section: dict[str, Any]) -> str:
     """Put it in words."""
-    kinds = "length angle speed acceleration mass density share"
     near = ", ".join(
-        f"{plain(name)} within {quantity(dev, kinds, 'tolerance')} of"
-        f" {quantity(section['nominal'][name], kinds, 'nominal')}"
+        f"{plain(name)} within {quantity(dev, KINDS, 'tolerance')} of"
+        f" {quantity(section['nominal'][name], KINDS, 'nominal')}"
         for name, dev in section["tolerance"].items()
     )
     goal = section["goal"]
@@ -1965,14 +1980,13 @@ def statement_of_refutation(section: dict[str, Any]) -> str:
 
 def check_deviations(scene: Scene, section: dict[str, Any]) -> str:
     """Check that the scene deviates from the nominal values by no more than is said; "" or what fails."""
-    kinds = "length angle speed acceleration mass density share"
     flat = dict(quantities(scene.raw))
     for name, text in section["tolerance"].items():
         square = name == "throw.speed" and "throw.kappa" in flat
         key = "throw.kappa" if square else name
         require(key in flat, f"refuted: {plain(name)} is not a quantity of the scene")
-        q, nominal = quantity(flat[key], kinds, key), quantity(section["nominal"][name], kinds, key)
-        dev = quantity(text, kinds, "tolerance")
+        q, nominal = quantity(flat[key], KINDS, key), quantity(section["nominal"][name], KINDS, key)
+        dev = quantity(text, KINDS, "tolerance")
         require(dev.lo == dev.hi >= 0 and nominal.lo == nominal.hi, "refuted: a deviation is not one number")
         if dev.unit == "%":
             power = 2 if square else 1
@@ -1989,8 +2003,8 @@ def check_deviations(scene: Scene, section: dict[str, Any]) -> str:
     return ""
 
 
-def check_refuted(scene: Scene, c: Cells, section: dict[str, Any]) -> str:
-    """Throw the orbit again in balls; "" or what fails."""
+def check_refuted(scene: Scene, section: dict[str, Any]) -> str:
+    """Throw the orbit again in balls, whatever the cells are; "" or what fails."""
     why, goal = section["why"], section["goal"]
     if not why:
         return "it shows a passing orbit only: a goal is refuted by one that comes back"
@@ -2382,18 +2396,17 @@ def check_tolerance(raw: list[Any], tolerance: object) -> tuple[dict[str, str], 
     require(isinstance(tolerance, dict) and 0 < len(tolerance) <= 64, "tolerance is not an object")
     assert isinstance(tolerance, dict)
     flat = [dict(quantities(scene)) for scene in raw]
-    kinds = "length angle speed acceleration mass density share"
     ranges: list[list[Quantity]] = []
     shown, names = {}, []
     for name, text in tolerance.items():
-        dev = quantity(text, kinds, "tolerance")
+        dev = quantity(text, KINDS, "tolerance")
         square = name == "throw.speed" and "throw.kappa" in flat[0]
         key = "throw.kappa" if square else name
         require(
             all(key in f for f in flat) and dev.lo == dev.hi >= 0,
             f"tolerance: {plain(name)} is not understood",
         )
-        own = [quantity(f[key], kinds, key) for f in flat]
+        own = [quantity(f[key], KINDS, key) for f in flat]
         require(len({q.pi for q in own}) == 1, f"{plain(key)}: mixes degrees and radians")
         ranges.append(own)
         require(key not in names, "tolerance names one quantity twice")
@@ -3397,6 +3410,13 @@ def check_box_claims(
     Images are proved to lie strictly inside the union of their target cells (or at most at the arm's length), so
     that "invariant" already gives "trapping".
     """
+    if "refuted" in claims:
+        bad = check_refuted(scene, claims["refuted"])
+        if bad:
+            yield ["refuted"], bad
+        claims = {name: section for name, section in claims.items() if name != "refuted"}
+        if not claims:
+            return
     everything = list(claims)
     first_version = claims.get("goal", {}).get("starts", "") is None
     bad = check_structure(c, scene, 0 if first_version else -1) or check_components(c)
@@ -3541,7 +3561,8 @@ def check_certificate(
         tell_starts(report, claims["goal"], scenes, cells)
     report.statement = [statement_of(name, section, noise is not None) for name, section in claims.items()]
     which = " (first box)" if len(cells) > 1 else ""
-    report.statement.append(f"attracting cells: {extents(cells[0])}{which}")
+    if set(claims) - {"refuted"}:  # which does not speak of them: they are not checked for it
+        report.statement.append(f"attracting cells: {extents(cells[0])}{which}")
     if own is not None and not {"goal", "refuted"} & set(claims):
         report.statement.append("of the scene's own goal nothing is claimed")
     for name in claims:
@@ -3603,9 +3624,6 @@ def value_in_words(value: object, name: str) -> str:
     if isinstance(value, str | list):
         return str(quantity(value, KINDS, name))
     return plain(value)
-
-
-KINDS = "length angle speed acceleration mass density share"
 
 
 def deviations_in_words(deviations: object) -> str:

@@ -19,7 +19,7 @@ from limitsets.errors import AnswerError
 from limitsets.proofs.rational import Span
 from limitsets.scene import Scene
 from limitsets.scene.quantities import find, text_at
-from limitsets.scene.units import exact_factor, parse
+from limitsets.scene.units import exact_factor, parse, share_of_pi
 
 __all__ = ["Piece", "whole"]
 
@@ -123,7 +123,7 @@ def whole(scene: Scene, tolerance: Mapping[str, str]) -> Piece:
             raise AnswerError("the tolerance", name, "a quantity that the scene gives", "name another")
         given = parse(node, find(name).dimension)
         nominal = Fraction(given.number)
-        if not relative and quantity.unit.startswith("deg") != given.unit.startswith("deg"):
+        if not relative and (share_of_pi(quantity.unit) is None) != (share_of_pi(given.unit) is None):
             raise AnswerError("the tolerance", text, f"percent, or the scene's {given.unit}", "convert it")
         factor = Fraction(1) if relative else exact_factor(quantity.unit, given.unit)
         half = abs(nominal) * share if relative else Fraction(quantity.number) * factor

@@ -45,7 +45,7 @@ def _share(finding: Finding) -> str:
 
 def _verdict(finding: Finding) -> str:
     if finding.called_for is None:
-        return f"cannot tell: {finding.missing}?" if finding.missing else "cannot tell: no limit set"
+        return f"cannot tell: {finding.missing}?" if finding.missing else "cannot tell: no throw known"
     if not finding.called_for:
         return f"holds ({finding.how})"
     if finding.place == "limit-set":
@@ -103,16 +103,19 @@ def summary(found: Audit) -> list[str]:
     limit = found.on("limit-set")
     called = dict.fromkeys(each.effect for each in limit if each.called_for and not each.simulated)
     missing = dict.fromkeys(each.missing for each in limit if each.missing and each.called_for is None)
-    lines = [
-        f"Called for on the limit set: {', '.join(called)}."
-        if called
-        else "No throw on the limit set was seen to break an assumption that can be told."
-    ]
+    if called:
+        lines = [f"Called for on the limit set: {', '.join(called)}."]
+    elif any(each.called_for is None and not each.missing for each in limit):
+        lines = ["No orbit was followed on a limit set: what its throws call for cannot be told."]
+    else:
+        lines = ["No throw on the limit set was seen to break an assumption that can be told."]
     if missing:
         lines.append(f"Give {', '.join(missing)} in [world] to have the rest told.")
     if found.scene.effects.on():
         names = ", ".join(found.scene.effects.on())
         lines.append(f"Simulated: {names}. What is asked here is what the model without effects would need.")
+    if not found.extents:
+        return [*lines, "No limit set was found."]
     where = (
         "The limit set lies in cells that are proved to hold it."
         if found.enclosed

@@ -33,18 +33,27 @@ def everything(analysis: Analysis) -> dict[int, list[tuple[float, float]]]:
 def trust(analysis: Analysis) -> str:
     """Say what is sampled, what is flagged, what is assumed."""
     unit, cells = analysis.scene.unit, [int(n) for n in analysis.grid.shape[:, 0]]
-    inside = min((attractor.in_cells for attractor in analysis.attractors), default=1.0)
+    inside = [attractor.in_cells for attractor in analysis.attractors]
     lines = [
         "## How far to trust this",
         " ".join(
             (
                 "**Sampled, not proved.**",
                 f"The arm was cut into {cells[0]} cells per side, and the image of each was found from its ends.",
-                f"{percent(inside)} of the states of a long orbit lay in the cells of its limit set.",
+                *(
+                    f"{percent(min(inside))} of the states of a long orbit lay in the cells of its limit set."
+                    for _ in inside[:1]
+                ),
                 f"{percent(analysis.second_pass)} of the throws needed the slow, sure search for the impact.",
             )
         ),
     ]
+    if analysis.starts is not None and not analysis.starts.missed:
+        lines.append(
+            f"{analysis.starts.count} random starts, thrown up to {analysis.starts.throws} times, ended where their "
+            "cells say, or in a limit set shown here."
+        )
+    lines += [f"**Not settled:** {text}." for text in analysis.advice]
     if analysis.accuracy is not None:
         lines.append(_accuracy(analysis.accuracy))
     if analysis.spurious:

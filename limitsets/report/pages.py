@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 from limitsets.analysis import overlap
 from limitsets.goals import OrientedBeyond, Reaches
 from limitsets.report.background import everything, figure_line, scene_of, steps, trust
-from limitsets.report.questions import order_of, question_of
+from limitsets.report.questions import order_of, question_of, verdict_of, void_of
 from limitsets.report.tables import bands, intervals, percent, table
 from limitsets.report.tables import count as count_of
 
@@ -17,6 +16,8 @@ if TYPE_CHECKING:
     from limitsets.analysis import Analysis
 
 __all__ = ["page"]
+
+OUTSIDE = "a throw after which the part has not landed within a full turn, or a start at x <= a"
 
 
 def page(analysis: Analysis, figures: Mapping[str, str]) -> str:
@@ -59,9 +60,12 @@ def _summary(analysis: Analysis) -> str:
     basins, count = analysis.basins, len(analysis.attractors)
     if count == 0:
         leaving = ", ".join(f"{percent(share)} {name}" for name, share in basins.exits.items() if share)
-        return (
-            f"Thrown again and again, **no start was found to stay on the arm** ({leaving or 'undecided'})."
-        )
+        if basins.undecided_between:
+            leaving = ", ".join(filter(None, [f"{percent(basins.undecided_between)} undecided", leaving]))
+            return (
+                f"Thrown again and again, **no limit set was found**, and not all starts leave ({leaving})."
+            )
+        return f"Thrown again and again, **no start was found to stay on the arm** ({leaving})."
     where = "one limit set" if count == 1 else f"{count} limit sets"
     shares = " and ".join(percent(share) for share in basins.attractors)
     lines = [f"Thrown again and again, the part ends up in **{where}**, reached from {shares} of all starts."]
@@ -73,8 +77,9 @@ def _summary(analysis: Analysis) -> str:
             else f"It stays on side {order[0]}."
         )
     if analysis.goal is not None:
-        verdict = {True: "holds", False: "does not hold", None: "was not decided"}[analysis.goal.holds]
-        lines.append(f"The goal **{verdict}** ({analysis.goal.how}, not proved): see below.")
+        lines.append(
+            f"The goal **{verdict_of(analysis.goal)}** ({analysis.goal.how}, not proved): see below."
+        )
     broken = overlap(analysis.other_vertex_first, everything(analysis))
     if broken:
         lines.append(
@@ -139,13 +144,13 @@ def _goal(analysis: Analysis) -> str:
     if asked is None:
         return ""
     goal = asked.goal
-    verdict = {True: "It holds", False: "It does not hold", None: "This analysis cannot tell"}[asked.holds]
+    verdict = "This analysis cannot tell" if asked.holds is None else f"It {verdict_of(asked)}"
     lines = ["## The goal", f"Asked: {question_of(goal, unit)}. **{verdict}** ({asked.how}: no proof)."]
     if isinstance(goal, OrientedBeyond) and asked.threshold is not None:
         lines.append(f"The sentence is true from x = {asked.threshold:.3f} {unit} on.")
-        reach = max((hi for parts in everything(analysis).values() for _, hi in parts), default=-math.inf)
-        if reach <= goal.x:
-            lines.append(f"But no part gets there: the limit set ends at x = {reach:.3f} {unit}.")
+    void = void_of(asked, unit)
+    if void:
+        lines.append(f"But {void}.")
     if isinstance(goal, Reaches) and asked.threshold is not None:
         lines.append(f"The farthest x reached on side {goal.side} is {asked.threshold:.3f} {unit}.")
     return "\n\n".join([lines[0], " ".join(lines[1:])])
@@ -155,10 +160,14 @@ def _starts(analysis: Analysis, figures: Mapping[str, str]) -> str:
     basins = analysis.basins
     rows = [[f"limit set {k}", percent(share)] for k, share in enumerate(basins.attractors)]
     rows += [[f"leave: {name}", percent(share)] for name, share in basins.exits.items()]
-    rows.append(["undecided: cells whose paths end in different places", percent(basins.undecided_between)])
+    rows.append(
+        ["undecided: paths end in different places, or may stay elsewhere", percent(basins.undecided_between)]
+    )
+    beyond = basins.exits.get("outside-model", 0.0) > 0.0
     return (
         "## From which starts\n\nShare of the starts (by length, over all sides, up to the arm's end):\n\n"
         + table(["where they end", "share"], rows)
+        + f"\n\nOutside the model: {OUTSIDE}." * beyond
         + figure_line(figures, "basins", "Basins per side")
     )
 

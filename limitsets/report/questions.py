@@ -3,10 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
-from limitsets.goals import AttractsAll, FlipOrder, Goal, OrientedBeyond, Predicate, Reaches
+from limitsets.goals import (
+    AttractsAll,
+    FlipOrder,
+    Goal,
+    OrientedBeyond,
+    Predicate,
+    Reaches,
+    StaysOnArm,
+    unknown_goal,
+)
 
-__all__ = ["order_of", "question_of"]
+if TYPE_CHECKING:
+    from limitsets.analysis import Answered
+
+__all__ = ["order_of", "question_of", "verdict_of", "void_of"]
 
 
 def order_of(order: Sequence[int]) -> str:
@@ -46,4 +59,45 @@ def _question(goal: Goal, unit: str) -> str:
         return f"the sides follow each other as {order_of(goal.order)}"
     if isinstance(goal, Predicate):
         return f"every part at rest satisfies: {goal.name}"
-    return "no throw carries the part off the arm or into the joint"
+    if isinstance(goal, StaysOnArm):
+        return "no throw carries the part off the arm or into the joint"
+    raise unknown_goal(goal)
+
+
+def verdict_of(asked: Answered) -> str:
+    """Say in a word or two what became of a goal.
+
+    Examples
+    --------
+    >>> from limitsets.analysis import Answered
+    >>> verdict_of(Answered(OrientedBeyond(20.0, 2), True, 17.5, reach=(19.0,)))
+    'holds vacuously'
+    """
+    if asked.vacuous:
+        return "holds vacuously"
+    return {True: "holds", False: "does not hold", None: "was not decided"}[asked.holds]
+
+
+def void_of(asked: Answered, unit: str) -> str:
+    """Say where a goal that holds speaks of nothing; empty where it does not.
+
+    Examples
+    --------
+    >>> from limitsets.analysis import Answered
+    >>> void_of(Answered(OrientedBeyond(20.0, 2), True, 17.5, reach=(19.0,)), "in")
+    'no part gets there: the limit set ends at x = 19.000 in, before x = 20 in'
+    """
+    goal = asked.goal
+    if isinstance(goal, StaysOnArm) and asked.holds and not goal.from_anywhere:
+        return "no throw leads out of any limit set; from_anywhere = true asks it of every start"
+    if not isinstance(goal, OrientedBeyond) or not asked.holds:
+        return ""
+    short = [k for k, x in enumerate(asked.reach) if x <= goal.x]
+    if goal.from_anywhere:
+        ends = [f"the farthest landing is at x = {asked.reach[k]:.3f} {unit}" for k in short]
+    elif len(asked.reach) == 1:
+        ends = [f"the limit set ends at x = {asked.reach[k]:.3f} {unit}" for k in short]
+    else:
+        ends = [f"limit set {k} ends at x = {asked.reach[k]:.3f} {unit}" for k in short]
+    who = "no part gets there" if asked.vacuous else "not every part gets there"
+    return f"{who}: {', '.join(ends)}, before x = {goal.x:g} {unit}" if ends else ""

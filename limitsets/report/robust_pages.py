@@ -6,13 +6,14 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from limitsets.goals import Goal, OrientedBeyond
+from limitsets.goals import Goal, OrientedBeyond, Reaches
 from limitsets.report.background import figure_line, scene_of
 from limitsets.report.questions import question_of
 from limitsets.report.robust_trust import called_for, checked_again, noise_of, trusted
 from limitsets.report.tables import table
-from limitsets.robust.margins.words import bound
-from limitsets.robust.sheet.entries import Entry, percent_of
+from limitsets.robust.margins.words import bound, void_of
+from limitsets.robust.sheet.entries import Entry, in_unit_of, percent_of
+from limitsets.scene.quantities import parsed_deviation
 
 if TYPE_CHECKING:
     from limitsets.robust.margins.beyond import MarginsBeyond
@@ -75,6 +76,9 @@ def answer(found: Robustness) -> str:
         "undecided": "Of the scene as it is this is **neither proved nor refuted**, so no deviation is proved safe.",
     }[found.verdict]
     lines = [f"**Asked:** {goals}. {verdict}"]
+    void = void_of(found.goals, found.reach, found.scene.unit)
+    if void:
+        lines.append(f"But it holds vacuously: {void}.")
     first = tightest(found)
     if first is not None and first.holds:
         by = ", for its tolerance" if _by_tolerance(found) else ""
@@ -124,7 +128,9 @@ def _room(entry: Entry, found: Robustness) -> tuple[int, float]:
     # the landing place is noise in a tolerance, all else fixed but unknown
     if text is None or (entry.reading == "per-throw") != (entry.quantity == "landing.x"):
         return 1, math.inf
-    return 0, entry.proved / float(text.split("%")[0].split()[0])
+    given = parsed_deviation(text, entry.quantity)
+    low = in_unit_of(entry, entry.proved, given.unit)
+    return 0, math.inf if low is None else low / float(given.number)
 
 
 def _share(entry: Entry, found: Robustness) -> float:
@@ -286,8 +292,8 @@ def _joint(found: Robustness, figures: Mapping[str, str]) -> str:
         return f"{head}\n\nNothing is left for deviations: the scene as it is fails already."
     rows = []
     for name, text in found.tolerance.items():
-        number, unit = (text[:-1], "%") if text.endswith("%") else text.rsplit(" ", 1)
-        size = float(number)
+        given = parsed_deviation(text, name)
+        size, unit = float(given.number), given.unit
         how = READINGS["per-throw" if name == "landing.x" else "fixed"]
         high = None if joint.refuted is None else joint.refuted * size
         rows.append([name, how, text, bound(joint.proved * size, unit), bound(high, unit, up=True)])
@@ -341,11 +347,17 @@ def _curve(found: Robustness, figures: Mapping[str, str]) -> str:
         f"Asked of each X, on the limit set: beyond it the part lies on side {curve.side} only, and almost every orbit "
         f"comes to rest there. {_best(curve)}"
     )
-    joint = found.joint
-    if joint is not None and joint.proved > curve.best()[1] and curve.names[0] == "joint":
+    joint, best = found.joint, curve.best()[1]
+    if joint is not None and joint.proved > best and curve.names[0] == "joint":
+        own = next(goal for goal in found.goals if isinstance(goal, OrientedBeyond | Reaches))
+        asks = (
+            "That asks more than the scene's goal, which"
+            if found.goals == (OrientedBeyond(own.x, own.side),)
+            else "The scene's goal"
+        )
         text += (
-            f" That is more than the scene's goal, which is proved up to {bound(joint.proved, 'times the tolerance')} "
-            "at its own X."
+            f" {asks} at its own X = {own.x:g} {found.scene.unit} is proved up to "
+            f"{bound(joint.proved, 'times the tolerance')}, against {bound(best)} here."
         )
     rest = found.left_out.get("rest of the curve")
     text += f" ({rest[0].upper()}{rest[1:]}.)" if rest else ""

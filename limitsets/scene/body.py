@@ -21,6 +21,7 @@ from limitsets.geometry import (
     triangle_of,
 )
 from limitsets.scene.resolve import LEAST, Resolver
+from limitsets.scene.units import density_dimension
 
 if TYPE_CHECKING:
     from limitsets.scene.schema import CenterTable, MassTable, PartTable
@@ -78,7 +79,7 @@ def shape_of(
     number : callable
         From a quantity's name to its scalar.
     read : callable
-        From a text and its dimension to a scalar, for what is no quantity: the plate's density.
+        From a text and its dimension to a scalar, for what is no quantity: the plate's density and thickness.
     sqrt : callable
         Square root for these scalars.
     """
@@ -99,7 +100,10 @@ def shape_of(
         tuple(number(f"part.mass.points[{k}].{word}") for word in ("x", "y", "mass"))
         for k in range(len(mass.get("points", ())))
     ]
-    found = mass_of(vertices, read(mass["plate_density"], "mass per area"), points, sqrt)
+    density = read(mass["plate_density"], density_dimension(mass["plate_density"]))
+    if "plate_thickness" in mass:
+        density = density * read(mass["plate_thickness"], "length")
+    found = mass_of(vertices, density, points, sqrt)
     return vertices, found.centre, lengths, found.radius_of_gyration
 
 
@@ -137,13 +141,14 @@ def _shape(table: PartTable, resolver: Resolver) -> tuple[npt.NDArray[np.float64
 def _by_centre(mass: MassTable, resolver: Resolver) -> bool:
     """Tell how the mass is given; a mixture and half a description are refused."""
     measured = [name for name in ("center", "radius_of_gyration") if getattr(mass, name) is not None]
-    made = [name for name in ("plate_density", "points") if getattr(mass, name) is not None]
+    plate = ("plate_density", "plate_thickness", "points")
+    made = [name for name in plate if getattr(mass, name) is not None]
     allowed = "center and radius_of_gyration, or plate_density and points"
     if measured and made:
         found = " and ".join(measured + made)
         raise resolver.refusal("part.mass", "the mass", found, allowed, "give one of the two, not both")
-    if len(measured) == 1 or made == ["points"] or not (measured or made):
-        found = f"only {(measured + made)[0]}" if measured or made else "empty"
+    if len(measured) == 1 or (not measured and "plate_density" not in made):
+        found = f"only {' and '.join(measured + made)}" if measured or made else "empty"
         raise resolver.refusal("part.mass", "the mass", found, allowed, "add what is missing")
     return bool(measured)
 
@@ -163,8 +168,7 @@ def _centre(table: CenterTable, vertices: npt.NDArray[np.float64], resolver: Res
 def _plate(
     mass: MassTable, vertices: npt.NDArray[np.float64], resolver: Resolver
 ) -> tuple[tuple[float, float], float]:
-    assert mass.plate_density is not None
-    density = resolver.positive(mass.plate_density, "mass per area", "part.mass.plate_density")
+    density = _density(mass, resolver)
     points = []
     for index, point in enumerate(mass.points or ()):
         key = f"part.mass.points[{index}]"
@@ -174,3 +178,27 @@ def _plate(
         found = plate_with_points(vertices, density, points)
     x, y = found.centre
     return (x, y), found.radius_of_gyration
+
+
+def _density(mass: MassTable, resolver: Resolver) -> float:
+    """Give the mass per area, from one per volume where a thickness is given."""
+    text, thickness = mass.plate_density, mass.plate_thickness
+    assert text is not None
+    dimension = density_dimension(text)
+    key, keys = "part.mass.plate_density", "part.mass.plate_thickness"
+    if dimension == "mass per volume" and thickness is None:
+        allowed = "a mass per area, or a mass per volume with plate_thickness"
+        raise resolver.refusal(key, "this density", text, allowed, f'add {keys}, like "2 mm"')
+    if dimension == "mass per area" and thickness is not None:
+        raise resolver.refusal(
+            keys,
+            "the thickness",
+            thickness,
+            "one beside a mass per volume",
+            f"{text} holds the thickness already: leave it out, or give the density in kg/m^3 or g/cm^3",
+        )
+    # of a scene in um a density in its unit is a small number, and none is ever squared
+    density = resolver.value(text, dimension, key)
+    if not density > 0.0:
+        raise resolver.refusal(key, f"this {dimension}", text, "above 0", "correct it")
+    return density if thickness is None else density * resolver.positive(thickness, "length", keys)

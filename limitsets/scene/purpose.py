@@ -51,7 +51,11 @@ def resolve_goal(table: GoalTable, count: int, arm_length: float, resolver: Reso
     if table.flip_order is not None:
         order = tuple(side(value, f"goal.flip_order[{i}]") for i, value in enumerate(table.flip_order))
         return FlipOrder(order, from_anywhere=anywhere)
-    return AttractsAll(anywhere) if table.attracts_all else StaysOnArm(anywhere)
+    plain: dict[str, type[AttractsAll | StaysOnArm]] = {
+        "attracts_all": AttractsAll,
+        "stays_on_arm": StaysOnArm,
+    }
+    return plain[named[0]](anywhere)
 
 
 def resolve_world(table: WorldTable, resolver: Resolver) -> World:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from limitsets.errors import SceneError
 from limitsets.scene.facts import Deviation
-from limitsets.scene.units import convert, parse, shown, written
+from limitsets.scene.units import Quantity, convert, parse, shown, written
 from limitsets.scene.validation import Tree
 
 if TYPE_CHECKING:
@@ -26,6 +26,7 @@ __all__ = [
     "deviation",
     "find",
     "in_units",
+    "parsed_deviation",
     "replaced",
     "require",
     "text_at",
@@ -107,10 +108,15 @@ def base_unit(dimension: str, unit: str) -> str:
     >>> base_unit("acceleration", "in"), base_unit("angular speed", "in")
     ('in/s^2', 'rad/s')
     """
-    units = {"length": unit, "angle": "rad", "angular speed": "rad/s", "acceleration": f"{unit}/s^2"}
-    return units.get(
-        dimension, {"mass": "kg", "mass per area": f"kg/{unit}^2", "share": ""}.get(dimension, unit)
-    )
+    return {
+        "angle": "rad",
+        "angular speed": "rad/s",
+        "acceleration": f"{unit}/s^2",
+        "mass": "kg",
+        "mass per area": f"kg/{unit}^2",
+        "mass per volume": f"kg/{unit}^3",
+        "share": "",
+    }.get(dimension, unit)
 
 
 def text_at(tree: Mapping[str, Any], name: str) -> Any:
@@ -242,6 +248,20 @@ def _as_text(value: object, place: Place, scene: Scene) -> str:
     )
 
 
+def parsed_deviation(text: object, name: str, *, key: str | None = None, file: str | None = None) -> Quantity:
+    """Take the text of a deviation apart: a share, or a number with a unit of the quantity's own dimension.
+
+    Examples
+    --------
+    >>> parsed_deviation("1%", "throw.speed"), parsed_deviation("0.5\u00b0", "gravity.tilt")
+    (Quantity(number='1', unit='%'), Quantity(number='0.5', unit='deg'))
+    """
+    place = find(name, key=key, file=file)
+    # where a landing is measured from is a convention: a share of it means nothing
+    relative = isinstance(text, str) and text.rstrip().endswith("%") and name != _NOISE_ONLY
+    return parse(text, "share" if relative else place.dimension, key=key, file=file)
+
+
 def deviation(
     text: object,
     name: str,
@@ -280,11 +300,10 @@ def deviation(
     >>> deviation("1 %", "throw.speed", "in"), deviation("2.54 cm", "arm.length", "in")
     (Deviation(value=0.01, relative=True), Deviation(value=1.0, relative=False))
     """
-    place = find(name, key=key, file=file)
-    # where a landing is measured from is a convention: a share of it means nothing
-    relative = isinstance(text, str) and text.rstrip().endswith("%") and name != _NOISE_ONLY
-    dimension = "share" if relative else place.dimension
-    value = convert(parse(text, dimension, key=key, file=file), base_unit(dimension, unit))
+    given = parsed_deviation(text, name, key=key, file=file)
+    relative = given.unit == "%"
+    dimension = "share" if relative else find(name).dimension
+    value = convert(given, base_unit(dimension, unit))
     if value < 0 or (value == 0 and not zero) or (relative and value >= 1):
         least = "from 0" if zero else "above 0"
         allowed = f"{least}{' and below 100 %' if relative else ''}"

@@ -14,7 +14,7 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 from pydantic_core import PydanticCustomError
 
 from limitsets.errors import SceneError
-from limitsets.scene.units import parse
+from limitsets.scene.units import density_dimension, parse
 
 __all__ = ["SceneTable"]
 
@@ -24,9 +24,13 @@ def _refusal(thing: str, allowed: str, remedy: str) -> PydanticCustomError:
 
 
 def _quantity(dimension: str) -> BeforeValidator:
+    return _quantity_of(lambda _: dimension)
+
+
+def _quantity_of(dimension: Callable[[object], str]) -> BeforeValidator:
     def check(value: object) -> object:
         try:
-            parse(value, dimension)
+            parse(value, dimension(value))
         except SceneError as error:
             raise _refusal(error.thing, error.allowed, error.remedy) from None
         return value
@@ -74,7 +78,7 @@ Angle: TypeAlias = Annotated[str, _quantity("angle")]
 AngularSpeed: TypeAlias = Annotated[str, _quantity("angular speed")]
 Acceleration: TypeAlias = Annotated[str, _quantity("acceleration")]
 Mass: TypeAlias = Annotated[str, _quantity("mass")]
-Density: TypeAlias = Annotated[str, _quantity("mass per area")]
+Density: TypeAlias = Annotated[str, _quantity_of(density_dimension)]
 Flag: TypeAlias = Annotated[
     bool,
     _fitting(lambda value: isinstance(value, bool), "this switch", "true or false", "write it unquoted"),
@@ -139,6 +143,7 @@ class MassTable(Table):
     center: CenterTable | None = None
     radius_of_gyration: Length | None = None
     plate_density: Density | None = None
+    plate_thickness: Length | None = None
     points: Annotated[list[PointTable], Field(max_length=1000)] | None = None
 
 

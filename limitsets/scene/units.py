@@ -7,27 +7,56 @@ a value in the unit asked for is the float of its text.
 
 from __future__ import annotations
 
-import difflib
 import math
 import re
+from collections.abc import Mapping
 from fractions import Fraction
 from functools import lru_cache
 from typing import Any, NamedTuple
 
 from limitsets.errors import SceneError
 
-__all__ = ["UNITS", "Quantity", "convert", "exact_factor", "parse", "written"]
+__all__ = [
+    "UNITS",
+    "Quantity",
+    "convert",
+    "density_dimension",
+    "exact_factor",
+    "parse",
+    "share_of_pi",
+    "spelled_plainly",
+    "written",
+]
 
 UNITS: dict[str, tuple[str, ...]] = {
-    "length": ("m", "cm", "mm", "in", "ft"),
+    "length": ("m", "cm", "mm", "in", "ft", "um"),
     "angle": ("deg", "rad"),
-    "angular speed": ("deg/s", "rad/s"),
-    "acceleration": ("m/s^2", "cm/s^2", "mm/s^2", "in/s^2", "ft/s^2"),
-    "mass": ("kg", "g", "lb"),
-    "mass per area": ("kg/m^2",),
+    "angular speed": ("deg/s", "rad/s", "rpm"),
+    "acceleration": ("m/s^2", "cm/s^2", "mm/s^2", "in/s^2", "ft/s^2", "um/s^2"),
+    "mass": ("kg", "g", "lb", "t", "mg"),
+    "mass per area": ("kg/m^2", "g/cm^2"),
+    "mass per volume": ("kg/m^3", "g/cm^3"),
     "share": ("%",),
 }
 """The units a scene may use, by dimension."""
+
+_SPELLINGS = {"\u00b5m": "um", "\u03bcm": "um", "\u00b0": "deg"}
+"""Other signs for some of them: micro and Greek mu, the degree sign."""
+
+# Micro signs, degree signs and what looks like them, superscripts.
+_PLAIN_SIGNS = str.maketrans(
+    {
+        "\u00b5": "u",
+        "\u03bc": "u",
+        "\u00b0": "deg",
+        "\u00ba": "deg",
+        "\u02da": "deg",
+        "\u00b2": "^2",
+        "\u00b3": "^3",
+    }
+)
+
+_SHARES_OF_PI = {"deg": Fraction(1, 180), "deg/s": Fraction(1, 180), "rpm": Fraction(1, 30)}
 
 _EXAMPLES = {
     "length": "5.75 in",
@@ -36,10 +65,37 @@ _EXAMPLES = {
     "acceleration": "193.045 in/s^2",
     "mass": "20 g",
     "mass per area": "1.5 kg/m^2",
+    "mass per volume": "7850 kg/m^3",
     "share": "1 %",
 }
+
+# What people write instead: how much of which unit one of it is.
+_OTHER_NAMES = {
+    "dm": "1/10 m",
+    "km": "1000 m",
+    "Mm": "1000000 m",
+    "yd": "3 ft",
+    "mrad": "1/1000 rad",
+    "deg/min": "1/60 deg/s",
+    "rev/s": "360 deg/s",
+    "rps": "360 deg/s",
+    "rad/min": "1/60 rad/s",
+    "oz": "28.349523125 g",
+    "ug": "1/1000000 g",
+    **dict.fromkeys(("meter", "metre", "meters", "metres"), "1 m"),
+    **dict.fromkeys(("inch", "inches", '"'), "1 in"),
+    **dict.fromkeys(("foot", "feet"), "1 ft"),
+    **dict.fromkeys(("degree", "degrees"), "1 deg"),
+    **dict.fromkeys(("radian", "radians"), "1 rad"),
+    **dict.fromkeys(("rev/min", "r/min"), "1 rpm"),
+    **dict.fromkeys(("kilogram", "kilograms"), "1 kg"),
+    **dict.fromkeys(("gram", "grams"), "1 g"),
+    **dict.fromkeys(("lbs", "pound", "pounds"), "1 lb"),
+    **dict.fromkeys(("tonne", "tonnes", "Mg"), "1 t"),
+    **dict.fromkeys(("g/ml", "kg/l", "kg/dm^3"), "1 g/cm^3"),
+}
 _NUMBER = r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]{1,3})?"
-_QUANTITY = re.compile(rf"({_NUMBER})(?: +|(?=%))([^\s].*)")
+_QUANTITY = re.compile(rf"({_NUMBER})(?: +|(?=[%\u00b0]))([^\s].*)")
 _LONGEST = 64
 _SMALLEST, _LARGEST = 1e-300, 1e12
 
@@ -47,6 +103,7 @@ _SMALLEST, _LARGEST = 1e-300, 1e12
 _DEFINITIONS = """
 centi- = 0.01 = c-
 milli- = 0.001 = m-
+micro- = 0.000001 = u-
 kilo- = 1000 = k-
 pi = 3.1415926535897932384626433832795028841971693993751
 meter = [length] = m
@@ -55,13 +112,15 @@ foot = 12 * inch = ft
 second = [time] = s
 radian = [] = rad
 degree = pi / 180 * radian = deg
+revolution_per_minute = pi / 30 * radian / second = rpm
 gram = [mass] = g
+tonne = 1000000 * gram = t
 pound = 453.59237 * gram = lb
 """
 
 
 class Quantity(NamedTuple):
-    """A number as it was written, and its unit."""
+    """A number as it was written, and its unit in letters of ASCII."""
 
     number: str
     unit: str
@@ -98,7 +157,8 @@ def parse(text: object, dimension: str, *, key: str | None = None, file: str | N
     example = _EXAMPLES[dimension]
 
     def refuse(value: object, remedy: str) -> SceneError:
-        units = ", ".join(UNITS[dimension])
+        other = [sign for sign, unit in _SPELLINGS.items() if unit in UNITS[dimension]]
+        units = ", ".join([*UNITS[dimension], *other[:1]])
         allowed = f'{article} {dimension}, "<decimal number> <unit>" with a unit of {units}'
         return SceneError(f"this {dimension}", value, allowed, remedy, key=key, file=file)
 
@@ -109,12 +169,12 @@ def parse(text: object, dimension: str, *, key: str | None = None, file: str | N
     match = _QUANTITY.fullmatch(text.strip(" "))
     if match is None:
         raise refuse(text, _why_no_quantity(text, example))
-    number, unit = match[1], match[2]
-    if unit not in UNITS[dimension]:
-        raise refuse(text, _why_not_unit(unit, dimension, example))
+    number, unit = match[1], _SPELLINGS.get(match[2], match[2])
     size = abs(float(number))
     if not (_SMALLEST <= size <= _LARGEST or _is_zero(number)):
         raise refuse(text, f"give 0 or a size from {_SMALLEST:g} to {_LARGEST:g}; choose another unit")
+    if unit not in UNITS[dimension]:
+        raise refuse(text, _why_not_unit(number, unit, dimension))
     return Quantity(number, unit)
 
 
@@ -127,17 +187,48 @@ def _why_no_quantity(text: str, example: str) -> str:
         return f'write the decimal point as a point and leave no commas, like "{example}"'
     if re.fullmatch(_NUMBER, text.strip()):
         return f'add the unit, like "{example}"'
-    if re.fullmatch(_NUMBER + r"[a-zA-Z%]\S*", text.strip(" ")):
-        return f'put a space between number and unit, like "{example}"'
+    close = re.fullmatch(rf"({_NUMBER})([a-zA-Z\u00b5\u03bc]\S*)", text.strip(" "))
+    if close is not None:
+        return f'put a space between number and unit: "{close[1]} {close[2]}"'
     return f'write one finite decimal number, a space and the unit, like "{example}"'
 
 
-def _why_not_unit(unit: str, dimension: str, example: str) -> str:
+def _why_not_unit(number: str, unit: str, dimension: str) -> str:
+    """Say what is wrong with a unit; what is proposed is the same value, whatever the unit was."""
+    if unit == "N":
+        wanted = ", and a mass is wanted: give kg" if dimension == "mass" else ": the dimension is wrong"
+        return f"N is a unit of force{wanted}"
+    size, name = _in_known_unit(unit)
     for other, units in UNITS.items():
-        if unit in units:
+        if name in units and other != dimension:
             return f"{unit} is a unit of {other}: the dimension is wrong"
-    near = difflib.get_close_matches(unit.lower(), UNITS[dimension], n=1, cutoff=0.5)
-    return f"the unit {unit!r} is not known; {f'did you mean {near[0]!r}?' if near else f'write {example!r}'}"
+    if not name:
+        return f"the unit {unit!r} is not known; convert the value to one of these"
+    if size == 1:
+        return f"the unit {unit!r} is not known; did you mean {name!r}?"
+    return f'the unit {unit!r} is not known; write "{float(Fraction(number) * size):.15g} {name}"'
+
+
+def _in_known_unit(unit: str) -> tuple[Fraction, str]:
+    """Say how many of which known unit one of another is, or of one in another spelling; 0 and "" if that is not known.
+
+    Examples
+    --------
+    >>> _in_known_unit("km"), _in_known_unit("g/m\u00b2")
+    ((Fraction(1000, 1), 'm'), (Fraction(1, 1000), 'kg/m^2'))
+    """
+    name = unit
+    if unit not in _OTHER_NAMES:
+        name = unit.translate(_PLAIN_SIGNS).replace("**", "^").lower()
+        name = re.sub(r"(?<=[a-z])[23]$", r"^\g<0>", name)
+    if any(name in units for units in UNITS.values()):
+        return Fraction(1), name
+    density = re.fullmatch(r"([a-z]+)/([a-z]+)\^([23])", name)
+    if density is not None and density[1] in UNITS["mass"] and density[2] in UNITS["length"]:
+        power = int(density[3])
+        return exact_factor(density[1], "kg") / exact_factor(density[2], "m") ** power, f"kg/m^{power}"
+    size, _, known = _OTHER_NAMES.get(name, "0").partition(" ")
+    return Fraction(size), known
 
 
 def convert(quantity: Quantity, unit: str) -> float:
@@ -174,6 +265,47 @@ def _registry() -> Any:
     import pint  # lazily: it takes 0.1 s, and most scenes need no conversion
 
     return pint.UnitRegistry(_DEFINITIONS.strip().splitlines(), non_int_type=Fraction)
+
+
+def density_dimension(text: object) -> str:
+    """Say of what a plate's density is one, by its unit: of an area or of a volume.
+
+    Examples
+    --------
+    >>> density_dimension("7850 kg/m^3"), density_dimension("3 kg/m^2")
+    ('mass per volume', 'mass per area')
+    """
+    volume = isinstance(text, str) and text.rstrip(" ").endswith(("3", "\u00b3"))
+    return "mass per volume" if volume else "mass per area"
+
+
+def share_of_pi(unit: str) -> Fraction | None:
+    """Say what share of pi an angle's unit is, or a speed's for 1 rad/s; None for all others.
+
+    Examples
+    --------
+    >>> share_of_pi("rpm"), share_of_pi("rad/s")
+    (Fraction(1, 30), None)
+    """
+    return _SHARES_OF_PI.get(unit)
+
+
+def spelled_plainly(tree: Any) -> Any:
+    """Spell every quantity in what stands in a scene in one way: number, one blank, unit in letters of ASCII.
+
+    Examples
+    --------
+    >>> spelled_plainly({"tilt": " 30\u00b0", "order": [0, 1]})
+    {'tilt': '30 deg', 'order': [0, 1]}
+    """
+    if isinstance(tree, Mapping):
+        return {key: spelled_plainly(inner) for key, inner in tree.items()}
+    if isinstance(tree, list | tuple):
+        return [spelled_plainly(inner) for inner in tree]
+    match = _QUANTITY.fullmatch(tree.strip(" ")) if isinstance(tree, str) else None
+    unit = "" if match is None else _SPELLINGS.get(match[2], match[2])
+    known = any(unit in units for units in UNITS.values())
+    return f"{match[1]} {unit}" if match is not None and known else tree
 
 
 def written(value: float, unit: str) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,8 +11,11 @@ from numpy.typing import NDArray
 from limitsets.cells import Grid
 from limitsets.errors import AnswerError
 from limitsets.graph import TransitionGraph
+from limitsets.graph.components import reach
+from limitsets.graph.survey import survey
 from limitsets.maps import codes
 from limitsets.sets.attractors import Attractor
+from limitsets.sets.passing import passing
 
 __all__ = ["Basins", "basins"]
 
@@ -25,14 +29,16 @@ class Basins:
     grid : Grid
         The cells.
     labels : ndarray of int32, shape (n_cells,)
-        0 and up: attractor of that number, on every path.  -1, -2, -3: the exit of that code, on every path.
-        -4: paths end in different places, so the cell is undecided.
+        0 and up: attractor of that number, on every path.  -1, -2, -3, -5: the exit of that code, on every path.
+        -4: paths end in different places, or may stay in a recurrent set that is not closed: the cell is undecided.
     attractors : tuple of float
         Share of each attractor's basin, weighted by length (area, volume) over all sides.
     undecided_between : float
         Share of undecided cells.
     exits : dict of str to float
         Share of the cells all of whose paths leave by that exit.
+    advice : str or None
+        What to do about recurrent sets that are not closed, where there are any.
     """
 
     grid: Grid
@@ -40,6 +46,7 @@ class Basins:
     attractors: tuple[float, ...]
     undecided_between: float
     exits: dict[str, float]
+    advice: str | None = None
 
 
 def basins(graph: TransitionGraph, found: tuple[Attractor, ...]) -> Basins:
@@ -69,8 +76,8 @@ def basins(graph: TransitionGraph, found: tuple[Attractor, ...]) -> Basins:
     >>> ls.basins(graph, ls.attractors(graph)).attractors
     (0.5, 0.5)
     """
-    known = graph.survey()
-    if any(a.cells.grid is not graph.grid for a in found) or len(found) != int(known.attracting.sum()):
+    attracting = graph.survey().attracting
+    if any(a.cells.grid is not graph.grid for a in found) or len(found) != int(attracting.sum()):
         raise AnswerError(
             "the attractors",
             f"{len(found)} of another graph",
@@ -79,15 +86,31 @@ def basins(graph: TransitionGraph, found: tuple[Attractor, ...]) -> Basins:
         )
     weight = graph.grid.measure
     total = float(weight.sum())
-    labels = known.destination
-    share = (
-        np.bincount(labels - codes.UNDECIDED, weights=weight, minlength=len(found) - codes.UNDECIDED) / total
-    )
-    by_code = {code: float(share[code - codes.UNDECIDED]) for code in range(codes.UNDECIDED, len(found))}
+    sets, through = graph.recurrent_components(), passing(graph)
+    labels = survey(graph.ranges, graph.components(), graph.exits, sets, through).destination
+    lowest = min(codes.UNDECIDED, *graph.exits.values())
+    share = np.bincount(labels - lowest, weights=weight, minlength=len(found) - lowest) / total
+    by_code = {code: float(share[code - lowest]) for code in range(lowest, len(found))}
     return Basins(
         graph.grid,
         labels,
         tuple(by_code[k] for k in range(len(found))),
         by_code[codes.UNDECIDED],
         {name: by_code[code] for name, code in graph.exits.items()},
+        _advice(graph, list(itertools.compress(sets, ~(attracting | through)))),
+    )
+
+
+def _advice(graph: TransitionGraph, lasting: list[NDArray[np.int32]]) -> str | None:
+    """Say from how many starts a recurrent set that is not closed can be reached, and what to do."""
+    if not lasting:
+        return None
+    marks = np.zeros(graph.n_cells, dtype=np.uint8)
+    for cells in lasting:
+        marks[cells] = 1
+    weight = graph.grid.measure
+    share = float(weight[reach(graph.ranges, graph.components(), marks) > 0].sum() / weight.sum())
+    return (
+        f"from {100 * share:.3g} % of the starts a recurrent set that is not closed can be reached, an unstable cycle "
+        "or an attractor in cells that are too coarse for it: they are undecided; ask for finer cells"
     )

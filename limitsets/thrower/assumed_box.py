@@ -140,7 +140,9 @@ def _throw(b: SideBox, rest: Rest, x: Interval, phi: Interval, slope: Interval, 
     omega, _ = strike_box(b.flight, b, x, phi)
     press = iv.sub(iv.mul(omega, at.right), at.falling)
     along = iv.absolute(iv.sub(lever, iv.mul(omega, at.above)))
-    stick = iv.div(along, press)
+    # from the first friction can stop the vertex, from the second the impact does not set it sliding again
+    stop = iv.div(along, press if press[0] > 0.0 else (press[1], press[1]))
+    turned = iv.div(iv.absolute(iv.mul(at.right, at.above)), iv.add(b.rho2, iv.sqr(at.above)))
     speed = iv.sub(at.falling, at.right)
     moved = iv.mul(iv.absolute(iv.sub(slope, (1.0, 1.0))), iv.mul(phi, b.kappa))
     half = iv.mul((0.5, 0.5), b.inertia)
@@ -150,11 +152,9 @@ def _throw(b: SideBox, rest: Rest, x: Interval, phi: Interval, slope: Interval, 
     out[ANGLE] = phi
     out[PRESS] = iv.div(press, x)
     out[STICK_FRICTION] = (
-        stick[0] if press[0] > 0.0 else (max(iv.div(along, (press[1], press[1]))[0], 0.0)),
-        stick[1] if press[0] > 0.0 else math.inf,
+        max(stop[0], turned[0]) if press[1] > 0.0 else math.inf,
+        max(stop[1], turned[1]) if press[0] > 0.0 else math.inf,
     )
-    if press[1] <= 0.0:
-        out[STICK_FRICTION] = math.inf, math.inf
     out[DROP] = iv.div(iv.sqr(speed), iv.mul((2.0, 2.0), b.kappa))
     out[STROKE] = iv.mul(iv.mul((0.5, 0.5), b.kappa), iv.sqr(phi))
     out[SPEED] = moved

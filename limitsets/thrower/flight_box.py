@@ -11,6 +11,7 @@ from typing import Any
 
 import limitsets.interval as iv
 from limitsets.interval.arithmetic import Interval
+from limitsets.interval.rounding import down, up
 from limitsets.jit import generic, proof_kernel
 from limitsets.thrower.params import Exact, SmallAngle, SmallAngle2
 from limitsets.thrower.side_box import SideBox
@@ -62,24 +63,23 @@ def _nearer(kappa: float, a: float, d: float, reach: float, phi: float) -> float
 
 
 @proof_kernel
-def _height(kappa: float, a: float, d: float, reach: float, phi: float) -> Interval:
-    """f at one angle for one set of parameters."""
-    _, v, w = turn_point(phi)
-    p = (phi, phi)
-    fall = iv.sub((reach, reach), iv.mul((kappa, kappa), (0.5 * phi, 0.5 * phi)))
-    return iv.add(iv.mul(p, fall), iv.add(iv.mul((a, a), w), iv.mul((d, d), v)))
-
-
-@proof_kernel
 def _least_height(b: SideBox, reach: Interval, phi: float) -> float:
     """Bound on f from below, for all parameters: f grows with reach, a and d (v, w >= 0) and falls with kappa."""
-    return _height(b.kappa[1], b.a[0], b.d[0], reach[0], phi)[0]
+    _, v, w = turn_point(phi)
+    a, d = b.a[0], b.d[0]
+    fall = down(reach[0] - up(b.kappa[1] * (0.5 * phi)))
+    turned = down(down(min(a * w[0], a * w[1])) + down(min(d * v[0], d * v[1])))
+    return down(down(phi * fall) + turned)
 
 
 @proof_kernel
 def _most_height(b: SideBox, reach: Interval, phi: float) -> float:
     """Bound on f from above."""
-    return _height(b.kappa[0], b.a[1], b.d[1], reach[1], phi)[1]
+    _, v, w = turn_point(phi)
+    a, d = b.a[1], b.d[1]
+    fall = up(reach[1] - down(b.kappa[0] * (0.5 * phi)))
+    turned = up(up(max(a * w[0], a * w[1])) + up(max(d * v[0], d * v[1])))
+    return up(up(phi * fall) + turned)
 
 
 @proof_kernel
@@ -121,8 +121,9 @@ def _marched(b: SideBox, x: float) -> tuple[Interval, bool]:
         step = shrink * (low + math.sqrt(max(inside, 0.0))) / bound
         going = (f > 0.0) & (step > 2.0**-40 * t)
         t = t + step if going else t
-    width = 2.0**-36 * t
-    while t + width < FULL_TURN and not _most_height(b, reach, t + width) < 0.0:
+    # Never 0: it would stay 0, as it would where the start is not proved to be right of a.
+    width = max(2.0**-36 * t, 2.0**-1022)
+    while t > 0.0 and t + width < FULL_TURN and not _most_height(b, reach, t + width) < 0.0:
         width *= 1.25
     hi = t + width
     proved = (reach[0] > 0.0) & (t > 0.0) & (hi <= FULL_TURN) & (_most_height(b, reach, hi) < 0.0)

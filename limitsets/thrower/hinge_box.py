@@ -66,10 +66,11 @@ def _least(rho2: Interval, energy: Interval, outer: Interval, inner: Interval) -
 @proof_kernel
 def _friction(ell: Interval, rho2: Interval, energy: Interval, height: Interval) -> Interval:
     """Enclose |f| / n for heights between two."""
-    across = iv.sqrt(iv.sub(iv.sqr(ell), iv.sqr(height)))
+    square = iv.sub(iv.sqr(ell), iv.sqr(height))
+    across = iv.sqrt((max(square[0], 0.0), square[1]))  # only rounding and dependency carry it below 0
     slope = iv.sub(iv.mul((3.0, 3.0), height), iv.mul((2.0, 2.0), energy))
     press = iv.add(rho2, iv.mul(height, slope))
-    ratio = iv.div(iv.mul((across[0], max(across[1], 0.0)), iv.absolute(slope)), press)
+    ratio = iv.div(iv.mul(across, iv.absolute(slope)), press)
     good = (press[0] > 0.0) & (ratio[1] >= 0.0)
     return ratio[0] if good else 0.0, ratio[1] if good else math.inf
 

@@ -6,6 +6,7 @@ from typing import Any
 
 import limitsets.interval as iv
 from limitsets.interval.arithmetic import Interval
+from limitsets.interval.rounding import down, up
 from limitsets.jit import generic, proof_kernel
 from limitsets.thrower.params import Energy, Exact, Signed, SmallAngle, SmallAngle2
 from limitsets.thrower.side_box import SideBox
@@ -30,7 +31,7 @@ def decide_box(flip: Any, b: SideBox, omega: Interval, barrier: Interval) -> Int
 @proof_kernel
 def _signed_square(x: Interval) -> Interval:
     """x |x|, which grows with x."""
-    return iv.mul((x[0], x[0]), (abs(x[0]), abs(x[0])))[0], iv.mul((x[1], x[1]), (abs(x[1]), abs(x[1])))[1]
+    return down(x[0] * abs(x[0])), up(x[1] * abs(x[1]))
 
 
 @proof_kernel

@@ -11,6 +11,7 @@ from typing import Any
 
 import limitsets.interval as iv
 from limitsets.interval.arithmetic import Interval
+from limitsets.interval.rounding import down, up
 from limitsets.jit import proof_kernel
 from limitsets.maps import codes
 from limitsets.thrower.flight_box import angle_slope, bracket, sure_bracket
@@ -62,7 +63,7 @@ def _between(
     most = displacement_box(b.flight, b, outer_hi)[0][1], displacement_box(b.flight, b, last)[0][1]
     # Both are found and one is chosen: the turns at the ends of the brackets are known, at a chosen angle they are not.
     at_lo, at_hi = least[0] if grows else least[1], most[0] if grows else most[1]
-    ends = iv.add((lo, lo), (at_lo, at_lo))[0], iv.add((hi, hi), (at_hi, at_hi))[1]
+    ends = down(lo + at_lo), up(hi + at_hi)
     whole = iv.add(x, shift)
     rising = slope[0] > 0.0
     image = (ends[0] if rising else whole[0], ends[1] if rising else whole[1])

@@ -84,6 +84,8 @@ class Trace:
         Whether another vertex would have landed before the left one: an assumption of the model broken.
     stopped : str or None
         The exit, or "stalled".
+    reason : str or None
+        Why the last throw is outside the model, where it is.
     """
 
     x: NDArray[np.float64]
@@ -94,6 +96,7 @@ class Trace:
     turned: NDArray[np.int64]
     other_vertex_first: NDArray[np.bool_]
     stopped: str | None
+    reason: str | None = None
 
 
 @dataclass(frozen=True)
@@ -170,7 +173,20 @@ def trace(params: Throw | FullThrow, x: float, side: int, count: int = 1) -> Tra
     phi[outside] = shift[outside] = math.nan
     other &= ~outside
     turned[outside] = 0
-    return Trace(path.x, path.side, path.code, phi, shift, turned, other, path.stopped)
+    reason = (
+        _beyond_model(params, float(path.x[made - 1]), int(path.side[made - 1])) if outside.any() else None
+    )
+    return Trace(path.x, path.side, path.code, phi, shift, turned, other, path.stopped, reason)
+
+
+def _beyond_model(params: Throw | FullThrow, x: float, side: int) -> str:
+    """Say why a throw from x is outside the model."""
+    a = float(params.a[side])
+    if x <= a:
+        return f"R <= a: no part rests on side {side} with its centre of mass at x = {x:.6g}, for a = {a:.6g}"
+    if isinstance(params, FullThrow):
+        return "no impact within a full turn, or a case that an effect does not describe (docs/model.md, effects)"
+    return "no impact within a full turn"
 
 
 def impact_angles(params: Throw | FullThrow, x: ArrayLike, side: int) -> NDArray[np.float64]:

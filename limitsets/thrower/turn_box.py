@@ -13,7 +13,6 @@ from __future__ import annotations
 import math
 
 from limitsets.interval.arithmetic import Interval
-from limitsets.interval.rounding import down, up
 from limitsets.jit import proof_kernel
 from limitsets.thrower.turn import V0, V1, V2, V3, V4, V5, V6, V7, W0, W1, W2, W3, W4, W5, W6, W7
 
@@ -43,13 +42,13 @@ def exact_turn(phi: float) -> tuple[float, float, float]:
 
 @proof_kernel
 def turn_point(phi: float) -> tuple[Interval, Interval, Interval]:
-    """Enclosures at one angle."""
+    """Enclosures at one angle; `BOUND` has room for the rounding of the sums below."""
     s, v, w = exact_turn(phi)
     es, ev, ew = BOUND * phi + TINY, BOUND * phi * phi + TINY, BOUND * w + TINY
     return (
-        (max(down(s - es), -1.0), min(up(s + es), 1.0)),
-        (max(down(v - ev), 0.0), min(up(v + ev), 2.0)),
-        (max(down(w - ew), 0.0), up(w + ew)),
+        (max(s - es, -1.0), min(s + es, 1.0)),
+        (max(v - ev, 0.0), min(v + ev, 2.0)),
+        (max(w - ew, 0.0), w + ew),
     )
 
 

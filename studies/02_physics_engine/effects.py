@@ -23,8 +23,6 @@ STEPS = (4e-3, 2e-3, 1e-3, 5e-4)
 STROKE = 0.2  # rad
 # Energy, as a share of what lifts the part by its size, up to which the engine's contact keeps its own law.
 KEEPS = 1e-3
-# Beyond this error [in] a throw is made again with a quarter of the step.
-FAR = 0.04
 CONTACT = {"landing": True, "roll": True, "slip": True, "pivot": True}
 
 
@@ -102,15 +100,7 @@ def random_throws(case: Case, seed: int, throws: int) -> Any:
     count = max(int(throws * case.share), 1)
     side = random.integers(len(scene.sides), size=count)
     x = random.uniform(scene.sides.a[side], scene.arm_length)
-    seen = ls.engine.compare(scene, x, side, step=case.step, **case.how)
-    far = np.flatnonzero(reasons(seen)["same law"] & (np.abs(seen.error) > FAR))
-    if (
-        far.size and case.share == 1.0
-    ):  # near a jump of the law the step decides which side of it the engine is on
-        again = ls.engine.compare(scene, x[far], side[far], step=0.25 * case.step, **case.how)
-        for name in ("x_engine", "side_engine", "status", "struck", "residual", "reverses", "rocks"):
-            getattr(seen, name)[far] = getattr(again, name)
-    return seen
+    return ls.engine.compare(scene, x, side, step=case.step, **case.how)
 
 
 def reasons(seen: Any) -> dict[str, Any]:

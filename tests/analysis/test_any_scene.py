@@ -90,7 +90,7 @@ def test_an_answer_or_an_error(table: dict[str, Any]) -> None:
     check_throws(scene)
     shares = [*found.basins.attractors, found.basins.undecided_between, *found.basins.exits.values()]
     assert math.isclose(sum(shares), 1.0, rel_tol=1e-9)
-    assert found.basins.labels.min() >= codes.UNDECIDED
+    assert found.basins.labels.min() >= codes.UNDEFINED
     assert found.basins.labels.max() < len(found.attractors)
     for limit, attractor in zip(found.limit_sets, found.attractors, strict=True):
         assert limit.converged or limit.advice

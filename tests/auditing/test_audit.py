@@ -13,6 +13,11 @@ from limitsets.auditing import ASSUMPTIONS, choose, where
 from limitsets.proofs.parameters import parameter_box
 from limitsets.thrower.assumed_box import Assumed, assumed, corner_bounds
 from limitsets.thrower.effects import BUILT
+from limitsets.thrower.effects.bounce import struck
+from limitsets.thrower.effects.landing import first_arrival
+from limitsets.thrower.effects.slip import Slip
+from limitsets.thrower.full import gather_full
+from limitsets.thrower.motion import above, right_of
 from tests.thrower.reference import paper
 
 SCENES = ["paper-initial", "paper-designed", "paper-initial-small-angle", "paper-designed-small-angle"]
@@ -152,6 +157,8 @@ def mechanics(facts, side, x):
     m = rho2 + abs(lever) ** 2
     omega = (rho2 + (mp.conj(lever) * speed).imag) / m
     impulse = mp.mpc(0, 1) * lever * omega - speed
+    # at rest along the arm, an impulse up sets the corner sliding unless friction is this part of it
+    held = abs(lever.real * lever.imag) / (rho2 + lever.imag**2)
     energy = m * omega**2 / 2 + kappa * lever.imag
     corner = mp.mpf(facts["corner"][side])
     top = kappa * abs(lever)
@@ -178,7 +185,7 @@ def mechanics(facts, side, x):
     return {
         Assumed.ANGLE: phi,
         Assumed.PRESS: impulse.imag / x,
-        Assumed.STICK_FRICTION: abs(impulse.real) / impulse.imag if impulse.imag > 0 else mp.inf,
+        Assumed.STICK_FRICTION: max(abs(impulse.real) / impulse.imag, held) if impulse.imag > 0 else mp.inf,
         Assumed.DROP: fall**2 / (2 * kappa),
         Assumed.FORCE: least,
         Assumed.HOLD_FRICTION: friction,
@@ -207,6 +214,24 @@ def test_against_mechanics_written_apart(name):
                 assert got[Assumed.HOLD_FRICTION, 1] >= friction * (1 - 1e-3)
             elif math.isinf(friction):
                 assert math.isinf(got[Assumed.HOLD_FRICTION, 1])
+
+
+def test_the_friction_a_landing_needs_is_that_from_which_on_it_does_not_slip():
+    scene, random = (
+        told("paper-designed", {"friction": 1.0}, landing=True, slip=True),
+        np.random.default_rng(6),
+    )
+    box, held = parameter_box(ls.load("paper-designed")), 0
+    for side in range(3):
+        for x in random.uniform(6.0, 20.0, 12):
+            need = assumed(box.lo, box.hi, side, [x], [x])[0, Assumed.STICK_FRICTION].mean()
+            part = gather_full(scene.map, side)
+            hit, _ = first_arrival(part.effects.landing, part, x)
+            right, high = right_of(part, hit.vertex, hit.psi), above(part, hit.vertex, hit.psi)
+            held += need == pytest.approx(abs(right * high) / (part.own.rho2 + high * high), rel=1e-9)
+            slides = [struck(None, Slip(need * by), part, hit).slide != 0.0 for by in (1 - 1e-6, 1 + 1e-6)]
+            assert slides == [True, False], (side, x)
+    assert held > 5
 
 
 def test_a_change_of_the_speed_shifts_the_landing_as_the_map_says():

@@ -144,12 +144,23 @@ def test_throw_ends_at_the_first_exit(capfd):
     (record,) = json.loads(out)
     assert record == {
         "x": -3.0, "side": 2, "status": "outside-model", "phi": None, "displacement": None, "sides_turned": 0,
-        "other_vertex_first": False
+        "other_vertex_first": False,
+        "reason": "R <= a: no part rests on side 2 with its centre of mass at x = -3, for a = 4.22558",
     }  # fmt: skip
     scene = ls.load("paper-designed").with_values({"arm.surface_height": -3.0})
     ls.dump(scene, "high.toml")
     _, out, _ = run(capfd, "throw", "high.toml", "--x", "20", "--side", "0", "--count", "99", "--json")
     assert [each["status"] for each in json.loads(out)][-1] == "outward"
+
+
+def test_throw_says_why_it_is_outside_the_model(capfd):
+    _, _, err = run(capfd, "throw", "paper-designed", "--x", "1", "--side", "2")
+    assert "outside-model: R <= a" in err
+    weak = ls.load("paper-designed").with_values({"throw.kappa": 1.0})  # 2 (R - a) is more than 2 pi kappa
+    ls.dump(weak, "weak.toml")
+    _, out, err = run(capfd, "throw", "weak.toml", "--x", "27", "--side", "2", "--json")
+    assert json.loads(out)[-1]["reason"] == "no impact within a full turn"
+    assert "no impact within a full turn" in err
 
 
 def test_throw_that_stalls_says_so(capfd):
@@ -196,6 +207,16 @@ def test_analyse_in_words(capfd):
     assert "18.995 to 19.976, 20.434 to 21.554" in out
     assert "goal oriented_beyond: does not hold (sampled, not proved)" in out
     assert f"report: {Path('here') / 'report.md'}" in out
+
+
+def test_analyse_of_a_goal_that_no_part_gets_to(capfd):
+    tree = ls.load("paper-designed").as_dict() | {"goal": {"oriented_beyond": {"x": "25 in", "side": 2}}}
+    ls.dump(ls.load(tree), Path("own.toml"))
+    _, out, _ = run(capfd, "analyse", "own.toml", "-o", "here", "--cells", "1024")
+    assert (
+        "goal oriented_beyond: holds vacuously (sampled, not proved); but no part gets there: the limit"
+        in out
+    )
 
 
 def test_analyse_to_an_error(capfd):

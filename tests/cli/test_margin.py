@@ -22,6 +22,13 @@ def test_a_table_in_units_that_people_use(capfd):
     assert not list(Path().iterdir())
 
 
+def test_a_margin_of_a_goal_that_no_part_gets_to_says_so(capfd):
+    _, out, _ = run(capfd, "margin", "paper-designed", "landing.x", "--width", "0.3", "--x", "25")
+    assert "landing.x: what is proved holds vacuously, no part gets beyond x = 25 in" in out
+    _, out, _ = run(capfd, "margin", "paper-designed", "landing.x", "--width", "0.3")
+    assert "vacuously" not in out
+
+
 def test_json_and_files_that_recheck_accepts(capfd):
     pytest.importorskip("flint", reason="the checker needs python-flint")
     words = ("margin", "paper-designed", "landing.x", "--width", "0.1", "--json", "-o", "deep/down")

@@ -93,11 +93,13 @@ def test_a_stroke_ends_with_a_turn_at_rate_1():
     assert tuple(stage.space.gravity) == pytest.approx(tuple(gravity))
 
 
-@pytest.mark.parametrize(("friction", "back"), [(0.1, True), (0.5, True), (0.6, False), (1.0, False)])
+@pytest.mark.parametrize(
+    ("friction", "back"), [(0.1, True), (0.5, True), (0.54, True), (0.6, False), (1.0, False)]
+)
 def test_when_an_impact_slides_back(friction, back):
     """x = 14.15, side 2: X 2.285, H 3.625, so |B| = 5.30 and A = 9.41; the vertex strikes while it slides right.
 
-    mu A < |B| up to mu = 0.563; the no-slip impulse lies outside the cone of 0.5.
+    mu A < |B| up to mu = 0.563; the impulse that stops it lies outside the cone of 0.5, and in that of 0.54.
     """
     stage = set_up(DESIGNED, 14.1501654661399, 2)
     from limitsets.engine.flying import fly

@@ -1,8 +1,23 @@
 import math
+from dataclasses import dataclass
+from typing import get_args
 
 import pytest
 
-from limitsets.goals import AttractsAll, FlipOrder, Goal, OrientedBeyond, Reaches, StaysOnArm, evaluate
+from limitsets.errors import AnswerError
+from limitsets.goals import (
+    AttractsAll,
+    FlipOrder,
+    Goal,
+    OrientedBeyond,
+    Predicate,
+    Reaches,
+    StaysOnArm,
+    evaluate,
+)
+from limitsets.report.questions import question_of
+from limitsets.robust.margins.finding import goals_of
+from limitsets.scene import load
 
 # the limit sets of two paper scenes (docs/model.md)
 DESIGNED = {
@@ -56,3 +71,35 @@ def test_goals_about_places(extents: dict, goal: Goal, holds: bool | None, thres
 )
 def test_goals_about_the_whole(goal: Goal, facts: dict, holds: bool) -> None:
     assert evaluate(goal, DESIGNED, **facts) == (holds, None)
+
+
+@dataclass(frozen=True)
+class Upright:
+    """A goal of the caller's own making, of which the package knows nothing."""
+
+    kind = "stays_on_arm"
+    from_anywhere: bool = False
+
+
+def test_what_is_no_goal_of_these_has_no_verdict_and_no_words():
+    """It was answered, and described, as stays_on_arm."""
+    for ask in (
+        lambda goal: evaluate(goal, DESIGNED),
+        lambda goal: question_of(goal, "in"),
+        lambda goal: goals_of(load("paper-designed"), goal),
+    ):
+        with pytest.raises(AnswerError, match=r"'Upright'.*OrientedBeyond, .*Predicate"):
+            ask(Upright())
+
+
+@pytest.mark.parametrize("kind", get_args(Goal))
+def test_every_goal_has_words_of_its_own(kind):
+    goals = {
+        OrientedBeyond: OrientedBeyond(20.0, 2),
+        Reaches: Reaches(20.0, 2),
+        FlipOrder: FlipOrder((0, 1)),
+        Predicate: Predicate(lambda lo, hi, side: lo < 9.0, "below 9 in"),
+    }
+    words = {each: question_of(goals.get(each, each), "in") for each in get_args(Goal) if each in goals}
+    words |= {each: question_of(each(), "in") for each in (AttractsAll, StaysOnArm)}
+    assert [each for each, text in words.items() if text == words[kind]] == [kind]

@@ -36,7 +36,7 @@ def test_components(graph, plain):
 
 
 def test_sinks_are_attracting_components_to_networkx(graph):
-    sinks = [{graph.n_cells + e} for e in range(3)]
+    sinks = [{graph.n_cells + e} for e in range(4)]
     found = list(nx.attracting_components(graph))
     assert all(sink in found for sink in sinks)
     assert all(graph.successors(min(sink)).tolist() == sorted(sink) for sink in sinks)
@@ -60,7 +60,7 @@ def test_condensation(graph, plain, given):
 
 
 def test_reachability_from_cells_and_sinks(graph, plain):
-    for node in [0, 17, 200, 449, graph.n_cells, graph.n_cells + 1, graph.n_cells + 2]:
+    for node in [0, 17, 200, 449, graph.n_cells, graph.n_cells + 1, graph.n_cells + 2, graph.n_cells + 3]:
         assert nx.descendants(graph, node) == nx.descendants(plain, node)
         assert nx.ancestors(graph, node) == nx.ancestors(plain, node)
 
@@ -86,7 +86,7 @@ def test_the_rest_of_networkx_by_conversion(graph, plain):
 
 def test_every_node_but_none_has_successors(graph):
     assert all(graph.successors(node).size for node in graph)
-    assert len(graph) == graph.number_of_nodes() == graph.n_cells + 3
+    assert len(graph) == graph.number_of_nodes() == graph.n_cells + 4
     assert graph.is_directed()
     assert not graph.is_multigraph()
 

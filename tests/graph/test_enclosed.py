@@ -254,6 +254,58 @@ def test_answers_that_prove_nothing_lead_everywhere(way):
     assert attracting(graph) == []
 
 
+class Hole(NamedTuple):
+    """Not defined at 0, or up to it: the sine of the inverse, or of the logarithm."""
+
+    inverse: float
+
+
+def hole(params, x, side):
+    return (math.sin(1.0 / x) if params.inverse > 0.0 else math.sin(math.log(x))), side, 0
+
+
+def hole_box(low, high, lo, hi, side):
+    after = iv.sin(iv.div((1.0, 1.0), (lo, hi))) if low.inverse > 0.0 else iv.sin(iv.log((lo, hi)))
+    slot = (after[0], after[1], side, 0)
+    return 1, slot, slot, (0.0, 0.0)
+
+
+ls.register(Hole, image=hole, image_box=hole_box)
+
+
+class Root(NamedTuple):
+    """Not defined left of the edge."""
+
+    edge: float
+
+
+def root(params, x, side):
+    return math.sin(math.sqrt(x - params.edge)), side, 0
+
+
+def root_box(low, high, lo, hi, side):
+    after = iv.sin(iv.sqrt(iv.sub((lo, hi), (low.edge, high.edge))))
+    slot = (after[0], after[1], side, 0)
+    return 1, slot, slot, (0.0, 0.0)
+
+
+ls.register(Root, image=root, image_box=root_box)
+
+
+def test_a_cell_that_is_not_defined_throughout_is_undecided():
+    """Whatever a kernel makes of the number: a sine is bounded."""
+    edges = np.linspace(-1.0, 1.0, 9)
+    found = enclosed.enclosures(Root(0.3), Root(0.3), edges, 0)
+    assert found.lost.tolist() == [True] * 6 + [False] * 2
+    lo, hi = found.hulls[0, 0]
+    assert lo[7] <= math.sin(math.sqrt(0.45)) <= math.sin(math.sqrt(0.7)) <= hi[7]
+    assert enclosed.enclosures(Root(-1.0), Root(-1.0), edges, 0).lost.tolist() == [False] * 8
+    for inverse, lost in ((1.0, [3, 4]), (0.0, [0, 1, 2, 3, 4])):
+        edges = np.linspace(-1.0, 1.0, 9)
+        found = enclosed.enclosures(Hole(inverse), Hole(inverse), edges, 0)
+        assert np.flatnonzero(found.lost).tolist() == lost
+
+
 def test_a_side_that_does_not_exist_is_refused():
     with pytest.raises(AnswerError, match="side"):
         ls.transitions(Broken(5.0), ls.grid([(0.0, 1.0)], cells=8), method="boxes")

@@ -114,6 +114,9 @@ def test_destinations_agree_with_networkx(graph):
     attractors = [
         set(cells.tolist()) for cells, good in zip(recurrent, found.attracting, strict=True) if good
     ]
+    left = {
+        int(c) for cells, good in zip(recurrent, found.attracting, strict=True) if not good for c in cells
+    }
     assert sorted(map(sorted, attractors)) == sorted(
         sorted(part)
         for part in ends
@@ -124,10 +127,10 @@ def test_destinations_agree_with_networkx(graph):
         numbers = [k for k, part in enumerate(attractors) if part & reachable]
         codes = [code for e, code in enumerate(graph.exits.values()) if graph.n_cells + e in reachable]
         options = numbers + codes
-        if len(options) == 1:
-            assert found.destination[cell] == options[0]
-        elif len(options) > 1:
+        if len(options) > 1 or reachable & left:  # a set that is not closed may hold an orbit
             assert found.destination[cell] == UNDECIDED
+        elif len(options) == 1:
+            assert found.destination[cell] == options[0]
 
 
 @pytest.mark.parametrize("count", [3, 60, 130])
@@ -153,4 +156,7 @@ def test_more_components_than_one_sweep_holds(count):
     assert nx.is_directed_acyclic_graph(morse)
     assert nx.dag_longest_path_length(morse) == count - 1
     assert morse.number_of_edges() == count - 1
-    assert (graph.survey().destination == 0).all()
+    assert (graph.survey().destination[:2] == 0).all()
+    assert (
+        graph.survey().destination[2:] == UNDECIDED
+    ).all()  # from there on an unstable cell can be reached

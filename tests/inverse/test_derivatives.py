@@ -148,6 +148,12 @@ def test_a_plate_with_points_by_vertices_and_tilt():
     )
     wanted = differences(scene, names)
     assert np.abs(found.matrix - wanted).max() < 1e-7 * np.abs(wanted).max()
+    # the same plate by its thickness, and the same speed in turns per minute
+    tree = scene.as_dict()
+    tree["part"]["mass"] |= {"plate_density": "2.5 g/cm^3", "plate_thickness": "2 mm"}
+    tree["throw"] = {"speed": "25 rpm"}
+    again = critical_jacobian(ls.load(tree), *names)
+    assert again.matrix == pytest.approx(found.matrix, rel=1e-9)
     # moving the whole part moves nothing: the columns of all x, and of all y, add up to nothing
     for axis in "xy":
         columns = [k for k, name in enumerate(names) if name.endswith(f".{axis}")]

@@ -25,6 +25,8 @@ pytest.importorskip("flint", reason="the checker needs python-flint")
 
 from flint import arb
 
+from limitsets.scene.quantities import base_unit
+from limitsets.scene.units import UNITS, convert, parse, spelled_plainly
 from tests.proofs import forge
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -755,6 +757,89 @@ def test_vertices_and_plate():
         assert s.d.contains(d)
         assert s.length.contains(12)
     assert scene.sides[0].rho2.contains(arb(24) / 2 + arb(13) / 4)
+
+
+def test_a_plate_of_some_thickness_in_small_units():
+    """92.90304 g on a square foot of 1 kg/m^2, which weighs as much: 1 mm of 1 g/cm^3, or 0.1 g/cm^2."""
+    raw = forge.scene("designed")
+    point = {"x": "203200 um", "y": "3 in", "mass": "92903.04 mg"}
+    plates = [
+        {"plate_density": "0.1 g/cm^2"},
+        {"plate_density": "1 g/cm^3", "plate_thickness": "1000 um"},
+        {"plate_density": "1000 kg/m^3", "plate_thickness": "0.1 cm"},
+    ]
+    for plate in plates:
+        for mass in ("92903.04 mg", "0.00009290304 t"):
+            raw["part"] = {
+                "vertices": [["0 in", "0 in"], ["12 in", "0 in"], ["1 ft", "1 ft"], ["0 in", "30.48 cm"]],
+                "mass": {**plate, "points": [{**point, "mass": mass}]},
+            }
+            scene = checker.read_scene(raw, None)
+            for s, a, d in zip(scene.sides, (7, 7.5, 5, 4.5), (4.5, 7, 7.5, 5), strict=True):
+                assert s.a.contains(a)
+                assert s.d.contains(d)
+            assert scene.sides[0].rho2.contains(arb(24) / 2 + arb(13) / 4)
+    for wrong in (
+        {"plate_density": "1 g/cm^3"},
+        {"plate_density": "1 kg/m^3"},
+        {"plate_density": "0.1 g/cm^2", "plate_thickness": "1 mm"},
+        {"plate_density": "1 g/cm^3", "plate_thickness": "1 g"},
+        {"plate_density": "1 g/cm^3", "plate_thickness": "0 mm"},
+        {"plate_density": "1 g/cm^3", "plate_thickness": "-1 mm"},
+    ):
+        raw["part"]["mass"] = {**wrong, "points": [point]}
+        with pytest.raises(checker.BadFileError):
+            checker.read_scene(raw, None)
+
+
+def test_turns_per_minute_are_multiples_of_pi_as_degrees_are():
+    raw = forge.scene("designed")
+    raw["gravity"] = {"tilt": "30 deg"}
+    want = arb("4.903325") / arb("0.0254") / (arb.pi() / 2) ** 2
+    for speed in ("15 rpm", ["15 rpm", "90 deg/s"]):  # 15 turns a minute are a quarter of one a second
+        raw["throw"] = {"speed": speed}
+        scene = checker.read_scene(raw, None)
+        assert scene.k_lo <= want.upper()
+        assert scene.k_hi >= want.lower()
+        assert scene.k_hi - scene.k_lo < 1e-20
+    scene = checker.read_scene(raw | {"throw": {"speed": "15 rpm"}}, {"throw.speed": "0.15 rpm"})
+    assert abs(scene.k_lo - want / arb("1.01") ** 2) < 1e-20
+    raw["throw"] = {"speed": ["15 rpm", "1.6 rad/s"]}
+    with pytest.raises(checker.BadFileError, match="mixes degrees and radians"):
+        checker.read_scene(raw, None)
+
+
+CHECKERS = {  # the checker's words for the package's
+    "angular speed": "speed",
+    "mass per area": "density",
+    "mass per volume": "bulk",
+}
+
+
+@pytest.mark.parametrize("dimension", UNITS)
+def test_checker_and_package_know_the_same_units(dimension):
+    kind = CHECKERS.get(dimension, dimension)
+    assert set(checker.UNITS[kind]) == set(UNITS[dimension])
+    base = {"share": ""}.get(dimension, base_unit(dimension, "m"))
+    signs = {"um": ["\u00b5m", "\u03bcm"], "deg": ["\u00b0"]}
+    for unit in UNITS[dimension]:
+        for sign in [unit, *signs.get(unit, [])]:
+            (text,) = spelled_plainly([f"2.5 {sign}"])
+            read = checker.quantity(text, kind, "here")
+            mine = convert(parse(f"2.5 {sign}", dimension), base)
+            assert float(read.lo) * (math.pi if read.pi else 1.0) == pytest.approx(mine, rel=1e-15)
+
+
+@pytest.mark.parametrize(
+    "text", ["700000 \u00b5m", "700000 \u03bcm", "700000 u\u0301m", "700000 Um", "700000um", "700000 umm"]
+)
+def test_lengths_are_spelled_spelled_plainly(text):
+    raw = forge.scene("designed")
+    raw["arm"]["length"] = "700000 um"
+    assert checker.read_scene(raw, None).unit == "um"
+    raw["arm"]["length"] = text
+    with pytest.raises(checker.BadFileError):
+        checker.read_scene(raw, None)
 
 
 def test_kappa_from_speed_gravity_and_noise():

@@ -4,12 +4,15 @@ Where the goal x > 20 in fails for a corner of a wider tolerance is found apart,
 """
 
 import copy
+import json
+import zipfile
 from fractions import Fraction
 
 import numpy as np
 import pytest
 
 import limitsets as ls
+from limitsets.proofs.parameters import parameter_box
 
 pytest.importorskip("flint", reason="the checker needs python-flint")
 
@@ -187,6 +190,47 @@ LEAD_QUAD = {
     "gravity": {"tilt": "30 deg"},
     "goal": {"oriented_beyond": {"x": "52 cm", "side": 0}},
 }
+
+
+OTHER_UNITS = {
+    "part": {
+        "vertices": [["0 mm", "0 mm"], ["130000 \u00b5m", "0 mm"], ["150 mm", "70 mm"], ["30 mm", "100 mm"]],
+        "mass": {
+            "plate_density": "1.5 g/cm^3",
+            "plate_thickness": "2000 \u03bcm",
+            "points": [{"x": "110 mm", "y": "15 mm", "mass": "60000 mg"}],
+        },
+    },
+    "arm": {"surface_height": "-15000 \u00b5m", "length": "700 mm"},
+    "throw": {"speed": " 26.7   rpm"},
+    "gravity": {"tilt": "30\u00b0"},
+    "world": {"stroke": "5 \u00b0"},
+}
+
+
+@pytest.mark.parametrize(
+    ("tolerance", "noise"),
+    [
+        (None, None),
+        ({"throw.speed": "0.05 deg/s", "arm.surface_height": "5 \u00b5m"}, None),
+        (None, {"throw.speed": "0.01 rpm", "gravity.tilt": "0.01\u00b0"}),
+    ],
+)
+def test_a_scene_in_the_units_of_other_workshops_is_rechecked(tmp_path, tolerance, noise):
+    scene = ls.load(LEAD_QUAD | OTHER_UNITS)
+    proof = ls.certify(scene, ["invariant"], tolerance=tolerance, noise=noise)
+    assert proof.proved
+    path = proof.save(tmp_path / "quad.proof.zip")
+    report = ls.recheck(path)
+    assert (report.verdict, report.reason) == ("proved", "")
+    with zipfile.ZipFile(path) as file:
+        header = json.loads(file.read("header.json"))
+    assert json.dumps(header, ensure_ascii=False).isascii()
+    # 26.7 rpm is 160.2 deg/s, and a plate of 1.5 g/cm^3, 2 mm thick, has 3 kg/m^2
+    same = ls.load(LEAD_QUAD | {"throw": {"speed": "160.2 deg/s"}})
+    box, wanted = parameter_box(scene).lo, parameter_box(same).lo
+    assert box.kappa == pytest.approx(wanted.kappa, rel=1e-15)
+    assert box.radius_of_gyration == pytest.approx(wanted.radius_of_gyration, rel=1e-15)
 
 
 @pytest.mark.parametrize("model", [{}, {"model": {"flight": "exact"}}, {"model": {"flip": "energy"}}])

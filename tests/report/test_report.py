@@ -2,15 +2,20 @@
 
 import json
 import re
+from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
 
 import pytest
 
 import limitsets as ls
+from limitsets.analysis import Answered
 from limitsets.errors import LimitsetsError
+from limitsets.goals import OrientedBeyond
 from limitsets.report import page, write
 from limitsets.report import write as write_report
+from limitsets.report.audits import audit_page
+from limitsets.report.questions import verdict_of, void_of
 from limitsets.report.tables import bands
 
 SCENES = Path(__file__).parents[1] / "analysis"
@@ -79,6 +84,80 @@ def test_goals_of_other_kinds(goal):
     assert "None" not in text
 
 
+def asking(goal, **tables):
+    return ls.analyse({**ls.load("paper-designed").as_dict(), "goal": goal, **tables}, 1024)
+
+
+def section(text, name):
+    return text.split(f"## {name}\n")[1].split("\n## ")[0]
+
+
+@pytest.mark.parametrize("side", [0, 2])
+def test_a_goal_that_no_part_gets_to_holds_vacuously(side):
+    """tests/test_paper.py: the limit set ends at 23.383 in."""
+    found = asking({"oriented_beyond": {"x": "25 in", "side": side}})
+    text = page(found, {})
+    assert "The goal **holds vacuously** (sampled" in text.split("##")[0]
+    assert "**It holds vacuously** (sampled" in text
+    assert "But no part gets there: the limit set ends at x = 23.383 in, before x = 25 in." in text
+    assert found.to_json()["goal_vacuous"] is True
+    assert analysed("paper-designed").to_json()["goal_vacuous"] is False
+    assert "vacuously" not in page(analysed("paper-designed"), {})
+
+
+def test_a_goal_is_vacuous_also_where_parts_never_lie_on_another_side():
+    """Thrown so fast the part jogs about x = 8.98 in on side 2: nothing was said of the 20 in that it never gets to."""
+    text = page(asking({"oriented_beyond": {"x": "20 in", "side": 2}}, throw={"kappa": "4 in"}), {})
+    assert "It holds vacuously" in section(text, "The goal")
+    assert "the limit set ends at x = 8.976 in, before x = 20 in" in section(text, "The goal")
+
+
+def test_what_is_asked_from_anywhere_is_not_answered_by_where_the_limit_set_ends():
+    """It fails, by a landing beyond 25 in; the page added that no part gets there."""
+    text = page(asking({"oriented_beyond": {"x": "25 in", "side": 2}, "from_anywhere": True}), {})
+    assert "**It does not hold**" in text
+    assert "gets there" not in text
+    text = page(asking({"oriented_beyond": {"x": "27.9 in", "side": 2}, "from_anywhere": True}), {})
+    assert "**It holds vacuously**" in text
+    assert "no part gets there: the farthest landing is at x = 2" in text
+
+
+def test_a_limit_set_that_ends_before_is_named_where_another_does_not():
+    goal = OrientedBeyond(20.0, 2)
+    asked = Answered(goal, True, 19.7, reach=(23.4, 12.0))
+    assert not asked.vacuous
+    assert verdict_of(asked) == "holds"
+    assert (
+        void_of(asked, "in")
+        == "not every part gets there: limit set 1 ends at x = 12.000 in, before x = 20 in"
+    )
+    assert void_of(Answered(goal, False, 21.0, reach=(23.4, 12.0)), "in") == ""
+
+
+def test_no_throw_leads_out_of_any_limit_set():
+    assert "from_anywhere = true asks it of every start" in page(asking({"stays_on_arm": True}), {})
+    assert "asks it of every start" not in page(asking({"stays_on_arm": True, "from_anywhere": True}), {})
+
+
+def test_starts_outside_the_model_are_told_why():
+    fast = page(asking({"attracts_all": True}, throw={"kappa": "4 in"}), {})
+    assert "Outside the model: a throw after which the part has not landed within a full turn" in fast
+    assert "Outside the model" not in page(analysed("paper-designed"), {})
+
+
+def test_an_audit_says_where_it_followed_no_throw():
+    """With kappa = 8 in the orbit comes to rest in fewer throws than are left out as a transient."""
+    tree = ls.load("paper-designed").as_dict() | {"throw": {"kappa": "8 in"}}
+    text = audit_page(ls.audit(tree))
+    assert "No orbit was followed on a limit set" in text
+    assert "was seen to break" not in text
+    assert "cannot tell: no throw known" in text
+    assert "no throw known" not in audit_page(ls.audit("paper-designed"))
+    found = replace(ls.audit("paper-designed"), extents={})
+    assert "No limit set was found." in audit_page(found)
+    assert "in cells that are proved" not in audit_page(found)
+
+
 def test_flags_and_assumptions_in_words():
     text = page(analysed("paper-designed"), {})
     assert "**Another vertex lands first** on throws from side 0: 20.152 to 28.000 in; side 1: 26.424" in text
@@ -91,8 +170,6 @@ def test_flags_and_assumptions_in_words():
 
 
 def test_a_flag_on_the_limit_set_is_said_at_the_top():
-    from dataclasses import replace
-
     found = replace(analysed("paper-designed"), other_vertex_first={0: [(19.0, 28.0)], 1: [], 2: []})
     text = page(found, {})
     assert "another vertex lands first: the model does not describe" in text.split("##")[0]
@@ -106,6 +183,13 @@ def test_nothing_stays(tmp_path):
     assert "no start was found to stay on the arm" in text
     assert "100 % inward" in text
     assert "This analysis cannot tell" in text
+    assert "of the states of a long orbit" not in text  # there was none
+
+
+def test_what_is_not_settled_is_said():
+    text = page(ls.analyse("paper-initial", 20), {})
+    assert "**Not settled:**" in text
+    assert "ended where their cells say" in page(analysed("paper-designed"), {})
 
 
 def test_bands_tell_which_sides_occur_where():

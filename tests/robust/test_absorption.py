@@ -147,7 +147,7 @@ def test_two_closed_classes_are_kept_apart():
 
     from scipy.sparse import csr_array
 
-    chain = replace(free, throw=csr_array(matrix), landing=None, sinks=np.zeros((n + 1, 1)))
+    chain = replace(free, throw=csr_array(matrix), landing=None, sinks=np.zeros((n + 1, 2)))
     parts = classes(chain)
     assert [part.cells.mask.nonzero()[0].tolist() for part in parts if part.closed] == [
         [0],

@@ -14,7 +14,7 @@ from mpmath import mp, mpf
 import limitsets as ls
 from limitsets.errors import LimitsetsError
 from limitsets.goals import AttractsAll, OrientedBeyond, Predicate, Reaches
-from limitsets.robust.margins.deviations import given, measures
+from limitsets.robust.margins.deviations import given, measure, measures
 from tests.thrower import reference
 
 X = 20
@@ -106,6 +106,25 @@ def test_lengths_are_bracketed(name):
     least = min(breaks_at(name, sign, np.array([0.97, 1.0, 1.02]) * found.refuted) for sign in (-1, 1))
     assert found.proved <= least
     assert 0.97 * found.refuted < least <= 1.02 * found.refuted
+
+
+def test_a_tolerance_in_turns_or_milligrams_says_the_unit_of_the_margin():
+    scene = ls.load("paper-designed").as_dict()
+    scene["throw"], scene["gravity"] = {"speed": "26.336 rpm"}, {"acceleration": "193.045 in/s^2"}
+    (by_share,) = ls.margin(ls.load(scene), "throw.speed", reading="fixed", width=0.05)
+    scene["tolerance"] = {"throw.speed": "0.1 rpm"}
+    (found,) = ls.margin(ls.load(scene), "throw.speed", reading="fixed", width=0.05)
+    assert (found.unit, found.closed) == ("rpm", True)
+    # two brackets of one number
+    assert found.proved < 0.26336 * by_share.refuted
+    assert 0.26336 * by_share.proved < found.refuted
+    scene["part"] = {
+        "sides": scene["part"]["sides"],
+        "mass": {"plate_density": "1 kg/m^2", "points": [{"x": "2 in", "y": "1 in", "mass": "6000 mg"}]},
+    }
+    scene["tolerance"] = {"part.mass.points[0].mass": "500 mg"}
+    one = measure(ls.load(scene), "part.mass.points[0].mass")
+    assert (one.unit, one.least) == ("mg", 6)
 
 
 def test_the_landing_place_agrees_with_the_throw_at_50_digits():

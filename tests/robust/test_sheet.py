@@ -6,6 +6,7 @@ digits).  A tolerance of the speed alone makes the joint factor that margin over
 
 import json
 import math
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -15,11 +16,13 @@ from mpmath import mpf
 import limitsets as ls
 from limitsets.errors import LimitsetsError
 from limitsets.goals import OrientedBeyond
-from limitsets.report.robust_pages import answer, robustness_page
+from limitsets.plot import tolerance_box
+from limitsets.report.robust_pages import answer, robustness_page, tightest
 from limitsets.robust.margins.beyond import MarginsBeyond
+from limitsets.robust.margins.words import bound
 from limitsets.robust.sheet import against_x, gathering
 from limitsets.robust.sheet.chance import noise_of, scattering_from, still
-from limitsets.robust.sheet.entries import Entry, percent_of
+from limitsets.robust.sheet.entries import Entry, in_unit_of, percent_of
 from limitsets.robust.sheet.keeping import Kept
 from tests.thrower import reference
 
@@ -286,4 +289,52 @@ def test_a_curve_that_asks_more_than_the_goal_is_not_taken_for_it(sheet, at_best
     # the sheet's own joint factor is 0.733 / 2, of the tolerance of 2 %
     proved = np.array([[at_best]])
     curve = MarginsBeyond(sheet.scene, 2, np.array([21.5]), ("joint",), ("",), proved, 2 * proved, ())
-    assert ("more than the scene's goal" in robustness_page(replace(sheet, curve=curve), {})) is says
+    text = robustness_page(replace(sheet, curve=curve), {})
+    assert ("more than the scene's goal" in text) is says
+    # both numbers are named, and where each is
+    (joint,) = re.findall(
+        r"goal, which at its own X = 20 in is proved up to (\S+) times the tolerance, against 0.01 here", text
+    ) or [""]
+    assert (joint == bound(sheet.joint.proved)) is says
+
+
+def test_room_is_compared_in_the_units_of_the_tolerance():
+    """Heights have 0.05 in of room, 60 times 20 um; 0.05 was taken for so many of 20 um.  A share needs no blank."""
+    tolerance = {"throw.speed": "1%", "gravity.tilt": "0.1\u00b0", "arm.surface_height": "20 \u00b5m"}
+    scene = with_tables(throw={"speed": "26.336 rpm"}, gravity={"tilt": "30\u00b0"})
+    words = {"reading": "fixed", "tolerance": tolerance, "width": 0.5}
+    found = ls.robustness(scene, *tolerance, leave_out=["joint", "curve", "noise", "audit"], **words)
+    assert tightest(found).quantity == "throw.speed"
+    speed, tilt, height = found.singles
+    assert in_unit_of(height, 0.05, "um") == pytest.approx(1270)
+    assert in_unit_of(tilt, 0.3, "%") == pytest.approx(1)
+    assert in_unit_of(speed, 0.5, "deg/s") == pytest.approx(0.005 * 158.016)
+    assert in_unit_of(replace(speed, nominal=None), 0.5, "deg/s") is None
+    # 1 % of all of it is safe, says an entry made up for the page
+    joint = replace(
+        height, quantity="joint", reading="tolerance", proved=0.01, refuted=0.02, unit="", nominal=None
+    )
+    whole = replace(found, entries=(*found.entries, joint))
+    text = robustness_page(whole, {})
+    assert "| arm.surface_height | fixed, but unknown | 20 \u00b5m | 0.2 um | 0.4 um |" in text
+    assert "| throw.speed | fixed, but unknown | 1% | 0.01 % | 0.02 % |" in text
+    labels = [each.get_text() for each in tolerance_box(whole.margins()[-1]).axes[0].texts]
+    assert labels == ["\u00b1 0.01 %", "\u00b1 0.001 deg", "\u00b1 0.2 um"]
+
+
+def test_a_sheet_of_a_goal_that_no_part_gets_to_says_so():
+    """The limit set ends at 23.383 in (tests/test_paper.py)."""
+    goal = {"oriented_beyond": {"x": "25 in", "side": 2}}
+    left_out = ["margins", "joint", "curve", "noise", "audit"]
+    found = ls.robustness(with_tables(goal=goal), leave_out=left_out)
+    assert (
+        "But it holds vacuously: no part gets beyond x = 25 in: the attracting cells end at x = 23."
+        in answer(found)
+    )
+    assert found.to_json()["vacuous"] is True
+    assert 23.383 < found.reach < 23.6  # the ends of cells
+    other = ls.robustness("paper-designed", leave_out=left_out)
+    assert "vacuously" not in answer(other)
+    assert other.to_json()["vacuous"] is False
+    there = with_tables(goal=goal | {"from_anywhere": True})
+    assert ls.robustness(there, leave_out=left_out).to_json()["vacuous"] is False

@@ -235,3 +235,29 @@ def test_noise_of_x_in_two_dimensions_is_refused():
         transfer(ls.maps.Baker(), ls.grid([(0.0, 1.0), (0.0, 1.0)], cells=4), landing=Uniform(0.1))
     with pytest.raises(AnswerError, match="dimension"):
         transfer(ls.maps.Baker(), ls.grid(LINE, cells=4))
+
+
+class Shifted(NamedTuple):
+    """A root with forced images: no number below 0."""
+
+    factor: float
+
+
+def _shifted(params, x, side):
+    return (params.factor * np.sqrt(x) if x >= 0.0 else np.nan), side, 0
+
+
+def _shifted_on(params, x, side, branch):
+    root = np.sqrt(x) if x >= 0.0 else np.nan
+    return params.factor * root, side, 0.5 * params.factor / root
+
+
+ls.register(Shifted, image=_shifted, image_on=_shifted_on)
+
+
+def test_what_has_no_image_is_undefined_and_not_outside():
+    """Below 0 there is no number; from 1/4 on 2 sqrt(x) lies beyond 1, the end of the domain."""
+    chain = transfer(Shifted(2.0), ls.grid([(-1.0, 1.0)], cells=8))
+    assert chain.exits == ("outside", "undefined")
+    np.testing.assert_allclose(chain.sinks[:, 1], [1, 1, 1, 1, 0, 0, 0, 0], rtol=0, atol=1e-9)
+    np.testing.assert_allclose(chain.sinks[:, 0], [0, 0, 0, 0, 0, 1, 1, 1], rtol=0, atol=1e-9)

@@ -70,6 +70,52 @@ def test_plate_with_a_point_mass(plate: dict[str, Any]) -> None:
     np.testing.assert_allclose(scene.sides.d, [1.5, 3.0, 2.5, 3.0])
 
 
+def test_a_density_of_volume_and_a_thickness_are_one_of_area(plate: dict[str, Any]) -> None:
+    """1 g/cm^3 times 2 mm is 2 kg/m^2."""
+    wanted = load(plate)
+    for density, thickness in (
+        ("1000 kg/m^3", "2 mm"),
+        ("1 g/cm^3", "2000 \u00b5m"),
+        ("0.5 g/cm^3", "0.4 cm"),
+    ):
+        plate["part"]["mass"] |= {"plate_density": density, "plate_thickness": thickness}
+        scene = load(plate)
+        assert scene.centre == pytest.approx(wanted.centre, rel=1e-15)
+        assert scene.radius_of_gyration == pytest.approx(wanted.radius_of_gyration, rel=1e-15)
+        assert load(dump(scene)) == scene
+        assert load(dump(scene)).as_dict() == plate
+    del plate["part"]["mass"]["plate_thickness"]
+    plate["part"]["mass"]["plate_density"] = "0.2 g/cm^2"
+    assert load(plate).radius_of_gyration == pytest.approx(wanted.radius_of_gyration, rel=1e-15)
+
+
+def test_units_of_other_workshops(plate: dict[str, Any]) -> None:
+    """The same scene in micrometres, milligrams and turns per minute; the file keeps its signs."""
+    plate["throw"], plate["gravity"] = {"speed": "150 deg/s"}, {"tilt": "30 deg"}
+    plate["goal"] = {"oriented_beyond": {"x": "5 cm", "side": 0}}
+    wanted = load(plate)
+    plate["throw"], plate["gravity"] = {"speed": "25 rpm"}, {"tilt": "30\u00b0"}
+    plate["arm"] = {"surface_height": "-5000 \u00b5m", "length": "700000 \u00b5m"}
+    plate["part"]["mass"]["points"][0]["mass"] = "4800 mg"
+    plate["goal"] = {"oriented_beyond": {"x": "50000 \u03bcm", "side": 0}}
+    plate["world"] = {"stroke": "5 \u00b0"}
+    plate["tolerance"] = {"throw.speed": "0.5 rpm", "arm.surface_height": "2 \u00b5m"}
+    scene = load(plate)
+    assert scene.unit == "um"
+    assert scene.value("throw.speed") == pytest.approx(math.radians(150), rel=1e-15)
+    assert scene.kappa == pytest.approx(1e4 * wanted.kappa, rel=1e-15)
+    assert scene.sides.d == pytest.approx(1e4 * wanted.sides.d, rel=1e-14)
+    assert scene.radius_of_gyration == pytest.approx(1e4 * wanted.radius_of_gyration, rel=1e-14)
+    assert scene.goal == OrientedBeyond(50000.0, 0)
+    assert scene.tolerance["arm.surface_height"].value == 2.0
+    assert dump(load(dump(scene))) == dump(scene)
+    assert load(dump(scene)).as_dict() == plate
+    assert scene.with_values({"throw.speed": "30 rpm"}).value("throw.speed") == pytest.approx(
+        math.pi, rel=1e-15
+    )
+    assert scene.with_values({"arm.length": "0.8 m"}).unit == "um"
+
+
 @pytest.mark.parametrize(
     ("goal", "expected"),
     [

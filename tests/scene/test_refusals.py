@@ -226,6 +226,28 @@ def test_part_that_tips_over_names_the_side_and_the_lack(plate: dict[str, Any]) 
         ({"part/mass/points/0/z": "1 cm"}, "part.mass.points[0].z", "mass, x, y"),
         ({"part/mass/plate_density": "0 kg/m^2"}, "part.mass.plate_density", "above 0"),
         ({"part/mass/plate_density": GONE}, "part.mass", "only points"),
+        (
+            {"part/mass/plate_density": "7850 kg/m^3"},
+            "part.mass.plate_density",
+            "add part.mass.plate_thickness",
+        ),
+        (
+            {"part/mass/plate_density": "7.85 g/cm^3"},
+            "part.mass.plate_density",
+            "add part.mass.plate_thickness",
+        ),
+        ({"part/mass/plate_thickness": "2 mm"}, "part.mass.plate_thickness", "2 kg/m^2 holds the thickness"),
+        (
+            {"part/mass/plate_density": "7850 kg/m^3", "part/mass/plate_thickness": "0 mm"},
+            "part.mass.plate_thickness",
+            "above 0",
+        ),
+        (
+            {"part/mass/plate_density": GONE, "part/mass/plate_thickness": "2 mm"},
+            "part.mass",
+            "only plate_thickness and points",
+        ),
+        ({"part/mass/points/0/mass": "0.05 N"}, "part.mass.points[0].mass", "a mass is wanted: give kg"),
     ],
 )
 def test_refuses_vertices_and_points(

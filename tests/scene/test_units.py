@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from limitsets.errors import SceneError
 from limitsets.scene.quantities import base_unit
-from limitsets.scene.units import UNITS, convert, parse, written
+from limitsets.scene.units import UNITS, convert, parse, spelled_plainly, written
 
 
 def test_factors_are_those_of_pints_own_registry() -> None:
@@ -38,6 +38,17 @@ def test_factors_are_those_of_pints_own_registry() -> None:
         ("1 kg/m^2", "mass per area", "kg/in^2", 0.00064516),
         ("1 %", "share", "", 0.01),
         ("0.7%", "share", "", 0.007),
+        ("600 um", "length", "mm", 0.6),
+        ("600 \u00b5m", "length", "mm", 0.6),  # micro sign
+        ("600 \u03bcm", "length", "mm", 0.6),  # Greek mu
+        ("45 \u00b0", "angle", "deg", 45.0),
+        ("45\u00b0", "angle", "deg", 45.0),
+        ("25 rpm", "angular speed", "deg/s", 150.0),  # 25 turns of 360 deg in 60 s
+        ("60 rpm", "angular speed", "rad/s", 6.283185307179586),
+        ("6000 mg", "mass", "g", 6.0),
+        ("2 t", "mass", "kg", 2000.0),
+        ("0.3 g/cm^2", "mass per area", "kg/m^2", 3.0),
+        ("7.85 g/cm^3", "mass per volume", "kg/m^3", 7850.0),
     ],
 )
 def test_values(text: str, dimension: str, unit: str, value: float) -> None:
@@ -46,7 +57,7 @@ def test_values(text: str, dimension: str, unit: str, value: float) -> None:
 
 @given(st.floats(1e-12, 1e12), st.sampled_from(UNITS["length"]), st.sampled_from(UNITS["length"]))
 def test_conversions_are_rounded_once(number: float, unit: str, target: str) -> None:
-    metres = {"m": "1", "cm": "0.01", "mm": "0.001", "in": "0.0254", "ft": "0.3048"}
+    metres = {"m": "1", "cm": "0.01", "mm": "0.001", "um": "1e-6", "in": "0.0254", "ft": "0.3048"}
     exact = Fraction(Decimal(repr(number))) * Fraction(metres[unit]) / Fraction(metres[target])
     assert convert(parse(written(number, unit), "length"), target) == float(exact)
 
@@ -95,6 +106,63 @@ def test_refuses(text: object, words: str) -> None:
     assert (error.key, error.file) == ("arm.length", "arm.toml")
     assert words in str(error)
     assert "m, cm, mm, in, ft" in error.allowed
+
+
+@pytest.mark.parametrize(
+    ("text", "dimension", "words"),
+    [
+        ("2 rps", "angular speed", 'write "720 deg/s"'),
+        ("25 rev/min", "angular speed", "did you mean 'rpm'?"),
+        ("25 RPM", "angular speed", "did you mean 'rpm'?"),
+        ("158 \u00b0/s", "angular speed", "did you mean 'deg/s'?"),
+        ("6 rad/min", "angular speed", 'write "0.1 rad/s"'),
+        ("25 Hz", "angular speed", "convert the value"),  # of what, is not said
+        ("45 \u00ba", "angle", "did you mean 'deg'?"),  # the sign of an ordinal
+        ("3 km", "length", 'write "3000 m"'),
+        ("3 dm", "length", 'write "0.3 m"'),
+        ("3 nm", "length", "convert the value"),
+        ("3e999 km", "length", "size from"),  # no float to propose
+        ("3 MM", "length", "did you mean 'mm'?"),
+        ("25 rpm", "length", "rpm is a unit of angular speed: the dimension is wrong"),
+        ("25 km", "mass", "km is a unit of length: the dimension is wrong"),
+        ("2 Mg", "mass", "did you mean 't'?"),
+        ("2 oz", "mass", 'write "56.69904625 g"'),
+        ("2 \u00b5g", "mass", 'write "2e-06 g"'),
+        ("0.2 N", "mass", "N is a unit of force, and a mass is wanted: give kg"),
+        ("0.2 N", "length", "N is a unit of force: the dimension is wrong"),
+        ("300 g/m^2", "mass per area", 'write "0.3 kg/m^2"'),
+        ("300 g/m\u00b2", "mass per area", 'write "0.3 kg/m^2"'),
+        ("7850 kg/m\u00b3", "mass per volume", "did you mean 'kg/m^3'?"),
+        ("7.85 t/m^3", "mass per volume", 'write "7850 kg/m^3"'),
+        ("7.85 kg/dm^3", "mass per volume", "did you mean 'g/cm^3'?"),
+        ("9.8 m/s2", "acceleration", "did you mean 'm/s^2'?"),
+        ("600\u00b5m", "length", 'put a space between number and unit: "600 \u00b5m"'),
+    ],
+)
+def test_what_is_proposed_is_the_same_value(text: str, dimension: str, words: str) -> None:
+    with pytest.raises(SceneError) as caught:
+        parse(text, dimension)
+    assert words in caught.value.remedy
+
+
+def test_spellings_for_certificates() -> None:
+    tree = {
+        "x": " 600   \u00b5m ",
+        "of": [["45\u00b0", "1 \u03bcm"], 3, True, None],
+        "name": "\u00b5m",
+        "w": "25  rpm",
+        "share": "1%",
+        "said": "5  parsec",
+    }
+    wanted = {
+        "x": "600 um",
+        "of": [["45 deg", "1 um"], 3, True, None],
+        "name": "\u00b5m",
+        "w": "25 rpm",
+        "share": "1 %",
+        "said": "5  parsec",
+    }
+    assert spelled_plainly(tree) == wanted
 
 
 @given(st.text(max_size=80))

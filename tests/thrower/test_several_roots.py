@@ -1,5 +1,8 @@
 """Boxes where kappa < ell: several roots, a first root that jumps, impacts that graze, none within a full turn."""
 
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 
@@ -49,3 +52,24 @@ def test_a_cell_on_which_the_impact_grazes_has_a_wide_bracket_and_is_still_enclo
     assert jumps.size >= 1
     assert wide.size >= 1
     assert all(np.abs(wide - k).min() <= 1 for k in jumps if not found.lost[k])
+
+
+# A start at the upper end of what is known of a: no reach is proved, and the march once never came back from there.
+AT_A = """
+import numpy as np
+import limitsets as ls
+from limitsets.graph.images.enclosed import enclosures
+
+scene = ls.load("paper-designed").with_values({"throw.kappa": 2.0})
+wide = scene.map._replace(a=scene.map.a + 0.001)
+for low, upper in ((scene.map, scene.map), (scene.map, wide)):
+    found = enclosures(low, upper, upper.a[0] + np.array([0.0, 1e-9, 1.0]), 0)
+    print(found.lost[0])
+"""
+
+
+def test_a_cell_that_begins_at_the_upper_end_of_a_is_answered():
+    done = subprocess.run(
+        [sys.executable, "-c", AT_A], capture_output=True, text=True, check=False, timeout=300
+    )
+    assert done.stdout.split() == ["True", "True"], done.stderr

@@ -12,7 +12,7 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from limitsets.jit import proof_kernel
+from limitsets.jit import proof_kernel, take_mark
 from limitsets.maps.contract import fallback_box, image_box, on_side_box
 from limitsets.maps.drivers import pick, put
 
@@ -38,11 +38,23 @@ def _store(answer: Any, k: int, count: Any, first: Any, second: Any, to: Any, wi
 
 
 @proof_kernel(entry=True)
-def _enclose(lo_map: Any, hi_map: Any, side: int, lo: Any, hi: Any, kept: Any) -> None:
-    """Images of boxes."""
+def _enclose(lo_map: Any, hi_map: Any, side: int, lo: Any, hi: Any, kept: Any) -> bool:
+    """Images of boxes; whether a function was asked beyond where it is defined, for any of them."""
+    take_mark()
     one, two = on_side_box(lo_map, hi_map, side)
     for k in range(lo[0].size):
         _store(image_box(one, two, pick(lo, k), pick(hi, k), side), k, *kept)
+    return bool(take_mark())
+
+
+@proof_kernel(entry=True)
+def _find_undefined(lo_map: Any, hi_map: Any, side: int, lo: Any, hi: Any, count: Any) -> None:
+    """Give up the boxes on which one was: apart from the loop above, which it would keep from vectorising."""
+    for k in range(count.size):
+        take_mark()
+        one, two = on_side_box(lo_map, hi_map, side)
+        found = image_box(one, two, pick(lo, k), pick(hi, k), side)
+        count[k] = NOTHING if take_mark() else found[0]
 
 
 @proof_kernel(entry=True)
@@ -50,7 +62,10 @@ def _enclose_surely(lo_map: Any, hi_map: Any, side: int, lo: Any, hi: Any, again
     """Images of some of them, the slow and sure way."""
     one, two = on_side_box(lo_map, hi_map, side)
     for k in again:
+        take_mark()
         _store(fallback_box(one, two, pick(lo, k), pick(hi, k), side), k, *kept)
+        if take_mark():
+            kept[0][k] = NOTHING
 
 
 @proof_kernel(entry=True)
@@ -98,7 +113,8 @@ def _widen(begin: int, wanted: Any, lo: Any, hi: Any, side: Any, branch: Any, ce
 class Images:
     """Images of boxes: `count`, and per slot the corners, an array for each axis, the sides and the branches.
 
-    `count` is NOTHING too where the answer is none of the three, or no finite box.
+    `count` is NOTHING too where the answer is none of the three, or no finite box, or a function was asked beyond where
+    it is defined.
     """
 
     def __init__(self, lo_map: Any, hi_map: Any, side: int, lo: Columns, hi: Columns) -> None:
@@ -110,7 +126,8 @@ class Images:
         )
         self.slots = [tuple(tuple(np.empty(n) for _ in axes) for _ in range(2)) for _ in range(2)]
         kept = (self.count, *self.slots, self.to, self.witness)
-        _enclose(lo_map, hi_map, side, lo, hi, kept)
+        if _enclose(lo_map, hi_map, side, lo, hi, kept):
+            _find_undefined(lo_map, hi_map, side, lo, hi, self.count)
         again = np.flatnonzero(self.count == NOTHING)
         if again.size and type(lo_map) in fallback_box.methods:
             _enclose_surely(lo_map, hi_map, side, lo, hi, again, kept)

@@ -15,12 +15,12 @@ from limitsets.cells import Grid
 from limitsets.errors import AnswerError
 from limitsets.graph.boxes import Boxes, merged
 from limitsets.graph.images.samples import Samples
-from limitsets.graph.images.undecided import every_branch, split
+from limitsets.graph.images.undecided import bent, every_branch, split
 from limitsets.graph.target import Target, place
 from limitsets.jit import kernel
 from limitsets.maps import codes, images
 from limitsets.maps.contract import fallback, image, on_side
-from limitsets.maps.drivers import pick, put
+from limitsets.maps.drivers import judged, pick, put
 
 __all__ = ["sampled"]
 
@@ -50,13 +50,13 @@ def _images_of_product(
             x, to, code = image(here, pick(xs, k), side)
             put(after, base + k, x)
             side_after[base + k] = to
-            code_after[base + k] = code
+            code_after[base + k] = judged(x, code)
         for k in range(inner):
             if code_after[base + k] == codes.UNSETTLED:
                 x, to, code = fallback(here, pick(xs, k), side)
                 put(after, base + k, x)
                 side_after[base + k] = to
-                code_after[base + k] = code
+                code_after[base + k] = judged(x, code)
                 again += 1
     return again
 
@@ -158,10 +158,13 @@ def _boxes_of_side(params: Any, grid: Grid, side: int, target: Target, samples: 
     _hulls(
         target, shape, strides, samples.offsets, samples.pad, after, to, code, state, side_out, lo, hi, exits
     )
+    if samples.split:
+        state[bent(after[0], to, code)] = MIXED
     mixed = np.flatnonzero(state == MIXED)
     if not mixed.size and (state == DECIDED).all():
         return Boxes(np.arange(n), side_out, lo, hi, exits, second)
     decided = np.flatnonzero(state == DECIDED)
+    exits[mixed] = 0
     parts = [Boxes(decided, side_out[decided], lo[decided], hi[decided], exits, second)]
     if mixed.size and samples.split:
         parts += split(params, side, target, samples, mixed)

@@ -50,7 +50,7 @@ def _half(r: Interval, a: float, b: float) -> Interval:
     first_hi = iv.mul((a, a), iv.sub((r[1], r[1]), iv.sqr((a, a))))
     last_hi = iv.mul((b, b), iv.sub((r[1], r[1]), iv.sqr((b, b))))
     most = max(r[1], 0.0)
-    turn = iv.sqrt(iv.div((most, most), (3.0, 3.0)))
+    turn = iv.sqrt(iv.maximum(iv.div((most, most), (3.0, 3.0)), (0.0, 0.0)))
     top = iv.mul(iv.mul((2.0, 2.0), turn), iv.div((most, most), (3.0, 3.0)))
     turns = (turn[0] <= b) & (turn[1] >= a)
     ends = max(first_hi[1], last_hi[1])

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from limitsets.goals import Goal
+from limitsets.goals import Goal, unknown_goal
 from limitsets.proofs.asked import attracts_all, flip_order, oriented_beyond, predicate, reaches, stays_on_arm
 from limitsets.proofs.asked.kind import Answer, Kind
 from limitsets.proofs.asked.reaches import not_null
@@ -52,7 +52,14 @@ def prove(found: Attraction, scene: Scene, goal: Goal) -> Answer:
     Answer
         "proved" for every start, almost every start, or the starts from some x on; "proved-on-cells" where the goal is
         proved for the starts in some cells only; else "undecided".
+
+    Raises
+    ------
+    AnswerError
+        For what is no goal of `limitsets.goals`.
     """
+    if not isinstance(goal, Goal):  # whatever it calls itself
+        raise unknown_goal(goal)
     kind = KINDS[goal.kind]
     answer = kind.prove(found, scene, goal)
     if answer.verdict != "proved":

@@ -43,7 +43,7 @@ def _prove(found: Attraction, _: Scene, goal: FlipOrder) -> Answer:
         return undecided(
             "parts may roll on to other sides than the next, in this version no order is proved then"
         )
-    visits, left = peeled(found, inside, np.zeros_like(inside), (0,))
+    visits, left = peeled(found, inside, np.zeros_like(inside), codes.JOG)
     if left.size:
         return undecided(f"orbits may jog for ever on {found.cover.place(int(left[0]))}")
     section = {"kind": goal.kind, "order": list(goal.order), "jogs": max(visits - 1, 0)}

@@ -2,7 +2,9 @@
 
 *Peeling*: cells all of whose images lie in the cells wanted are one throw away from them; cells all of whose images
 lie in those or in the cells wanted, two; and so on.  Every orbit that starts in a cell so peeled comes to the cells
-wanted, whatever it does in between and whether or not the map is continuous.
+wanted, whatever it does in between and whether or not the map is continuous.  With the edges from the cells wanted
+taken away these are the cells from which neither a recurrent cell nor an exit can be reached, and the throws are the
+longest path.
 """
 
 from __future__ import annotations
@@ -14,6 +16,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from limitsets.graph.components import ranks, reach, strong_components
+from limitsets.graph.ranges import Ranges, build
 from limitsets.proofs.asked.recurring import Refutation
 from limitsets.proofs.asked.search import State
 from limitsets.proofs.attraction import BELOW, Attraction
@@ -137,7 +141,7 @@ def above(x: float) -> float:
 
 
 def peeled(
-    found: Attraction, cells: Mask, wanted: Mask, branches: Sequence[int] | None = None
+    found: Attraction, cells: Mask, wanted: Mask, branch: int | None = None
 ) -> tuple[int, NDArray[np.int64]]:
     """Count the throws after which every orbit from the cells has come to those wanted.
 
@@ -149,8 +153,8 @@ def peeled(
         Where orbits begin.
     wanted : ndarray of bool, shape (n_cells,)
         Where they have to come; a start there has arrived.
-    branches : sequence of int, optional
-        Branches to follow; a throw of another one has arrived.  Default: all.
+    branch : int, optional
+        The branch to follow; a throw of another one has arrived.  Default: all.
 
     Returns
     -------
@@ -159,21 +163,25 @@ def peeled(
     ndarray of int64
         Cells from which it is not proved.
     """
-    ends = (
-        everywhere(found.cover) if branches is None else [targets(found.cover, branch) for branch in branches]
-    )
-    done = cells & wanted
-    left = np.flatnonzero(cells & ~done & (found.cover.graph.ranges.exits == 0))
-    throws = 0
-    while left.size:
-        missing = np.concatenate([[0], np.cumsum(~done)])
-        falls = np.ones(left.size, dtype=bool)
-        for rows in ends:
-            first, last = rows[left, 0], rows[left, 1]
-            falls &= (first < 0) | (missing[last + 1] == missing[first])
-        if not falls.any():
-            break
-        done[left[falls]] = True
-        left = left[~falls]
-        throws += 1
-    return throws, np.flatnonzero(cells & ~done)
+    ranges = found.cover.graph.ranges if branch is None else _of_branch(found, branch)
+    owner = np.repeat(np.arange(cells.size), np.diff(ranges.first))
+    ranges = ranges._replace(
+        run=np.where(wanted[owner], np.int32(0), ranges.run)
+    )  # what has arrived goes no farther
+    parts = strong_components(ranges)
+    stay = (parts.recurrent[parts.label] | (ranges.exits > 0)) & ~wanted
+    late = reach(ranges, parts, stay.astype(np.uint8)) > 0
+    steps = ranks(ranges, parts, np.zeros(parts.count, dtype=bool))
+    throws = int(steps[cells & ~late].max(initial=0))
+    # of one branch the last throw is one that is not followed
+    return throws + (0 if branch is None else 1), np.flatnonzero(cells & late)
+
+
+def _of_branch(found: Attraction, branch: int) -> Ranges:
+    """Target cells of one branch as ranges, with the exits of all."""
+    grid, ends = found.cover.grid, targets(found.cover, branch)
+    some = ends[:, 0] >= 0
+    side = grid.side_of(ends[some, 0]).astype(np.int32)
+    lo, hi = (((ends[some, k] - grid.offset[side])[:, None]).astype(np.int32) for k in (0, 1))
+    first = np.concatenate([[0], np.cumsum(some)])
+    return build(grid, first, side, lo, hi, found.cover.graph.ranges.exits)

@@ -44,11 +44,8 @@ from limitsets.sets import Cycle
 
 __all__ = ["Loop", "Refutation", "closed", "cycle_near", "cycle_that", "recurrent_violation"]
 
-# Places of an orbit from which it is followed back to them, and throws until it has to have come back.
-TRIED, LONGEST = 48, 80
-
-# Places from which orbits are followed that refute a goal by what they never do: any place on them will do.
-FEW = 12
+# Places of a long orbit, and of a short one, from which it is followed back to them; throws until it has come back.
+TRIED, FEW, LONGEST = 48, 6, 80
 
 # A periodic orbit is looked for this near to a place, relative to x; beyond such a slope floats do not resolve it.
 NEAR, STEEPEST = 1e-3, 1e10
@@ -116,7 +113,10 @@ def recurrent_violation(found: Attraction, scene: Scene, wrong: Wrong) -> Refuta
     box = _quiet(found, scene)
     for path in _paths(found, box):
         bad = np.flatnonzero(wrong(path.x * MORE_THAN_ROUNDING, path.side))
-        loop = cycle_near(box, path, bad, lambda loop: _violates(wrong, loop.lo[0], loop.hi[0], loop.side[0]))
+        tried = TRIED if path.code.size > SHORT else FEW
+        loop = cycle_near(
+            box, path, bad, lambda one: _violates(wrong, one.lo[0], one.hi[0], one.side[0]), tried
+        )
         if loop is not None:
             return _of(loop, box, found)
     if not found.cover.box.noise or not (found.component >= 0).any():
@@ -161,8 +161,8 @@ def cycle_that(
             if refutes(loop):
                 return _of(loop, box, found)
     for path in _paths(found, box):
-        ends = np.arange(max(path.x.size - 1 - 2 * LONGEST, 0), path.x.size)
-        best = cycle_near(box, path, ends, refutes, most=FEW, steepest=1.0 if attracting else STEEPEST)
+        ends = np.arange(max(path.x.size - 2 * LONGEST, 0), max(path.x.size - LONGEST, 1))
+        best = cycle_near(box, path, ends, refutes, FEW)
         if best is not None:
             return _of(best, box, found)
     return Refutation()
@@ -180,16 +180,27 @@ def _paths(found: Attraction, box: ParameterBox) -> Iterator[Orbit]:
     if (found.component >= 0).any():
         first = settled(found)
         met.add(_component(found, *first))
-        yield orbit(map_now, *first, SEARCHED)
+        yield _lasting(map_now, *first, SEARCHED)
     for side, (edges,) in enumerate(found.cover.grid.edges):
         for x in np.linspace(edges[0], edges[-1], OTHERS + 2)[1:-1].tolist():
-            path = orbit(map_now, x, side, SETTLING)
+            path = _lasting(map_now, x, side, SETTLING)
             last = float(path.x[-1]), int(path.side[-1])
             if path.stopped is not None or _component(found, *last) in met:
                 continue
             met.add(_component(found, *last))
             met.discard(-1)  # off the attracting cells any two may end in different places
-            yield orbit(map_now, *last, SHORT)
+            yield _lasting(map_now, *last, SHORT)
+
+
+def _lasting(map_now: Any, x: float, side: int, throws: int) -> Orbit:
+    """Follow an orbit; where it moves by less than floats can tell it is said to stay, so that one comes back there."""
+    path = orbit(map_now, x, side, throws)
+    if path.stopped != "stalled":
+        return path
+    code = images(map_now, path.x[-1:], int(path.side[-1])).code
+    return Orbit(
+        np.append(path.x, path.x[-1]), np.append(path.side, path.side[-1]), np.append(path.code, code), None
+    )
 
 
 def _component(found: Attraction, x: float, side: int) -> int:
@@ -207,13 +218,7 @@ def _violates(wrong: Wrong, lo: float, hi: float, side: int) -> bool:
 
 
 def cycle_near(
-    box: ParameterBox,
-    path: Orbit,
-    at: Ints,
-    refutes: Callable[[Loop], bool],
-    *,
-    most: int = TRIED,
-    steepest: float = STEEPEST,
+    box: ParameterBox, path: Orbit, at: Ints, refutes: Callable[[Loop], bool], tried: int
 ) -> Loop | None:
     """Find a periodic orbit through, nearly, one of some places of a long orbit, and prove it.
 
@@ -226,27 +231,20 @@ def cycle_near(
     at : ndarray of int
         Numbers of the places.
     refutes : callable
-        From a proved orbit, which begins near the place, to whether it is wanted.
-    most : int
-        Places tried.
-    steepest : float
-        Orbits with larger slopes are not looked for.
-
-    Returns
-    -------
-    Loop or None
-        The first one found, the places tried from the largest x on.
+        From an orbit, which begins near the place, to whether it is wanted: asked of it as it is found, and as proved.
+    tried : int
+        Places that are tried, evenly spread from the largest x on.
     """
     order = at[np.argsort(-path.x[at], kind="stable")]
-    for k in order[:: max(1, order.size // most)].tolist():
-        for loop in _returns(box, path, k, steepest):
+    for k in order[:: max(1, order.size // tried)][:tried].tolist():
+        for loop in _returns(box, path, k, refutes):
             on_arm = (loop.lo > box.hi.a[loop.side]).all() and (loop.hi <= box.lo.arm_length).all()
             if on_arm and refutes(loop):
                 return loop
     return None
 
 
-def _returns(box: ParameterBox, path: Orbit, k: int, steepest: float) -> Iterator[Loop]:
+def _returns(box: ParameterBox, path: Orbit, k: int, refutes: Callable[[Loop], bool]) -> Iterator[Loop]:
     """Periodic orbits near place k, by itineraries of growing length."""
     map_now = box.at_kappa(box.middle_kappa)
     for period in range(1, min(LONGEST, path.code.size - k) + 1):
@@ -255,15 +253,17 @@ def _returns(box: ParameterBox, path: Orbit, k: int, steepest: float) -> Iterato
         x, steep = (_root_on_orbit if box.effects else _root)(map_now, path, k, period)
         if abs(steep) > STEEPEST:
             return
-        if not (abs(x - path.x[k]) <= NEAR * abs(path.x[k]) and abs(steep) <= steepest):
+        if not abs(x - path.x[k]) <= NEAR * abs(path.x[k]):
             continue
-        around = orbit(map_now, x, int(path.side[k]), period)
-        if around.code.size < period or (around.side != path.side[k : k + period + 1]).any():
+        around = _lasting(map_now, x, int(path.side[k]), period)
+        same = around.code.size == period and (around.side == path.side[k : k + period + 1]).all()
+        if not same or not (box.effects or (around.code == path.code[k : k + period]).all()):
+            continue
+        points = around.x[:-1], around.x[:-1], around.side[:-1], around.code.astype(np.int64)
+        if not refutes(Loop(*points, abs(steep) < 1.0, {})):
             continue
         if box.effects:
             proved = _enclosed(box, around)
-        elif (around.code != path.code[k : k + period]).any():
-            continue
         else:
             cycle = Cycle(around.x[:-1], around.side[:-1], around.code, steep, 0.0, True)
             one = proved_cycle(box, cycle)
@@ -278,7 +278,7 @@ def _root(map_now: Any, path: Orbit, k: int, period: int) -> tuple[float, float]
     for _ in range(4):
         (y,), _, (steep,) = along(map_now, [x], side, word)
         x += (y - x) / (1.0 - steep) if steep != 1.0 else np.nan
-        if not np.isfinite(x):
+        if not abs(x - path.x[k]) <= NEAR * abs(path.x[k]):
             break
     return x, float(steep)
 

@@ -15,7 +15,7 @@ from limitsets.proofs.parameters import VARYING
 from limitsets.proofs.rational import Span
 from limitsets.proofs.tolerance import Piece
 from limitsets.scene import Scene
-from limitsets.scene.quantities import find, text_at, texts
+from limitsets.scene.quantities import find, parsed_deviation, text_at, texts
 from limitsets.scene.units import Quantity, exact_factor, parse
 
 __all__ = ["READINGS", "Measure", "decimal", "given", "measure", "measures", "short"]
@@ -115,6 +115,8 @@ class Measure:
             return Fraction(1, 10)
         if self.unit in ("deg", "rad"):
             return Fraction(1, 20) if self.unit == "deg" else Fraction(1, 1000)
+        if find(self.quantity).dimension != "length":
+            return short(abs(self.nominal) * exact_factor(self.given.unit, self.unit) / 1000)
         # lengths: about a thousandth of the part
         sides = [float(length) for length in self.scene.sides.length]
         return short(exact_factor(self.scene.unit, self.unit) * Fraction(min(sides)) / 1000)
@@ -194,8 +196,7 @@ def _unit(scene: Scene, quantity: str, reading: str) -> str:
     """Choose the unit: as the scene's [tolerance] has it, or as people give such a deviation."""
     text = scene.text.get("tolerance", {}).get(quantity)
     if text is not None:
-        share = text.rstrip().endswith("%")
-        return str(parse(text, "share" if share else find(quantity).dimension).unit)
+        return parsed_deviation(text, quantity).unit
     if quantity.startswith(_SHARES) or quantity.endswith(".mass"):
         return "%"
     if quantity == "gravity.tilt":

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from limitsets.errors import AnswerError
-from limitsets.goals import Goal, Predicate
+from limitsets.goals import Goal, Predicate, unknown_goal
 from limitsets.proofs.asked import State
 from limitsets.proofs.simulated import scattered
 from limitsets.robust.margins.asking import Asked, Question
@@ -126,14 +126,12 @@ def goals_of(scene: Scene, goal: GoalLike | Sequence[GoalLike] | None) -> tuple[
     several = list(goal) if isinstance(goal, Sequence) else [goal]
     found: list[Goal] = []
     for one in several:
-        if hasattr(one, "kind"):
-            found.append(one)  # type: ignore[arg-type]  # a kind is what makes it a goal
+        if isinstance(one, Goal):
+            found.append(one)
         elif callable(one):
             found.append(Predicate(one, getattr(one, "__name__", "the predicate")))
         else:
-            raise AnswerError(
-                "the goal", one, "a goal of limitsets.goals, or a function", "see limitsets.goals.Predicate"
-            )
+            raise unknown_goal(one)
     if not found:
         raise AnswerError("the goal", "no goals", "one at least", "name one")
     return tuple(found)

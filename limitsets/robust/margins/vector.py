@@ -11,8 +11,7 @@ from limitsets.proofs.tolerance import Piece
 from limitsets.robust.margins.deviations import Measure, measure, short
 from limitsets.robust.margins.effect import scene_at
 from limitsets.scene import Scene
-from limitsets.scene.quantities import deviation, find
-from limitsets.scene.units import parse
+from limitsets.scene.quantities import deviation, parsed_deviation
 
 __all__ = ["Parts", "Tolerance"]
 
@@ -51,10 +50,9 @@ class Tolerance:
         for name, text in texts.items():
             deviation(text, name, scene.unit, key=f'tolerance."{name}"')
             one = measure(scene, name)
-            share = text.rstrip().endswith("%")
-            given = parse(text, "share" if share else find(name).dimension)
+            given = parsed_deviation(text, name)
             one = replace(one, unit=given.unit)
-            if name == "throw.speed" and one.key != name and not share:
+            if name == "throw.speed" and one.key != name and given.unit != "%":
                 raise AnswerError("the tolerance", text, "percent, for a scene given by kappa", "give it so")
             if name == "landing.x":
                 landing, landing_size = one, Fraction(given.number)

@@ -1,10 +1,14 @@
-"""A margin in words: a size with its unit, never rounded to more than is known."""
+"""A margin in words: a size with its unit, never rounded to more than is known, and goals that hold of nothing."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from decimal import ROUND_CEILING, ROUND_FLOOR, Context, Decimal
 
-__all__ = ["bound"]
+from limitsets.goals import Goal, OrientedBeyond
+from limitsets.robust.margins.asking import Asked
+
+__all__ = ["bound", "reach_of", "void_of"]
 
 
 def bound(value: float | None, unit: str = "", *, up: bool = False) -> str:
@@ -21,3 +25,24 @@ def bound(value: float | None, unit: str = "", *, up: bool = False) -> str:
         return f"0 {unit}".rstrip()
     context = Context(prec=4, rounding=ROUND_CEILING if up else ROUND_FLOOR)
     return f"{context.create_decimal(Decimal(repr(value))):f} {unit}".rstrip()
+
+
+def reach_of(pieces: Sequence[Asked]) -> float | None:
+    """Say how far out the cells reach that attract in all of what was proved together; None where nothing was."""
+    cells = [piece.found.cells.extents() for piece in pieces if piece.found is not None]
+    return max((hi for each in cells for parts in each.values() for _, hi in parts), default=None)
+
+
+def void_of(goals: Sequence[Goal], reach: float | None, unit: str) -> str:
+    """Say which goal holds only because no part gets to where it is asked; empty where none does.
+
+    Examples
+    --------
+    >>> void_of([OrientedBeyond(25.0, 2)], 23.41, "in")
+    'no part gets beyond x = 25 in: the attracting cells end at x = 23.41 in'
+    """
+    limits = [goal.x for goal in goals if isinstance(goal, OrientedBeyond) and not goal.from_anywhere]
+    for x in limits:
+        if reach is not None and reach <= x:
+            return f"no part gets beyond x = {x:g} {unit}: the attracting cells end at x = {reach:.7g} {unit}"
+    return ""

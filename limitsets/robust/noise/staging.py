@@ -65,8 +65,23 @@ def from_pieces(
             sinks[rows, above] += over
             branches[rows, boxes.branch] += boxes.weight
     missing = 1.0 - branches.sum(axis=1)
-    sinks[:, without] += np.where(missing > 1e-12, missing, 0.0)  # below that: rounding of sums of shares
+    missing[missing <= 1e-12] = 0.0  # rounding of sums of shares
+    if missing.any():
+        exits = tuple(kind.exits.values())
+        sinks += missing[:, None] * _ways_out(map_of(float(strata.mean[0])), grid, exits, without)
     return Sheets(grid.n_cells, edges, tuple(sheets)), sinks, branches
+
+
+def _ways_out(params: Any, grid: Grid, exits: tuple[int, ...], otherwise: int) -> Array:
+    """Shares of the ways out among the points of each cell that have no image; `otherwise` where all have one."""
+    met = np.zeros((grid.n_cells, len(exits)))
+    for side in range(grid.sides):
+        source, _, _, code, _, _ = rows_of_points(lambda _: params, grid, 0.0, 0.0, 1.0, side)
+        for column, value in enumerate(exits):
+            met[:, column] += np.bincount(source[code == value], minlength=grid.n_cells)
+    met[met.sum(axis=1) == 0, otherwise] = 1.0
+    shares: Array = met / met.sum(axis=1, keepdims=True)
+    return shares
 
 
 def from_points(

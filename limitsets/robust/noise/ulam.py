@@ -169,7 +169,7 @@ def transfer(
     >>> from limitsets.robust import Uniform, transfer
     >>> found = transfer(ls.maps.Doubling(), ls.grid([(0.0, 1.0)], cells=4), landing=Uniform(0.125))
     >>> found.matrix.toarray()[0], found.sinks[0]
-    (array([0.4375, 0.4375, 0.0625, 0.    ]), array([0.0625]))
+    (array([0.4375, 0.4375, 0.0625, 0.    ]), array([0.0625, 0.    ]))
     """
     fixed = isinstance(map_of, tuple)
     at: Callable[[float], Any] = (lambda _: map_of) if fixed else map_of

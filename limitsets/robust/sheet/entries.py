@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from limitsets.robust.margins.finding import Margin
     from limitsets.scene import Scene
 
-__all__ = ["Entry", "nominal_of", "percent_of"]
+__all__ = ["Entry", "in_unit_of", "nominal_of", "percent_of"]
 
 REFUTED = ".refuted.zip"
 
@@ -171,3 +171,16 @@ def percent_of(entry: Entry, size: float | None) -> float | None:
     if entry.unit != entry.nominal_unit:
         size *= float(exact_factor(entry.unit, entry.nominal_unit))
     return 100.0 * size / abs(entry.nominal)
+
+
+def in_unit_of(entry: Entry, size: float, unit: str) -> float | None:
+    """Give a deviation in another unit, percent included; None where a percentage has no value to be one of."""
+    if entry.unit == unit:
+        return size
+    if unit == "%":
+        return percent_of(entry, size)
+    if entry.unit != "%":
+        return size * float(exact_factor(entry.unit, unit))
+    if entry.nominal is None:
+        return None
+    return 0.01 * size * abs(entry.nominal) * float(exact_factor(entry.nominal_unit, unit))

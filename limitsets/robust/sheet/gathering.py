@@ -15,6 +15,7 @@ from limitsets.robust.margins.deviations import Measure, measure, measures
 from limitsets.robust.margins.finding import GoalLike, Margin, asked_of, goals_of, margin
 from limitsets.robust.margins.joint import joint_margin
 from limitsets.robust.margins.vector import Tolerance
+from limitsets.robust.margins.words import reach_of
 from limitsets.robust.noise.scattering import Scattering
 from limitsets.robust.noise.statistics import CELLS, Levels, NoiseStatistics, noise_levels, noise_statistics
 from limitsets.robust.sheet.against_x import curve
@@ -296,8 +297,8 @@ def _filled(
     )
     sheet.tell("the goal in the scene as it is")
     question = asked_of(scene, goals)
-    verdict = question.prove().verdict
-    verdict = verdict if verdict == "proved" else question.refute().verdict
+    nominal = question.prove()
+    verdict = nominal.verdict if nominal.verdict == "proved" else question.refute().verdict
     sheet.done += 1
     entries = [] if "margins" in missing else sheet.singles(width, verdict)
     entries += [] if "joint" in missing else [sheet.joint(width)]
@@ -310,6 +311,7 @@ def _filled(
         scene,
         goals,
         verdict,
+        reach_of([nominal]) if verdict == "proved" else None,
         tuple(entries),
         sheet.tolerance,
         against,

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from limitsets.goals import Goal
 from limitsets.robust.margins.beyond import MarginsBeyond
 from limitsets.robust.margins.finding import Margin
+from limitsets.robust.margins.words import void_of
 from limitsets.robust.noise.statistics import Levels, NoiseStatistics
 from limitsets.robust.sheet.against_x import curve_table
 from limitsets.robust.sheet.entries import Entry, percent_of
@@ -35,6 +36,8 @@ class Robustness:
         What has to hold, all of it.
     verdict : str
         Of the goals in the scene as it is: "proved", "refuted" or "undecided".
+    reach : float or None
+        Where the attracting cells end in which the goals are proved of the scene as it is.
     entries : tuple of Entry
         One per quantity and reading; the last is joint, where there is a tolerance.  Proved and refuted.
     tolerance : dict of str to str
@@ -64,6 +67,7 @@ class Robustness:
     scene: Scene
     goals: tuple[Goal, ...]
     verdict: str
+    reach: float | None
     entries: tuple[Entry, ...]
     tolerance: dict[str, str]
     curve: MarginsBeyond | None
@@ -123,6 +127,7 @@ class Robustness:
             "digests": self.digests,
             "scene": self.scene.as_dict(),
             "holds": {"proved": True, "refuted": False}.get(self.verdict),
+            "vacuous": bool(void_of(self.goals, self.reach, self.scene.unit)),
             "margins": [entry.to_json() for entry in self.entries],
             "tolerance": self.tolerance or None,
             "curve": None if self.curve is None else curve_table(self.curve),

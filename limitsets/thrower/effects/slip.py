@@ -4,12 +4,12 @@ With the centre of mass X right of the contact and H above it, an impulse (J_t, 
 
     A J_t + B J_n along the arm,  B J_t + C J_n off it,   A = 1 + H^2/rho^2,  B = -X H/rho^2,  C = 1 + X^2/rho^2.
 
-The vertex sticks if the impulse that stops it pushes and lies in the cone, |J_t| <= mu J_n.  Otherwise, also where that
-impulse would have to pull, Routh's method: J_n grows and friction is -mu J_n against the sliding; when the sliding
-stops on the way, the vertex sticks if |B| <= mu A, else it slides the other way, that of B; compression ends when the
-contact no longer approaches the arm.  (The cone is asked first: with |B| > mu A Routh's path would slide back from some
-of the impulses in it, so that the law jumps there.)  With mu large enough nothing slips; with mu = 0 the centre of mass
-keeps its horizontal velocity.  A part that stays on a side slides on there by xdot^2/(2 mu kappa).
+Routh's method: J_n grows and friction is -mu J_n against the sliding; when the sliding stops on the way, the vertex
+sticks if |B| <= mu A, else it slides the other way, that of B; compression ends when the contact no longer approaches
+the arm.  What comes out has no jump.  The vertex sticks, as the bare map has it, where the impulse that stops it pushes
+and mu is at least |J_t|/J_n of that impulse and |B|/A; where that impulse would have to pull it slides on, with any
+friction.  With mu = 0 the centre of mass keeps its horizontal velocity.  A part that stays on a side slides on there by
+xdot^2/(2 mu kappa).
 Source: docs/model.md, effects; Wang and Mason, J. Applied Mechanics 59, 1992.
 """
 
@@ -75,16 +75,15 @@ def compressed(slip: Any, part: FullSide, hit: Arrival) -> tuple[Contact, float]
     right, high, rho2 = right_of(part, hit.vertex, hit.psi), above(part, hit.vertex, hit.psi), part.own.rho2
     inertia = rho2 + (right * right + high * high)
     omega = (rho2 * hit.omega + right * hit.vy - high * hit.vx) / inertia
-    drag, push = -(omega * high + hit.vx), omega * right - hit.vy
     stuck = Contact(hit.vertex, hit.psi, hit.shift, omega, 0.0, 0.0)
     if slip is None:
-        return stuck, push
-    if push > 0.0 and abs(drag) <= slip.friction * push:
-        return stuck, push
+        return stuck, omega * right - hit.vy
     a, b, c = 1.0 + high * high / rho2, -right * high / rho2, 1.0 + right * right / rho2
     along, off = hit.vx + hit.omega * high, hit.vy - hit.omega * right
     push = _compression(slip.friction, a, b, c, along, off)
     drag, slide = _dragged(slip.friction, a, b, along, push)
+    if slide == 0.0:  # still along the arm and off it: rounded as the bare map rounds it
+        return stuck, push
     omega = hit.omega + (high * drag - right * push) / rho2
     return Contact(hit.vertex, hit.psi, hit.shift, omega, slide, 0.0), push
 

@@ -1,7 +1,7 @@
 """A throw as a rigid body among contacts, in plain coordinates: what the effects are compared with.
 
 Written apart from the kernels.  The part is a list of points about its centre of mass, its motion is integrated in
-(x, y, theta) by scipy's DOP853, contact forces and impulses come from 2 x 2 systems, flights are searched for
+(x, y, theta) by scipy's DOP853, contact forces come from 2 x 2 systems, impulses from `routh`, flights are searched for
 their first contact on a fine grid, and a mode of contact is found by trying them all.
 """
 
@@ -14,6 +14,8 @@ from typing import Any
 import numpy as np
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
+
+from tests.thrower.effects.routh import routh
 
 TIGHT: dict[str, Any] = {"method": "DOP853", "rtol": 3e-14, "atol": 1e-15}
 
@@ -170,7 +172,7 @@ class Simulation:
     # -------------------------------------------------------------- impacts
 
     def impact(self, y: np.ndarray, corner: int) -> np.ndarray:
-        """Strike: Routh's path, leg by leg, through the plane of impulses."""
+        """Strike: a corner that sticks whatever that takes, or Routh's law."""
         plastic = self._impact(y, corner, 0.0)
         after = plastic
         if self.law.restitution is not None:
@@ -180,46 +182,17 @@ class Simulation:
         return after
 
     def _impact(self, y: np.ndarray, corner: int, restitution: float) -> np.ndarray:
-        lever = self.lever(y, corner)
-        compliance = lever @ self.inverse @ lever.T
-        velocity = lever @ y[3:6]
-        mu = np.inf if self.law.slip is None else self.law.slip
-        full = np.linalg.solve(compliance, -velocity)
-        if self.law.slip is None or (full[1] > 0 and abs(full[0]) <= mu * full[1]):
-            impulse, velocity = full, np.zeros(2)
-        else:
-            impulse, velocity = self._leg(compliance, mu, np.zeros(2), velocity, None)
-        back = restitution * max(impulse[1], 0.0)
-        impulse, _ = self._leg(compliance, mu, impulse, velocity, impulse[1] + back)
-        after = y.copy()
-        after[3:6] += self.inverse @ lever.T @ impulse
+        lever, after = self.lever(y, corner), y.copy()
+        gain = self.inverse @ lever.T
+        if self.law.slip is not None:
+            after[3:6], push = routh(gain, lever, y[3:6], self.law.slip)
+            after[3:6], _ = routh(gain, lever, after[3:6], self.law.slip, restitution * push)
+            return after
+        compliance = lever @ gain
+        stop = np.linalg.solve(compliance, -lever @ y[3:6])
+        held = np.array([-compliance[0, 1] / compliance[0, 0], 1.0])
+        after[3:6] += gain @ (stop + restitution * max(stop[1], 0.0) * held)
         return after
-
-    @staticmethod
-    def _leg(
-        w: np.ndarray, mu: float, impulse: np.ndarray, velocity: np.ndarray, until: float | None
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """Let the normal impulse grow until it is `until`, or until the approach has stopped."""
-        for _ in range(4):
-            if abs(velocity[0]) > 1e-15:
-                rate = np.array([-mu * np.sign(velocity[0]), 1.0])
-            else:
-                hold = -w[0, 1] / w[0, 0]
-                rate = np.array([hold if abs(hold) <= mu else np.copysign(mu, hold), 1.0])
-            change = w @ rate
-            ends = [np.inf, np.inf]
-            if velocity[0] * change[0] < 0 and abs(velocity[0]) > 1e-15:
-                ends[0] = -velocity[0] / change[0]
-            if until is not None:
-                ends[1] = until - impulse[1]
-            elif change[1] > 0:
-                ends[1] = max(-velocity[1], 0.0) / change[1]
-            step = min(ends)
-            impulse, velocity = impulse + step * rate, velocity + step * change
-            if ends[1] <= ends[0]:
-                return impulse, velocity
-            velocity[0] = 0.0
-        raise AssertionError("a path through the plane of impulses has two legs")
 
     # -------------------------------------------------------------- contact
 
@@ -370,10 +343,11 @@ class Simulation:
         side = next(s for s in range(len(reach)) if self.body.edge(s) == (left, right))
         place = float(y[0])
         if self.law.slip is not None:
-            # the side's velocity along the arm, while its fall and rotation end together
+            # the part's velocity along the arm, while its fall and rotation end together
             push, d, mu = -y[4], -reach[corner, 1], self.law.slip
-            w = np.array([[1.0, -y[5] * d / push], [0.0, 0.0]])
-            _, velocity = self._leg(w, mu, np.zeros(2), np.array([y[3] + y[5] * d, 0.0]), push)
+            gain = np.array([[1.0, 0.0], [0.0, 1.0], [0.0, -y[5] / push]])
+            lever = np.array([[1.0, 0.0, d], [0.0, 1.0, 0.0]])
+            velocity, _ = routh(gain, lever, y[3:6], mu, push)
             if abs(velocity[0]) > 1e-12:
                 ahead = reach[right, 0] if velocity[0] > 0 else -reach[left, 0]
                 if mu == 0 or mu * d > ahead:

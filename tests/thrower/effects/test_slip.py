@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from types import SimpleNamespace
 
 import numpy as np
@@ -10,12 +11,13 @@ import pytest
 
 from limitsets.thrower import throw_map
 from limitsets.thrower.effects import with_effects
-from limitsets.thrower.effects.bounce import struck
+from limitsets.thrower.effects.bounce import Bounce, struck
 from limitsets.thrower.effects.slip import Slip, slid_on
 from limitsets.thrower.full import gather_full
-from limitsets.thrower.motion import LOST, Arrival, Contact, Face, FullSide
+from limitsets.thrower.motion import LOST, Arrival, Contact, Face, FullSide, above, right_of
 from limitsets.thrower.sliding import slide_on
-from limitsets.thrower.turn import turn
+from limitsets.thrower.turn import Turned, turn
+from tests.thrower.effects.routh import routh, smoothed
 from tests.thrower.effects.throws import agree, cases, same_end
 
 HALF = math.sqrt(0.5)
@@ -69,6 +71,155 @@ def test_sliding_stops_and_reverses_on_the_way() -> None:
     assert after.omega == pytest.approx((1.4 * drag - 0.2 * push) / 0.04, rel=1e-12)
 
 
+@dataclass(frozen=True)
+class Meeting:
+    """A vertex of a random part at the arm, and friction around |B|/A."""
+
+    part: FullSide
+    vertex: int
+    psi: Turned
+    mu: float
+
+    @property
+    def arms(self) -> tuple[float, float]:
+        return right_of(self.part, self.vertex, self.psi), above(self.part, self.vertex, self.psi)
+
+    @property
+    def lever(self) -> np.ndarray:
+        """Velocity of the vertex = lever @ rates."""
+        right, high = self.arms
+        return np.array([[1.0, 0.0, high], [0.0, 1.0, -right]])
+
+    @property
+    def gain(self) -> np.ndarray:
+        """Change of the rates by an impulse at the vertex."""
+        return np.diag([1.0, 1.0, 1.0 / self.part.own.rho2]) @ self.lever.T
+
+    def stop(self, rates: np.ndarray) -> np.ndarray:
+        """Impulse (J_t, J_n) that stops the vertex."""
+        return np.linalg.solve(self.lever @ self.gain, -self.lever @ rates)
+
+    def struck(self, rates: np.ndarray, mu: float, restitution: float = 0.0) -> np.ndarray:
+        """Rates after an impact, by the kernels."""
+        hit = Arrival(self.vertex, self.psi, 0.0, *rates)
+        after = struck(Bounce(restitution, 0.0), Slip(mu), self.part, hit)
+        right, high = self.arms
+        return np.array([after.slide - after.omega * high, after.lift + after.omega * right, after.omega])
+
+
+def meetings(count: int, seed: int) -> list[Meeting]:
+    """Random contacts; half of them have |B| > mu A."""
+    rng, found = np.random.default_rng(seed), []
+    for case in cases(count, seed):
+        part = gather_full(case.full(("slip", "bounce")), 0)
+        vertex = int(rng.integers(part.a.size))
+        at = Meeting(part, vertex, turn(float(rng.uniform(0.0, part.corner[vertex]))), 0.0)
+        compliance = at.lever @ at.gain
+        mu = float(rng.uniform(0.5, 1.5)) * abs(compliance[0, 1]) / compliance[0, 0]
+        found.append(Meeting(part, vertex, at.psi, mu))
+    return found
+
+
+def test_an_impulse_in_the_cone_does_not_stick_where_the_path_slides_back() -> None:
+    # As above, A = 50, B = -7, C = 2 and mu = 1/10 < |B|/A, but sliding right at 2.5: the impulse that stops it,
+    # J_n = (1 - 7 * 2.5/50)/(2 - 49/50) = 0.65/1.02 = 0.637 and J_t = (7 J_n - 2.5)/50 = 0.039, lies in the cone.
+    part, psi = square(0.1, rho=0.2), turn(math.asin(0.6))
+    after = struck(None, Slip(0.1), part, Arrival(0, psi, 0.0, 2.5, -1.0, 0.0))
+    # slides right until 2.5 = 12 J: J = 5/24, v_n = -1 + 2.7 * 5/24 = -0.4375; then left by 2 for 0.4375/1.3
+    assert after.slide == pytest.approx(-2 * 0.4375 / 1.3, rel=1e-12)
+
+
+@pytest.mark.parametrize("restitution", [0.0, 0.6, 1.0])
+def test_impacts_are_those_of_the_integrated_law(restitution: float) -> None:
+    back, gained = 0, []
+    rng = np.random.default_rng(40)
+    for at in meetings(60, 40):
+        right, high = at.arms
+        for _ in range(6):
+            # of what stops it the vertex needs some impulse near the cone, either way
+            need = np.array([float(rng.uniform(-2.0, 2.0)) * at.mu, 1.0])
+            rates = -at.gain @ need + np.array([-high, right, 1.0]) * rng.normal()
+            if (at.lever @ rates)[1] >= 0.0:
+                continue
+            after = at.struck(rates, at.mu, restitution)
+            wanted, push = routh(at.gain, at.lever, rates, at.mu)
+            wanted, _ = routh(at.gain, at.lever, wanted, at.mu, restitution * push)
+            np.testing.assert_allclose(after, wanted, rtol=0, atol=1e-11 * np.abs(rates).max())
+            masses = np.array([1.0, 1.0, at.part.own.rho2])
+            gained.append(masses @ (after**2 - rates**2) / (masses @ rates**2))
+            # sliding back although the impulse that stops it is in the cone
+            back += abs(need[0]) < at.mu and abs((at.lever @ wanted)[0]) > 1e-9 and restitution == 0.0
+    assert max(gained) <= 1e-13
+    assert min(gained) < -0.1
+    assert back > 10 or restitution > 0.0
+
+
+def test_it_is_the_limit_of_friction_that_is_a_smooth_function_of_the_sliding() -> None:
+    rng = np.random.default_rng(41)
+    for at in meetings(40, 41):
+        rates = -at.gain @ (float(rng.uniform(-1.0, 1.0)) * at.mu, 1.0)
+        if (at.lever @ rates)[1] < 0.0:
+            seen = smoothed(at.gain, at.lever, rates, at.mu, 1e-5, 0.6)
+            np.testing.assert_allclose(at.struck(rates, at.mu, 0.6), seen, rtol=0, atol=1e-4)
+
+
+@pytest.mark.parametrize("restitution", [0.0, 0.6])
+def test_the_law_has_no_jump(restitution: float) -> None:
+    """Approach velocities on a line over v_t = 0 and both borders of the cone: a jump does not shrink with the step."""
+    steep = 0
+    for at in meetings(24, 42):
+        compliance = at.lever @ at.gain
+        steep += abs(compliance[0, 1]) > at.mu * compliance[0, 0]
+        steps = []
+        # the direction of the impulse that stops the vertex goes from one side of the cone to the other
+        for count in (150, 1500):
+            ends = [
+                at.struck(-at.gain @ (share * at.mu, 1.0), at.mu, restitution)
+                for share in np.linspace(-3.0, 3.0, count + 1)
+            ]
+            steps.append(np.abs(np.diff(ends, axis=0)).max())
+        assert steps[1] < steps[0] / 5
+    assert 6 < steep < 18
+
+
+def test_enough_friction_is_that_to_stick_and_not_to_slide_back() -> None:
+    """The bare map's impact from the larger of |J_t|/J_n and |B|/A on, and not before."""
+    rng, second = np.random.default_rng(43), 0
+    for at in meetings(60, 43):
+        compliance = at.lever @ at.gain
+        need, turned = float(rng.uniform(-1.0, 1.0)), abs(compliance[0, 1]) / compliance[0, 0]
+        right, high = at.arms
+        # turning about the vertex by 1 when it has stopped
+        rates = np.array([-high, right, 1.0]) - at.gain @ (need, 1.0)
+        if (at.lever @ rates)[1] >= 0.0:
+            continue
+        hit, enough = Arrival(at.vertex, at.psi, 0.0, *rates), max(abs(need), turned)
+        second += turned > abs(need)
+        for mu in (enough * (1 + 1e-9), 1e9):
+            after = struck(None, Slip(mu), at.part, hit)
+            assert (after.slide, after.omega) == (0.0, pytest.approx(1.0, rel=1e-13))
+        assert abs(struck(None, Slip(enough * (1 - 1e-6)), at.part, hit).slide) > 1e-9
+    assert 10 < second < 50
+
+
+def test_where_the_stop_would_pull_endless_friction_lets_it_slide_on() -> None:
+    """An impulse along the arm alone, J_t = -v_n/B, stops the approach first: v_t goes on, as v_t - v_n A/B."""
+    rng = np.random.default_rng(44)
+    for at in meetings(60, 44):
+        (a, b), (_, c) = at.lever @ at.gain
+        # an approach, B J_t > C, and J_n = -1
+        rates = -at.gain @ (float(rng.uniform(1.1, 3.0)) * c / b, -1.0)
+        along, off = at.lever @ rates
+        assert off < 0.0
+        for mu in (1e6, 1e9):
+            slide, lift = at.lever @ at.struck(rates, mu)
+            assert slide == pytest.approx(
+                along - off * a / b, rel=1e2 / mu * max(1.0, c / abs(b), a / abs(b))
+            )
+            assert abs(lift) < 1e-12
+            assert slide * along > 0.0
+
+
 def test_without_friction_the_horizontal_velocity_stays_and_nothing_rests() -> None:
     for case in cases(20, 1, friction=0.0):
         part = gather_full(case.full(("slip",)), case.side)
@@ -79,8 +230,8 @@ def test_without_friction_the_horizontal_velocity_stays_and_nothing_rests() -> N
         assert case.mapped(("slip",)) is None
 
 
-def test_where_the_stop_pushes_enough_friction_is_the_bare_map() -> None:
-    stuck = 0
+def test_endless_friction_is_the_bare_map_where_the_stop_pushes_and_only_there() -> None:
+    stuck, slid = 0, 0
     for case in cases(60, 2, friction=1e9):
         # the impulse that stops the vertex, from the throw's formulas in docs/model.md
         facts = case.body.numbers()
@@ -91,10 +242,15 @@ def test_where_the_stop_pushes_enough_friction_is_the_bare_map() -> None:
         right, high = a * math.cos(phi) - d * math.sin(phi), a * math.sin(phi) + d * math.cos(phi)
         fall = case.x - case.kappa * phi
         omega = (rho**2 + right * fall + high * (case.height + d)) / (rho**2 + a * a + d * d)
-        if omega * right - fall > 1e-6:
+        push = omega * right - fall
+        if push > 1e-6:
             stuck += 1
             assert same_end(case.mapped(("slip",)), case.mapped(()))
+        elif push < -1e-3:
+            slid += 1
+            assert not same_end(case.mapped(("slip",)), case.mapped(()))
     assert stuck > 20
+    assert slid > 5
 
 
 def _landing(a: float, d: float, kappa: float, x: float) -> float:

@@ -1,0 +1,56 @@
+"""Whether the graph of a grid fits in memory: said before it is built, for a process that takes more is killed."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+from limitsets.cells import Grid
+from limitsets.errors import AnswerError
+
+__all__ = ["require_memory"]
+
+# Bytes a cell at the peak, in one, two and three dimensions, as measured on textbook maps; "random" for each sample.
+BYTES = {"random": (41, 96, 136), "boxes": (125, 151, 197)}
+BYTES_SAMPLED = (104, 95, 155)
+
+# cgroup versions 2 and 1: limit, and what is in use.
+LIMITS = (
+    ("/sys/fs/cgroup/memory.max", "/sys/fs/cgroup/memory.current"),
+    ("/sys/fs/cgroup/memory/memory.limit_in_bytes", "/sys/fs/cgroup/memory/memory.usage_in_bytes"),
+)
+
+
+def _free_bytes() -> int | None:
+    """Memory that this process may still take; None where the system does not say."""
+    found = []
+    try:
+        lines = Path("/proc/meminfo").read_text(encoding="ascii").splitlines()
+        found += [1024 * int(line.split()[1]) for line in lines if line.startswith("MemAvailable:")]
+    except OSError:
+        if hasattr(os, "sysconf") and "SC_PHYS_PAGES" in os.sysconf_names:
+            found.append(os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE"))
+    for limit, used in LIMITS:
+        try:
+            found.append(
+                int(Path(limit).read_text(encoding="ascii")) - int(Path(used).read_text(encoding="ascii"))
+            )
+        except (OSError, ValueError):  # no such limit, or "max"
+            continue
+    return min(found, default=None)
+
+
+def require_memory(grid: Grid, method: str, samples: int) -> None:
+    """Refuse a grid whose graph takes more memory than there is."""
+    per_cell = BYTES.get(method, BYTES_SAMPLED)[grid.dimension - 1] * (samples if method == "random" else 1)
+    wanted, free = per_cell * grid.n_cells, _free_bytes()
+    if free is None or wanted <= free:
+        return
+    share = (free / wanted) ** (1.0 / grid.dimension)
+    fits = " by ".join(str(max(int(share * n), 1)) for n in grid.shape.max(axis=0).tolist())
+    raise AnswerError(
+        f"the memory for the graph of {grid.n_cells} cells",
+        f"about {wanted / 1e9:.1f} GB",
+        f"the {free / 1e9:.1f} GB that are free here",
+        f"ask for fewer cells: {fits} fit",
+    )

@@ -1,0 +1,361 @@
+"""Labels of cells against orbits: no start in a cell may end elsewhere than its label says."""
+
+import math
+from typing import NamedTuple
+
+import networkx as nx
+import numpy as np
+import pytest
+
+import limitsets as ls
+from limitsets.maps import OUTSIDE, UNDECIDED, UNDEFINED, images
+
+# ---------------------------------------------------------------- maps with holes: roots, logarithms, quotients
+
+
+class Root(NamedTuple):
+    below: float
+
+
+def root(params, x, side):
+    return math.sqrt(x) - params.below if x >= 0.0 else math.nan, side, 0
+
+
+class Logarithm(NamedTuple):
+    above: float
+
+
+def logarithm(params, x, side):
+    return math.log(x) + params.above if x > 0.0 else math.nan, side, 0
+
+
+class Log2(NamedTuple):
+    factor: float
+
+
+def log_of_size(params, x, side):
+    """A pole and no hole: every orbit but one of a countable set goes on for ever, until it passes the border."""
+    return (params.factor * math.log(abs(x)) if x != 0.0 else -math.inf), side, 0
+
+
+class Gap(NamedTuple):
+    half: float
+
+
+def gap(params, x, side):
+    """The logarithm of x^2 - half^2: a hole in the middle, with a steep border on both sides."""
+    inside = x * x - params.half * params.half
+    return 0.3 * math.log(inside) + 1.0 if inside > 0.0 else math.nan, side, 0
+
+
+class Newton(NamedTuple):
+    square: float
+
+
+def newton(params, x, side):
+    """Newton's method for a root: a pole at 0, two attractors."""
+    return (0.5 * (x + params.square / x) if x != 0.0 else math.nan), side, 0
+
+
+class Reciprocal(NamedTuple):
+    less: float
+
+
+def reciprocal(params, x, side):
+    return (1.0 / x - params.less if x != 0.0 else math.nan), side, 0
+
+
+class Tangent(NamedTuple):
+    factor: float
+
+
+def tangent(params, x, side):
+    return params.factor * math.tan(x), side, 0
+
+
+class Arch(NamedTuple):
+    height: float
+
+
+def arch(params, x, side):
+    """A half circle: vertical at both ends of where it is defined."""
+    under = 1.0 - x * x
+    return params.height * math.sqrt(under) - 0.5 if under >= 0.0 else math.nan, side, 0
+
+
+class Means(NamedTuple):
+    share: float
+
+
+def means(params, x, side):
+    """Arithmetic and geometric means: undefined where the signs differ, else towards a point of the diagonal."""
+    under = x[0] * x[1]
+    other = math.sqrt(under) if under >= 0.0 else math.nan
+    return (params.share * (x[0] + x[1]), 0.9 * other + 0.05), side, 0
+
+
+class Quotient(NamedTuple):
+    factor: float
+
+
+def quotient(params, x, side):
+    return (params.factor * x[0] / x[1] if x[1] != 0.0 else math.nan, 0.5 * x[1] + 0.3 * x[0]), side, 0
+
+
+class Cubes(NamedTuple):
+    scale: float
+
+
+def cubes(params, z, side):
+    """Newton's method for z^3 = 1 in the plane: a pole at 0, three basins mixed everywhere between them."""
+    x, y = z
+    size = (x * x + y * y) ** 2
+    if size == 0.0:
+        return (math.nan, math.nan), side, 0
+    return (
+        (
+            (2.0 * x + params.scale * (x * x - y * y) / size) / 3.0,
+            (2.0 * y - params.scale * 2.0 * x * y / size) / 3.0,
+        ),
+        side,
+        0,
+    )
+
+
+class Steep(NamedTuple):
+    factor: float
+
+
+def steep(params, x, side):
+    """Next to where the logarithm begins one step leads below any border, a little farther on to no number."""
+    return (math.log(x[0]) if x[0] > 0.0 else math.nan, params.factor * x[1]), side, 0
+
+
+class SteepOn(NamedTuple):
+    factor: float
+
+
+def steep_on(params, x, side, branch):
+    first, slope = (math.log(x[0]), 1.0 / x[0]) if x[0] > 0.0 else (math.nan, math.nan)
+    return (first, params.factor * x[1]), side, ((slope, 0.0), (0.0, params.factor))
+
+
+class Disc(NamedTuple):
+    radius: float
+
+
+def disc(params, x, side):
+    """A round hole, around which all turns and comes in."""
+    under = x[0] * x[0] + x[1] * x[1] - params.radius * params.radius
+    size = math.sqrt(under) if under >= 0.0 else math.nan
+    return (0.7 * x[0] - 0.6 * x[1] + 0.1 * size, 0.6 * x[0] + 0.7 * x[1]), side, 0
+
+
+class Nothing(NamedTuple):
+    unused: float
+
+
+def nothing(params, x, side):
+    return math.nan, side, 0
+
+
+for line, image in (
+    (Root, root),
+    (Logarithm, logarithm),
+    (Log2, log_of_size),
+    (Gap, gap),
+    (Newton, newton),
+    (Reciprocal, reciprocal),
+    (Tangent, tangent),
+    (Arch, arch),
+    (Nothing, nothing),
+):
+    ls.register(line, image=image)
+for plane, image in ((Means, means), (Quotient, quotient), (Cubes, cubes), (Steep, steep), (Disc, disc)):
+    ls.register(plane, image=image, dimension=2)
+ls.register(SteepOn, image=steep, image_on=steep_on, dimension=2)
+
+SQUARE = [(-2.0, 2.0), (-2.0, 2.0)]
+HOLES = [
+    (Root(0.2), [(-1.0, 2.0)], 1000),
+    (Root(-0.25), [(-1.0, 2.0)], 333),
+    (Logarithm(1.5), [(-1.0, 4.0)], 1000),
+    (Log2(1.3), [(-3.0, 3.0)], 999),
+    (Gap(0.01), [(-2.0, 2.0)], 500),
+    (Newton(2.0), [(-3.0, 3.0)], 1001),
+    (Newton(-1.0), [(-30.0, 30.0)], 1000),
+    (Reciprocal(0.6), [(-2.0, 2.0)], 777),
+    (Tangent(0.7), [(-5.0, 5.0)], 1000),
+    (Arch(1.2), [(-1.5, 1.5)], 700),
+    (Means(0.5), SQUARE, 64),
+    (Quotient(0.4), SQUARE, 81),
+    (Cubes(1.0), SQUARE, 128),
+    (Steep(0.5), [(-3.0, 3.0), (-2.0, 2.0)], 65),
+    (SteepOn(0.5), [(-3.0, 3.0), (-2.0, 2.0)], 64),
+    (Disc(0.37), SQUARE, 101),
+    (Nothing(0.0), [(0.0, 1.0)], 50),
+]
+TEXTBOOK = [
+    (ls.maps.Baker(), [(0.0, 1.0), (0.0, 1.0)], 64),
+    (ls.maps.Contraction(0.5), [(-1.0, 1.0)], 333),
+    (ls.maps.Cubic(1.5), [(-1.7, 1.7)], 1000),
+    (ls.maps.Cubic(2.6), [(-1.7, 1.7)], 1001),
+    (ls.maps.Doubling(2.0), [(0.0, 1.0)], 333),
+    (ls.maps.Henon(1.4, 0.3), SQUARE, 128),
+    (ls.maps.Henon(1.0, 0.3), SQUARE, 256),
+    (ls.maps.Leslie(), ls.maps.domain_of(ls.maps.Leslie()), 128),
+    (ls.maps.Linear2(0.5, 0.0, 0.0, 2.0), SQUARE, 64),
+    (ls.maps.Logistic(3.2), [(-0.2, 1.2)], 1000),
+    (ls.maps.Logistic(3.83), [(-0.2, 1.2)], 777),
+    (ls.maps.Logistic(4.1), [(0.0, 1.0)], 999),
+    (ls.maps.Product(), [(0.0, 1.2), (0.0, 1.2)], 64),
+    (ls.maps.Rotation(), [(0.0, 1.0)], 100),
+    (ls.maps.ThreeState(), [(-3.0, 3.0)], 100),
+    (ls.maps.TwoState(1.0), SQUARE, 32),
+]
+
+
+def outcomes(params, grid, starts, steps):
+    """Where each start is after so many steps: cell, or code of the exit it left the grid by."""
+    x, end = starts.copy(), np.zeros(len(starts), np.int64)
+    going = np.arange(len(starts))
+    for _ in range(steps):
+        there = images(params, x[going], 0)
+        x[going] = there.x
+        cell = grid.index(there.x, 0)
+        end[going] = np.where(there.code < 0, there.code, np.where(cell < 0, OUTSIDE, cell))
+        going = going[end[going] >= 0]
+    return end
+
+
+def contradicted(params, domain, cells, method=None):
+    """Starts of which a label says something else than their orbit: cells, labels, ends."""
+    grid = ls.grid(domain, cells=cells)
+    graph = ls.transitions(params, grid, method)
+    found = ls.attractors(graph, throws=1000)
+    shares = ls.basins(graph, found)
+    rng = np.random.default_rng(10)
+    numbers = np.repeat(np.arange(grid.n_cells), 4 if len(domain) == 1 else 2)
+    lo, hi = grid.boxes(numbers, 0)
+    starts = lo + rng.random(lo.shape) * (hi - lo)
+    end = outcomes(
+        params, grid, starts[:, 0] if len(domain) == 1 else starts, 1000 if len(domain) == 1 else 150
+    )
+    label = shares.labels[numbers]
+    staying = np.array([*(each.cells.mask for each in found), np.zeros(grid.n_cells, bool)])
+    kept = staying[np.maximum(label, -1), np.maximum(end, 0)] & (end >= 0)
+    right = (label == UNDECIDED) | (label == end) | ((label >= 0) & kept)
+    return np.stack([numbers[~right], label[~right], end[~right]], axis=1).tolist()
+
+
+@pytest.mark.parametrize(("params", "domain", "cells"), HOLES + TEXTBOOK, ids=lambda value: str(value)[:24])
+def test_no_label_is_contradicted_by_an_orbit(params, domain, cells):
+    assert contradicted(params, domain, cells) == []
+
+
+@pytest.mark.parametrize(("params", "domain", "cells"), TEXTBOOK, ids=lambda value: str(value)[:24])
+def test_no_label_of_proved_images_is_contradicted(params, domain, cells):
+    assert contradicted(params, domain, cells // 2, "boxes") == []
+
+
+def test_an_orbit_would_contradict_a_wrong_label():
+    """One point for a whole cell misses most of its image: the comparison above sees it."""
+    assert contradicted(ls.maps.Cubic(2.6), [(-1.7, 1.7)], 1001, "centres") != []
+
+
+# ---------------------------------------------------------------- undefined
+
+
+def test_a_map_without_numbers_has_no_attractor():
+    graph = ls.transitions(Nothing(0.0), ls.grid([(0.0, 1.0)], cells=50))
+    found = ls.attractors(graph)
+    shares = ls.basins(graph, found)
+    assert found == ()
+    assert shares.attractors == ()
+    assert shares.exits == {"outside": 0.0, "undefined": pytest.approx(1.0)}
+    assert (shares.labels == UNDEFINED).all()
+    assert shares.advice is None
+    assert list(graph.exits.items()) == [("outside", OUTSIDE), ("undefined", UNDEFINED)]
+    assert nx.number_attracting_components(graph) == 2
+    assert graph.successors(7).tolist() == [graph.n_cells + 1]
+
+
+def test_undefined_is_the_last_exit_of_every_map():
+    assert list(ls.maps.kind_of(ls.load("paper-designed").map).exits) == [
+        "inward", "outward", "outside-model", "undefined",
+    ]  # fmt: skip
+    assert list(ls.maps.kind_of(ls.maps.Henon(1.4, 0.3)).exits) == ["outside", "undefined"]
+
+
+@pytest.mark.parametrize(("params", "start"), [(Root(0.5), 0.3), (Steep(0.5), (0.4, 1.0))])
+def test_an_orbit_stops_where_the_map_is_undefined(params, start):
+    path = ls.orbit(params, start, 0, 10)
+    assert (path.stopped, path.code[-1]) == ("undefined", UNDEFINED)
+    assert path.code.size < 10
+    assert (path.code[:-1] >= 0).all()
+    assert np.isfinite(path.x[:-1]).all()
+    assert np.isnan(path.x[-1]).any()
+
+
+class Unproved(NamedTuple):
+    end: float
+
+
+def less(params, x, side):
+    return 0.4 * x, side, 0
+
+
+def less_box(lo_params, hi_params, lo, hi, side):
+    """Nothing is known of cells beyond 0.5: the box has an end that is none."""
+    end = lo_params.end if hi > 0.5 else 0.4 * hi
+    return 1, (0.4 * lo, end, side, 0), (0.0, 0.0, side, 0), (0.0, 0.0)
+
+
+ls.register(Unproved, image=less, image_box=less_box)
+
+
+@pytest.mark.parametrize("end", [math.nan, math.inf])
+def test_a_proved_image_without_an_end_is_undecided(end):
+    graph = ls.transitions(Unproved(end), ls.grid([(0.0, 1.0)], cells=8), "boxes")
+    shares = ls.basins(graph, ls.attractors(graph, throws=10))
+    assert (shares.labels[4:] == UNDECIDED).all()
+    assert (shares.labels[:4] == 0).all()
+
+
+# ---------------------------------------------------------------- what leaves
+
+
+@pytest.mark.parametrize("cells", [128, 512, 1024])
+def test_starts_that_stay_are_not_said_to_leave(cells):
+    """0.432 +- 0.002 of uniform starts stay bounded; their cells are undecided, and the answer says what to do."""
+    graph = ls.transitions(ls.maps.Henon(1.4, 0.3), ls.grid(SQUARE, cells=cells))
+    shares = ls.basins(graph, ls.attractors(graph))
+    assert shares.attractors == ()
+    assert 0.430 < shares.undecided_between < 0.50
+    assert shares.exits["outside"] < 0.570
+    assert "finer cells" in shares.advice
+    starts = np.random.default_rng(1).uniform(-2.0, 2.0, (2000, 2))
+    end = outcomes(graph.map, graph.grid, starts, 500)
+    label = shares.labels[graph.grid.index(starts, 0)]
+    assert (label[end >= 0] == UNDECIDED).all()
+    assert np.mean(end >= 0) == pytest.approx(0.432, abs=0.04)
+
+
+def test_cells_that_reach_a_set_that_is_not_closed_are_undecided():
+    """The unstable fixed point 0.6875 of the logistic map: its cell, and those on a path to it by networkx."""
+    graph = ls.transitions(ls.maps.Logistic(3.2), ls.grid([(0.0, 1.0)], cells=1000))
+    shares = ls.basins(graph, ls.attractors(graph, throws=100))
+    (cell,) = graph.grid.index([0.6875], 0)
+    leading = sorted(nx.ancestors(graph.to_networkx(), int(cell)) | {int(cell)})
+    assert len(leading) > 5
+    assert (shares.labels[leading] == UNDECIDED).all()
+    assert shares.attractors[0] > 0.95
+
+
+def test_a_set_that_orbits_pass_through_takes_no_label_away():
+    """x/2 on padded cells: one cell after the attracting ones meets its own image, and nothing stays there."""
+    graph = ls.transitions(ls.maps.Contraction(0.5), ls.grid([(0.0, 1.0)], cells=64), method="corners-padded")
+    assert len(graph.recurrent_components()) > 1
+    shares = ls.basins(graph, ls.attractors(graph, throws=100))
+    assert shares.attractors == (pytest.approx(1.0),)
+    assert shares.advice is None
