@@ -2649,7 +2649,9 @@ def read_starts(section: dict[str, Any], goal: dict[str, Any], n_sides: int) -> 
             x is None or point is None or x[i] >= point[1],
             "starts before the end of a fixed point are claimed",
         )
-    require(kind == "every" or not anywhere, "a goal from anywhere is one of every start")
+    require(not (almost and kind == "every"), "a goal of almost every orbit is claimed for every start")
+    of = "almost-every" if almost else "every"
+    require(kind == of or not anywhere, f"this goal from anywhere is one of starts {of}")
     require(kind != "cells" or goal["kind"] != "attracts_all", "attracts_all of some cells")
     return starts
 

@@ -65,8 +65,8 @@ def prove(found: Attraction, scene: Scene, goal: Goal) -> Answer:
     if answer.verdict != "proved":
         return answer
     if goal.from_anywhere and goal.kind != "attracts_all":  # of every start, as its kind proves it
-        section = {**answer.section, "starts": "every"}
-        return answer._replace(section=section, starts="every", shares=WHOLE)
+        starts = "almost-every" if kind.almost(goal) else "every"
+        return answer._replace(section={**answer.section, "starts": starts}, starts=starts, shares=WHOLE)
     return _for_starts(found, answer, almost=kind.almost(goal))
 
 
