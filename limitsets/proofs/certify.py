@@ -492,9 +492,7 @@ def _halved(
         box = parameter_box(scene, tree=part.tree(), noise=noise)
         one, answers = _attempt(scene, wanted, box, (cells,), None, search=looked < MOST_SEARCHED)
         tried, looked = tried + one.cover.grid.n_cells, looked + 1
-        missing = tuple(
-            each for each in answers if not (each.written and (each.final or each.verdict == "proved"))
-        )
+        missing = tuple(each for each in answers if not _settled(each))
         refuted = tuple(replace(each, fixed=part.texts()) for each in missing if each.verdict == "refuted")
         if (
             noise
@@ -518,6 +516,11 @@ def _halved(
             waiting += [(half, min(cells * 6 // 5, LADDER[-1])) for half in part.halves(scales)]
     joined = tuple(weakest_of([answers[k] for _, answers in proved]) for k in range(len(wanted)))
     return tuple(one for one, _ in proved), joined
+
+
+def _settled(claim: Claim) -> bool:
+    """Whether narrower pieces cannot bring a better verdict: where starts leave a goal holds on cells at best."""
+    return claim.verdict == "proved" or (claim.written and claim.shares["leaves"] > 0.0)
 
 
 def weakest_of(claims: Sequence[Claim]) -> Claim:

@@ -239,9 +239,13 @@ def test_throws_so_fast_that_parts_never_land_are_undecided(kappa):
     assert ls.orbit(scene.map, 27.0, 0, 1).stopped == "outside-model"
     proof = ls.certify(scene, ["attracts-all", "goal", "invariant", "expanding"])
     for claim in proof.claims:
-        assert claim.verdict == "undecided"
+        assert claim.verdict == "undecided" or claim.claim == "attracts-all"
         assert claim.reason
         assert claim.section == {}
+    attracts = claim_of(proof, "attracts-all")
+    assert attracts.verdict == ("undecided" if kappa == 2.0 else "refuted")
+    for last in attracts.counterexample[-1:]:  # other starts do land, off the arm
+        assert last.hi <= scene.sides.a[last.side] or last.lo > scene.arm_length
     assert "side " in claim_of(proof, "attracts-all").reason
     with pytest.raises(AnswerError, match="without a proved claim"):
         proof.save("nowhere.proof.zip")

@@ -217,7 +217,6 @@ UNDECIDED = [
     ({"arm.surface_height": 0.5}, "not every start up to the fixed point of the jog is proved to jog"),
     ({"arm.surface_height": 0.0}, "not proved to be below the joint nor above it"),
     ({"arm.surface_height": 1e-4}, "too little for such cells"),  # 2 h/(kappa - d) = 8e-6
-    ({"arm.surface_height": 0.1, "arm.length": 4.5}, "is not on the arm"),  # R*_2 = 4.81
 ]
 
 
@@ -230,6 +229,19 @@ def test_what_is_undecided_says_why(values, why):
     assert claim.verdict == "undecided"
     assert why in claim.reason
     assert record(proof)["jog_fixed_points"] is None
+
+
+def test_an_arm_that_ends_before_the_fixed_point_is_left():
+    """R*_2 = 4.81 lies beyond an arm of 4.5 in, and other starts are thrown off its end."""
+    tree = ls.load("paper-designed").as_dict()
+    del tree["goal"]
+    scene = ls.load(tree).with_values({"arm.surface_height": 0.1, "arm.length": 4.5})
+    (claim,) = ls.certify(scene, ["attracts-all"]).claims
+    assert claim.verdict == "refuted"
+    first, last = claim.counterexample[0], claim.counterexample[-1]
+    assert last.lo > 4.5
+    path = ls.orbit(scene.map, first.lo, first.side, len(claim.counterexample))
+    assert path.stopped == "outward"
 
 
 def test_in_the_small_angle_flight_every_jog_goes_inward():

@@ -195,7 +195,9 @@ def test_what_is_not_proved_beside_a_corner_is_not_true(side, along, above):
     scene, part = obtuse(side, along, above), obtuse_part(side, along, above)
     ends, attracts = ls.certify(scene, ASKED).claims
     assert ends.verdict == "proved"
-    assert attracts.verdict == "undecided"
+    assert attracts.verdict == "refuted"
+    last = attracts.counterexample[-1]
+    assert last.hi <= part.a[last.side] or last.lo > 28
     assert "side 0, x in [" in attracts.reason
     assert "may leave the cells" in attracts.reason
     lo, hi = (mp.mpf(text) for text in attracts.reason.split("[")[1].split("]")[0].split(","))
@@ -225,7 +227,9 @@ def test_what_is_not_proved_where_a_flight_may_meet_the_arm_twice_is_not_true():
     assert part.kappa < mp.hypot(part.a[2], part.d[2])
     ends, attracts = ls.certify(scene, ASKED).claims
     assert (ends.verdict, ends.reason) == ("undecided", "there are no attracting cells")
-    assert attracts.verdict == "undecided"
+    assert attracts.verdict == "refuted"
+    last = attracts.counterexample[-1]
+    assert last.hi <= part.a[last.side] or last.lo > 7
     assert "the image of side 0, x in [1.79777, 1.79777] may leave the cells" in attracts.reason
     x = mp.mpf("1.79777")
     assert part.margin(x, 0) > 0

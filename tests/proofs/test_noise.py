@@ -51,10 +51,9 @@ def tilted_scene(throw=None):
 
 def require_rechecked(proof, tmp_path):
     report = ls.recheck(proof.save(tmp_path / "x.proof.zip"))
-    assert (report.verdict, report.reason) == ("proved", "")
-    assert {claim for claim, state, _ in report.claims if state == "proved"} == {
-        claim.claim for claim in proof.claims if claim.verdict == "proved"
-    }
+    written = {claim.claim: claim.verdict for claim in proof.claims if claim.written}
+    assert {claim: state for claim, state, _ in report.claims} == written
+    assert report.verdict == max(written.values(), key=("proved", "proved-on-cells").index)
 
 
 def require_thrown(proof, word="goal"):
@@ -123,7 +122,8 @@ def test_the_margin_of_the_landing_place_is_the_same_by_a_formula_and_by_reachab
 def test_the_landing_place_is_proved_below_its_margin_and_refuted_above(tmp_path):
     sharp = sharp_landing()
     proof = ls.certify("paper-designed", EVERYWHERE_INSIDE, noise={"landing.x": f"{0.97 * sharp:.6f} in"})
-    assert verdicts(proof) == dict.fromkeys(EVERYWHERE_INSIDE, "proved")
+    # the goal for the starts in some cells: from the middle of the arm, too, such landings can lose a part at the joint
+    assert verdicts(proof) == dict.fromkeys(EVERYWHERE_INSIDE, "proved") | {"goal": "proved-on-cells"}
     require_rechecked(proof, tmp_path)
     proof = ls.certify("paper-designed", ["goal"], noise={"landing.x": f"{1.02 * sharp:.6f} in"})
     assert verdicts(proof) == {"goal": "refuted"}

@@ -57,15 +57,12 @@ def test_a_fixed_point_that_attracts_and_never_meets_the_goal_is_seen():
     scene = ls.load(FOUR_GON)
     path = ls.orbit(scene.map, 274.8, 3, 200)
     assert path.x[-1] == pytest.approx(274.729, abs=1e-3)
-    open_at = []
-    for cells in (512, 1024, 2048, 4096):
+    for cells in (256, 1024, 4096):
         found = attraction_of(scene, cells)
         (there,) = found.cover.grid.index([274.729], 3)
-        if found.component[there] < 0:  # so coarse that the cells around it do not attract yet
-            assert found.basin.rank[there] == -1
-            open_at.append(cells)
+        # either the cell around it attracts, and the goal fails in it; or nothing is claimed of its starts
+        assert found.component[there] >= 0 or found.basin.rank[there] == -1
         assert asked.prove(found, scene, scene.goal).verdict != "proved"
-    assert open_at
     proof = ls.certify(scene, ["goal"])
     assert proof.claims[0].verdict == "refuted"
     assert proof.claims[0].starts == "almost-every"

@@ -236,9 +236,16 @@ def test_a_scene_in_the_units_of_other_workshops_is_rechecked(tmp_path, toleranc
 @pytest.mark.parametrize("model", [{}, {"model": {"flight": "exact"}}, {"model": {"flip": "energy"}}])
 def test_a_scene_that_leaves_its_model_to_the_defaults_is_rechecked(tmp_path, model):
     proof = ls.certify(ls.load(LEAD_QUAD | model), ["goal"])
-    assert proof.proved
+    (claim,) = proof.claims
+    assert claim.verdict == "proved-on-cells"  # 22 % of the starts leave the arm
     report = ls.recheck(proof.save(tmp_path / "quad.proof.zip"))
-    assert (report.verdict, report.reason) == ("proved", "")
+    assert report.verdict == "proved-on-cells"
+    rng = np.random.default_rng(4)
+    one, left = proof.scene, []
+    for side, foot in enumerate(one.sides.a):
+        ends = [ls.orbit(one.map, x, side, 300).stopped for x in rng.uniform(foot, one.arm_length, 500)]
+        left += [end in ("inward", "outward") for end in ends]
+    assert np.mean(left) >= claim.shares["leaves"] - 0.05
     flip = model.get("model", {}).get("flip", "signed")
     assert f"flight exact, flip {flip}" in report.relied_on[0]
 
@@ -251,6 +258,6 @@ def test_corners_and_masses_with_a_tolerance_are_rechecked(tmp_path):
         "part.mass.points[0].x": "1.2 mm",
     }
     proof = ls.certify(ls.load(LEAD_QUAD), ["goal"], tolerance=tolerance)
-    assert proof.proved
+    assert [claim.verdict for claim in proof.claims] == ["proved-on-cells"]  # some starts leave, as above
     report = ls.recheck(proof.save(tmp_path / "quad.proof.zip"))
-    assert (report.verdict, report.reason) == ("proved", "")
+    assert report.claims == [("goal", "proved-on-cells", "")]

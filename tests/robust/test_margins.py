@@ -140,15 +140,21 @@ def test_the_landing_place_agrees_with_the_throw_at_50_digits():
     (found,) = ls.margin("paper-designed", "landing.x")
     assert found.reading == "per-throw"
     assert found.proved < sharp < found.refuted
-    assert found.closed
+    assert found.refuted < 1.01 * sharp
+    # 0.07 in: beyond, the worst landings can lose starts from the middle of the arm, and the goal holds on cells only
+    assert not found.closed
+    assert "may leave the cells" in found.reason
 
 
 def test_a_deviation_that_never_breaks_the_goal_says_what_ends_it():
     """With a side 2 that is 21.5 % longer the part no longer rests on side 1: a_1 reaches its length."""
     (found,) = ls.margin("paper-designed", "part.sides[2]", width=0.05)
     assert found.refuted is None
-    assert "no such part" in found.reason
+    # before that starts next to the arm's end are thrown off it: then the goal is not one of every start
+    assert "may leave the cells" in found.reason
     scene = ls.load("paper-designed")
+    longer = scene.with_values({"part.sides[2]": 6.75 * 1.2127})
+    assert ls.orbit(longer.map, 28.0, 0, 1).stopped == "outward"
     scene.with_values({"part.sides[2]": 6.75 * (1 + found.proved / 100)})
     with pytest.raises(LimitsetsError):
         scene.with_values({"part.sides[2]": 6.75 * (1 + 1.06 * found.proved / 100)})

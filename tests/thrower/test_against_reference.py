@@ -208,8 +208,9 @@ def test_an_impact_beyond_a_full_turn_is_outside_the_model(flip: str) -> None:
 def test_starts_that_are_none(model: tuple[str, str], kappa: float) -> None:
     params = throw_map(**reference.paper("designed", flight=model[0], flip=model[1], kappa=kappa).numbers)
     for side in range(3):
-        starts = [params.a[side], params.a[side] - 1.0, 0.0, -5.0, -math.inf, math.nan, math.inf]
+        starts = [params.a[side], params.a[side] - 1.0, 0.0, -5.0, -math.inf, math.inf]
         assert (maps.images(params, starts, side).code == maps.OUTSIDE_MODEL).all()
+        assert maps.images(params, [math.nan], side).code == maps.UNDEFINED
 
 
 def test_the_second_pass() -> None:
