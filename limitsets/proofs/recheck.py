@@ -2603,7 +2603,8 @@ class Starts(NamedTuple):
     """For which starts a goal is claimed: "every", "almost-every", "from" (beyond x on each side) or "cells".
 
     `thinning`: rounds of it; `near`: factors and fixed points of starts below the first cells, where they are claimed;
-    `lost`: up to where, on each side, a worst sequence of landings takes a part to the joint.
+    `lost`: up to where, on each side, a worst sequence of landings takes a part to the joint; `only`: whether nothing
+    is claimed of other starts than those in the attracting cells.
     """
 
     kind: str
@@ -2611,10 +2612,14 @@ class Starts(NamedTuple):
     thinning: int = 0
     near: tuple[list[float], list[Pair | None]] | None = None
     lost: list[float] | None = None
+    only: bool = False
 
     def fixed(self, side: int) -> Pair | None:
         """Return the bracket of the jog's fixed point on a side, where one is named."""
         return None if self.near is None else self.near[1][side]
+
+
+ATTRACTING = Starts("cells", only=True)  # as in certificates of version 1
 
 
 def read_starts(section: dict[str, Any], goal: dict[str, Any], n_sides: int) -> Starts:
@@ -2633,9 +2638,9 @@ def read_starts(section: dict[str, Any], goal: dict[str, Any], n_sides: int) -> 
     lost = None
     if "lost" in section:
         lost = [hex_float(each, "lost") for each in by_side(section["lost"], "lost", n_sides)]
-    starts = Starts(kind, x, thinning, near, lost)
     anywhere = goal["anywhere"] and goal["kind"] != "attracts_all"  # which is of every start in any case
     almost = goal["kind"] == "reaches" and not goal["every"]
+    starts = Starts(kind, x, thinning, near, lost, only=almost and kind == "cells")
     points = [starts.fixed(i) for i in range(n_sides)]
     require(lost is None or kind in ("from", "cells"), f"starts {kind}: none of them are lost")
     if kind in ("every", "almost-every"):
@@ -2713,10 +2718,10 @@ def goal_of_scene(scene: dict[str, Any], n_sides: int) -> dict[str, Any] | None:
 
 def statement_of_goal(goal: dict[str, Any], noisy: bool) -> str:
     """Put a goal in words, `starts` being those for which it is proved."""
-    starts = goal["starts"] or Starts("every" if goal["all"] else "cells")
+    starts = goal["starts"] or (Starts("every") if goal["all"] else ATTRACTING)
     place = starts_in_words(starts, noisy)
     into = f"; into the attracting cells comes, and there stays, {place}"
-    if starts == Starts("cells"):  # a certificate of version 1: of others nothing is said
+    if starts.only:
         place, into = "every start in the attracting cells", ""
     if goal["anywhere"]:
         into = ""
@@ -2786,6 +2791,8 @@ def check_starts(c: Cells, scene: Scene, goal: dict[str, Any], starts: Starts) -
     to lower ranks, while each jog from it moves the part one way by more than the landing scatters.  What is left, Z,
     has to thin out, rank by rank; and starts of length zero have to come from starts of length zero only.
     """
+    if starts.only:
+        return ""
     inside, claimed = c.component >= 0, c.rank >= 0
     near, almost = starts.near, goal["kind"] == "reaches" and not goal["every"]
     if goal["kind"] == "attracts_all" and near is not None and any(near[1]):
@@ -2942,7 +2949,7 @@ def shares(c: Cells, scene: Scene, starts: Starts, cells: Array) -> tuple[float,
         since = -math.inf if starts.x is None else starts.x[i]
         own = cells[c.start[i] : c.start[i + 1]]
         claimed += float(np.clip(edges[1:] - np.maximum(edges[:-1], since), 0.0, None)[own].sum())
-        if starts.near is not None:
+        if starts.near is not None and not starts.only:
             claimed += max(0.0, float(edges[0]) - max(begin if fixed is None else fixed[1], since))
         until = fixed[0] if fixed is not None else begin if starts.lost is None else starts.lost[i]
         explained += max(0.0, min(until, end) - begin)
@@ -3588,9 +3595,9 @@ MOST_OPEN = 0.01  # of the arm may be open where a goal is proved from some x on
 def first_version_starts(scene: Scene, c: Cells, claims: dict[str, dict[str, Any]]) -> None:
     """Find for which starts a goal of version 1 is proved: "attracts-all" in the same file brings them to the cells."""
     goal, attracts = claims.get("goal"), claims.get("attracts-all")
-    if goal is None or goal.get("found") == Starts("cells"):
+    if goal is None or goal.get("found") == ATTRACTING:
         return
-    found = Starts("every" if goal["all"] else "cells")
+    found = Starts("every") if goal["all"] else ATTRACTING
     if attracts is not None and not goal["all"]:
         fixed = attracts["fixed"]
         found = Starts("every", near=(attracts["q"], fixed))
@@ -3598,16 +3605,16 @@ def first_version_starts(scene: Scene, c: Cells, claims: dict[str, dict[str, Any
             found = found._replace(kind="from", x=[point[1] for point in fixed])
         almost = goal["kind"] == "reaches" and not goal["every"]
         if almost and check_null(c, scene, c.component < 0, not any(fixed)):
-            found = Starts("cells")
+            found = ATTRACTING
     goal["found"] = found
 
 
 def tell_starts(report: Report, goal: dict[str, Any], scenes: list[Scene], cells: list[Cells]) -> None:
     """Fill in for which starts the goal is proved, and how much of the arm they are: the least of all boxes."""
-    goal["starts"] = starts = goal["starts"] or goal.get("found") or Starts("cells")
+    goal["starts"] = starts = goal["starts"] or goal.get("found") or ATTRACTING
     both = []
     for scene, c in zip(scenes, cells, strict=True):
-        some = c.component >= 0 if starts == Starts("cells") else c.rank >= 0
+        some = c.component >= 0 if starts.only else c.rank >= 0
         both.append(shares(c, scene, starts, some))
     beyond = None if starts.x is None else {str(i): x for i, x in enumerate(starts.x)}
     report.starts = starts.kind if beyond is None else {"from": beyond}

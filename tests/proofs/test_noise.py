@@ -53,7 +53,7 @@ def require_rechecked(proof, tmp_path):
     report = ls.recheck(proof.save(tmp_path / "x.proof.zip"))
     written = {claim.claim: claim.verdict for claim in proof.claims if claim.written}
     assert {claim: state for claim, state, _ in report.claims} == written
-    assert report.verdict == max(written.values(), key=("proved", "proved-on-cells").index)
+    assert report.verdict == max(written.values(), key=("proved", "proved-on-cells").index), report.reason
 
 
 def require_thrown(proof, word="goal"):

@@ -547,6 +547,6 @@ def test_the_impact_is_bracketed_next_to_the_joint():
             low, high = (checker.beside_root(s, x, scene.k_lo, before) for before in (True, False))
             assert checker.flight(x, scene.k_lo, low) > 0
             assert checker.flight(x, scene.k_lo, high) < 0
-            assert high.p - low.p < low.p * arb(2) ** -40
+            assert high.p - low.p < low.p * arb(2) ** -20
             tried += 1
     assert tried > 40

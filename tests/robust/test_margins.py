@@ -140,7 +140,7 @@ def test_the_landing_place_agrees_with_the_throw_at_50_digits():
     (found,) = ls.margin("paper-designed", "landing.x")
     assert found.reading == "per-throw"
     assert found.proved < sharp < found.refuted
-    assert found.refuted < 1.01 * sharp
+    assert found.refuted < 1.02 * sharp
     # 0.07 in: beyond, the worst landings can lose starts from the middle of the arm, and the goal holds on cells only
     assert not found.closed
     assert "may leave the cells" in found.reason

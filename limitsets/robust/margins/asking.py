@@ -5,6 +5,7 @@ Cells are made fine where it pays: first some hundreds of them a side, then bord
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
@@ -130,6 +131,11 @@ class Question:
         except AnswerError as error:
             return Asked("impossible", _said(error), piece=piece, noise=noise)
         reason = missing.reason
+        if missing.verdict == "proved-on-cells":
+            share = 100.0 * missing.shares["share"]
+            reason = (
+                f"the goal is proved for {math.floor(10.0 * share) / 10.0:g} % of the starts only: {reason}"
+            )
         if not (found.component >= 0).any():
             reason = f"{reason}: from some of them, parts may leave the arm"
         return Asked("undecided", reason, found, piece=piece, noise=noise)

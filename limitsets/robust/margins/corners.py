@@ -25,7 +25,7 @@ def at_corners(
         if own is not None and (bad is None or own < bad):
             bad, against = own, by
         reason = reason or why
-    return good_all or Fraction(0), bad, against, "" if bad is not None else reason
+    return good_all or Fraction(0), bad, against, reason
 
 
 def _at_one(
@@ -58,6 +58,10 @@ def _at_one(
     for k in range(10):
         if refutes(rounded(top * (1 + Fraction(2**k - 1, 400)))):
             break
+    low = top  # what is not proved need not fail: it may hold for fewer starts than all
+    while bad is not None and bad - low > width * bad:
+        middle = rounded((low + bad) / 2)
+        low = low if refutes(middle) else middle
     return good, bad, against, reason
 
 
