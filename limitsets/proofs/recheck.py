@@ -3597,13 +3597,14 @@ def first_version_starts(scene: Scene, c: Cells, claims: dict[str, dict[str, Any
     goal, attracts = claims.get("goal"), claims.get("attracts-all")
     if goal is None or goal.get("found") == ATTRACTING:
         return
-    found = Starts("every") if goal["all"] else ATTRACTING
+    almost = goal["kind"] == "reaches" and not goal["every"]
+    every = Starts("almost-every" if almost else "every")
+    found = every if goal["all"] else ATTRACTING
     if attracts is not None and not goal["all"]:
         fixed = attracts["fixed"]
-        found = Starts("every", near=(attracts["q"], fixed))
+        found = every._replace(near=(attracts["q"], fixed))
         if None not in fixed:
             found = found._replace(kind="from", x=[point[1] for point in fixed])
-        almost = goal["kind"] == "reaches" and not goal["every"]
         if almost and check_null(c, scene, c.component < 0, not any(fixed)):
             found = ATTRACTING
     goal["found"] = found

@@ -24,9 +24,15 @@ def with_goal(good, section, **header):
     """The goal alone, claimed of every start unless it says another thing."""
     f = good.copy()
     own = {key: f.header["claims"][4]["section"][key] for key in ("starts", "near_joint")}
+    own["starts"] = of_every(section)
     f.header["claims"] = [{"claim": "goal", "section": own | section}]
     f.header |= header
     return f
+
+
+def of_every(section):
+    """Word for a goal of every start, which is of almost every one where it speaks of almost every orbit."""
+    return "almost-every" if section.get("every_orbit") is False else "every"
 
 
 def reaches(x, every, throws, **more):
@@ -56,7 +62,13 @@ def test_a_right_goal_is_proved(good, tmp_path, section):
     assert (report.verdict, report.reason) == ("proved", "")
     assert report.claims == [("goal", "proved", "")]
     assert "every start a_i < x <= arm.length" in report.statement[0]
-    assert (report.starts, report.share, report.open) == ("every", 1.0, 0.0)
+    assert (report.starts, report.share, report.open) == (of_every(section), 1.0, 0.0)
+
+
+def test_almost_every_orbit_is_no_matter_of_every_start(good, tmp_path):
+    for more in ({}, ANYWHERE):
+        report = verdict(with_goal(good, reaches(21, False, 400) | more | {"starts": "every"}), tmp_path)
+        assert report.verdict == "bad file"
 
 
 @pytest.mark.parametrize("section", TRUE, ids=str)
@@ -67,11 +79,11 @@ def test_a_goal_of_the_first_version_is_of_every_start_if_these_are_attracted(go
     report = verdict(old, tmp_path)
     everywhere = section.get("from_anywhere") or section["kind"] == "attracts_all"
     assert report.verdict == ("proved" if everywhere else "proved-on-cells")
-    assert report.starts == ("every" if everywhere else "cells")
+    assert report.starts == (of_every(section) if everywhere else "cells")
     assert 0.2 < report.share <= 1.0
     old.header["claims"].append(attracts)
     report = verdict(old, tmp_path)
-    assert (report.verdict, report.reason, report.starts) == ("proved", "", "every")
+    assert (report.verdict, report.reason, report.starts) == ("proved", "", of_every(section))
     old.arrays["0.rank"][np.argmax(old.arrays["0.rank"])] = 0
     report = verdict(old.seal(), tmp_path)
     assert report.verdict == "failed"
