@@ -203,6 +203,7 @@ def proved_goal(
         found.doubts.append("proved-on-cells without a certificate: the cells are not known")
         return
     thinned = claim.get("starts") in (None, "almost-every") or "thinning" in section
+    thinned |= goal.get("reaches", {}).get("every_orbit") is False  # which speaks of almost every orbit
     least = min(int(section.get("throws") or 0) + 1, 20_000)
     least = max(least, min(int(section.get("jogs") or 0) + 2, 20_000))
     for each in within if not thinned else []:

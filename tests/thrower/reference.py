@@ -50,6 +50,7 @@ def roots_in_turn(facts: Facts, side: int, x: float) -> int:
     return int(np.count_nonzero(over[1:] != over[:-1]))
 
 
+@mp.workdps(50)  # whatever the module imported last has set
 def impact(facts: Facts, side: int, x: float) -> mpf | None:
     """Return the smallest positive root within a full turn, None where there is none."""
     a, d, kappa, at = facts.a[side], facts.d[side], facts.kappa, mpf(x)
@@ -125,6 +126,7 @@ def land(facts: Facts, side: int, x: mpf, phi: mpf, flips: bool) -> mpf:
     return vertex - (facts.length[after] - facts.a[after]) if flips else vertex + a
 
 
+@mp.workdps(50)  # whatever the module imported last has set
 def throw(facts: Facts, side: int, x: float) -> Throw | None:
     """Throw once; None outside the model."""
     phi = impact(facts, side, x)
