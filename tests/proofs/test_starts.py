@@ -18,6 +18,7 @@ from limitsets.proofs.attraction import attraction
 from limitsets.proofs.certify import Claim, weakest_of
 from limitsets.proofs.cover import Cover, cover
 from limitsets.proofs.parameters import parameter_box
+from limitsets.proofs.thinning import thinned
 
 FOUR_GON = {
     "name": "four-gon",
@@ -207,3 +208,12 @@ def test_pieces_of_a_tolerance_claim_the_fewest_starts():
     assert joined.section["lost"] == {"0": (1.8).hex()}
     assert "near_joint" not in joined.section
     assert joined.shares["share"] == 0.8
+
+
+def test_starts_next_to_a_fixed_point_that_attracts_do_not_thin_out():
+    found = attraction_of(ls.load(FOUR_GON), 256)
+    (there,) = found.cover.grid.index([274.729], 3)
+    cells = np.arange(found.component.size) == there  # its jogs stay in it, with slope 0.519
+    result = thinned(found.cover, cells)
+    assert result.thick[there]
+    assert result.reason
