@@ -374,9 +374,9 @@ class Side:
     hd: Arb = ZERO  # h + d
     landing: Arb = ZERO  # a part lands within this of where the throw would put it
     over_2m: Arb = ZERO
-    floats: tuple[float, float, float] = (0.0, 0.0, 0.0)  # a, d, small_d: for guesses only
-    early: tuple[float, float, float] = (0.0, 0.0, 0.0)  # those of the earliest impact, and of the latest
-    late: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    floats: tuple[float, ...] = (0.0, 0.0, 0.0, 0.0)  # a, d, small_d, a past half a turn: for guesses only
+    early: tuple[float, ...] = (0.0, 0.0, 0.0, 0.0)  # those of the earliest impact, and of the latest: f has -a sin p,
+    late: tuple[float, ...] = (0.0, 0.0, 0.0, 0.0)  # so that a large a hastens it up to p = pi and delays it from there
 
 
 @dataclass(slots=True)
@@ -501,9 +501,10 @@ def read_scene(raw: object, noise: object) -> Scene:
         side.landing = scatter
         side.small_d = side.d if model["flight"] == "small-angle-2" else ZERO
         side.concave = bool(k_lo > side.ell) or not side.exact
-        side.floats = (float(side.a.mid()), float(side.d.mid()), float(side.small_d.mid()))
-        side.early = (float(side.a.upper()), float(side.d.lower()), float(side.small_d.lower()))
-        side.late = (float(side.a.lower()), float(side.d.upper()), float(side.small_d.upper()))
+        a_lo, a, a_hi = (float(end) for end in (side.a.lower(), side.a.mid(), side.a.upper()))
+        side.floats = (a, float(side.d.mid()), float(side.small_d.mid()), a)
+        side.early = (a_hi, float(side.d.lower()), float(side.small_d.lower()), a_lo)
+        side.late = (a_lo, float(side.d.upper()), float(side.small_d.upper()), a_hi)
         require(bool(k_lo > side.small_d), "small-angle-2 needs kappa > d")
     ends = reach.lo / unit, reach.hi / unit
     whole = Scene(sides, k_lo, k_hi, rho, ends, reach.unit, scene, noise)
@@ -987,16 +988,17 @@ def positive_until(s: Side, x: Arb, kappa: Arb, end: Angle) -> bool:
 SLACKS = (2.0**-40, 2.0**-26)
 
 
-def guess_root(floats: tuple[float, float, float], exact: bool, x: float, kappa: float, p: float) -> float:
+def guess_root(floats: tuple[float, ...], exact: bool, x: float, kappa: float, p: float) -> float:
     """Newton in floats from p; believed by nobody."""
-    a, d, small = floats
+    first_a, d, small, a_past = floats
     if not exact:
-        return 2.0 * (x - a) / (kappa - small)
+        return 2.0 * (x - first_a) / (kappa - small)
     last = math.inf
     for k in range(
         100
     ):  # next to the joint the angle is far smaller than where it begins, and is halved at first
         sin, cos = math.sin(p), math.cos(p)
+        a = first_a if sin > 0 else a_past
         slope = x - a * cos + d * sin - kappa * p
         if slope >= 0.0:
             return math.nan
@@ -1558,7 +1560,7 @@ def beside_root(s: Side, x: Arb, kappa: Arb, before: bool) -> Angle:
         p = p.lower() if before else p.upper()
         prove(bool(p > 0 and p < FULL_TURN), "the impact is not within a turn")
         return at_angle(s, p)
-    a, d, _ = s.floats
+    a, d, _, _ = s.floats
     x0, k = float(x), float(kappa)
     right = (x0 + math.sqrt(x0 * x0 + 2 * k * (d + math.hypot(a, d)))) / k  # f < 0 there
     p = arb(guess_root(s.floats, s.exact, x0, k, right) if 0 < right < 1e3 else math.nan)

@@ -98,3 +98,58 @@ def test_a_margin_that_is_denied_is_undecided(tmp_path, wrong):
     assert [file.name.split(".", 1)[1] for file in files] == ["refuted.zip"]
     assert "denied" in left.reason
     assert {path.name.split(".", 1)[1] for path in tmp_path.iterdir()} == {"denied.zip", "refuted.zip"}
+
+
+# ------------------------------------------------------------------- an impact later than half a turn, with a tolerance
+
+LATE = {
+    "flips by energy": {
+        "part": {
+            "sides": ["2.45841 in", "1.92018 in", "1.99109 in"],
+            "mass": {
+                "center": {"side": 0, "along": "1.12022 in", "above": "0.631575 in"},
+                "radius_of_gyration": "0.428394 in",
+            },
+        },
+        "arm": {"surface_height": "-0.071355 in", "length": "17.661 in"},
+        "gravity": {"tilt": "73.0 deg"},
+        "throw": {"speed": "374.4 deg/s"},
+        "model": {"flight": "exact", "flip": "energy"},
+        "tolerance": {"part.mass.center.above": "0.1695 %"},
+    },
+    "a heavy point": {
+        "part": {
+            "vertices": [
+                ["0.864742 cm", "0.983764 cm"],
+                ["-1.33843 cm", "-1.02662 cm"],
+                ["0.887191 cm", "-2.9061 cm"],
+                ["2.40741 cm", "-1.49521 cm"],
+            ],
+            "mass": {
+                "plate_density": "3 kg/m^2",
+                "points": [
+                    {"x": "0.675821 cm", "y": "-1.33623 cm", "mass": "0.001349 lb"},
+                    {"x": "-0.345433 cm", "y": "-0.984184 cm", "mass": "0.0004335 kg"},
+                    {"x": "0.362217 cm", "y": "-0.532232 cm", "mass": "0.001205 kg"},
+                ],
+            },
+        },
+        "arm": {"surface_height": "-0.50786 cm", "length": "597.79 mm"},
+        "throw": {"kappa": "303.974 mm"},
+        "model": {"flight": "exact", "flip": "signed"},
+        "tolerance": {"part.mass.points[2].mass": "0.0643 %"},
+    },
+}
+
+
+@pytest.mark.parametrize("which", LATE)
+def test_an_impact_after_half_a_turn_is_bracketed_as_closely_as_one_before(tmp_path, which):
+    """f has -a sin(p): past half a turn a large a delays the impact, and both guesses stood on the wrong side of it."""
+    scene = dict(LATE[which])
+    tolerance = scene.pop("tolerance")
+    proof = ls.certify(ls.load(scene), ["attracts-all"], tolerance=tolerance)
+    assert proof.proved
+    cells = sum(len(found.component) for found in proof.attractions)
+    report = ls.recheck(proof.save(tmp_path / "x.proof.zip", recheck=False))
+    assert (report.verdict, report.reason) == ("proved", "")
+    assert report.boxes < 2 * cells
