@@ -76,7 +76,7 @@ def mass_of(
         across_x, across_y = ux - vx, uy - vy
         squares = ux * ux + uy * uy + vx * vx + vy * vy + across_x * across_x + across_y * across_y
         pieces.append((mass, (ux + vx) / 3, (uy + vy) / 3, mass * squares / 36))
-    pieces += [(mass, x - origin_x, y - origin_y, mass - mass) for x, y, mass in points]
+    pieces += [(mass, x - origin_x, y - origin_y, 0 * mass) for x, y, mass in points]
     total = _sum([mass for mass, _, _, _ in pieces])
     x = _sum([mass * px for mass, px, _, _ in pieces]) / total
     y = _sum([mass * py for mass, _, py, _ in pieces]) / total

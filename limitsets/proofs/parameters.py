@@ -191,8 +191,7 @@ class _Reader:
         """As `body`, but narrower where several of its numbers are known to a tolerance only."""
         plain, radius = self.body()
         # pairs of texts are what has a tolerance
-        wide = [name for name, text in texts(self.tree["part"], "part") if isinstance(text, list)]
-        names = [name for name in wide if find(name).dimension == "length"]
+        names = [name for name, text in texts(self.tree["part"], "part") if isinstance(text, list)]
         if not names:
             return plain, radius
         box = [self.span(name) for name in names]

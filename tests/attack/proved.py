@@ -94,7 +94,7 @@ def settle(goal: dict[str, Any], within: Range, x: Any, i: Any, rng: Any, style:
     bad = np.arange(orbits.x.size)
     code, at, side = np.zeros(orbits.x.size, dtype=int), orbits.x.copy(), orbits.i.copy()
     many = style == 4
-    windows = (200, 500, 2000) if many else (500, 1000, 4000, 16000)
+    windows = (200, 500, 2000, 8000) if many else (500, 1000, 4000, 16000)
     for window in windows:
         window = max(window, least)
         if not anywhere:

@@ -263,3 +263,47 @@ def test_corners_and_masses_with_a_tolerance_are_rechecked(tmp_path):
     report = ls.recheck(proof.save(tmp_path / "quad.proof.zip"))
     assert report.verdict == "proved-on-cells"
     assert report.share == pytest.approx(proof.claims[0].shares["share"], abs=1e-3)
+
+
+def heavy(part, mass):
+    """A quadrilateral in metres with one point of that mass [kg]: the moments are of the order of 1e-8 kg m^2."""
+    tree = copy.deepcopy(part)
+    tree["part"]["mass"]["points"][0]["mass"] = f"{mass!r} kg"
+    return ls.load(tree)
+
+
+def test_a_mass_known_to_a_tolerance_widens_the_part_by_what_it_moves(tmp_path):
+    """The radius of gyration was enclosed from 0 on: a span of masses less itself stood for a moment of 0."""
+    part = {
+        "part": {
+            "vertices": [
+                ["0.00258 m", "0.00511 m"], ["-0.00415 m", "0.0012 m"],
+                ["-0.00066 m", "-0.00763 m"], ["0.00529 m", "-0.00786 m"],
+            ],
+            "mass": {
+                "plate_density": "5 kg/m^2",
+                "points": [{"x": "0.00204 m", "y": "-0.00142 m", "mass": "0.00033 kg"}],
+            },
+        },
+        "arm": {"surface_height": "-0.00031 m", "length": "0.088 m"},
+        "throw": {"kappa": "0.045 m"},
+    }  # fmt: skip
+    masses = 0.00033 + 1e-6 * np.linspace(-1, 1, 41)
+    scenes = [heavy(part, float(mass)) for mass in masses]
+    numbers = np.array([[*s.sides.a, *s.sides.d, s.map.radius_of_gyration] for s in scenes])
+    tree = copy.deepcopy(part)
+    tree["part"]["mass"]["points"][0]["mass"] = ["0.000329 kg", "0.000331 kg"]
+    lo, hi = parameter_box(scenes[20], tree=tree).bare
+    wide = np.array(
+        [
+            *(hi.a - lo.a),
+            *(hi.d - lo.d),
+            hi.radius_of_gyration - lo.radius_of_gyration,
+        ]
+    )
+    assert (wide >= np.ptp(numbers, axis=0) - 1e-15).all()
+    moved = np.ptp(numbers, axis=0)
+    assert (wide <= 1.05 * moved + 0.05 * moved.max()).all()
+    proof = ls.certify(scenes[20], ["invariant"], tolerance={"part.mass.points[0].mass": "0.000001 kg"})
+    assert proof.proved
+    assert ls.recheck(proof.save(tmp_path / "x.proof.zip", recheck=False)).verdict == "proved"
