@@ -574,24 +574,31 @@ class Rising:
     __radd__, __rmul__ = __add__, __mul__
 
 
+def ends_of(value: object, where: str, unit: Fraction) -> tuple[Fraction, Fraction]:
+    """Read a length of the part in the scene's unit, or a mass in kg: its least and its largest value."""
+    kind, by = ("mass", Fraction(1)) if where.endswith(".mass") else ("length", unit)
+    q = quantity(value, kind, where)
+    return q.lo / by, q.hi / by
+
+
 def narrow_part(part: object, unit: Fraction) -> tuple[list[tuple[Any, ...]], Arb]:
     """Enclose (a_i, d_i, L_i, a_i + L_next - a_next) of every side, and rho.
 
-    Where lengths are intervals a formula that names one of them twice is too wide: f(c) + f'(box) (q - c) is narrower.
+    Where lengths or masses are intervals a formula that names one of them twice is too wide: f(c) + f'(box) (q - c) is
+    narrower.
     """
 
-    def length(value: object, where: str) -> Arb:
-        q = quantity(value, "length", where)
-        return span(q.lo / unit, q.hi / unit)
+    def plain(value: object, where: str) -> Arb:
+        return span(*ends_of(value, where, unit))
 
-    plain_rests, rho = read_part(part, unit, length)
+    plain_rests, rho = read_part(part, unit, plain)
     wide: dict[int, tuple[int, Fraction, Fraction]] = {}
 
     def look(value: object, where: str) -> Arb:
-        q = quantity(value, "length", where)
-        if q.lo < q.hi:
-            wide.setdefault(id(value), (len(wide), q.lo / unit, q.hi / unit))
-        return length(value, where)
+        lo, hi = ends_of(value, where, unit)
+        if lo < hi:
+            wide.setdefault(id(value), (len(wide), lo, hi))
+        return span(lo, hi)
 
     read_part(part, unit, look)
     if not wide:
@@ -599,12 +606,12 @@ def narrow_part(part: object, unit: Fraction) -> tuple[list[tuple[Any, ...]], Ar
 
     def middle(value: object, where: str) -> Arb:
         known = wide.get(id(value))
-        return length(value, where) if known is None else exact((known[1] + known[2]) / 2)
+        return plain(value, where) if known is None else exact((known[1] + known[2]) / 2)
 
     def rising(value: object, where: str) -> Any:
         known = wide.get(id(value))
         own = None if known is None else known[0]
-        return Rising(length(value, where), [ONE if k == own else ZERO for k in range(len(wide))])
+        return Rising(plain(value, where), [ONE if k == own else ZERO for k in range(len(wide))])
 
     centre, rho_centre = read_part(part, unit, middle)
     steep, rho_steep = read_part(part, unit, rising)
@@ -626,26 +633,26 @@ def narrow_part(part: object, unit: Fraction) -> tuple[list[tuple[Any, ...]], Ar
 
 
 def read_part(
-    part: Any, unit: Fraction, length: Callable[[object, str], Any]
+    part: Any, unit: Fraction, read: Callable[[object, str], Any]
 ) -> tuple[list[tuple[Any, ...]], Any]:
-    """Compute (a_i, d_i, L_i, a_i + L_next - a_next) of every side, and rho, in whatever arithmetic `length` gives."""
-    vertices = read_polygon(part, length)
+    """Compute (a_i, d_i, L_i, a_i + L_next - a_next) of every side, and rho, in whatever arithmetic `read` gives."""
+    vertices = read_polygon(part, read)
     n = len(vertices)
     mass = part["mass"]
     if "plate_density" in mass:
         table(mass, "part.mass", "plate_density", "plate_thickness points")
-        start, rho2 = read_plate(mass, vertices, unit, length)
+        start, rho2 = read_plate(mass, vertices, unit, read)
         (ex, ey), along, above, rho, own = (ONE, ZERO), ZERO, ZERO, rho2.sqrt(), -1
     else:
         table(mass, "part.mass", "center radius_of_gyration")
         center = table(mass["center"], "part.mass.center", "side along above")
         fits = type(center["side"]) is int and 0 <= center["side"] < n
         require(fits, "part.mass.center.side is not a side")
-        along = length(center["along"], "part.mass.center.along")
-        above = length(center["above"], "part.mass.center.above")
+        along = read(center["along"], "part.mass.center.along")
+        above = read(center["above"], "part.mass.center.above")
         own = center["side"]
         start, (ex, ey), _ = side_frame(vertices, own)
-        rho = length(mass["radius_of_gyration"], "part.mass.radius_of_gyration")
+        rho = read(mass["radius_of_gyration"], "part.mass.radius_of_gyration")
     rests = []
     for i in range(n):
         (px, py), (ux, uy), long = side_frame(vertices, i)
@@ -655,13 +662,13 @@ def read_part(
         d = ux * y - uy * x + along * across_e + above * with_e
         # what stands in the scene is narrower than what is computed, where something is known to a tolerance only
         a, d = (along, above) if i == own else (a, d)
-        long = length(part["sides"][i], "part.sides") if "sides" in part else long
+        long = read(part["sides"][i], "part.sides") if "sides" in part else long
         rests.append((a, d, long))
     after = rests[1:] + rests[:1]
     return [(a, d, long, a + ll - aa) for (a, d, long), (aa, _, ll) in zip(rests, after, strict=True)], rho
 
 
-def read_polygon(part: object, length: Callable[[object, str], Arb]) -> list[tuple[Arb, Arb]]:
+def read_polygon(part: object, read: Callable[[object, str], Any]) -> list[tuple[Arb, Arb]]:
     """Read the vertices, counterclockwise; side i goes from vertex -i to vertex 1 - i (mod their number).
 
     So side 0 is the edge from vertex 0 to vertex 1, and the left vertex of side i is the right vertex of side i+1.
@@ -671,7 +678,7 @@ def read_polygon(part: object, length: Callable[[object, str], Arb]) -> list[tup
     require(isinstance(keys["mass"], dict), "part.mass is not an object")
     if "sides" in keys:
         three = rows(keys["sides"], "part.sides", 3, 3)
-        base, left, right = (length(q, f"part.sides[{i}]") for i, q in enumerate(three))
+        base, left, right = (read(q, f"part.sides[{i}]") for i, q in enumerate(three))
         x = (base**2 + left**2 - right**2) / (2 * base)
         y2 = left**2 - x**2
         positive = all(bool(q > 0) for q in (base, left, right, y2))
@@ -679,7 +686,7 @@ def read_polygon(part: object, length: Callable[[object, str], Arb]) -> list[tup
         vertices = [(ZERO, ZERO), (base, ZERO), (x, y2.sqrt())]
     else:
         pairs = [rows(v, "a vertex", 2, 2) for v in rows(keys["vertices"], "part.vertices", 3, 64)]
-        vertices = [(length(x, "part.vertices"), length(y, "part.vertices")) for x, y in pairs]
+        vertices = [(read(x, "part.vertices"), read(y, "part.vertices")) for x, y in pairs]
     n = len(vertices)
     for k in range(n):
         (px, py), (ex, ey), _ = side_frame(vertices, -k)
@@ -702,7 +709,7 @@ def read_plate(
     mass: dict[str, Any],
     vertices: list[tuple[Arb, Arb]],
     unit: Fraction,
-    length: Callable[[object, str], Arb],
+    read: Callable[[object, str], Any],
 ) -> tuple[tuple[Arb, Arb], Arb]:
     """Compute centre of mass and squared radius of gyration of a uniform plate with points of mass on it."""
     area = sx = sy = second = ZERO
@@ -722,10 +729,9 @@ def read_plate(
     total, sx, sy, second = weight * area, weight * sx, weight * sy, weight * second
     for point in rows(mass.get("points", []), "part.mass.points", 0, 1000):
         table(point, "part.mass.points", "x y mass")
-        x, y = (length(point[key], f"part.mass.points.{key}") for key in "xy")
-        m = quantity(point["mass"], "mass", "part.mass.points.mass")
-        require(m.lo > 0, "a mass is not positive")
-        w = m.ball()
+        x, y = (read(point[key], f"part.mass.points.{key}") for key in "xy")
+        w = read(point["mass"], "part.mass.points.mass")
+        require(w > 0, "a mass is not positive")
         total, sx, sy, second = total + w, sx + w * x, sy + w * y, second + w * (x**2 + y**2)
     require(density.lo > 0 and bool(total > 0), "a mass is not positive")
     return (sx / total, sy / total), second / total - (sx / total) ** 2 - (sy / total) ** 2
@@ -3029,10 +3035,10 @@ def read_lengths(part: object, unit: Fraction) -> list[tuple[int, str, Arb]]:
     found: dict[int, tuple[int, str, Arb]] = {}
 
     def look(value: object, where: str) -> Arb:
-        q = quantity(value, "length", where)
-        if q.lo < q.hi:
-            found.setdefault(id(value), (id(value), where, span(q.lo / unit, q.hi / unit)))
-        return span(q.lo / unit, q.hi / unit)
+        lo, hi = ends_of(value, where, unit)
+        if lo < hi and not where.endswith(".mass"):
+            found.setdefault(id(value), (id(value), where, span(lo, hi)))
+        return span(lo, hi)
 
     read_part(part, unit, look)
     return list(found.values())
@@ -3073,11 +3079,10 @@ def two_throws(scene: Scene, kind: Two, lengths: list[int], v: list[Any]) -> lis
     known = dict(zip(lengths, v[MORE:], strict=True))
     unit = LENGTHS[scene.unit]
 
-    def length(value: object, where: str) -> Any:
-        q = quantity(value, "length", where)
-        return known.get(id(value), span(q.lo / unit, q.hi / unit))
+    def read(value: object, where: str) -> Any:
+        return known.get(id(value), span(*ends_of(value, where, unit)))
 
-    rests, rho = read_part(scene.raw["part"], unit, length)
+    rests, rho = read_part(scene.raw["part"], unit, read)
     begin, then = rests[kind.side], rests[(kind.side + kind.first) % len(rests)]
     _, mid, m = by_angle(scene, begin, rho, v[KAPPA], v[HEIGHT], v[P])
     start, end, n = by_angle(scene, then, rho, v[KAPPA], v[HEIGHT], v[R])
