@@ -375,8 +375,18 @@ class Side:
     landing: Arb = ZERO  # a part lands within this of where the throw would put it
     over_2m: Arb = ZERO
     floats: tuple[float, ...] = (0.0, 0.0, 0.0, 0.0)  # a, d, small_d, a past half a turn: for guesses only
-    early: tuple[float, ...] = (0.0, 0.0, 0.0, 0.0)  # those of the earliest impact, and of the latest: f has -a sin p,
-    late: tuple[float, ...] = (0.0, 0.0, 0.0, 0.0)  # so that a large a hastens it up to p = pi and delays it from there
+    early: tuple[float, ...] = (
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+    )  # those of the earliest impact, and of the latest: f has -a sin p,
+    late: tuple[float, ...] = (
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+    )  # so that a large a hastens it up to p = pi and delays it from there
 
 
 @dataclass(slots=True)
