@@ -111,6 +111,8 @@ def refuted(found: Verdict, claim: dict[str, Any], within: list[Range]) -> None:
     recurs = claim.get("recurs") or {}
     points = [(mpf(state["x"]), state["side"]) for state in states]
     flips = sum(p[1] != q[1] for p, q in pairwise(points))
+    if "thinning" in recurs:
+        again_and_again(found, goal, within, word)
     if "cycle" in recurs:
         points, flips = cycle(found, claim, recurs["cycle"], facts, word)
     elif "component" in recurs:
@@ -158,6 +160,23 @@ def component(
         move(orbits, within[0], 2000, rng, style)
         if not wrong(goal, within[0].facts, orbits, 2000).all():
             found.fault(f"{word}: orbits from the cells that never get there do get there (noise {style})")
+
+
+def again_and_again(found: Verdict, goal: dict[str, Any], within: list[Range], word: str) -> None:
+    """Refuted by almost every orbit of some cells: of starts spread over the arm some must go on violating the goal."""
+    rng = np.random.default_rng(found.case.seed)
+    numbers = within[0].facts.floats()
+    i = rng.integers(0, numbers[0].size, 500)
+    x = numbers[0][i] + (numbers[6] - numbers[0][i]) * rng.random(500)
+    for style in (0, 1, 4) if within[0].noisy else (-1,):
+        orbits = Orbits(numbers, x, i)
+        move(orbits, within[0], 2000, rng, style)
+        orbits.look()
+        move(orbits, within[0], 2000, rng, style)
+        if not (wrong(goal, within[0].facts, orbits, 2000) & (orbits.code >= 0)).any():
+            found.fault(
+                f"{word} by almost every orbit of a component, but no orbit is seen to (noise {style})"
+            )
 
 
 def _before(states: list[dict[str, Any]]) -> dict[str, Any]:
@@ -214,8 +233,7 @@ def cycle(
     bounds = sorted(map(number, told["multiplier"]))
     if not bounds[0] - mpf("1e-6") * abs(slope) <= slope <= bounds[1] + mpf("1e-6") * abs(slope):
         found.fault(f"{word}: multiplier {mp.nstr(slope, 17)} is not in {told['multiplier']}")
-    if bool(told.get("attracts")) != (abs(slope) < 1) or (claim.get("starts") == "almost-every") != (
-        abs(slope) < 1
-    ):
+    almost = claim.get("starts") == "almost-every" and "thinning" not in claim["recurs"]
+    if bool(told.get("attracts")) != (abs(slope) < 1) or almost > (abs(slope) < 1):
         found.fault(f"{word}: multiplier {mp.nstr(slope, 10)}, attracts: {told.get('attracts')}")
     return points, sum(codes)

@@ -10,6 +10,7 @@ import json
 import zipfile
 from itertools import pairwise
 
+import numpy as np
 import pytest
 from mpmath import mpf
 
@@ -19,6 +20,8 @@ from limitsets.proofs.asked.recurring import closed
 from limitsets.proofs.asked.search import Choice, Path
 from limitsets.proofs.parameters import parameter_box
 from limitsets.proofs.refutation import write_refutation
+from tests.attack import facts
+from tests.attack.throws import Orbits
 from tests.thrower import reference
 
 pytest.importorskip("flint", reason="the checker needs python-flint")
@@ -101,6 +104,33 @@ def test_each_has_the_quantifier_of_what_it_refutes(claims, name):
     if expected.get(name, name) != "once":
         first, last = claim.counterexample[0], claim.counterexample[-1]
         assert (first.lo, first.hi, first.side) == (last.lo, last.hi, last.side)
+
+
+@pytest.mark.parametrize(
+    ("x", "side", "starts"), [(18.0, 2, "almost-every"), (19.5, 1, "almost-every"), (19.5, 2, "every")]
+)
+def test_almost_every_orbit_violates_what_is_refuted_so(x, side, starts):
+    """Of a side that is passed by every orbit; thrown apart, each of 2000 starts violates the goal again and again."""
+    tree = ls.load("paper-designed").as_dict() | {"goal": {"oriented_beyond": {"x": f"{x} in", "side": side}}}
+    proof = ls.certify(ls.load(tree), ["goal"])
+    (claim,) = proof.claims
+    assert (claim.verdict, claim.starts) == ("refuted", starts)
+    assert "cycle" in claim.recurs  # which the checker confirms: it refutes "every start"
+    if (
+        starts == "every"
+    ):  # a part may pass x on another side rarely: no cells of which that is proved of almost all
+        assert "thinning" not in claim.recurs
+        return
+    numbers = facts.read(tree).floats()
+    rng = np.random.default_rng(18)
+    i = rng.integers(0, 3, 2000)
+    orbits = Orbits(numbers, 12.0 + 14.0 * rng.random(2000), i)
+    orbits.fly(1000)
+    for _ in range(3):
+        orbits.look()
+        orbits.fly(1000)
+        others = np.delete(orbits.most, side, axis=1).max(axis=1)
+        assert (others[orbits.code >= 0] > x).all()
 
 
 def facts_with(kappa=None, **changed):

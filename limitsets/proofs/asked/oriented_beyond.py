@@ -8,10 +8,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from limitsets.cells import CellSet
 from limitsets.goals import OrientedBeyond
 from limitsets.proofs.asked.kind import (
     Answer,
     Kind,
+    above,
     against,
     below,
     common,
@@ -24,6 +26,8 @@ from limitsets.proofs.asked.recurring import recurrent_violation
 from limitsets.proofs.asked.starts import one_throw
 from limitsets.proofs.attraction import Attraction
 from limitsets.proofs.chains import stays_below
+from limitsets.proofs.expansion import slopes
+from limitsets.proofs.thinning import thinned
 from limitsets.scene import Scene
 
 __all__ = ["KIND", "section_of"]
@@ -73,9 +77,32 @@ def _refute(found: Attraction, scene: Scene, goal: OrientedBeyond) -> Answer:
         return (x > goal.x) & (side != goal.side)
 
     if not goal.from_anywhere:
-        return against(recurrent_violation(found, scene, wrong))
+        refutation = recurrent_violation(found, scene, wrong)
+        again = _again(found, goal) if refutation.of == "every" else {}
+        if again:
+            refutation = refutation._replace(of="almost-every", recurs={**refutation.recurs, **again})
+        return against(refutation)
     reason = _thrown_there(found, goal, _exceptions(found, goal))
     return once(one_throw(found, wrong) if reason else (), reason)
+
+
+def _again(found: Attraction, goal: OrientedBeyond) -> dict[str, int]:
+    """Find an attracting component almost every orbit of which violates the goal again and again.
+
+    Almost every orbit leaves the cells of the component that do not violate the goal.  Where the slope is positive, a
+    throw carries no set of positive length into one of length zero: so almost every orbit leaves them after each throw.
+    """
+    bad = np.zeros(found.component.size, dtype=bool)
+    for side, (edges,) in enumerate(found.cover.grid.edges):
+        if side != goal.side:
+            bad[found.cover.grid.of_side(side)] = edges[:-1] >= above(goal.x)
+    for number in np.unique(found.component[bad & (found.component >= 0)]).tolist():
+        mine = found.component == number
+        if (slopes(found.cover, CellSet(found.cover.grid, mine))[mine] > 0.0).all():
+            throws, _, reason = thinned(found.cover, mine & ~bad)
+            if not reason:
+                return {"component": number, "thinning": throws}
+    return {}
 
 
 def _thrown_there(found: Attraction, goal: OrientedBeyond, bad: NDArray[np.bool_]) -> str:
