@@ -204,6 +204,29 @@ def test_a_closed_orbit_comes_back_at_50_digits(files, name):
     assert (found[0].x - start[1]) * (found[1].x - start[1]) < 0
 
 
+@pytest.mark.parametrize(
+    ("slower", "noise", "how"), [(0.00085, {}, "cycle"), (0.0, {"throw.speed": "0.085 %"}, "closed")]
+)
+def test_where_a_throw_hardly_expands_orbits_take_hundreds_of_throws_to_come_back(
+    tmp_path, slower, noise, how
+):
+    """The goal fails from 0.0801 % on, with noise from 0.0796 % on (study 04); slopes are 1.02 a throw."""
+    tree = ls.load("paper-initial-small-angle").as_dict()
+    tree["goal"] = {"oriented_beyond": {"x": "20.41 in", "side": 0}}
+    kappa = ls.load("paper-initial-small-angle").map.kappa / (1 - slower) ** 2
+    tree.pop("gravity", None)
+    scene = ls.load({**tree, "throw": {"kappa": f"{kappa!r} in"}})
+    proof = ls.certify(scene, ["goal"], noise=noise)
+    (claim,) = proof.claims
+    assert (claim.verdict, claim.starts) == ("refuted", "every")
+    assert len(claim.counterexample) > 81
+    path = tmp_path / "x.zip"
+    write_refutation(path, proof.attractions[0], scene.goal, claim.counterexample, claim.recurs, {}, scene)
+    report = ls.recheck(path)
+    assert (report.verdict, report.reason) == ("refuted", "")
+    assert how in claim.recurs
+
+
 def test_what_passes_once_closes_only_where_the_noise_brings_it_back():
     """From 27.9 on side 2 one throw lands beyond 20 on side 0: with 0.001 % of noise no throws lead there again."""
     scene = scene_of(WIDE)

@@ -47,6 +47,10 @@ __all__ = ["Loop", "Refutation", "closed", "cycle_near", "cycle_that", "recurren
 # Places of a long orbit, and of a short one, from which it is followed back to them; throws until it has come back.
 TRIED, FEW, LONGEST = 48, 6, 80
 
+# Where a throw hardly expands, orbits need longer to come round to a small place: up to so many throws, of which the
+# nearest returns are tried.  The checker reads no longer ones.
+LATEST, RETURNS = 1000, 8
+
 # A periodic orbit is looked for this near to a place, relative to x; beyond such a slope floats do not resolve it.
 NEAR, STEEPEST = 1e-3, 1e10
 
@@ -54,7 +58,7 @@ NEAR, STEEPEST = 1e-3, 1e10
 OTHERS, SHORT = 12, 2000
 
 # Steering back: places of the raster along the arm, values of kappa, throws at most, ways to close that are tried.
-PLACES, KAPPAS, BACK, CLOSINGS = 20_000, 5, 60, 20
+PLACES, KAPPAS, BACK, CLOSINGS = 20_000, 5, 400, 20
 
 # An exact landing between two values of kappa: so near to it, as shares of the way to the ends of the noise.
 SPANS = (1e-6, 1e-4, 1e-2, 0.1, 0.5, 1.0)
@@ -247,9 +251,7 @@ def cycle_near(
 def _returns(box: ParameterBox, path: Orbit, k: int, refutes: Callable[[Loop], bool]) -> Iterator[Loop]:
     """Periodic orbits near place k, by itineraries of growing length."""
     map_now = box.at_kappa(box.middle_kappa)
-    for period in range(1, min(LONGEST, path.code.size - k) + 1):
-        if path.side[k + period] != path.side[k]:
-            continue
+    for period in _periods(path, k):
         x, steep = (_root_on_orbit if box.effects else _root)(map_now, path, k, period)
         if abs(steep) > STEEPEST:
             return
@@ -270,6 +272,14 @@ def _returns(box: ParameterBox, path: Orbit, k: int, refutes: Callable[[Loop], b
             proved = _loop(one) if isinstance(one, ProvedCycle) else None
         if proved is not None:
             yield proved
+
+
+def _periods(path: Orbit, k: int) -> list[int]:
+    """Throws after which the orbit lies on the side of place k again: up to `LONGEST` all, then the nearest returns."""
+    period = 1 + np.flatnonzero(path.side[k + 1 : k + 1 + LATEST] == path.side[k])
+    later = period[period > LONGEST]
+    nearest = np.argsort(np.abs(path.x[k + later] - path.x[k]), kind="stable")[:RETURNS]
+    return [*period[period <= LONGEST].tolist(), *np.sort(later[nearest]).tolist()]
 
 
 def _root(map_now: Any, path: Orbit, k: int, period: int) -> tuple[float, float]:
