@@ -11,6 +11,7 @@ import limitsets as ls
 from limitsets.analysis import other_vertex_first, overlap, scene_of
 from limitsets.errors import AnswerError, GridError, SceneError
 from limitsets.thrower import impact_angles
+from tests.scene.four_gon import FOUR_GON
 
 HERE = Path(__file__).parent
 PAPER = ["paper-designed", "paper-designed-small-angle", "paper-initial", "paper-initial-small-angle"]
@@ -266,27 +267,6 @@ def test_wrong_calls(error, call):
 
 
 # ---------------------------------------------------------------- random starts
-
-FOUR_GON = {
-    "name": "four-gon",
-    "part": {
-        "vertices": [
-            ["8.748 mm", "31.560 mm"], ["-7.853 mm", "31.732 mm"],
-            ["-21.757 mm", "-26.582 mm"], ["-0.592 mm", "-32.428 mm"],
-        ],
-        "mass": {
-            "plate_density": "3 kg/m^2",
-            "points": [
-                {"x": "0.404 mm", "y": "12.471 mm", "mass": "0.775 g"},
-                {"x": "-1.976 mm", "y": "20.782 mm", "mass": "0.791 g"},
-            ],
-        },
-    },
-    "arm": {"surface_height": "-5.202 mm", "length": "427.206 mm"},
-    "throw": {"kappa": "125.9620 mm"},
-    "model": {"flight": "exact", "flip": "energy"},
-    "goal": {"reaches": {"x": "69.0806 mm", "side": 1, "every_orbit": True}},
-}  # fmt: skip
 
 
 def test_random_starts_that_stay_elsewhere_ask_for_finer_cells():

@@ -1,7 +1,7 @@
 """`python -m tests.equivalence record FILE` before a change, `... compare FILE` after it: what differs, by name.
 
-Digests of bounds, floats, certificates, reports and verdicts.  What runs is asked by its public name where it has one, so
-that the net outlives moves within the package.
+Digests of bounds, floats, certificates, reports and verdicts.  What runs is asked by its public name where it has one,
+so that the net outlives moves within the package.
 """
 
 from __future__ import annotations

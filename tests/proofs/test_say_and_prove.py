@@ -22,6 +22,7 @@ from limitsets.proofs.cover import cover
 from limitsets.proofs.parameters import parameter_box
 from tests.proofs import forge
 from tests.proofs.test_recheck import COARSE, checker, parts, verdict, whole
+from tests.scene.four_gon import FOUR_GON
 
 
 @pytest.fixture(scope="module")
@@ -323,40 +324,18 @@ def test_a_certificate_that_says_another_thing(good, tmp_path, way):
 
 # Two attractors, 16384 cells a side being enough to find both: that of most starts, which comes to side 1 beyond 69 mm
 # again and again, and a fixed point near x = 274.73 mm on side 3 (slope 0.52) that never does.
-TWO = {
-    "name": "two",
-    "part": {
-        "vertices": [
-            ["8.748 mm", "31.560 mm"],
-            ["-7.853 mm", "31.732 mm"],
-            ["-21.757 mm", "-26.582 mm"],
-            ["-0.592 mm", "-32.428 mm"],
-        ],
-        "mass": {
-            "plate_density": "3 kg/m^2",
-            "points": [
-                {"x": "0.404 mm", "y": "12.471 mm", "mass": "0.775 g"},
-                {"x": "-1.976 mm", "y": "20.782 mm", "mass": "0.791 g"},
-            ],
-        },
-    },
-    "arm": {"surface_height": "-5.202 mm", "length": "427.206 mm"},
-    "throw": {"kappa": "125.9620 mm"},
-    "model": {"flight": "exact", "flip": "energy"},
-    "goal": {"reaches": {"x": "69.0806 mm", "side": 1, "every_orbit": True}},
-}
 
 
 @pytest.fixture(scope="module")
 def two():
-    scene = ls.load(TWO)
+    scene = ls.load(FOUR_GON)
     return attraction(cover(parameter_box(scene), 16384, {side: [69.0806] for side in range(4)}))
 
 
 def dropped(found, component, starts, tmp_path, **more):
-    """The goal of TWO with some attracting cells only, ranks and thinning made for them."""
+    """The goal of FOUR_GON with some attracting cells only, ranks and thinning made for them."""
     doctored = replace(found, component=component)
-    throws, left = peeled(doctored, component >= 0, _wanted(doctored, ls.load(TWO).goal))
+    throws, left = peeled(doctored, component >= 0, _wanted(doctored, ls.load(FOUR_GON).goal))
     section = {"kind": "reaches", "x": "69.0806 mm", "side": 1, "every_orbit": True}
     claims = [{"claim": "goal", "section": section | {"throws": throws, "starts": starts} | more}]
     path = tmp_path / "x.proof.zip"

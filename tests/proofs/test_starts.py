@@ -19,29 +19,7 @@ from limitsets.proofs.certify import Claim, weakest_of
 from limitsets.proofs.cover import Cover, cover
 from limitsets.proofs.parameters import parameter_box
 from limitsets.proofs.thinning import thinned
-
-FOUR_GON = {
-    "name": "four-gon",
-    "part": {
-        "vertices": [
-            ["8.748 mm", "31.560 mm"],
-            ["-7.853 mm", "31.732 mm"],
-            ["-21.757 mm", "-26.582 mm"],
-            ["-0.592 mm", "-32.428 mm"],
-        ],
-        "mass": {
-            "plate_density": "3 kg/m^2",
-            "points": [
-                {"x": "0.404 mm", "y": "12.471 mm", "mass": "0.775 g"},
-                {"x": "-1.976 mm", "y": "20.782 mm", "mass": "0.791 g"},
-            ],
-        },
-    },
-    "arm": {"surface_height": "-5.202 mm", "length": "427.206 mm"},
-    "throw": {"kappa": "125.9620 mm"},
-    "model": {"flight": "exact", "flip": "energy"},
-    "goal": {"reaches": {"x": "69.0806 mm", "side": 1, "every_orbit": True}},
-}
+from tests.scene.four_gon import FOUR_GON
 
 
 def attraction_of(scene, cells, **noise):
