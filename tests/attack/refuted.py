@@ -104,6 +104,9 @@ def refuted(found: Verdict, claim: dict[str, Any], within: list[Range]) -> None:
     )
     if last[2] < 0:
         return
+    if kind == "attracts_all" and claim.get("starts") == "almost-every":
+        two_basins(found, mpf(states[0]["x"]), states[0]["side"], within, word)
+        return
     if kind in ("attracts_all", "stays_on_arm"):
         found.fault(f"{word}: the orbit does not leave the arm")
         return
@@ -177,6 +180,26 @@ def again_and_again(found: Verdict, goal: dict[str, Any], within: list[Range], w
             found.fault(
                 f"{word} by almost every orbit of a component, but no orbit is seen to (noise {style})"
             )
+
+
+def two_basins(found: Verdict, x: mpf, side: int, within: list[Range], word: str) -> None:
+    """A start below the fixed point of the jog creeps to the joint; others must be seen to go elsewhere."""
+    facts = within[0].facts
+    numbers = facts.floats()
+    creeping = Orbits(numbers, [float(x)], [side])
+    creeping.fly(20_000)
+    a, arm = numbers[0], numbers[6]
+    if (
+        creeping.code[0] < 0
+        or creeping.i[0] != side
+        or not creeping.x[0] - a[side] < 0.5 * (float(x) - a[side])
+    ):
+        found.fault(f"{word}: the start at {mp.nstr(x, 17)} on side {side} does not creep to the joint")
+    i = np.repeat(np.arange(a.size), 200)
+    others = Orbits(numbers, a[i] + (arm - a[i]) * np.tile((np.arange(200) + 0.5) / 200, a.size), i)
+    others.fly(2000)
+    if not ((others.code < 0) | (others.x - a[others.i] > 0.01 * (arm - a[others.i]))).any():
+        found.fault(f"{word}: all starts creep to the joint")
 
 
 def _before(states: list[dict[str, Any]]) -> dict[str, Any]:
