@@ -23,8 +23,8 @@ __all__ = ["certify"]
 LAST = 8
 
 REFUTED = {
-    "every": "There are starts of which it is not true.",
-    "almost-every": "There are so many starts of which it is not true that they have a length.",
+    "every": "The goal fails for some starts, perhaps for starts of total length zero only.",
+    "almost-every": "The goal fails for starts of positive total length.",
 }
 
 HELP_CLAIM = (
