@@ -30,7 +30,10 @@ def starts(facts: model.Facts, rng: Any, count: int) -> tuple[Any, Any, int]:
         places = np.append(changes(numbers, side), arm)
         mine = near & ~joint & (i == side)
         off = rng.choice((-1, 1), count) * 10 ** rng.uniform(-11, -1.5, count) * (arm - a[side])
-        x[mine] = np.clip(rng.choice(places, count) + off, np.nextafter(a[side], arm), arm)[mine]
+        least = a[side] + 1e-9 * (
+            arm - a[side]
+        )  # nearer to the joint a throw may move by less than floats can tell
+        x[mine] = np.clip(rng.choice(places, count) + off, least, arm)[mine]
     return x, i, even
 
 
@@ -130,7 +133,8 @@ def cells_of(file: Path) -> list[tuple[Any, list[Any]]]:
         for box in header["boxes"]:
             prefix = box["prefix"]
             sides = [
-                arrays[f"{prefix}edges.{k}"] for k in range(sum(f"{prefix}edges." in key for key in arrays))
+                arrays[f"{prefix}edges.{k}"]
+                for k in range(sum(key.startswith(f"{prefix}edges.") for key in arrays))
             ]
             found.append((arrays[f"{prefix}rank"], sides))
     return found
