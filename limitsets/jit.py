@@ -40,6 +40,7 @@ import numba
 import numpy as np
 from llvmlite import ir
 from numba import extending, types
+from numba.core import cgutils
 from numba.core.errors import NumbaError
 from numba.core.registry import cpu_target
 
@@ -47,10 +48,13 @@ from limitsets.errors import LimitsetsError, MapError
 
 __all__ = [
     "cover_foreign_class",
+    "formula",
     "generic",
     "kernel",
     "mark_undefined",
     "named_tuple_class",
+    "number",
+    "operation",
     "proof_kernel",
     "take_mark",
 ]
@@ -58,6 +62,7 @@ __all__ = [
 F = TypeVar("F", bound=Callable[..., Any])
 P = ParamSpec("P")
 R = TypeVar("R", covariant=True)
+T = TypeVar("T")
 
 PACKAGE = Path(__file__).resolve().parent
 
@@ -85,6 +90,7 @@ KEPT_DIGESTS = 8
 _COMMON = {"nopython": True, "error_model": "numpy", "no_cfunc_wrapper": True}
 _ESTIMATE = {**_COMMON, "fastmath": {"contract"}}
 _PROOF = {**_COMMON, "fastmath": False}
+_OVERLOAD = ("error_model", "fastmath")  # what an overload takes of these
 
 
 def _package_digest() -> str:
@@ -596,6 +602,108 @@ def take_mark(typing: Any) -> Any:
     return types.boolean(), take
 
 
+# ---------------------------------------------------------------- numbers that are not floats
+
+
+class _NumberType(types.Type):  # type: ignore[misc]  # numba has no types
+    """How numba sees a number made of two floats."""
+
+    def __init__(self, cls: type) -> None:
+        self.cls = cls
+        super().__init__(name=cls.__qualname__)
+
+
+def number(cls: type[T]) -> type[T]:
+    """Make a class of two floats a number in compiled code: constructed by its name, its fields read by theirs.
+
+    What the number can do is added by `operation`.
+    """
+    kind, (first, second) = _NumberType(cls), tuple(cls.__annotations__)
+
+    def typer(context: Any) -> Any:
+        def typed(lo: Any, hi: Any) -> Any:
+            plain = all(isinstance(each, types.Number) for each in (lo, hi))
+            return numba.core.typing.signature(kind, types.float64, types.float64) if plain else None
+
+        return typed
+
+    def made(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        found = cgutils.create_struct_proxy(kind)(context, builder)
+        setattr(found, first, args[0])
+        setattr(found, second, args[1])
+        return found._getvalue()
+
+    fields = [(first, types.float64), (second, types.float64)]
+    extending.type_callable(cls)(typer)
+    extending.lower_builtin(cls, types.float64, types.float64)(made)
+    _MODELS[kind] = fields
+    _NUMBERS[cls] = kind
+    return cls
+
+
+_NUMBERS: dict[type, _NumberType] = {}
+_MODELS: dict[_NumberType, list[tuple[str, Any]]] = {}
+
+
+@extending.register_model(_NumberType)
+class _NumberModel(extending.models.StructModel):  # type: ignore[misc]  # numba has no types
+    def __init__(self, manager: Any, kind: Any) -> None:
+        super().__init__(manager, kind, _MODELS[kind])
+
+
+@extending.infer_getattr
+class _NumberFields(numba.core.typing.templates.AttributeTemplate):  # type: ignore[misc]  # numba has no types
+    key = _NumberType
+
+    def generic_resolve(self, kind: Any, name: str) -> Any:
+        return dict(_MODELS[kind]).get(name)
+
+
+@extending.lower_getattr_generic(_NumberType)  # type: ignore[untyped-decorator]  # numba has no types
+def _read_field(context: Any, builder: Any, kind: Any, value: Any, name: str) -> Any:
+    return getattr(cgutils.create_struct_proxy(kind)(context, builder, value=value), name)
+
+
+def operation(stub: Any, cls: type, method: Callable[..., Any]) -> None:
+    """Give a number a method of an operator, or of any function of Python, in compiled code.
+
+    Parameters
+    ----------
+    stub : callable
+        The operator of the module `operator`, or the function.
+    cls : type
+        The class of the number; the other arguments may be plain numbers.  `float` stands for plain numbers alone:
+        their methods may be contracted, all others are not.
+    method : callable
+        A module-level function.
+    """
+
+    def choose(*args: Any) -> Callable[..., Any] | None:
+        mine = [number_class(each) is cls for each in args]
+        plain = [isinstance(each, types.Number) for each in args]
+        fits = all(plain) if cls is float else any(mine) and all(np.logical_or(mine, plain))
+        return method if fits else None
+
+    given = _ESTIMATE if cls is float else _PROOF
+    options = {**{key: given[key] for key in _OVERLOAD}, "forceinline": True}
+    extending.overload(stub, jit_options=options, strict=False)(choose)
+
+
+def formula(function: F) -> F:
+    """Let compiled code run a plain function, inlined, on whatever numbers it is given; Python runs it as it stands.
+
+    Operations on floats may be contracted; those of other numbers are their own.
+    """
+    options = {**{key: _ESTIMATE[key] for key in _OVERLOAD}, "forceinline": True}
+    extending.overload(function, jit_options=options, strict=False)(lambda *args: function)
+    return function
+
+
+def number_class(numba_type: Any) -> type | None:
+    """Class of a number that `number` made, as numba sees it; None for any other type."""
+    return numba_type.cls if isinstance(numba_type, _NumberType) else None
+
+
 def named_tuple_class(numba_type: Any) -> type | None:
     """Class of a NamedTuple as numba sees it, None for any other type."""
     return getattr(numba_type, "instance_class", None) if isinstance(numba_type, types.BaseTuple) else None
@@ -657,9 +765,8 @@ def generic(
 def _generic(stub: Any, proof: bool, inlined: bool, default: Callable[..., Any] | None) -> Any:
     """Make the table of methods and the overload that reads it."""
     methods: dict[Any, Callable[..., Any]] = {}
-    options = {**(_PROOF if proof else _ESTIMATE), "forceinline": inlined}
-    options.pop("nopython")
-    options.pop("no_cfunc_wrapper")
+    given = _PROOF if proof else _ESTIMATE
+    options = {**{key: given[key] for key in _OVERLOAD}, "forceinline": inlined}
 
     def choose(first: Any, *rest: Any) -> Callable[..., Any] | None:
         key: Any = named_tuple_class(first)

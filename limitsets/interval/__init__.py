@@ -36,6 +36,7 @@ from limitsets.interval.arithmetic import (
     mul,
     neg,
     point,
+    power,
     sqr,
     sqrt,
     sub,
@@ -44,8 +45,10 @@ from limitsets.interval.elementary import atan2, cos, sin
 from limitsets.interval.exponential import exp
 from limitsets.interval.guard import guard, rounding_is_sound
 from limitsets.interval.logarithm import log
+from limitsets.interval.number import Interval
 
 __all__ = [
+    "Interval",
     "absolute",
     "add",
     "atan2",
@@ -61,6 +64,7 @@ __all__ = [
     "mul",
     "neg",
     "point",
+    "power",
     "rounding_is_sound",
     "sin",
     "sqr",

@@ -12,7 +12,7 @@ from limitsets.interval.rounding import above, above_sum, below, below_sum
 from limitsets.jit import mark_undefined, proof_kernel
 
 __all__ = [
-    "Interval",
+    "Ends",
     "absolute",
     "add",
     "contains",
@@ -25,35 +25,36 @@ __all__ = [
     "neg",
     "or_empty",
     "point",
+    "power",
     "sqr",
     "sqrt",
     "sub",
 ]
 
-Interval: TypeAlias = tuple[float, float]
+Ends: TypeAlias = tuple[float, float]
 """``(lo, hi)`` with lo <= hi, either of which may be infinite; (nan, nan) is the empty set."""
 
 
 @proof_kernel
-def point(x: float) -> Interval:
+def point(x: float) -> Ends:
     """Return the interval of one number."""
     return x, x
 
 
 @proof_kernel
-def contains(a: Interval, x: float) -> bool:
+def contains(a: Ends, x: float) -> bool:
     """Whether x lies in a; False for nan."""
     return (a[0] <= x) & (x <= a[1])
 
 
 @proof_kernel
-def holds(a: Interval) -> bool:
+def holds(a: Ends) -> bool:
     """Whether a is an interval; False for the empty set, and for any other pair with a nan or the wrong way round."""
     return a[0] <= a[1]
 
 
 @proof_kernel
-def or_empty(good: bool, lo: float, hi: float) -> Interval:
+def or_empty(good: bool, lo: float, hi: float) -> Ends:
     """(lo, hi), or the empty set: never half of it."""
     return lo if good else math.nan, hi if good else math.nan
 
@@ -65,7 +66,7 @@ def _number(y: float) -> float:
 
 
 @proof_kernel
-def hull(a: Interval, b: Interval) -> Interval:
+def hull(a: Ends, b: Ends) -> Ends:
     """Return the smallest interval that holds both; of the empty set and b, b."""
     one, two = holds(a), holds(b)
     lo = min(a[0] if one else math.inf, b[0] if two else math.inf)
@@ -74,46 +75,46 @@ def hull(a: Interval, b: Interval) -> Interval:
 
 
 @proof_kernel
-def neg(a: Interval) -> Interval:
+def neg(a: Ends) -> Ends:
     """Return -a, exactly."""
     return or_empty(holds(a), -a[1], -a[0])
 
 
 @proof_kernel
-def absolute(a: Interval) -> Interval:
+def absolute(a: Ends) -> Ends:
     """Return |a|, exactly."""
     lo = max(max(a[0], -a[1]), 0.0)
     return or_empty(holds(a), lo, max(-a[0], a[1]))
 
 
 @proof_kernel
-def minimum(a: Interval, b: Interval) -> Interval:
+def minimum(a: Ends, b: Ends) -> Ends:
     """Smaller of the two, exactly."""
     return or_empty(holds(a) & holds(b), min(a[0], b[0]), min(a[1], b[1]))
 
 
 @proof_kernel
-def maximum(a: Interval, b: Interval) -> Interval:
+def maximum(a: Ends, b: Ends) -> Ends:
     """Larger of the two, exactly."""
     return or_empty(holds(a) & holds(b), max(a[0], b[0]), max(a[1], b[1]))
 
 
 @proof_kernel
-def add(a: Interval, b: Interval) -> Interval:
+def add(a: Ends, b: Ends) -> Ends:
     """Return a + b."""
     lo, hi = a[0] + b[0], a[1] + b[1]
     return or_empty(lo <= hi, below_sum(lo), above_sum(hi))
 
 
 @proof_kernel
-def sub(a: Interval, b: Interval) -> Interval:
+def sub(a: Ends, b: Ends) -> Ends:
     """Return a - b."""
     lo, hi = a[0] - b[1], a[1] - b[0]
     return or_empty(lo <= hi, below_sum(lo), above_sum(hi))
 
 
 @proof_kernel
-def mul(a: Interval, b: Interval) -> Interval:
+def mul(a: Ends, b: Ends) -> Ends:
     """Return a b."""
     p, q = _number(a[0] * b[0]), _number(a[0] * b[1])
     r, s = _number(a[1] * b[0]), _number(a[1] * b[1])
@@ -122,7 +123,7 @@ def mul(a: Interval, b: Interval) -> Interval:
 
 
 @proof_kernel
-def div(a: Interval, b: Interval) -> Interval:
+def div(a: Ends, b: Ends) -> Ends:
     """Return a / b; all numbers where b holds 0."""
     p, q = _number(a[0] / b[0]), _number(a[0] / b[1])
     r, s = _number(a[1] / b[0]), _number(a[1] / b[1])
@@ -132,7 +133,7 @@ def div(a: Interval, b: Interval) -> Interval:
 
 
 @proof_kernel
-def sqr(a: Interval) -> Interval:
+def sqr(a: Ends) -> Ends:
     """a^2, with both factors the same number."""
     p, q = a[0] * a[0], a[1] * a[1]
     across = (a[0] <= 0.0) & (a[1] >= 0.0)
@@ -140,7 +141,21 @@ def sqr(a: Interval) -> Interval:
 
 
 @proof_kernel
-def sqrt(a: Interval) -> Interval:
+def power(a: Ends, count: int) -> Ends:
+    """a^count for a whole number: that of each end, or of |a| where the power is even."""
+    if count == 2:
+        return sqr(a)
+    n = abs(count)
+    base = absolute(a) if n % 2 == 0 else a
+    lo, hi = (1.0, 1.0), (1.0, 1.0)
+    for _ in range(n):
+        lo, hi = mul(lo, (base[0], base[0])), mul(hi, (base[1], base[1]))
+    found = or_empty(holds(a), lo[0], hi[1])
+    return found if count >= 0 else div((1.0, 1.0), found)
+
+
+@proof_kernel
+def sqrt(a: Ends) -> Ends:
     """Square root of the part of a that is not negative; the empty set where there is none.
 
     Where another part is negative the cell whose image is computed is undecided, see `limitsets.interval`.

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import math
 
-from limitsets.interval.arithmetic import Interval, holds, or_empty
+from limitsets.interval.arithmetic import Ends, holds, or_empty
 from limitsets.interval.rounding import down, up
 from limitsets.jit import mark_undefined, proof_kernel
 
@@ -63,7 +63,7 @@ def _reduced(x: float) -> float:
 
 
 @proof_kernel
-def _sine(x: float) -> Interval:
+def _sine(x: float) -> Ends:
     """Enclosure of sin at one double of the range."""
     s, _, n = sin_cos(x)
     error = RELATIVE * abs(s) if n == 0.0 else NEAR
@@ -71,7 +71,7 @@ def _sine(x: float) -> Interval:
 
 
 @proof_kernel
-def _cosine(x: float) -> Interval:
+def _cosine(x: float) -> Ends:
     """Enclosure of cos at one double of the range."""
     _, c, _ = sin_cos(x)
     return max(down(c - NEAR), -1.0), min(up(c + NEAR), 1.0)
@@ -89,7 +89,7 @@ def _meets(lo: float, hi: float, offset: float) -> bool:
 
 
 @proof_kernel
-def _waves(a: Interval, u: Interval, v: Interval, bottom: float, top: float) -> Interval:
+def _waves(a: Ends, u: Ends, v: Ends, bottom: float, top: float) -> Ends:
     """Range of sine or cosine, whose values at the ends are u and v, lowest and highest at that many quarter turns."""
     far = (a[0] < -LARGEST) | (a[1] > LARGEST)
     # A sine of an infinite end is a nan in plain numbers, so that what leads here is not defined on all of the cell.
@@ -101,13 +101,13 @@ def _waves(a: Interval, u: Interval, v: Interval, bottom: float, top: float) -> 
 
 
 @proof_kernel
-def sin(a: Interval) -> Interval:
+def sin(a: Ends) -> Ends:
     """Sine of an interval."""
     return _waves(a, _sine(_reduced(a[0])), _sine(_reduced(a[1])), 3.0, 1.0)
 
 
 @proof_kernel
-def cos(a: Interval) -> Interval:
+def cos(a: Ends) -> Ends:
     """Cosine of an interval."""
     return _waves(a, _cosine(_reduced(a[0])), _cosine(_reduced(a[1])), 2.0, 0.0)
 
@@ -128,7 +128,7 @@ def _not_beyond(angle: float, y: float, x: float) -> bool:
 
 
 @proof_kernel
-def _angle(y: float, x: float) -> Interval:
+def _angle(y: float, x: float) -> Ends:
     """Enclosure of the angle of one vector of finite size: libm proposes, signs of sines decide.
 
     Very large and very small vectors are scaled by a power of two; the candidates are 2^-44 to either side, far above
@@ -145,7 +145,7 @@ def _angle(y: float, x: float) -> Interval:
 
 
 @proof_kernel
-def _angles(y: float, x: float) -> Interval:
+def _angles(y: float, x: float) -> Ends:
     """Angles at one corner of a box.  Where a coordinate is infinite the vectors turn to its axis, or to both axes."""
     tall, long = abs(y) == math.inf, abs(x) == math.inf
     up_or_down = _angle(math.copysign(1.0, y), 0.0)
@@ -157,7 +157,7 @@ def _angles(y: float, x: float) -> Interval:
 
 
 @proof_kernel
-def atan2(y: Interval, x: Interval) -> Interval:
+def atan2(y: Ends, x: Ends) -> Ends:
     """Angle of the vectors of a box, in (-pi, pi]; everything where the box holds the origin or meets the cut."""
     everything = (y[0] <= 0.0) & (y[1] >= 0.0) & (x[0] <= 0.0)
     # Away from the origin the angle is monotone along each border of the box, so the corners span it.

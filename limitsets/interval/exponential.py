@@ -15,7 +15,7 @@ import math
 
 import numpy as np
 
-from limitsets.interval.arithmetic import Interval, holds, or_empty
+from limitsets.interval.arithmetic import Ends, holds, or_empty
 from limitsets.interval.rounding import down, up
 from limitsets.jit import proof_kernel
 
@@ -56,7 +56,7 @@ def _clamped(x: float) -> float:
 
 
 @proof_kernel
-def exp(a: Interval) -> Interval:
+def exp(a: Ends) -> Ends:
     """Exponential of an interval."""
     y, z = exponential(_clamped(a[0])), exponential(_clamped(a[1]))
     lo, hi = down(y - RELATIVE * y), up(z + RELATIVE * z)

@@ -12,7 +12,7 @@ import sys
 
 import numpy as np
 
-from limitsets.interval.arithmetic import Interval, add, div, holds, mul, or_empty, sqr
+from limitsets.interval.arithmetic import Ends, add, div, holds, mul, or_empty, sqr
 from limitsets.jit import mark_undefined, proof_kernel
 
 __all__ = ["LN2", "REST", "TERMS", "log"]
@@ -28,7 +28,7 @@ FRACTION = (1 << MANTISSA) - 1
 
 
 @proof_kernel
-def _logarithm(x: float) -> Interval:
+def _logarithm(x: float) -> Ends:
     """Enclosure of ln at one positive finite double."""
     small = x < NORMAL
     bits = np.float64(x * 2.0**MANTISSA if small else x).view(np.int64)
@@ -53,7 +53,7 @@ def _positive(x: float) -> float:
 
 
 @proof_kernel
-def log(a: Interval) -> Interval:
+def log(a: Ends) -> Ends:
     """Natural logarithm of the part of a that is positive; the empty set where there is none.
 
     Where another part is not positive the cell whose image is computed is undecided, see `limitsets.interval`.

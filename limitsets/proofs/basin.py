@@ -26,14 +26,16 @@ from numpy.typing import NDArray
 
 from limitsets.cells import CellSet
 from limitsets.graph.components import ranks, reach
+from limitsets.interval import Interval
 from limitsets.jit import proof_kernel
 from limitsets.proofs.cover import Cover
 from limitsets.proofs.expansion import slopes
 from limitsets.proofs.joint import SCATTERED, NearJoint
 from limitsets.proofs.thinning import thinned
-from limitsets.thrower.impact_box import displacement_box
+from limitsets.thrower.impact import jog_displacement
 from limitsets.thrower.side_box import gather_box, with_kappa
 from limitsets.thrower.throw_box import throw_box
+from limitsets.thrower.turn_box import turn_box, turn_point
 
 __all__ = ["ROUNDING", "Basin", "basin"]
 
@@ -120,11 +122,11 @@ def _shifts(lo_map: Any, hi_map: Any, side: int, lo: Any, hi: Any, out: Any) -> 
     largest for all kappa.
     """
     whole = gather_box(lo_map, hi_map, side)
-    slow = with_kappa(whole, whole.kappa[1], whole.kappa[1])
+    slow = with_kappa(whole, whole.kappa.hi, whole.kappa.hi)
     for k in range(lo.size):
-        _, _, phi, _, _ = throw_box(whole, lo[k], hi[k])
+        _, _, phi, _, _ = throw_box(whole, Interval(lo[k], hi[k]))
         out[k, 0], out[k, 3] = _ends(whole, phi)
-        state, _, phi, _, _ = throw_box(slow, lo[k], hi[k])
+        state, _, phi, _, _ = throw_box(slow, Interval(lo[k], hi[k]))
         out[k, 1] = _ends(slow, phi)[1]
         out[k, 2] = 1.0 if state == 0 else 0.0
 
@@ -132,11 +134,11 @@ def _shifts(lo_map: Any, hi_map: Any, side: int, lo: Any, hi: Any, out: Any) -> 
 @proof_kernel
 def _ends(b: Any, phi: Any) -> Any:
     """Bounds of the displacement over a bracket of the angle, at its ends where the displacement grows."""
-    shift, rise = displacement_box(b.flight, b, phi)
-    least = displacement_box(b.flight, b, (phi[0], phi[0]))[0][0]
-    most = displacement_box(b.flight, b, (phi[1], phi[1]))[0][1]
-    grows = rise[0] > 0.0
-    return (least if grows else shift[0]), (most if grows else shift[1])
+    shift, rise = jog_displacement(b.flight, b, turn_box(phi))
+    least, _ = jog_displacement(b.flight, b, turn_point(phi.lo))
+    most, _ = jog_displacement(b.flight, b, turn_point(phi.hi))
+    grows = rise.lo > 0.0
+    return (least.lo if grows else shift.lo), (most.hi if grows else shift.hi)
 
 
 def _displacements(found: Cover) -> list[Floats]:

@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from limitsets.interval import Interval
 from limitsets.jit import proof_kernel
 from limitsets.proofs.intervals import Intervals
 from limitsets.proofs.mean_value import Slope, root
@@ -53,8 +54,10 @@ class Angle(NamedTuple):
 @proof_kernel(entry=True)
 def _turns(lo: Any, hi: Any, out: Any) -> None:
     for k in range(lo.size):
-        for row, found in enumerate(turn_box(lo[k], hi[k])):
-            out[2 * row, k], out[2 * row + 1, k] = found
+        at = turn_box(Interval(lo[k], hi[k]))
+        out[0, k], out[1, k] = at.s.lo, at.s.hi
+        out[2, k], out[3, k] = at.v.lo, at.v.hi
+        out[4, k], out[5, k] = at.w.lo, at.w.hi
 
 
 def variable(value: Intervals, number: int, count: int) -> Slope:

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from limitsets.cells import CellSet
+from limitsets.interval import Interval
 from limitsets.jit import proof_kernel
 from limitsets.proofs.cover import Cover
 from limitsets.thrower.motion import FullThrow
@@ -29,10 +30,10 @@ PIECES = 8
 def _slopes(lo_map: Any, hi_map: Any, side: int, lo: Any, hi: Any, out: Any) -> None:
     b = gather_box(lo_map, hi_map, side)
     for k in range(lo.size):
-        state, _, _, slope, _ = throw_box(b, lo[k], hi[k])
+        state, _, _, slope, _ = throw_box(b, Interval(lo[k], hi[k]))
         if state == NOTHING:  # parameters so wide that the fast bracket of the impact angle is not confirmed
-            state, _, _, slope, _ = sure_throw_box(b, lo[k], hi[k])
-        out[k] = slope[0] if state != NOTHING else -1.0
+            state, _, _, slope, _ = sure_throw_box(b, Interval(lo[k], hi[k]))
+        out[k] = slope.lo if state != NOTHING else -1.0
 
 
 def least_slope(found: Cover, cells: CellSet) -> tuple[float, str]:

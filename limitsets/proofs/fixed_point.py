@@ -34,15 +34,14 @@ from typing import Any
 
 import numpy as np
 
-import limitsets.interval as iv
-from limitsets.interval.arithmetic import Interval
+from limitsets.interval import Interval
 from limitsets.jit import proof_kernel
 from limitsets.proofs.parameters import ParameterBox
 from limitsets.thrower import Exact
 from limitsets.thrower.flight_box import bracket
-from limitsets.thrower.impact_box import decide_box, strike_box
+from limitsets.thrower.impact import margin, strike
 from limitsets.thrower.side_box import SideBox, gather_box
-from limitsets.thrower.turn_box import exact_turn, turn_point
+from limitsets.thrower.turn_box import exact_turn, turn_box, turn_point
 
 __all__ = ["FixedPoint", "fixed_points", "leaves"]
 
@@ -91,53 +90,43 @@ class FixedPoint:
 @proof_kernel
 def _ratios(phi: float) -> tuple[Interval, Interval]:
     """V and W at one angle, and their limits 1/2 and 1/6 at 0."""
-    _, v, w = turn_point(phi)
-    p = (phi, phi)
-    square = iv.sqr(p)
-    big, small = iv.div(v, square), iv.div(w, iv.mul(square, p))
-    start = phi == 0.0
-    sixth = iv.div((1.0, 1.0), (6.0, 6.0))
-    return (
-        (0.5 if start else big[0], 0.5 if start else big[1]),
-        (sixth[0] if start else small[0], sixth[1] if start else small[1]),
-    )
+    if phi == 0.0:
+        return Interval(0.5, 0.5), Interval(1.0, 1.0) / 6.0
+    at = turn_point(phi)
+    square = at.phi**2
+    return at.v / square, at.w / (square * at.phi)
 
 
 @proof_kernel
-def _terms(lo: float, hi: float) -> tuple[Interval, Interval, Interval, Interval]:
-    """V, phi^2 W, P and Q over angles in [lo, hi], from 0 to 2 pi: V and W fall."""
-    first, last = _ratios(lo), _ratios(hi)
-    p = (lo, hi)
-    big, small = (last[0][0], first[0][1]), (last[1][0], first[1][1])
-    short = iv.mul(iv.sqr(p), small)
-    return (
-        big,
-        short,
-        iv.sub(iv.sub((1.0, 1.0), short), big),
-        iv.mul(p, iv.sub(big, small)),
-    )
+def _terms(phi: Interval) -> tuple[Interval, Interval, Interval, Interval]:
+    """V, phi^2 W, P and Q over angles from 0 to 2 pi: V and W fall."""
+    big_first, small_first = _ratios(phi.lo)
+    big_last, small_last = _ratios(phi.hi)
+    big, small = Interval(big_last.lo, big_first.hi), Interval(small_last.lo, small_first.hi)
+    short = phi**2 * small
+    return big, short, 1.0 - short - big, phi * (big - small)
 
 
 @proof_kernel
 def _start(b: SideBox, phi: float) -> Interval:
     """R(phi), for all parameters."""
-    big, short, _, _ = _terms(phi, phi)
-    fall = iv.sub(iv.mul((0.5, 0.5), b.kappa), iv.mul(b.d, big))
-    return iv.add(iv.mul(b.a, iv.sub((1.0, 1.0), short)), iv.mul((phi, phi), fall))
+    big, short, _, _ = _terms(Interval(phi, phi))
+    fall = 0.5 * b.kappa - b.d * big
+    return b.a * (1.0 - short) + phi * fall
 
 
 @proof_kernel
 def _gain(b: SideBox, phi: float) -> Interval:
     """E(phi), for all parameters."""
-    big, short, _, _ = _terms(phi, phi)
-    out = iv.sub(iv.mul(iv.mul(b.a, (phi, phi)), big), iv.mul(b.d, short))
-    return iv.sub(out, b.h)
+    big, short, _, _ = _terms(Interval(phi, phi))
+    out = b.a * phi * big - b.d * short
+    return out - b.h
 
 
 @proof_kernel
 def _growth(b: SideBox, p: Interval, q: Interval) -> Interval:
     """dR/dphi."""
-    return iv.sub(iv.mul((0.5, 0.5), b.kappa), iv.add(iv.mul(b.a, q), iv.mul(b.d, p)))
+    return 0.5 * b.kappa - (b.a * q + b.d * p)
 
 
 @proof_kernel
@@ -158,49 +147,51 @@ def _find(lo: Any, hi: Any, side: int, out: Any) -> None:
     """Two angles, -E at the first and E at the second (both to be positive), and R at both."""
     b = gather_box(lo, hi, side)
     # E grows with a and falls with d and h
-    first = _guess(b.a[1], b.d[0], b.h[0]) * (1.0 - MARGIN)
-    last = _guess(b.a[0], b.d[1], b.h[1]) * (1.0 + MARGIN)
+    first = _guess(b.a.hi, b.d.lo, b.h.lo) * (1.0 - MARGIN)
+    last = _guess(b.a.lo, b.d.hi, b.h.hi) * (1.0 + MARGIN)
     out[0], out[1] = first, last
-    out[2], out[3] = -_gain(b, first)[1], _gain(b, last)[0]
-    out[4], out[5] = _start(b, first)[0], _start(b, last)[1]
+    out[2], out[3] = -_gain(b, first).hi, _gain(b, last).lo
+    out[4], out[5] = _start(b, first).lo, _start(b, last).hi
 
 
 @proof_kernel
-def _decided(b: SideBox, lo: float, hi: float) -> float:
+def _decided(b: SideBox, phi: Interval) -> float:
     """Return a number that is positive if every start that lands between two angles jogs; R(phi) grows there."""
-    x = (_start(b, lo)[0], _start(b, hi)[1])
-    omega, barrier = strike_box(b.flight, b, x, (lo, hi))
-    return -decide_box(b.flip, b, omega, barrier)[1]
+    x = Interval(_start(b, phi.lo).lo, _start(b, phi.hi).hi)
+    omega, barrier = strike(b.flight, b, x, turn_box(phi))
+    flips: Interval = margin(b.flip, b.inertia, omega, barrier)
+    return -flips.hi
 
 
 @proof_kernel(entry=True)
 def _examine(lo: Any, hi: Any, side: int, x: float, phi: Any, pieces: Any, ends: Any, rates: Any) -> None:
     """Numbers that have to be positive: `pieces` over (0, top], `ends` there; and slopes of R' over [phi_lo, top]."""
     b = gather_box(lo, hi, side)
-    top = bracket(b.flight, b, x)[0][1] * (1.0 + BEYOND)
-    ends[0] = _start(b, top)[0] - x
+    first, _ = bracket(b.flight, b, x)
+    top = first.hi * (1.0 + BEYOND)
+    ends[0] = _start(b, top).lo - x
     ends[1], ends[2] = top - phi[1], LARGEST - top
-    shift = iv.mul((top, top), _gain(b, top))
-    ends[3] = iv.sub((lo.arm_length, lo.arm_length), iv.add((x, x), shift))[0]
+    shift = top * _gain(b, top)
+    ends[3] = (lo.arm_length - (x + shift)).lo
     n = pieces.shape[1]
     for k in range(n):
-        near, far = top * (k / n), top * ((k + 1) / n)
-        big, short, p, q = _terms(near, far)
-        left = iv.sub(iv.mul((0.5, 0.5), b.kappa), b.h)
-        left = iv.sub(iv.add(left, iv.mul(b.a, q)), iv.mul(b.d, iv.add(big, short)))
-        pieces[0, k] = _growth(b, p, q)[0]
-        pieces[1, k] = iv.sub(iv.mul(b.a, p), iv.mul(b.d, q))[0]
-        pieces[2, k] = left[0]
-        pieces[3, k] = _decided(b, near, far)
+        angle = Interval(top * (k / n), top * ((k + 1) / n))
+        big, short, p, q = _terms(angle)
+        left = 0.5 * b.kappa - b.h
+        left = left + b.a * q - b.d * (big + short)
+        pieces[0, k] = _growth(b, p, q).lo
+        pieces[1, k] = (b.a * p - b.d * q).lo
+        pieces[2, k] = left.lo
+        pieces[3, k] = _decided(b, angle)
     n = rates.size
     for k in range(n):
         near, far = phi[0] + (top - phi[0]) * (k / n), phi[0] + (top - phi[0]) * ((k + 1) / n)
         far = top if k == n - 1 else far  # the sum need not round to it
-        big, short, p, q = _terms(near, far)
-        angle = (near, far)
-        rise = iv.mul(iv.mul(b.a, angle), iv.sub((1.0, 1.0), short))
-        rise = iv.sub(iv.sub(rise, iv.mul(b.d, iv.mul(iv.sqr(angle), big))), b.h)
-        rates[k] = iv.add((1.0, 1.0), iv.div(rise, _growth(b, p, q)))[0]
+        angle = Interval(near, far)
+        big, short, p, q = _terms(angle)
+        rise = b.a * angle * (1.0 - short)
+        rise = rise - b.d * (angle**2 * big) - b.h
+        rates[k] = (1.0 + rise / _growth(b, p, q)).lo
 
 
 # ---------------------------------------------------------------- answers

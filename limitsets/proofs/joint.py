@@ -21,15 +21,16 @@ from typing import Any
 
 import numpy as np
 
-import limitsets.interval as iv
+from limitsets.interval import Interval
 from limitsets.jit import proof_kernel
 from limitsets.proofs.cover import Cover
 from limitsets.proofs.fixed_point import leaves
 from limitsets.thrower.flight_box import bracket, sure_bracket
 from limitsets.thrower.full_box import full_ways
-from limitsets.thrower.impact_box import decide_box, displacement_box, strike_box
+from limitsets.thrower.impact import jog_displacement, margin, strike
 from limitsets.thrower.motion_box import gather_full_box
 from limitsets.thrower.side_box import gather_box
+from limitsets.thrower.turn_box import turn_box
 
 __all__ = ["SCATTERED", "NearJoint", "near_joint"]
 
@@ -79,24 +80,24 @@ def _near(lo: Any, hi: Any, side: int, x: float, out: Any) -> None:
     last, good = bracket(b.flight, b, x)
     if not good:  # so near to the joint its starts may lie far apart, where a is known to a tolerance only
         last, good = sure_bracket(b.flight, b, x)
-    phi = (0.0, last[1])
-    starts = (b.a[0], x)
-    omega, barrier = strike_box(b.flight, b, starts, phi)
-    margin = decide_box(b.flip, b, omega, barrier)
-    square = iv.mul(b.a, iv.sqr(phi))
-    left = iv.sub(iv.mul(b.a, (0.5, 0.5)), iv.div(square, (24.0, 24.0)))
-    left = iv.sub(left, iv.div(iv.mul(b.d, phi), (6.0, 6.0)))
-    shift, rise = displacement_box(b.flight, b, phi)
-    reached = iv.add((x, x), shift)[1]
+    phi, starts = Interval(0.0, last.hi), Interval(b.a.lo, x)
+    at = turn_box(phi)
+    omega, barrier = strike(b.flight, b, starts, at)
+    flips = margin(b.flip, b.inertia, omega, barrier)
+    square = b.a * phi**2
+    left = b.a * 0.5 - square / 24.0
+    left = left - b.d * phi / 6.0
+    shift, rise = jog_displacement(b.flight, b, at)
+    reached = (x + shift).hi
     out[0] = 1.0 if good else -1.0
-    out[1] = -margin[1]
-    out[2] = left[0]
-    out[3] = -b.h[1]
-    out[4] = iv.sub((lo.arm_length, lo.arm_length), (reached, reached))[0]
-    gain = iv.div(iv.mul((2.0, 2.0), iv.neg(b.h)), b.kappa)
-    out[5] = iv.add((1.0, 1.0), gain)[0]
+    out[1] = -flips.hi
+    out[2] = left.lo
+    out[3] = -b.h.hi
+    out[4] = (lo.arm_length - Interval(reached, reached)).lo
+    gain = 2.0 * -b.h / b.kappa
+    out[5] = (1.0 + gain).lo
     out[6] = reached
-    out[7] = rise[0]
+    out[7] = rise.lo
 
 
 @proof_kernel(entry=True)
@@ -105,13 +106,13 @@ def _near_ways(lo: Any, hi: Any, side: int, x: float, corner: Any, turned: Any, 
 
     `corner`: by how much the exterior angle at the left vertex exceeds the angle of impact.
     """
-    part = gather_full_box(lo, hi, side, (lo.bare.kappa, hi.bare.kappa))
+    part = gather_full_box(lo, hi, side, Interval(lo.bare.kappa, hi.bare.kappa))
     b = part.own
     last, good = bracket(b.flight, b, x)
-    phi, starts = (0.0, last[1]), (b.a[0], x)
-    shift, _ = displacement_box(b.flight, b, phi)
-    corner[0] = iv.sub((lo.bare.corner[side], lo.bare.corner[side]), (last[1], last[1]))[0]
-    ways = full_ways(part, starts, 0 if good else -1, phi, iv.add(starts, shift))
+    phi, starts = Interval(0.0, last.hi), Interval(b.a.lo, x)
+    shift, _ = jog_displacement(b.flight, b, turn_box(phi))
+    corner[0] = (lo.bare.corner[side] - Interval(last.hi, last.hi)).lo
+    ways = full_ways(part, starts, 0 if good else -1, phi, starts + shift)
     turned[0], turned[1] = ways.first.turned, ways.second.turned
     place[0, 0], place[0, 1] = ways.first.lo, ways.first.hi
     place[1, 0], place[1, 1] = ways.second.lo, ways.second.hi

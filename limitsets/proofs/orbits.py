@@ -19,8 +19,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-import limitsets.interval as iv
 from limitsets.errors import AnswerError
+from limitsets.interval import Interval
 from limitsets.jit import proof_kernel
 from limitsets.maps import codes
 from limitsets.proofs.attraction import Attraction
@@ -51,21 +51,20 @@ def _follow(
     lo_map: Any, hi_map: Any, branches: Any, lo: Any, hi: Any, side: Any, decided: Any, slope: Any
 ) -> int:
     """Fill the enclosures after the first, and that of the slope; how many throws have an image at all."""
-    product = (1.0, 1.0)
+    product = Interval(1.0, 1.0)
     for k in range(branches.size):
         b = gather_box(lo_map, hi_map, side[k])
-        state, jog, _, factor, _ = throw_box(b, lo[k], hi[k])
+        state, jog, _, factor, _ = throw_box(b, Interval(lo[k], hi[k]))
         if state == NOTHING:
             return k
         decided[k] = state == branches[k]
         if branches[k] == codes.FLIP:
-            lo[k + 1], hi[k + 1] = iv.sub(jog, b.shift)
-            side[k + 1] = b.next
+            after, side[k + 1] = jog - b.shift, b.next
         else:
-            lo[k + 1], hi[k + 1] = jog
-            side[k + 1] = b.side
-        product = iv.mul(product, factor)
-    slope[0], slope[1] = product
+            after, side[k + 1] = jog, b.side
+        lo[k + 1], hi[k + 1] = after.lo, after.hi
+        product = product * factor
+    slope[0], slope[1] = product.lo, product.hi
     return branches.size  # type: ignore[no-any-return]  # kernels take arrays as Any
 
 

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-import limitsets.interval as iv
+from limitsets.interval import Interval
 from limitsets.jit import proof_kernel
 from limitsets.maps import codes
 from limitsets.proofs.parameters import ParameterBox
@@ -29,15 +29,15 @@ def _replay(lo_map: Any, hi_map: Any, kappa: Any, landing: Any, lo: Any, hi: Any
     """Fill the enclosures after the first; the number of throws whose decision is proved."""
     for k in range(lo.size - 1):
         b = with_kappa(gather_box(lo_map, hi_map, side[k]), kappa[0, k], kappa[1, k])
-        state, jog, _, _, _ = throw_box(b, lo[k], hi[k])
+        state, jog, _, _, _ = throw_box(b, Interval(lo[k], hi[k]))
         if state == codes.JOG:
-            lo[k + 1], hi[k + 1], side[k + 1] = jog[0], jog[1], b.side
+            after, side[k + 1] = jog, b.side
         elif state == codes.FLIP:
-            lo[k + 1], hi[k + 1] = iv.sub(jog, b.shift)
-            side[k + 1] = b.next
+            after, side[k + 1] = jog - b.shift, b.next
         else:
             return k
-        lo[k + 1], hi[k + 1] = iv.add((lo[k + 1], hi[k + 1]), (landing[k], landing[k]))
+        after = after + landing[k]
+        lo[k + 1], hi[k + 1] = after.lo, after.hi
     return int(lo.size - 1)
 
 
@@ -45,15 +45,16 @@ def _replay(lo_map: Any, hi_map: Any, kappa: Any, landing: Any, lo: Any, hi: Any
 def _replay_full(lo_map: Any, hi_map: Any, kappa: Any, landing: Any, lo: Any, hi: Any, side: Any) -> int:
     """As `_replay`, with effects."""
     for k in range(lo.size - 1):
-        part = gather_full_box(lo_map, hi_map, side[k], (kappa[0, k], kappa[1, k]))
-        state, jog, phi, _, _ = sure_throw_box(part.own, lo[k], hi[k])
+        part = gather_full_box(lo_map, hi_map, side[k], Interval(kappa[0, k], kappa[1, k]))
+        x = Interval(lo[k], hi[k])
+        state, jog, phi, _, _ = sure_throw_box(part.own, x)
         if state == NOTHING:
             return k
-        x = (lo[k], hi[k])
         ways = rested_one_way(part.effects.roll, part, landed(part.effects.landing, part, x, phi, jog))
         if ways.number != 1:
             return k
-        lo[k + 1], hi[k + 1] = iv.add((ways.first.lo, ways.first.hi), (landing[k], landing[k]))
+        after = Interval(ways.first.lo, ways.first.hi) + landing[k]
+        lo[k + 1], hi[k + 1] = after.lo, after.hi
         side[k + 1] = (side[k] + ways.first.turned) % lo_map.bare.a.size
     return int(lo.size - 1)
 

@@ -19,7 +19,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-import limitsets.interval as iv
+from limitsets.interval import Interval
 from limitsets.jit import proof_kernel
 from limitsets.maps import codes
 from limitsets.proofs.parameters import ParameterBox
@@ -59,9 +59,9 @@ class Tile(NamedTuple):
 def _judge(lo_map: Any, hi_map: Any, side: int, lo: Any, hi: Any, branch: Any, sign: Any) -> None:
     b = gather_box(lo_map, hi_map, side)
     for k in range(lo.size):
-        state, _, _, slope, _ = throw_box(b, lo[k], hi[k])
+        state, _, _, slope, _ = throw_box(b, Interval(lo[k], hi[k]))
         branch[k] = state
-        sign[k] = 1 if slope[0] > 0.0 else (-1 if slope[1] < 0.0 else 0)
+        sign[k] = 1 if slope.lo > 0.0 else (-1 if slope.hi < 0.0 else 0)
         sign[k] = 0 if state == NOTHING else sign[k]
 
 
@@ -127,11 +127,11 @@ def _images(lo_map: Any, hi_map: Any, side: Any, lo: Any, hi: Any, out: Any) -> 
         for j in range(3):
             first = hi[k] if j == 1 else lo[k]
             last = lo[k] if j == 0 else hi[k]
-            state, jog, _, _, _ = throw_box(b, first, last)
-            flip = iv.sub(jog, b.shift)
+            state, jog, _, _, _ = throw_box(b, Interval(first, last))
+            flip = jog - b.shift
             good = state != NOTHING
-            out[2 * j, k], out[2 * j + 1, k] = jog[0] if good else -np.inf, jog[1] if good else np.inf
-            out[6 + 2 * j, k], out[7 + 2 * j, k] = flip[0] if good else -np.inf, flip[1] if good else np.inf
+            out[2 * j, k], out[2 * j + 1, k] = jog.lo if good else -np.inf, jog.hi if good else np.inf
+            out[6 + 2 * j, k], out[7 + 2 * j, k] = flip.lo if good else -np.inf, flip.hi if good else np.inf
 
 
 class Part(NamedTuple):

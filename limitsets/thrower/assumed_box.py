@@ -14,16 +14,16 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-import limitsets.interval as iv
-from limitsets.interval import guard
-from limitsets.interval.arithmetic import Interval
+from limitsets.interval import Interval, guard
+from limitsets.interval.number import larger, smaller, square_root
 from limitsets.jit import generic, proof_kernel
 from limitsets.maps import codes
 from limitsets.thrower.hinge_box import hinge_force, peak
-from limitsets.thrower.impact_box import strike_box
+from limitsets.thrower.impact import strike
 from limitsets.thrower.params import Exact, SmallAngle, SmallAngle2, Throw
 from limitsets.thrower.side_box import SideBox, gather_box
 from limitsets.thrower.throw_box import NOTHING, sure_throw_box, throw_box
+from limitsets.thrower.turn import Turned
 from limitsets.thrower.turn_box import turn_box, turn_point
 
 __all__ = ["Assumed", "assumed", "corner_bounds"]
@@ -71,25 +71,24 @@ class Pose(NamedTuple):
 
 
 @generic(proof=True)
-def pose_box(flight: Any, b: SideBox, x: Interval, phi: Interval) -> Pose:
+def pose_box(flight: Any, b: SideBox, x: Interval, at: Turned) -> Pose:
     """Return the part at its landing."""
 
 
 @proof_kernel
-def _exact(flight: Any, b: SideBox, x: Interval, phi: Interval) -> Pose:
-    s, v, _ = turn_box(phi[0], phi[1])
-    c = iv.sub((1.0, 1.0), v)
-    above = iv.add(iv.mul(b.a, s), iv.mul(b.d, c))
-    right = iv.sub(iv.mul(b.a, c), iv.mul(b.d, s))
-    return Pose(right, above, iv.sub(x, iv.mul(b.kappa, phi)), above)
+def _exact(flight: Any, b: SideBox, x: Interval, at: Turned) -> Pose:
+    c = 1.0 - at.v
+    above = b.a * at.s + b.d * c
+    right = b.a * c - b.d * at.s
+    return Pose(right, above, x - b.kappa * at.phi, above)
 
 
 @proof_kernel
-def _small(flight: Any, b: SideBox, x: Interval, phi: Interval) -> Pose:
+def _small(flight: Any, b: SideBox, x: Interval, at: Turned) -> Pose:
     # the paper's impact: the vertex as it was at phi = 0, and the velocity after phi = 2 (R - a) / kappa
-    reach = iv.sub(x, b.a)
-    lost = iv.div(iv.mul((2.0, 2.0), iv.mul(b.a, reach)), b.kappa)
-    return Pose(b.a, b.d, iv.sub(b.a, reach), iv.add(b.d, lost))
+    reach = x - b.a
+    lost = 2.0 * (b.a * reach) / b.kappa
+    return Pose(b.a, b.d, b.a - reach, b.d + lost)
 
 
 pose_box.on(Exact, _exact)
@@ -100,16 +99,16 @@ pose_box.on(SmallAngle2, _small)
 @proof_kernel
 def rest_box(lo: Throw, hi: Throw, side: int) -> Rest:
     """Intervals of a side on which the part rests."""
-    a = (lo.a[side], hi.a[side])
-    return Rest(a, (lo.d[side], hi.d[side]), iv.sub((lo.length[side], hi.length[side]), a))
+    a = Interval(lo.a[side], hi.a[side])
+    return Rest(a, Interval(lo.d[side], hi.d[side]), Interval(lo.length[side], hi.length[side]) - a)
 
 
 @proof_kernel
 def _needed(b: SideBox, rest: Rest, foot: Interval) -> Interval:
     """Energy needed to lift the part over an end of the side it lies on."""
-    square = iv.sqr(foot)
-    rise = iv.div(square, iv.add(iv.sqrt(iv.add(square, iv.sqr(rest.d))), rest.d))
-    return iv.mul(b.kappa, rise)
+    square = foot**2
+    rise = square / (square_root(square + rest.d**2) + rest.d)
+    return b.kappa * rise
 
 
 @proof_kernel
@@ -120,70 +119,76 @@ def _rolls(b: SideBox, rest: Rest, energy: Interval, jog: bool) -> Interval:
     one again, and is lifted over that; every strike leaves less, so no third one does more.
     """
     struck, other = (rest.right, rest.a) if jog else (rest.a, rest.right)
-    left = iv.sub(energy, iv.mul(b.kappa, rest.d))
-    own = iv.add(b.rho2, iv.sqr(rest.d))
-    keeps = iv.sub(own, iv.mul(rest.a, rest.right))
-    keeps = iv.sqr((max(keeps[0], 0.0), max(keeps[1], 0.0)))
-    share = iv.div(keeps, iv.mul(iv.add(own, iv.sqr(struck)), iv.add(own, iv.sqr(other))))
-    kinetic = iv.mul(share, left)
-    rocked = iv.mul(share, kinetic)
-    return iv.maximum(iv.div(kinetic, _needed(b, rest, struck)), iv.div(rocked, _needed(b, rest, other)))
+    left = energy - b.kappa * rest.d
+    own = b.rho2 + rest.d**2
+    keeps = own - rest.a * rest.right
+    keeps = Interval(max(keeps.lo, 0.0), max(keeps.hi, 0.0)) ** 2
+    share = keeps / ((own + struck**2) * (own + other**2))
+    kinetic = share * left
+    rocked = share * kinetic
+    return larger(kinetic / _needed(b, rest, struck), rocked / _needed(b, rest, other))
+
+
+@proof_kernel
+def _write(out: Any, column: int, found: Interval) -> None:
+    out[column, 0], out[column, 1] = found.lo, found.hi
 
 
 @proof_kernel
 def _throw(b: SideBox, rest: Rest, x: Interval, phi: Interval, slope: Interval, out: Any) -> Any:
     """Write what does not depend on the decision; return what the rest needs."""
-    lever = iv.add(b.h, b.d)
-    foot = iv.div(iv.add(b.rho2, iv.mul(b.d, lever)), x)
-    under = iv.minimum(iv.sub(rest.right, foot), iv.add(rest.a, foot))
-    at = pose_box(b.flight, b, x, phi)
-    omega, _ = strike_box(b.flight, b, x, phi)
-    press = iv.sub(iv.mul(omega, at.right), at.falling)
-    along = iv.absolute(iv.sub(lever, iv.mul(omega, at.above)))
+    lever = b.h + b.d
+    foot = (b.rho2 + b.d * lever) / x
+    under = smaller(rest.right - foot, rest.a + foot)
+    impact = turn_box(phi)
+    at = pose_box(b.flight, b, x, impact)
+    omega, _ = strike(b.flight, b, x, impact)
+    press = omega * at.right - at.falling
+    along = abs(lever - omega * at.above)
     # from the first friction can stop the vertex, from the second the impact does not set it sliding again
-    stop = iv.div(along, press if press[0] > 0.0 else (press[1], press[1]))
-    turned = iv.div(iv.absolute(iv.mul(at.right, at.above)), iv.add(b.rho2, iv.sqr(at.above)))
-    speed = iv.sub(at.falling, at.right)
-    moved = iv.mul(iv.absolute(iv.sub(slope, (1.0, 1.0))), iv.mul(phi, b.kappa))
-    half = iv.mul((0.5, 0.5), b.inertia)
-    energy = iv.add(iv.mul(half, iv.sqr(omega)), iv.mul(b.kappa, at.start))
-    out[UNDER] = under
-    out[RELEASE_FRICTION] = iv.div(iv.absolute(lever), x)
-    out[ANGLE] = phi
-    out[PRESS] = iv.div(press, x)
-    out[STICK_FRICTION] = (
-        max(stop[0], turned[0]) if press[1] > 0.0 else math.inf,
-        max(stop[1], turned[1]) if press[0] > 0.0 else math.inf,
+    stop = along / (press if press.lo > 0.0 else Interval(press.hi, press.hi))
+    turned = abs(at.right * at.above) / (b.rho2 + at.above**2)
+    speed = at.falling - at.right
+    moved = abs(slope - 1.0) * (phi * b.kappa)
+    energy = 0.5 * b.inertia * omega**2 + b.kappa * at.start
+    _write(out, UNDER, under)
+    _write(out, RELEASE_FRICTION, abs(lever) / x)
+    _write(out, ANGLE, phi)
+    _write(out, PRESS, press / x)
+    sticks = Interval(
+        max(stop.lo, turned.lo) if press.hi > 0.0 else math.inf,
+        max(stop.hi, turned.hi) if press.lo > 0.0 else math.inf,
     )
-    out[DROP] = iv.div(iv.sqr(speed), iv.mul((2.0, 2.0), b.kappa))
-    out[STROKE] = iv.mul(iv.mul((0.5, 0.5), b.kappa), iv.sqr(phi))
-    out[SPEED] = moved
+    _write(out, STICK_FRICTION, sticks)
+    _write(out, DROP, speed**2 / (2.0 * b.kappa))
+    _write(out, STROKE, 0.5 * b.kappa * phi**2)
+    _write(out, SPEED, moved)
     return at, omega, energy
 
 
 @proof_kernel
 def _wider(out: Any, column: int, found: Interval) -> None:
-    out[column, 0], out[column, 1] = min(out[column, 0], found[0]), max(out[column, 1], found[1])
+    out[column, 0], out[column, 1] = min(out[column, 0], found.lo), max(out[column, 1], found.hi)
 
 
 @proof_kernel
 def _branch(b: SideBox, rest: Rest, thrown: Any, jog: bool, image: Interval, arm: Interval, out: Any) -> None:
     """Widen by what one branch needs after the landing."""
     at, omega, energy = thrown
-    per_weight = iv.div(energy, b.kappa)
+    per_weight = energy / b.kappa
     top = peak(b.ell, at.right, at.start, omega, per_weight, jog)
     force, friction = hinge_force(b.ell, b.rho2, b.inertia, at.start, top, rest.d, per_weight)
     _wider(out, FORCE, force)
     _wider(out, HOLD_FRICTION, friction)
     _wider(out, ROLL, _rolls(b, rest, energy, jog))
-    _wider(out, ON_ARM, iv.minimum(iv.sub(arm, image), iv.sub(image, rest.a)))
+    _wider(out, ON_ARM, smaller(arm - image, image - rest.a))
 
 
 @proof_kernel
 def _cell(lo: Throw, hi: Throw, b: SideBox, x: Interval, out: Any) -> None:
-    state, image, phi, slope, _ = throw_box(b, x[0], x[1])
+    state, image, phi, slope, _ = throw_box(b, x)
     if state == NOTHING:
-        state, image, phi, slope, _ = sure_throw_box(b, x[0], x[1])
+        state, image, phi, slope, _ = sure_throw_box(b, x)
     for column in range(COUNT):
         out[column, 0], out[column, 1] = -math.inf, math.inf
     if state == NOTHING:
@@ -191,18 +196,18 @@ def _cell(lo: Throw, hi: Throw, b: SideBox, x: Interval, out: Any) -> None:
     thrown = _throw(b, rest_box(lo, hi, b.side), x, phi, slope, out)
     for column in (FORCE, HOLD_FRICTION, ROLL, ON_ARM):
         out[column, 0], out[column, 1] = math.inf, -math.inf
-    arm = (lo.arm_length, hi.arm_length)
+    arm = Interval(lo.arm_length, hi.arm_length)
     if state != codes.FLIP:
         _branch(b, rest_box(lo, hi, b.side), thrown, True, image, arm, out)
     if state != codes.JOG:
-        _branch(b, rest_box(lo, hi, b.next), thrown, False, iv.sub(image, b.shift), arm, out)
+        _branch(b, rest_box(lo, hi, b.next), thrown, False, image - b.shift, arm, out)
 
 
 @proof_kernel(entry=True)
 def _cells(lo: Throw, hi: Throw, side: int, x_lo: Any, x_hi: Any, out: Any) -> None:
     b = gather_box(lo, hi, side)
     for k in range(x_lo.size):
-        _cell(lo, hi, b, (x_lo[k], x_hi[k]), out[k])
+        _cell(lo, hi, b, Interval(x_lo[k], x_hi[k]), out[k])
 
 
 def assumed(lo: Throw, hi: Throw, side: int, x_lo: ArrayLike, x_hi: ArrayLike) -> NDArray[np.float64]:
@@ -238,14 +243,15 @@ def assumed(lo: Throw, hi: Throw, side: int, x_lo: ArrayLike, x_hi: ArrayLike) -
 
 
 @proof_kernel(entry=True)
-def _beyond(lo: Throw, hi: Throw, side: int, angle: float) -> Interval:
+def _beyond(lo: Throw, hi: Throw, side: int, angle: float) -> tuple[float, float]:
     """Enclose ell^2 sin(corner - angle), positive where 0 < angle < corner < pi."""
     own = rest_box(lo, hi, side)
     after = rest_box(lo, hi, side + 1 if side + 1 < lo.a.size else 0)
-    s, v, _ = turn_point(angle)
-    sine = iv.add(iv.mul(own.d, after.right), iv.mul(own.a, after.d))
-    cosine = iv.sub(iv.mul(own.d, after.d), iv.mul(own.a, after.right))
-    return iv.sub(iv.mul(sine, iv.sub((1.0, 1.0), v)), iv.mul(cosine, s))
+    at = turn_point(angle)
+    sine = own.d * after.right + own.a * after.d
+    cosine = own.d * after.d - own.a * after.right
+    found = sine * (1.0 - at.v) - cosine * at.s
+    return found.lo, found.hi
 
 
 def corner_bounds(lo: Throw, hi: Throw, side: int, guess: float) -> tuple[float, float]:

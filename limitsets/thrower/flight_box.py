@@ -9,13 +9,13 @@ from __future__ import annotations
 import math
 from typing import Any
 
-import limitsets.interval as iv
-from limitsets.interval.arithmetic import Interval
+from limitsets.interval import Interval
 from limitsets.interval.rounding import down, up
 from limitsets.jit import generic, proof_kernel
 from limitsets.thrower.params import Exact, SmallAngle, SmallAngle2
 from limitsets.thrower.side_box import SideBox
-from limitsets.thrower.turn_box import exact_turn, turn_box, turn_point
+from limitsets.thrower.turn import Turned
+from limitsets.thrower.turn_box import exact_turn, turn_point
 
 __all__ = ["angle_slope", "bracket", "sure_bracket"]
 
@@ -37,7 +37,7 @@ def sure_bracket(flight: Any, b: SideBox, x: float) -> tuple[Interval, bool]:
 
 
 @generic(proof=True)
-def angle_slope(flight: Any, b: SideBox, x: Interval, phi: Interval) -> Interval:
+def angle_slope(flight: Any, b: SideBox, x: Interval, at: Turned) -> Interval:
     """Return the derivative of the impact angle with respect to x."""
 
 
@@ -65,37 +65,37 @@ def _nearer(kappa: float, a: float, d: float, reach: float, phi: float) -> float
 @proof_kernel
 def _least_height(b: SideBox, reach: Interval, phi: float) -> float:
     """Bound on f from below, for all parameters: f grows with reach, a and d (v, w >= 0) and falls with kappa."""
-    _, v, w = turn_point(phi)
-    a, d = b.a[0], b.d[0]
-    fall = down(reach[0] - up(b.kappa[1] * (0.5 * phi)))
-    turned = down(down(min(a * w[0], a * w[1])) + down(min(d * v[0], d * v[1])))
+    at = turn_point(phi)
+    a, d = b.a.lo, b.d.lo
+    fall = down(reach.lo - up(b.kappa.hi * (0.5 * phi)))
+    turned = down(down(min(a * at.w.lo, a * at.w.hi)) + down(min(d * at.v.lo, d * at.v.hi)))
     return down(down(phi * fall) + turned)
 
 
 @proof_kernel
 def _most_height(b: SideBox, reach: Interval, phi: float) -> float:
     """Bound on f from above."""
-    _, v, w = turn_point(phi)
-    a, d = b.a[1], b.d[1]
-    fall = up(reach[1] - down(b.kappa[0] * (0.5 * phi)))
-    turned = up(up(max(a * w[0], a * w[1])) + up(max(d * v[0], d * v[1])))
+    at = turn_point(phi)
+    a, d = b.a.hi, b.d.hi
+    fall = up(reach.hi - down(b.kappa.lo * (0.5 * phi)))
+    turned = up(up(max(a * at.w.lo, a * at.w.hi)) + up(max(d * at.v.lo, d * at.v.hi)))
     return up(up(phi * fall) + turned)
 
 
 @proof_kernel
 def _exact_bracket(flight: Any, b: SideBox, x: float) -> tuple[Interval, bool]:
-    reach = iv.sub((x, x), b.a)
+    reach = x - b.a
     # As f, its root is smallest at one corner of the parameters and largest at the other.
-    phi = _right_of_root(b.kappa[1], b.a[0], b.d[0], b.ell[1], reach[0])
+    phi = _right_of_root(b.kappa.hi, b.a.lo, b.d.lo, b.ell.hi, reach.lo)
     for _ in range(3):
-        phi = _nearer(b.kappa[1], b.a[0], b.d[0], reach[0], phi)
+        phi = _nearer(b.kappa.hi, b.a.lo, b.d.lo, reach.lo, phi)
     other = phi
     for _ in range(2):
-        other = _nearer(b.kappa[0], b.a[1], b.d[1], reach[1], other)
+        other = _nearer(b.kappa.lo, b.a.hi, b.d.hi, reach.hi, other)
     lo, hi = phi - SLACK * phi, other + SLACK * other
-    proved = (reach[0] > 0.0) & (lo > 0.0) & (hi <= flight.full_turn) & b.single_root
+    proved = (reach.lo > 0.0) & (lo > 0.0) & (hi <= flight.full_turn) & b.single_root
     proved &= (_least_height(b, reach, lo) > 0.0) & (_most_height(b, reach, hi) < 0.0)
-    return (lo, hi), proved
+    return Interval(lo, hi), proved
 
 
 @proof_kernel
@@ -107,16 +107,16 @@ def _marched(b: SideBox, x: float) -> tuple[Interval, bool]:
     reached; the upper end is the next angle tried at which f is proved negative.  Near a double root, or where the
     first root jumps within the parameters, the bracket is wide and still right.
     """
-    reach = iv.sub((x, x), b.a)
-    bound = iv.add((b.kappa[1], b.kappa[1]), (b.ell[1], b.ell[1]))[1]
+    reach = x - b.a
+    bound = (Interval(b.kappa.hi, b.kappa.hi) + b.ell.hi).hi
     shrink = 1.0 - 2.0**-20
-    t = shrink * 2.0 * reach[0] / bound
-    going = reach[0] > 0.0
+    t = shrink * 2.0 * reach.lo / bound
+    going = reach.lo > 0.0
     while going and t < FULL_TURN:
         f = _least_height(b, reach, t)
-        s, v, _ = turn_point(t)
-        slope = iv.add(reach, iv.add(iv.mul(b.a, v), iv.mul(b.d, s)))
-        low = iv.sub(slope, iv.mul(b.kappa, (t, t)))[0]
+        at = turn_point(t)
+        slope = reach + (b.a * at.v + b.d * at.s)
+        low = (slope - b.kappa * t).lo
         inside = low * low + 2.0 * bound * f
         step = shrink * (low + math.sqrt(max(inside, 0.0))) / bound
         going = (f > 0.0) & (step > 2.0**-40 * t)
@@ -126,38 +126,38 @@ def _marched(b: SideBox, x: float) -> tuple[Interval, bool]:
     while t > 0.0 and t + width < FULL_TURN and not _most_height(b, reach, t + width) < 0.0:
         width *= 1.25
     hi = t + width
-    proved = (reach[0] > 0.0) & (t > 0.0) & (hi <= FULL_TURN) & (_most_height(b, reach, hi) < 0.0)
-    return (t, hi), proved
+    proved = (reach.lo > 0.0) & (t > 0.0) & (hi <= FULL_TURN) & (_most_height(b, reach, hi) < 0.0)
+    return Interval(t, hi), proved
 
 
 @proof_kernel
-def _exact_slope(flight: Any, b: SideBox, x: Interval, phi: Interval) -> Interval:
-    s, v, _ = turn_box(phi[0], phi[1])
-    reach = iv.sub(x, b.a)
-    below = iv.sub(iv.mul(b.kappa, phi), iv.add(reach, iv.add(iv.mul(b.a, v), iv.mul(b.d, s))))
-    return iv.div(phi, below)
+def _exact_slope(flight: Any, b: SideBox, x: Interval, at: Turned) -> Interval:
+    reach = x - b.a
+    below = b.kappa * at.phi - (reach + (b.a * at.v + b.d * at.s))
+    slope: Interval = at.phi / below
+    return slope
 
 
 @proof_kernel
 def _small_bracket(flight: Any, b: SideBox, x: float) -> tuple[Interval, bool]:
-    phi = iv.div(iv.mul((2.0, 2.0), iv.sub((x, x), b.a)), b.kappa)
-    return phi, (phi[0] > 0.0) & (phi[1] <= flight.full_turn)
+    phi = 2.0 * (x - b.a) / b.kappa
+    return phi, (phi.lo > 0.0) & (phi.hi <= flight.full_turn)
 
 
 @proof_kernel
-def _small_slope(flight: Any, b: SideBox, x: Interval, phi: Interval) -> Interval:
-    return iv.div((2.0, 2.0), b.kappa)
+def _small_slope(flight: Any, b: SideBox, x: Interval, at: Turned) -> Interval:
+    return 2.0 / b.kappa
 
 
 @proof_kernel
 def _small2_bracket(flight: Any, b: SideBox, x: float) -> tuple[Interval, bool]:
-    phi = iv.div(iv.mul((2.0, 2.0), iv.sub((x, x), b.a)), iv.sub(b.kappa, b.d))
-    return phi, (phi[0] > 0.0) & (phi[1] <= flight.full_turn)
+    phi = 2.0 * (x - b.a) / (b.kappa - b.d)
+    return phi, (phi.lo > 0.0) & (phi.hi <= flight.full_turn)
 
 
 @proof_kernel
-def _small2_slope(flight: Any, b: SideBox, x: Interval, phi: Interval) -> Interval:
-    return iv.div((2.0, 2.0), iv.sub(b.kappa, b.d))
+def _small2_slope(flight: Any, b: SideBox, x: Interval, at: Turned) -> Interval:
+    return 2.0 / (b.kappa - b.d)
 
 
 @proof_kernel

@@ -9,8 +9,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-import limitsets.interval as iv
-from limitsets.interval.arithmetic import Interval
+from limitsets.interval import Interval
 from limitsets.jit import generic, proof_kernel
 from limitsets.maps.contract import fallback_box, image_box
 from limitsets.thrower.arrival_box import landed
@@ -34,7 +33,7 @@ def _scattered(spread: Any, x: Interval) -> Interval:
     """Widen a place of rest by what a landing deviates by."""
     if spread is None:
         return x
-    return iv.add(x, (-spread.landing, spread.landing))
+    return x + Interval(-spread.landing, spread.landing)
 
 
 @proof_kernel
@@ -89,34 +88,36 @@ def _slots(part: FullSideBox, ways: Ways, phi: Interval) -> Any:
     """Count, images per branch, witness."""
     n = part.lo.a.size
     one, two = ways.first, ways.second
-    first = _scattered(part.effects.spread, (one.lo, one.hi))
-    second = _scattered(part.effects.spread, (two.lo, two.hi))
+    first = _scattered(part.effects.spread, Interval(one.lo, one.hi))
+    second = _scattered(part.effects.spread, Interval(two.lo, two.hi))
     return (
         ways.number if ways.number > 0 else NOTHING,
-        (first[0], first[1], (part.own.side + one.turned) % n, one.branch),
-        (second[0], second[1], (part.own.side + two.turned) % n, two.branch),
-        phi,
+        (first.lo, first.hi, (part.own.side + one.turned) % n, one.branch),
+        (second.lo, second.hi, (part.own.side + two.turned) % n, two.branch),
+        (phi.lo, phi.hi),
     )
 
 
 @proof_kernel
 def side_full_image_box(part: FullSideBox, same: FullSideBox, lo: float, hi: float, side: int) -> Any:
     """`image_box` on one side; the witness is the bracket of the left vertex's own landing."""
-    state, jog, phi, _, _ = throw_box(part.own, lo, hi)
-    return _slots(part, full_ways(part, (lo, hi), state, phi, jog), phi)
+    x = Interval(lo, hi)
+    state, jog, phi, _, _ = throw_box(part.own, x)
+    return _slots(part, full_ways(part, x, state, phi, jog), phi)
 
 
 @proof_kernel
 def side_full_fallback_box(part: FullSideBox, same: FullSideBox, lo: float, hi: float, side: int) -> Any:
     """`fallback_box` on one side."""
-    state, jog, phi, _, _ = sure_throw_box(part.own, lo, hi)
-    return _slots(part, full_ways(part, (lo, hi), state, phi, jog), phi)
+    x = Interval(lo, hi)
+    state, jog, phi, _, _ = sure_throw_box(part.own, x)
+    return _slots(part, full_ways(part, x, state, phi, jog), phi)
 
 
 @proof_kernel
 def gather_full_pair(lo: FullThrow, hi: FullThrow, side: int) -> tuple[FullSideBox, FullSideBox]:
     """`on_side_box`: the same intervals stand for both corners."""
-    part = gather_full_box(lo, hi, side, (lo.bare.kappa, hi.bare.kappa))
+    part = gather_full_box(lo, hi, side, Interval(lo.bare.kappa, hi.bare.kappa))
     return part, part
 
 

@@ -13,8 +13,8 @@ from __future__ import annotations
 
 import math
 
-import limitsets.interval as iv
-from limitsets.interval.arithmetic import Interval
+from limitsets.interval import Interval
+from limitsets.interval.number import square_root
 from limitsets.jit import proof_kernel
 
 __all__ = ["hinge_force", "peak"]
@@ -28,51 +28,51 @@ def peak(
     ell: Interval, right: Interval, start: Interval, omega: Interval, energy: Interval, jog: bool
 ) -> Interval:
     """Enclose the greatest height that the centre of mass passes."""
-    climbs = (min(max(energy[0], start[0]), ell[0]), max(min(energy[1], ell[1]), start[1]))
-    over = (ell[0], max(ell[1], start[1]))
-    if jog and right[0] > 0.0:
-        if omega[0] > 0.0:
+    climbs = Interval(min(max(energy.lo, start.lo), ell.lo), max(min(energy.hi, ell.hi), start.hi))
+    over = Interval(ell.lo, max(ell.hi, start.hi))
+    if jog and right.lo > 0.0:
+        if omega.lo > 0.0:
             return climbs
-        return start if omega[1] < 0.0 else (start[0], climbs[1])
-    if not jog and right[0] > 0.0:
+        return start if omega.hi < 0.0 else Interval(start.lo, climbs.hi)
+    if not jog and right.lo > 0.0:
         return over
-    if not jog and right[1] < 0.0 and omega[0] > 0.0:
+    if not jog and right.hi < 0.0 and omega.lo > 0.0:
         return start
-    return start[0], over[1]
+    return Interval(start.lo, over.hi)
 
 
 @proof_kernel
 def _press(rho2: Interval, energy: Interval, height: float) -> Interval:
     """M n at a height."""
-    h = (height, height)
-    slope = iv.sub(iv.mul((3.0, 3.0), h), iv.mul((2.0, 2.0), energy))
-    return iv.add(rho2, iv.mul(h, slope))
+    h = Interval(height, height)
+    return rho2 + h * (3.0 * h - 2.0 * energy)
 
 
 @proof_kernel
 def _least(rho2: Interval, energy: Interval, outer: Interval, inner: Interval) -> Interval:
     """Bounds of the least M n: from below by a tangent of the convex function, from above by a height surely passed."""
-    best = (energy[0] + energy[1]) / 6.0
-    at = min(max(best, outer[0]), outer[1])
-    slope = iv.sub(iv.mul((6.0, 6.0), (at, at)), iv.mul((2.0, 2.0), energy))
-    rest = iv.mul(slope, iv.sub(outer, (at, at)))
-    below = iv.add(_press(rho2, energy, at), rest)[0]
-    sure = inner[0] <= inner[1]
-    passed = min(max(best, inner[0]), inner[1])
-    ends = max(_press(rho2, energy, outer[0])[1], _press(rho2, energy, outer[1])[1])
-    return below, _press(rho2, energy, passed)[1] if sure else ends
+    best = (energy.lo + energy.hi) / 6.0
+    at = min(max(best, outer.lo), outer.hi)
+    slope = Interval(6.0, 6.0) * at - 2.0 * energy
+    rest = slope * (outer - at)
+    below = (_press(rho2, energy, at) + rest).lo
+    sure = inner.lo <= inner.hi
+    passed = min(max(best, inner.lo), inner.hi)
+    ends = max(_press(rho2, energy, outer.lo).hi, _press(rho2, energy, outer.hi).hi)
+    return Interval(below, _press(rho2, energy, passed).hi if sure else ends)
 
 
 @proof_kernel
 def _friction(ell: Interval, rho2: Interval, energy: Interval, height: Interval) -> Interval:
     """Enclose |f| / n for heights between two."""
-    square = iv.sub(iv.sqr(ell), iv.sqr(height))
-    across = iv.sqrt((max(square[0], 0.0), square[1]))  # only rounding and dependency carry it below 0
-    slope = iv.sub(iv.mul((3.0, 3.0), height), iv.mul((2.0, 2.0), energy))
-    press = iv.add(rho2, iv.mul(height, slope))
-    ratio = iv.div(iv.mul(across, iv.absolute(slope)), press)
-    good = (press[0] > 0.0) & (ratio[1] >= 0.0)
-    return ratio[0] if good else 0.0, ratio[1] if good else math.inf
+    square = ell**2 - height**2
+    # only rounding and dependency carry it below 0
+    across = square_root(Interval(max(square.lo, 0.0), square.hi))
+    slope = 3.0 * height - 2.0 * energy
+    press = rho2 + height * slope
+    ratio = across * abs(slope) / press
+    good = (press.lo > 0.0) & (ratio.hi >= 0.0)
+    return Interval(ratio.lo if good else 0.0, ratio.hi if good else math.inf)
 
 
 @proof_kernel
@@ -96,21 +96,21 @@ def hinge_force(
     energy : Interval
         The energy as a height [length].
     """
-    outer = (min(start[0], end[0]), max(max(start[1], end[1]), top[1]))
-    inner = (min(start[1], end[1]), max(max(start[0], end[0]), top[0]))
+    outer = Interval(min(start.lo, end.lo), max(max(start.hi, end.hi), top.hi))
+    inner = Interval(min(start.hi, end.hi), max(max(start.lo, end.lo), top.lo))
     least = _least(rho2, energy, outer, inner)
-    force = iv.div(least, inertia)
-    if not force[0] > 0.0:
-        surely = math.inf if force[1] < 0.0 else 0.0
-        return force, (surely, math.inf)
+    force = least / inertia
+    if not force.lo > 0.0:
+        surely = math.inf if force.hi < 0.0 else 0.0
+        return force, Interval(surely, math.inf)
     most, attained = 0.0, 0.0
-    step = (outer[1] - outer[0]) / SLICES
+    step = (outer.hi - outer.lo) / SLICES
     for k in range(SLICES):
-        first = outer[0] + k * step
-        last = outer[1] if k == SLICES - 1 else outer[0] + (k + 1) * step
-        most = max(most, _friction(ell, rho2, energy, (first, last))[1])
+        first = outer.lo + k * step
+        last = outer.hi if k == SLICES - 1 else outer.lo + (k + 1) * step
+        most = max(most, _friction(ell, rho2, energy, Interval(first, last)).hi)
         for border in (first, last):
-            height = min(max(border, inner[0]), inner[1])
-            if inner[0] <= inner[1]:
-                attained = max(attained, _friction(ell, rho2, energy, (height, height))[0])
-    return force, (attained, most)
+            height = min(max(border, inner.lo), inner.hi)
+            if inner.lo <= inner.hi:
+                attained = max(attained, _friction(ell, rho2, energy, Interval(height, height)).lo)
+    return force, Interval(attained, most)

@@ -1,68 +1,99 @@
-"""Impact: the rotation after the plastic, sticking landing on the left vertex, and what a flip would need.
+"""Impact and landing: the rotation after the plastic, sticking landing on the left vertex, and the place of rest.
 
-`strike` gives the rate after the impact, the kinetic energy about the vertex K and the barrier B = sgn(X) V: the
-potential energy still to be climbed, negative once the centre of mass is past the vertex (X < 0).  `decide` turns
-them into one number, positive where the part flips:
+The formulas stand once, for every kind of number: floats, and intervals over a cell of starts and a box of parameters.
+`strike` gives the rate after the impact and the barrier B = sgn(X) V: the potential energy still to be climbed,
+negative once the centre of mass is past the vertex (X < 0).  With the kinetic energy K about the vertex, `margin` is
+positive where the part flips:
 
     signed:  sgn(omega) K - B        energy:  K - B
 
-In the small-angle models X has no meaning and V keeps its own sign.
+In the small-angle models X has no meaning and V keeps its own sign.  A jog moves the centre of mass by
+-h phi + a (1 - cos phi) - d (phi - sin phi); a flip about the struck vertex by `Side.shift` less.  Both come from the
+angle alone, so that a short throw loses no digit to x.  Source: docs/model.md, impact and landing.
 """
 
 from __future__ import annotations
 
 from typing import Any
 
-from limitsets.jit import generic, kernel
-from limitsets.thrower.params import Energy, Exact, Side, Signed, SmallAngle, SmallAngle2
-from limitsets.thrower.turn import Turned
+from limitsets.interval.number import signed_square, where_positive, with_sign_of
+from limitsets.jit import formula, generic
+from limitsets.thrower.params import Energy, Exact, Signed, SmallAngle, SmallAngle2, per_inertia
 
-__all__ = ["decide", "strike"]
+__all__ = ["jog_displacement", "margin", "strike", "swing"]
 
 
-@generic
-def strike(flight: Any, part: Side, x: float, at: Turned) -> tuple[float, float, float]:
-    """Rate after the impact, kinetic energy, barrier."""
+# ---------------------------------------------------------------- impact
 
 
 @generic
-def decide(flip: Any, omega: float, kinetic: float, barrier: float) -> float:
-    """Return a number that is positive where the part flips."""
+def strike(flight: Any, part: Any, x: Any, at: Any) -> tuple[Any, Any]:
+    """Rate after the impact, barrier."""
 
 
-@kernel
-def _exact(flight: Any, part: Side, x: float, at: Turned) -> tuple[float, float, float]:
-    s, v = at.s, at.v
-    right = part.a * (1.0 - v) - part.d * s  # X: the centre right of the vertex
-    above = part.a * s + part.d * (1.0 - v)  # H: the centre above it
-    omega = (part.rho2 + right * (x - part.kappa * at.phi) + above * (part.h + part.d)) * part.per_inertia
-    kinetic = 0.5 * part.inertia * omega * omega
+@generic
+def margin(flip: Any, inertia: Any, omega: Any, barrier: Any) -> Any:
+    """Return the number that is positive where the part flips."""
+
+
+@formula
+def swing(part: Any, right: Any, above: Any, falling: Any, lever: Any) -> tuple[Any, Any]:
+    """Return the rate about a struck vertex, and the barrier.
+
+    The centre of mass is X = `right` of the vertex and H = `above` it; w x `falling` is its velocity down before the
+    impact, w x `lever` that along the arm.
+    """
+    omega = per_inertia(part, part.rho2 + (right * falling + above * lever))
     # ell - H = X^2 / (ell + H) keeps its digits near the top; for H < 0 the difference itself does.
-    near = right * abs(right) / (part.ell + abs(above))
-    far = (part.ell - above) if right > 0.0 else (above - part.ell)
-    return omega, kinetic, part.kappa * (near if above > 0.0 else far)
+    near = signed_square(right) / (part.ell + where_positive(above, above, -above))
+    far = with_sign_of(right, part.ell - above)
+    return omega, part.kappa * where_positive(above, near, far)
 
 
-@kernel
-def _small(flight: Any, part: Side, x: float, at: Turned) -> tuple[float, float, float]:
-    a, d = part.a, part.d
-    omega = (part.rho2 - a * x + 2.0 * a * a + d * d + d * part.h) * part.per_inertia
-    kinetic = 0.5 * part.inertia * omega * omega
-    return omega, kinetic, part.kappa * (a * a / (part.ell + d)) - 2.0 * a * (x - a)
+def _exact(flight: Any, part: Any, x: Any, at: Any) -> tuple[Any, Any]:
+    c = 1.0 - at.v
+    right, above = part.a * c - part.d * at.s, part.a * at.s + part.d * c
+    return swing(part, right, above, x - part.kappa * at.phi, part.h + part.d)
 
 
-@kernel
-def _signed(flip: Any, omega: float, kinetic: float, barrier: float) -> float:
-    return (kinetic if omega > 0.0 else -kinetic) - barrier
+def _small(flight: Any, part: Any, x: Any, at: Any) -> tuple[Any, Any]:
+    a, d, reach = part.a, part.d, x - part.a
+    own = a**2 + d**2 + d * part.h
+    omega = per_inertia(part, part.rho2 - a * reach + own)  # 2 a^2 - a R = a^2 - a (R - a)
+    return omega, part.kappa * (a**2 / (part.ell + d)) - 2.0 * (a * reach)
 
 
-@kernel
-def _energy(flip: Any, omega: float, kinetic: float, barrier: float) -> float:
-    return kinetic - barrier
+def _signed(flip: Any, inertia: Any, omega: Any, barrier: Any) -> Any:
+    return 0.5 * inertia * signed_square(omega) - barrier
+
+
+def _energy(flip: Any, inertia: Any, omega: Any, barrier: Any) -> Any:
+    return 0.5 * inertia * omega**2 - barrier
 
 
 strike.on(Exact, _exact)
 strike.on(SmallAngle, _small)
 strike.on(SmallAngle2, _small)
-decide.on(Signed, _signed)
-decide.on(Energy, _energy)
+margin.on(Signed, _signed)
+margin.on(Energy, _energy)
+
+
+# ---------------------------------------------------------------- landing
+
+
+@generic
+def jog_displacement(flight: Any, part: Any, at: Any) -> tuple[Any, Any]:
+    """Shift of the centre of mass by a jog, and its derivative with respect to phi."""
+
+
+def _exact_jog(flight: Any, part: Any, at: Any) -> tuple[Any, Any]:
+    return part.a * at.v - part.d * at.w - part.h * at.phi, part.a * at.s - part.d * at.v - part.h
+
+
+def _small_jog(flight: Any, part: Any, at: Any) -> tuple[Any, Any]:
+    return -(part.h * at.phi), -part.h
+
+
+jog_displacement.on(Exact, _exact_jog)
+jog_displacement.on(SmallAngle, _small_jog)
+jog_displacement.on(SmallAngle2, _small_jog)

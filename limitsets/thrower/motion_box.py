@@ -13,8 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-import limitsets.interval as iv
-from limitsets.interval.arithmetic import Interval
+from limitsets.interval import Interval
 from limitsets.jit import proof_kernel
 from limitsets.maps import codes
 from limitsets.thrower.motion import Effects, FullThrow
@@ -95,8 +94,8 @@ def _scattered(spread: Any, kappa: Interval) -> Interval:
     """kappa / (1 + delta)^2 for all the deviations of the speed."""
     if spread is None:
         return kappa
-    factor = iv.add((1.0, 1.0), (-spread.speed, spread.speed))
-    return iv.div(kappa, iv.sqr(factor))
+    factor = Interval(1.0, 1.0) + Interval(-spread.speed, spread.speed)
+    return kappa / factor**2
 
 
 @proof_kernel
@@ -104,7 +103,7 @@ def gather_full_box(lo: FullThrow, hi: FullThrow, side: int, kappa: Interval) ->
     """Intervals of one side, from the two corners of a parameter box, for throws with these kappa."""
     thrown = _scattered(lo.effects.spread, kappa)
     return FullSideBox(
-        with_kappa(gather_box(lo.bare, hi.bare, side), thrown[0], thrown[1]),
+        with_kappa(gather_box(lo.bare, hi.bare, side), thrown.lo, thrown.hi),
         lo.bare,
         hi.bare,
         lo.outline.p[side],
@@ -120,21 +119,21 @@ def gather_full_box(lo: FullThrow, hi: FullThrow, side: int, kappa: Interval) ->
 def box_of(part: FullSideBox, k: int) -> SideBox:
     """Return the minimal model of side number k, counted on without end."""
     b = gather_box(part.lo, part.hi, k % part.lo.a.size)
-    return with_kappa(b, part.own.kappa[0], part.own.kappa[1])
+    return with_kappa(b, part.own.kappa.lo, part.own.kappa.hi)
 
 
 @proof_kernel
 def corner_box(part: FullSideBox, k: int) -> Interval:
     """Exterior angle at vertex number k."""
     n = k % part.lo.a.size
-    return part.lo.corner[n], part.hi.corner[n]
+    return Interval(part.lo.corner[n], part.hi.corner[n])
 
 
 @proof_kernel
 def vertex_box(part: FullSideBox, k: int) -> tuple[Interval, Interval]:
     """Place of vertex number k from the centre of mass, before the throw."""
     n = k % part.lo.a.size
-    return (part.p_lo[n], part.p_hi[n]), (part.q_lo[n], part.q_hi[n])
+    return Interval(part.p_lo[n], part.p_hi[n]), Interval(part.q_lo[n], part.q_hi[n])
 
 
 @proof_kernel
@@ -149,8 +148,8 @@ def wait(
     if count < ROOM:
         row = part.waiting[count]
         row[0], row[1], row[2] = k, 1.0 if left else 0.0, 1.0 if rolled else 0.0
-        row[3], row[4] = max(energy[0], 0.0), max(energy[1], 0.0)
-        row[5], row[6] = x
+        row[3], row[4] = max(energy.lo, 0.0), max(energy.hi, 0.0)
+        row[5], row[6] = x.lo, x.hi
     return count + 1
 
 
@@ -167,13 +166,13 @@ def put(ways: Ways, turned: int, rolled: bool, x: Interval) -> Ways:
     branch = codes.JOG if turned == 0 else codes.FLIP
     branch = ROLLED if rolled | (turned < 0) | (turned > 1) else branch
     number, one, two = ways
-    mine = Way(turned, branch, x[0], x[1])
+    mine = Way(turned, branch, x.lo, x.hi)
     if number == 0:
         return Ways(1, mine, two)
     if (number > 0) & (one.turned == turned) & (one.branch == branch):
-        return Ways(number, Way(turned, branch, min(one.lo, x[0]), max(one.hi, x[1])), two)
+        return Ways(number, Way(turned, branch, min(one.lo, x.lo), max(one.hi, x.hi)), two)
     if number == 1:
         return Ways(2, one, mine)
     if (number == 2) & (two.turned == turned) & (two.branch == branch):
-        return Ways(2, one, Way(turned, branch, min(two.lo, x[0]), max(two.hi, x[1])))
+        return Ways(2, one, Way(turned, branch, min(two.lo, x.lo), max(two.hi, x.hi)))
     return Ways(NOTHING, one, two)

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from limitsets.errors import MapError
+from limitsets.jit import generic
 
 __all__ = ["Energy", "Exact", "Side", "Signed", "SmallAngle", "SmallAngle2", "Throw", "gather", "throw_map"]
 
@@ -139,6 +140,18 @@ def gather(params: Throw, side: int) -> Side:
         params.a[after],
         a + (params.length[after] - params.a[after]),
     )
+
+
+@generic
+def per_inertia(part: Any, momentum: Any) -> Any:
+    """Divide an angular momentum about the left vertex by the moment of inertia there."""
+
+
+def _per_inertia(part: Side, momentum: float) -> float:
+    return momentum * part.per_inertia
+
+
+per_inertia.on(Side, _per_inertia)
 
 
 FLIGHTS = {"exact": Exact, "small-angle": SmallAngle, "small-angle-2": SmallAngle2}

@@ -10,7 +10,8 @@ from __future__ import annotations
 
 from typing import Any
 
-import limitsets.interval as iv
+from limitsets.interval import Interval
+from limitsets.interval.number import smaller, square_root
 from limitsets.jit import proof_kernel
 from limitsets.thrower.motion_box import NOTHING, ROOM, FullSideBox, Ways, box_of, no_way, put, wait
 
@@ -29,7 +30,7 @@ def rested(roll: Any, part: FullSideBox, count: int) -> Ways:
     if roll is None:
         for number in range(count):
             row = part.waiting[number]
-            ways = put(ways, int(row[0]) - part.own.side, False, (row[5], row[6]))
+            ways = put(ways, int(row[0]) - part.own.side, False, Interval(row[5], row[6]))
         return ways
     # a part that is said to turn on whichever way it rotates has no energy to follow
     strikes = 0 if part.own.flip.sign > 0.0 else MOST_STRIKES
@@ -49,7 +50,7 @@ def rested_one_way(roll: Any, part: FullSideBox, count: int) -> Ways:
         return none
     if roll is None:
         row = part.waiting[0]
-        return put(ways, int(row[0]) - part.own.side, False, (row[5], row[6]))
+        return put(ways, int(row[0]) - part.own.side, False, Interval(row[5], row[6]))
     strikes = 0 if part.own.flip.sign > 0.0 else MOST_STRIKES
     while (count == 1) & (ways.number == 0) & (strikes < MOST_STRIKES):
         ways, count = _strike(part, ways, 0)
@@ -62,28 +63,28 @@ def _strike(part: FullSideBox, ways: Ways, count: int) -> tuple[Ways, int]:
     """Let the last side that waits come down: it rests there, or another one waits."""
     row = part.waiting[count]
     k, left, rolled = int(row[0]), row[1] > 0.0, row[2] > 0.0
-    energy, x = (row[3], row[4]), (row[5], row[6])
+    energy, x = Interval(row[3], row[4]), Interval(row[5], row[6])
     b, before, after = box_of(part, k), box_of(part, k - 1), box_of(part, k + 1)
-    right = iv.sub(before.shift, before.a)  # L - a, of this side
-    flat = iv.add(b.rho2, iv.sqr(b.d))
-    reach2 = iv.sqr(right)
-    keeps = iv.sub(flat, iv.mul(b.a, right))
-    share = iv.div(iv.sqr(keeps), iv.mul(b.inertia, iv.add(flat, reach2)))
-    kinetic = iv.mul(energy, share)
-    at_left = iv.mul(b.kappa, iv.div(iv.sqr(b.a), iv.add(b.ell, b.d)))
-    at_right = iv.mul(b.kappa, iv.div(reach2, iv.add(iv.sqrt(iv.add(reach2, iv.sqr(b.d))), b.d)))
-    lift, top = iv.minimum(at_left, at_right), at_right if left else at_left
-    stops = (keeps[1] <= 0.0) | (kinetic[1] <= lift[0])
-    moves = (keeps[0] > 0.0) & (kinetic[0] > lift[1])
+    right = before.shift - before.a  # L - a, of this side
+    flat = b.rho2 + b.d**2
+    reach2 = right**2
+    keeps = flat - b.a * right
+    share = keeps**2 / (b.inertia * (flat + reach2))
+    kinetic = energy * share
+    at_left = b.kappa * (b.a**2 / (b.ell + b.d))
+    at_right = b.kappa * (reach2 / (square_root(reach2 + b.d**2) + b.d))
+    lift, top = smaller(at_left, at_right), at_right if left else at_left
+    stops = (keeps.hi <= 0.0) | (kinetic.hi <= lift.lo)
+    moves = (keeps.lo > 0.0) & (kinetic.lo > lift.hi)
     if not moves:
         ways = put(ways, k - part.own.side, rolled, x)
     if stops:
         return ways, count
-    if not kinetic[0] > top[1]:
+    if not kinetic.lo > top.hi:
         count = wait(part, count, k, not left, rolled, kinetic, x)
-    if not kinetic[1] < top[0]:
+    if not kinetic.hi < top.lo:
         to, there = (k - 1, before.d) if left else (k + 1, after.d)
-        place = iv.add(x, before.shift) if left else iv.sub(x, b.shift)
-        higher = iv.add(kinetic, iv.mul(b.kappa, iv.sub(b.d, there)))
+        place = (x + before.shift) if left else (x - b.shift)
+        higher = kinetic + b.kappa * (b.d - there)
         count = wait(part, count, to, left, True, higher, place)
     return ways, count

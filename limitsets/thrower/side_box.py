@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-import limitsets.interval as iv
-from limitsets.interval.arithmetic import Interval
+from limitsets.interval import Interval
+from limitsets.interval.number import square_root
 from limitsets.jit import proof_kernel
-from limitsets.thrower.params import Throw
+from limitsets.thrower.params import Throw, per_inertia
 
 __all__ = ["SideBox", "gather_box", "with_kappa"]
 
@@ -34,24 +34,24 @@ class SideBox(NamedTuple):
 def gather_box(lo: Throw, hi: Throw, side: int) -> SideBox:
     """Intervals of one side's parameters, from the two corners of a parameter box."""
     after = side + 1 if side + 1 < lo.a.size else 0
-    a, d = (lo.a[side], hi.a[side]), (lo.d[side], hi.d[side])
-    kappa, rho = (lo.kappa, hi.kappa), (lo.radius_of_gyration, hi.radius_of_gyration)
-    ell2 = iv.add(iv.sqr(a), iv.sqr(d))
-    ell = iv.sqrt(ell2)
-    rho2 = iv.sqr(rho)
-    landed = iv.sub((lo.length[after], hi.length[after]), (lo.a[after], hi.a[after]))
+    a, d = Interval(lo.a[side], hi.a[side]), Interval(lo.d[side], hi.d[side])
+    kappa = Interval(lo.kappa, hi.kappa)
+    ell2 = a**2 + d**2
+    ell = square_root(ell2)
+    rho2 = Interval(lo.radius_of_gyration, hi.radius_of_gyration) ** 2
+    landed = Interval(lo.length[after], hi.length[after]) - Interval(lo.a[after], hi.a[after])
     return SideBox(
         lo.flight,
         lo.flip,
         kappa,
-        (lo.surface_height, hi.surface_height),
+        Interval(lo.surface_height, hi.surface_height),
         a,
         d,
         ell,
         rho2,
-        iv.add(rho2, ell2),
-        iv.add(a, landed),
-        kappa[0] > ell[1],
+        rho2 + ell2,
+        a + landed,
+        kappa.lo > ell.hi,
         side,
         after,
     )
@@ -63,7 +63,7 @@ def with_kappa(b: SideBox, lo: float, hi: float) -> SideBox:
     return SideBox(
         b.flight,
         b.flip,
-        (lo, hi),
+        Interval(lo, hi),
         b.h,
         b.a,
         b.d,
@@ -71,7 +71,15 @@ def with_kappa(b: SideBox, lo: float, hi: float) -> SideBox:
         b.rho2,
         b.inertia,
         b.shift,
-        lo > b.ell[1],
+        lo > b.ell.hi,
         b.side,
         b.next,
     )
+
+
+@proof_kernel
+def _per_inertia(part: SideBox, momentum: Interval) -> Interval:
+    return momentum / part.inertia
+
+
+per_inertia.on(SideBox, _per_inertia)

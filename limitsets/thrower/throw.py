@@ -13,8 +13,7 @@ from limitsets.jit import kernel
 from limitsets.maps import codes
 from limitsets.maps.contract import fallback_box, image_box, register
 from limitsets.thrower.flight import impact_angle, sure_impact_angle
-from limitsets.thrower.impact import decide, strike
-from limitsets.thrower.landing import jog_displacement
+from limitsets.thrower.impact import jog_displacement, margin, strike
 from limitsets.thrower.params import Side, Throw, gather
 from limitsets.thrower.side_box import SideBox
 from limitsets.thrower.throw_box import (
@@ -36,8 +35,9 @@ gather_side = kernel(gather)
 @kernel
 def flip_margin(part: Side, x: float, at: Turned) -> float:
     """Positive where the part flips after an impact at phi."""
-    omega, kinetic, barrier = strike(part.flight, part, x, at)
-    return decide(part.flip, omega, kinetic, barrier)
+    omega, barrier = strike(part.flight, part, x, at)
+    found: float = margin(part.flip, part.inertia, omega, barrier)
+    return found
 
 
 @kernel

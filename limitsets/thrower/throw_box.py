@@ -9,15 +9,15 @@ from __future__ import annotations
 import math
 from typing import Any
 
-import limitsets.interval as iv
-from limitsets.interval.arithmetic import Interval
+from limitsets.interval import Interval
 from limitsets.interval.rounding import down, up
 from limitsets.jit import proof_kernel
 from limitsets.maps import codes
 from limitsets.thrower.flight_box import angle_slope, bracket, sure_bracket
-from limitsets.thrower.impact_box import decide_box, displacement_box, strike_box
+from limitsets.thrower.impact import jog_displacement, margin, strike
 from limitsets.thrower.params import Throw
 from limitsets.thrower.side_box import SideBox, gather_box
+from limitsets.thrower.turn_box import turn_box, turn_point
 
 __all__ = ["gather_pair", "side_image_box", "throw_box", "throw_image_box"]
 
@@ -25,8 +25,8 @@ NOTHING, DECIDED, BOTH = -1, 1, 2
 
 
 @proof_kernel
-def throw_box(b: SideBox, lo: float, hi: float) -> tuple[int, Interval, Interval, Interval, Interval]:
-    """Enclose one throw of every start in [lo, hi].
+def throw_box(b: SideBox, x: Interval) -> tuple[int, Interval, Interval, Interval, Interval]:
+    """Enclose one throw of every start in x.
 
     Returns
     -------
@@ -34,44 +34,47 @@ def throw_box(b: SideBox, lo: float, hi: float) -> tuple[int, Interval, Interval
         `state`: -1 nothing is proved; 0 jog, 1 flip; 2 either.  `image`: of a jog (a flip moves by `shift` less).
         `phi`: impact angles.  `slope`: of x' against x.  `margin`: of the decision.
     """
-    first, good = bracket(b.flight, b, lo)
-    last, fine = bracket(b.flight, b, hi)
-    return _between(b, lo, hi, first, last, good & fine)
+    first, good = bracket(b.flight, b, x.lo)
+    last, fine = bracket(b.flight, b, x.hi)
+    return _between(b, x, first, last, good & fine)
 
 
 @proof_kernel
-def sure_throw_box(b: SideBox, lo: float, hi: float) -> tuple[int, Interval, Interval, Interval, Interval]:
+def sure_throw_box(b: SideBox, x: Interval) -> tuple[int, Interval, Interval, Interval, Interval]:
     """As `throw_box`, with the smallest root found by a march where there may be several."""
-    first, good = sure_bracket(b.flight, b, lo)
-    last, fine = sure_bracket(b.flight, b, hi)
-    return _between(b, lo, hi, first, last, good & fine)
+    first, good = sure_bracket(b.flight, b, x.lo)
+    last, fine = sure_bracket(b.flight, b, x.hi)
+    return _between(b, x, first, last, good & fine)
 
 
 @proof_kernel
 def _between(
-    b: SideBox, lo: float, hi: float, first: Interval, last: Interval, proved: bool
+    b: SideBox, x: Interval, first: Interval, last: Interval, proved: bool
 ) -> tuple[int, Interval, Interval, Interval, Interval]:
     """Enclose the throws of a cell from the brackets at its ends: the angle grows with x, if need be by jumps."""
-    phi, x = (first[0], last[1]), (lo, hi)
-    shift, shift_slope = displacement_box(b.flight, b, phi)
-    slope = iv.add((1.0, 1.0), iv.mul(shift_slope, angle_slope(b.flight, b, x, phi)))
+    phi = Interval(first.lo, last.hi)
+    at = turn_box(phi)
+    shift, shift_slope = jog_displacement(b.flight, b, at)
+    slope = 1.0 + shift_slope * angle_slope(b.flight, b, x, at)
     # With the parameters known within wide bounds the brackets are wide: where the displacement is proved to grow
     # with phi only the outer ends of them matter.
-    grows = shift_slope[0] > 0.0
-    outer_lo, outer_hi = (first[0], first[0]), (last[1], last[1])
-    least = displacement_box(b.flight, b, outer_lo)[0][0], displacement_box(b.flight, b, first)[0][0]
-    most = displacement_box(b.flight, b, outer_hi)[0][1], displacement_box(b.flight, b, last)[0][1]
+    grows = shift_slope.lo > 0.0
+    least, _ = jog_displacement(b.flight, b, turn_point(first.lo))
+    most, _ = jog_displacement(b.flight, b, turn_point(last.hi))
+    any_first, _ = jog_displacement(b.flight, b, turn_box(first))
+    any_last, _ = jog_displacement(b.flight, b, turn_box(last))
     # Both are found and one is chosen: the turns at the ends of the brackets are known, at a chosen angle they are not.
-    at_lo, at_hi = least[0] if grows else least[1], most[0] if grows else most[1]
-    ends = down(lo + at_lo), up(hi + at_hi)
-    whole = iv.add(x, shift)
-    rising = slope[0] > 0.0
-    image = (ends[0] if rising else whole[0], ends[1] if rising else whole[1])
-    omega, barrier = strike_box(b.flight, b, x, phi)
-    margin = decide_box(b.flip, b, omega, barrier)
-    state = codes.FLIP if margin[0] > 0.0 else (codes.JOG if margin[1] <= 0.0 else BOTH)
-    finite = (image[1] - image[0] < math.inf) & (margin[1] - margin[0] < math.inf)
-    return state if proved & finite else NOTHING, image, phi, slope, margin
+    at_lo = least.lo if grows else any_first.lo
+    at_hi = most.hi if grows else any_last.hi
+    ends = Interval(down(x.lo + at_lo), up(x.hi + at_hi))
+    whole = x + shift
+    rising = slope.lo > 0.0
+    image = Interval(ends.lo if rising else whole.lo, ends.hi if rising else whole.hi)
+    omega, barrier = strike(b.flight, b, x, at)
+    flips = margin(b.flip, b.inertia, omega, barrier)
+    state = codes.FLIP if flips.lo > 0.0 else (codes.JOG if flips.hi <= 0.0 else BOTH)
+    finite = (image.hi - image.lo < math.inf) & (flips.hi - flips.lo < math.inf)
+    return state if proved & finite else NOTHING, image, phi, slope, flips
 
 
 # ---------------------------------------------------------------- the map contract
@@ -87,30 +90,30 @@ def gather_pair(lo: Throw, hi: Throw, side: int) -> tuple[SideBox, SideBox]:
 @proof_kernel
 def side_image_box(b: SideBox, same: SideBox, lo: float, hi: float, side: int) -> Any:
     """`image_box` of the throw on one side; the witness is the bracket of the impact angle."""
-    state, jog, phi, _, _ = throw_box(b, lo, hi)
+    state, jog, phi, _, _ = throw_box(b, Interval(lo, hi))
     return _slots(b, state, jog, phi)
 
 
 @proof_kernel
 def side_fallback_box(b: SideBox, same: SideBox, lo: float, hi: float, side: int) -> Any:
     """`fallback_box` of the throw on one side."""
-    state, jog, phi, _, _ = sure_throw_box(b, lo, hi)
+    state, jog, phi, _, _ = sure_throw_box(b, Interval(lo, hi))
     return _slots(b, state, jog, phi)
 
 
 @proof_kernel
 def _slots(b: SideBox, state: int, jog: Interval, phi: Interval) -> Any:
     """Count, images per branch, witness."""
-    flip = iv.sub(jog, b.shift)
+    flip = jog - b.shift
     flips = state == codes.FLIP
     first = (
-        flip[0] if flips else jog[0],
-        flip[1] if flips else jog[1],
+        flip.lo if flips else jog.lo,
+        flip.hi if flips else jog.hi,
         b.next if flips else b.side,
         1 if flips else 0,
     )
     count = state if (state == NOTHING) | (state == BOTH) else DECIDED
-    return count, first, (flip[0], flip[1], b.next, 1), phi
+    return count, first, (flip.lo, flip.hi, b.next, 1), (phi.lo, phi.hi)
 
 
 @proof_kernel

@@ -60,8 +60,8 @@ def _path_details(
 def _fly(params: Throw, x: float, side: int) -> tuple[float, float, float, float]:
     part = _gather(params, side)
     at, _ = settle(part, x)
-    omega, kinetic, barrier = strike(part.flight, part, x, at)
-    return at.phi, omega, kinetic, barrier
+    omega, barrier = strike(part.flight, part, x, at)
+    return at.phi, omega, 0.5 * part.inertia * omega * omega, barrier
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ angle already turned to, `turn_back` and `turn_back_slightly` cost a fraction of
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from limitsets.jit import kernel
 
@@ -24,12 +24,12 @@ V0, V1, V2, V3, V4, V5, V6, V7 = ((-1) ** k / math.factorial(2 * k + 2) for k in
 
 
 class Turned(NamedTuple):
-    """An angle with its sine, 1 - cosine, and what the sine is short of it."""
+    """An angle with its sine, 1 - cosine, and what the sine is short of it; of any kind of number."""
 
-    phi: float
-    s: float
-    v: float
-    w: float
+    phi: Any
+    s: Any
+    v: Any
+    w: Any
 
 
 @kernel

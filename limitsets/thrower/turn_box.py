@@ -12,9 +12,9 @@ from __future__ import annotations
 
 import math
 
-from limitsets.interval.arithmetic import Interval
+from limitsets.interval import Interval
 from limitsets.jit import proof_kernel
-from limitsets.thrower.turn import V0, V1, V2, V3, V4, V5, V6, V7, W0, W1, W2, W3, W4, W5, W6, W7
+from limitsets.thrower.turn import V0, V1, V2, V3, V4, V5, V6, V7, W0, W1, W2, W3, W4, W5, W6, W7, Turned
 
 __all__ = ["BOUND", "exact_turn", "turn_box", "turn_point"]
 
@@ -41,25 +41,26 @@ def exact_turn(phi: float) -> tuple[float, float, float]:
 
 
 @proof_kernel
-def turn_point(phi: float) -> tuple[Interval, Interval, Interval]:
+def turn_point(phi: float) -> Turned:
     """Enclosures at one angle; `BOUND` has room for the rounding of the sums below."""
     s, v, w = exact_turn(phi)
     es, ev, ew = BOUND * phi + TINY, BOUND * phi * phi + TINY, BOUND * w + TINY
-    return (
-        (max(s - es, -1.0), min(s + es, 1.0)),
-        (max(v - ev, 0.0), min(v + ev, 2.0)),
-        (max(w - ew, 0.0), w + ew),
+    return Turned(
+        Interval(phi, phi),
+        Interval(max(s - es, -1.0), min(s + es, 1.0)),
+        Interval(max(v - ev, 0.0), min(v + ev, 2.0)),
+        Interval(max(w - ew, 0.0), w + ew),
     )
 
 
 @proof_kernel
-def turn_box(lo: float, hi: float) -> tuple[Interval, Interval, Interval]:
+def turn_box(phi: Interval) -> Turned:
     """Enclosures over an interval of angles in [0, 2 pi]: w grows throughout, v up to pi, s between its extremes."""
-    s0, v0, w0 = turn_point(lo)
-    s1, v1, w1 = turn_point(hi)
-    s_lo, s_hi = min(s0[0], s1[0]), max(s0[1], s1[1])
-    v_lo, v_hi = min(v0[0], v1[0]), max(v0[1], v1[1])
+    lo, hi = phi.lo, phi.hi
+    first, last = turn_point(lo), turn_point(hi)
+    s_lo, s_hi = min(first.s.lo, last.s.lo), max(first.s.hi, last.s.hi)
+    v_lo, v_hi = min(first.v.lo, last.v.lo), max(first.v.hi, last.v.hi)
     s_hi = 1.0 if (lo <= HALF_PI_ABOVE) & (hi >= HALF_PI_BELOW) else s_hi
     s_lo = -1.0 if (lo <= THREE_ABOVE) & (hi >= THREE_BELOW) else s_lo
     v_hi = 2.0 if (lo <= PI_ABOVE) & (hi >= PI_BELOW) else v_hi
-    return (s_lo, s_hi), (v_lo, v_hi), (w0[0], w1[1])
+    return Turned(phi, Interval(s_lo, s_hi), Interval(v_lo, v_hi), Interval(first.w.lo, last.w.hi))

@@ -6,7 +6,7 @@ import math
 from typing import NamedTuple
 
 import limitsets.interval as iv
-from limitsets.interval.arithmetic import Interval
+from limitsets.interval.arithmetic import Ends
 from limitsets.jit import proof_kernel
 from limitsets.maps import codes
 from limitsets.maps.contract import register
@@ -43,7 +43,7 @@ def _image_on(params: Cubic, x: float, side: int, branch: int) -> tuple[float, i
 
 
 @proof_kernel
-def _half(r: Interval, a: float, b: float) -> Interval:
+def _half(r: Ends, a: float, b: float) -> Ends:
     """Exact range on [a, b], 0 <= a: least at an end, with the least r; largest at an end or the turning point."""
     first_lo = iv.mul((a, a), iv.sub((r[0], r[0]), iv.sqr((a, a))))
     last_lo = iv.mul((b, b), iv.sub((r[0], r[0]), iv.sqr((b, b))))

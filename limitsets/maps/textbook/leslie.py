@@ -6,7 +6,7 @@ import math
 from typing import NamedTuple
 
 import limitsets.interval as iv
-from limitsets.interval.arithmetic import Interval
+from limitsets.interval.arithmetic import Ends
 from limitsets.jit import proof_kernel
 from limitsets.maps import codes
 from limitsets.maps.contract import register
@@ -58,24 +58,24 @@ def _image_on(params: Leslie, x: Point, side: int, branch: int) -> tuple[Point, 
 class _Rates(NamedTuple):
     """Parameters as intervals."""
 
-    young: Interval
-    old: Interval
-    crowding: Interval
+    young: Ends
+    old: Ends
+    crowding: Ends
 
 
 @proof_kernel
-def _born(p: _Rates, x: Interval, y: Interval) -> Interval:
+def _born(p: _Rates, x: Ends, y: Ends) -> Ends:
     return iv.add(iv.mul(p.young, x), iv.mul(p.old, y))
 
 
 @proof_kernel
-def _young(p: _Rates, x: Interval, y: Interval) -> Interval:
+def _young(p: _Rates, x: Ends, y: Ends) -> Ends:
     """First coordinate of the image, from each operation in turn."""
     return iv.mul(_born(p, x, y), iv.exp(iv.neg(iv.mul(p.crowding, iv.add(x, y)))))
 
 
 @proof_kernel
-def _crest(own: Interval, other: Interval, crowding: Interval, z: float) -> float:
+def _crest(own: Ends, other: Ends, crowding: Ends, z: float) -> float:
     """Largest value along the line on which the other age stays z: (own/c) exp(c z (other/own - 1) - 1)."""
     ratio = iv.sub(iv.div(other, own), (1.0, 1.0))
     power = iv.sub(iv.mul(iv.mul(crowding, (z, z)), ratio), (1.0, 1.0))
@@ -83,12 +83,12 @@ def _crest(own: Interval, other: Interval, crowding: Interval, z: float) -> floa
 
 
 @proof_kernel
-def _may_be_zero(a: Interval) -> bool:
+def _may_be_zero(a: Ends) -> bool:
     return not ((a[0] > 0.0) | (a[1] < 0.0))
 
 
 @proof_kernel
-def _crests(p: _Rates, x: Interval, y: Interval) -> float:
+def _crests(p: _Rates, x: Ends, y: Ends) -> float:
     """Largest value inside the four borders of a box: there the slope along the border is 0."""
     most = -math.inf
     for end in range(2):
@@ -101,7 +101,7 @@ def _crests(p: _Rates, x: Interval, y: Interval) -> float:
 
 
 @proof_kernel
-def _young_range(p: _Rates, x: Interval, y: Interval) -> Interval:
+def _young_range(p: _Rates, x: Ends, y: Ends) -> Ends:
     """Range over a box: exact, but for parameters that are intervals.
 
     Where both slopes keep their signs, the corners span it.  Where some are born and the parameters are positive,

@@ -6,7 +6,7 @@ import math
 from typing import NamedTuple
 
 import limitsets.interval as iv
-from limitsets.interval.arithmetic import Interval
+from limitsets.interval.arithmetic import Ends
 from limitsets.jit import proof_kernel
 from limitsets.maps import codes
 from limitsets.maps.contract import register
@@ -43,7 +43,7 @@ def _image_on(params: Logistic, x: float, side: int, branch: int) -> tuple[float
 
 
 @proof_kernel
-def _hump(x: float) -> Interval:
+def _hump(x: float) -> Ends:
     """x (1 - x) at one point; x near 1/2 does not come out above 1/4."""
     value = iv.mul((x, x), iv.sub((1.0, 1.0), (x, x)))
     return value[0], min(value[1], 0.25)

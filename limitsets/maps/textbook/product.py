@@ -6,7 +6,7 @@ import math
 from typing import NamedTuple
 
 import limitsets.interval as iv
-from limitsets.interval.arithmetic import Interval
+from limitsets.interval.arithmetic import Ends
 from limitsets.jit import proof_kernel
 from limitsets.maps import codes
 from limitsets.maps.contract import register
@@ -44,7 +44,7 @@ def _image_on(params: Product, x: Point, side: int, branch: int) -> tuple[Point,
 
 
 @proof_kernel
-def _moebius(pole: Interval, lo: float, hi: float) -> Interval:
+def _moebius(pole: Ends, lo: float, hi: float) -> Ends:
     """Exact range of x / (pole - x) left of the pole: monotone in x; nan or infinite where it may be met."""
     first = iv.div((lo, lo), iv.sub(pole, (lo, lo)))
     last = iv.div((hi, hi), iv.sub(pole, (hi, hi)))

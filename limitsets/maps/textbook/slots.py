@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from typing import TypeAlias
 
-from limitsets.interval.arithmetic import Interval
+from limitsets.interval.arithmetic import Ends
 from limitsets.jit import proof_kernel
 
 __all__ = [
@@ -24,7 +24,7 @@ __all__ = [
 ]
 
 Point: TypeAlias = tuple[float, float]
-Pair: TypeAlias = tuple[Interval, Interval]
+Pair: TypeAlias = tuple[Ends, Ends]
 
 LineSlot: TypeAlias = tuple[float, float, int, int]
 Line: TypeAlias = tuple[int, LineSlot, LineSlot, Point]
@@ -45,7 +45,7 @@ def _count(first: bool, second: bool, sound: bool) -> int:
 
 
 @proof_kernel
-def _finite(a: Interval) -> bool:
+def _finite(a: Ends) -> bool:
     return (a[0] <= a[1]) & (a[1] - a[0] < math.inf)
 
 
@@ -56,14 +56,14 @@ def rectangle(lo: Point, hi: Point) -> Pair:
 
 
 @proof_kernel
-def line(a: Interval, side: int, branch: int) -> Line:
+def line(a: Ends, side: int, branch: int) -> Line:
     """One image."""
     slot = (a[0], a[1], side, branch)
     return _count(True, False, _finite(a)), slot, slot, NO_WITNESS
 
 
 @proof_kernel
-def line_of_two(first: bool, a: Interval, second: bool, b: Interval, side: int) -> Line:
+def line_of_two(first: bool, a: Ends, second: bool, b: Ends, side: int) -> Line:
     """Images of branches 0 and 1, each as far as it is possible."""
     sound = (_finite(a) | (not first)) & (_finite(b) | (not second))
     zero, one = (a[0], a[1], side, 0), (b[0], b[1], side, 1)

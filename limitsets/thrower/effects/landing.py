@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 
 from limitsets.jit import kernel
 from limitsets.thrower.effects.drive import pulled
-from limitsets.thrower.landing import jog_displacement
+from limitsets.thrower.impact import jog_displacement
 from limitsets.thrower.motion import Arrival, FullSide, side_number
 from limitsets.thrower.throw import settle
 from limitsets.thrower.turn import Turned, turn

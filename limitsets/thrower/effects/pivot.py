@@ -14,10 +14,11 @@ from __future__ import annotations
 import math
 from typing import Any, NamedTuple
 
+from limitsets.interval.number import signed_square
 from limitsets.jit import kernel
 from limitsets.thrower.effects.drive import leant
 from limitsets.thrower.held import gives_way, holds_now, lets_go
-from limitsets.thrower.impact import decide
+from limitsets.thrower.impact import margin
 from limitsets.thrower.motion import (
     DOWN,
     LOST,
@@ -61,11 +62,12 @@ def _friction(pivot: Any, slip: Any) -> float:
 
 
 @kernel
-def _margin(pivot: Any, part: FullSide, omega: float, kinetic: float, barrier: float) -> float:
+def _margin(pivot: Any, part: FullSide, inertia: float, omega: float, barrier: float) -> float:
     """Positive where the part gets over its vertex; one that is held by no hinge does not ask for a criterion."""
     if pivot is None:
-        return decide(part.own.flip, omega, kinetic, barrier)
-    return (kinetic if omega > 0.0 else -kinetic) - barrier
+        found: float = margin(part.own.flip, inertia, omega, barrier)
+        return found
+    return 0.5 * inertia * signed_square(omega) - barrier
 
 
 @kernel
@@ -82,7 +84,7 @@ def _hinged(pivot: Any, part: FullSide, hit: Contact) -> Face:
     near = right * abs(right) / (ell + abs(high))  # sgn(X) (ell - H), see impact.py
     far = (ell - high) if right > 0.0 else (high - ell)
     barrier = gravity * (near if high > 0.0 else far)
-    over = _margin(pivot, part, hit.omega, kinetic, barrier) > 0.0
+    over = _margin(pivot, part, inertia, hit.omega, barrier) > 0.0
     side = hit.vertex + 1 if over else hit.vertex
     k = side_number(part, side)
     foot = part.a[k] - part.length[k] if over else part.a[k]

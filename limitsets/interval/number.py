@@ -1,0 +1,227 @@
+"""The interval as a number: a formula with ``+ - * /`` that is written once runs on floats and on intervals.
+
+In compiled code an `Interval` is a structure of two floats.  Its operators are the kernels of `arithmetic.py`: the
+bounds are theirs to the bit.  A plain number beside an interval stands for the interval of that number alone.  The
+functions below say what ``+ - * /`` do not say tightly; a formula calls them on any kind of number.
+"""
+
+from __future__ import annotations
+
+import math
+import operator
+from dataclasses import dataclass
+from typing import Any, TypeVar
+
+from limitsets.interval import arithmetic
+from limitsets.interval.rounding import down, up
+from limitsets.jit import number, operation
+
+__all__ = [
+    "Interval",
+    "larger",
+    "signed_square",
+    "smaller",
+    "square_root",
+    "where_positive",
+    "with_sign_of",
+]
+
+Number = TypeVar("Number", bound=Any)
+"""A float, an `Interval`, or a number of Python with the same operators."""
+
+
+@number
+@dataclass(frozen=True, slots=True)
+class Interval:
+    """All real numbers from lo to hi, with the contract of `limitsets.interval`.
+
+    Attributes
+    ----------
+    lo, hi : float
+        The ends.
+
+    Examples
+    --------
+    >>> from limitsets.interval import Interval
+    >>> third = 1.0 / Interval(3.0, 3.0)
+    >>> third.lo < 1.0 / 3.0 < third.hi
+    True
+    """
+
+    lo: float
+    hi: float
+
+    def __neg__(self) -> Interval:
+        return _neg(self)
+
+    def __add__(self, other: Interval | float) -> Interval:
+        return _add(self, other)
+
+    def __sub__(self, other: Interval | float) -> Interval:
+        return _sub(self, other)
+
+    def __mul__(self, other: Interval | float) -> Interval:
+        return _mul(self, other)
+
+    def __truediv__(self, other: Interval | float) -> Interval:
+        return _div(self, other)
+
+    def __radd__(self, other: float) -> Interval:
+        return _add(other, self)
+
+    def __rsub__(self, other: float) -> Interval:
+        return _sub(other, self)
+
+    def __rmul__(self, other: float) -> Interval:
+        return _mul(other, self)
+
+    def __rtruediv__(self, other: float) -> Interval:
+        return _div(other, self)
+
+    def __pow__(self, count: int) -> Interval:
+        return _pow(self, count)
+
+    def __abs__(self) -> Interval:
+        return _abs(self)
+
+
+# ---------------------------------------------------------------- the operators, on the kernels of pairs
+
+
+def _ends(x: Any) -> Any:
+    """Return an interval, or a plain number, as a pair."""
+    return _ends_of_interval(x) if isinstance(x, Interval) else _ends_of_number(x)
+
+
+def _ends_of_interval(x: Any) -> Any:
+    return x.lo, x.hi
+
+
+def _ends_of_number(x: Any) -> Any:
+    return float(x), float(x)
+
+
+def _neg(a: Any) -> Interval:
+    lo, hi = arithmetic.neg(_ends(a))
+    return Interval(lo, hi)
+
+
+def _add(a: Any, b: Any) -> Interval:
+    lo, hi = arithmetic.add(_ends(a), _ends(b))
+    return Interval(lo, hi)
+
+
+def _sub(a: Any, b: Any) -> Interval:
+    lo, hi = arithmetic.sub(_ends(a), _ends(b))
+    return Interval(lo, hi)
+
+
+def _mul(a: Any, b: Any) -> Interval:
+    lo, hi = arithmetic.mul(_ends(a), _ends(b))
+    return Interval(lo, hi)
+
+
+def _div(a: Any, b: Any) -> Interval:
+    lo, hi = arithmetic.div(_ends(a), _ends(b))
+    return Interval(lo, hi)
+
+
+def _pow(a: Any, count: Any) -> Interval:
+    lo, hi = arithmetic.power(_ends(a), count)
+    return Interval(lo, hi)
+
+
+def _abs(a: Any) -> Interval:
+    lo, hi = arithmetic.absolute(_ends(a))
+    return Interval(lo, hi)
+
+
+def _min(a: Any, b: Any) -> Interval:
+    lo, hi = arithmetic.minimum(_ends(a), _ends(b))
+    return Interval(lo, hi)
+
+
+def _max(a: Any, b: Any) -> Interval:
+    lo, hi = arithmetic.maximum(_ends(a), _ends(b))
+    return Interval(lo, hi)
+
+
+def _sqrt(a: Any) -> Interval:
+    lo, hi = arithmetic.sqrt(_ends(a))
+    return Interval(lo, hi)
+
+
+operation(_ends, Interval, _ends_of_interval)
+operation(_ends, float, _ends_of_number)
+for _stub, _method in (
+    (operator.neg, _neg),
+    (operator.add, _add),
+    (operator.sub, _sub),
+    (operator.mul, _mul),
+    (operator.truediv, _div),
+    (operator.pow, _pow),
+    (abs, _abs),
+    (min, _min),
+    (max, _max),
+    (math.sqrt, _sqrt),
+):
+    operation(_stub, Interval, _method)
+
+
+# ---------------------------------------------------------------- what the operators do not say tightly
+
+
+def square_root(x: Number) -> Number:
+    """Return the square root."""
+    root: Any = math.sqrt(x)
+    return root  # type: ignore[no-any-return]  # of the kind of x
+
+
+def smaller(x: Number, y: Number) -> Number:
+    """Return the smaller of two."""
+    return min(x, y)
+
+
+def larger(x: Number, y: Number) -> Number:
+    """Return the larger of two."""
+    return max(x, y)
+
+
+def signed_square(x: Number) -> Number:
+    """Return x |x|, which grows with x."""
+    return x * abs(x)  # type: ignore[no-any-return]  # of their kind
+
+
+def with_sign_of(x: Number, size: Number) -> Number:
+    """Return a size where x > 0, less the size where not."""
+    return size if x > 0.0 else -size  # type: ignore[no-any-return]  # of their kind
+
+
+def where_positive(x: Number, yes: Number, no: Number) -> Number:
+    """Return `yes` where x > 0 (is proved), `no` elsewhere."""
+    return yes if x > 0.0 else no
+
+
+def _signed_square(x: Any) -> Interval:
+    return Interval(down(x.lo * abs(x.lo)), up(x.hi * abs(x.hi)))
+
+
+def _with_sign_of(x: Any, size: Any) -> Interval:
+    least, most = max(size.lo, 0.0), max(size.hi, 0.0)
+    return Interval(-most if x.lo < 0.0 else least, most if x.hi > 0.0 else -least)
+
+
+def _where_positive(x: Any, yes: Any, no: Any) -> Interval:
+    sure = x.lo > 0.0
+    return Interval(yes.lo if sure else no.lo, yes.hi if sure else no.hi)
+
+
+operation(square_root, Interval, _sqrt)
+operation(smaller, Interval, _min)
+operation(larger, Interval, _max)
+operation(signed_square, float, signed_square)
+operation(with_sign_of, float, with_sign_of)
+operation(where_positive, float, where_positive)
+operation(signed_square, Interval, _signed_square)
+operation(with_sign_of, Interval, _with_sign_of)
+operation(where_positive, Interval, _where_positive)
