@@ -635,6 +635,7 @@ def number(cls: type[T]) -> type[T]:
 
     fields = [(first, types.float64), (second, types.float64)]
     extending.type_callable(cls)(typer)
+    extending.typeof_impl.register(cls)(lambda value, c: kind)
     extending.lower_builtin(cls, types.float64, types.float64)(made)
     _MODELS[kind] = fields
     _NUMBERS[cls] = kind
@@ -662,6 +663,29 @@ class _NumberFields(numba.core.typing.templates.AttributeTemplate):  # type: ign
 @extending.lower_getattr_generic(_NumberType)  # type: ignore[untyped-decorator]  # numba has no types
 def _read_field(context: Any, builder: Any, kind: Any, value: Any, name: str) -> Any:
     return getattr(cgutils.create_struct_proxy(kind)(context, builder, value=value), name)
+
+
+@extending.box(_NumberType)  # type: ignore[untyped-decorator]  # numba has no types
+def _to_python(kind: Any, value: Any, c: Any) -> Any:
+    found = cgutils.create_struct_proxy(kind)(c.context, c.builder, value=value)
+    fields = [c.pyapi.float_from_double(getattr(found, name)) for name, _ in _MODELS[kind]]
+    cls = c.pyapi.unserialize(c.pyapi.serialize_object(kind.cls))
+    made = c.pyapi.call_function_objargs(cls, fields)
+    for each in (*fields, cls):
+        c.pyapi.decref(each)
+    return made
+
+
+@extending.unbox(_NumberType)  # type: ignore[untyped-decorator]  # numba has no types
+def _from_python(kind: Any, instance: Any, c: Any) -> Any:
+    made = cgutils.create_struct_proxy(kind)(c.context, c.builder)
+    for name, _ in _MODELS[kind]:
+        field = c.pyapi.object_getattr_string(instance, name)
+        setattr(made, name, c.pyapi.float_as_double(field))
+        c.pyapi.decref(field)
+    return extending.NativeValue(
+        made._getvalue(), is_error=cgutils.is_not_null(c.builder, c.pyapi.err_occurred())
+    )
 
 
 def operation(stub: Any, cls: type, method: Callable[..., Any]) -> None:

@@ -6,6 +6,7 @@ from fractions import Fraction
 import mpmath
 import numpy as np
 
+from limitsets.interval import Interval
 from limitsets.thrower import turn_box as boxes
 from limitsets.thrower.turn import V0, V1, V2, V3, V4, V5, V6, V7, W0, W1, W2, W3, W4, W5, W6, W7
 
@@ -74,18 +75,18 @@ def test_enclosures_hold_against_mpmath():
         for phi in angles[angles <= 2 * np.pi].tolist():
             p = mpmath.mpf(phi)
             exact = (mpmath.sin(p), 1 - mpmath.cos(p), p - mpmath.sin(p))
-            for box, value in zip(boxes.turn_point(phi), exact, strict=True):
-                assert box[0] <= value <= box[1]
+            for box, value in zip(boxes.turn_point(phi)[1:], exact, strict=True):
+                assert box.lo <= value <= box.hi
 
 
 def test_boxes_hold_their_points_and_their_extremes():
     rng = np.random.default_rng(4)
     for lo, hi in np.sort(rng.uniform(0, 2 * np.pi, (500, 2)), axis=1).tolist():
-        s, v, w = boxes.turn_box(lo, hi)
+        _, s, v, w = boxes.turn_box(Interval(lo, hi))
         for phi in np.linspace(lo, hi, 7):
-            assert s[0] <= math.sin(phi) + 1e-15
-            assert math.sin(phi) - 1e-15 <= s[1]
-            assert v[0] <= 1 - math.cos(phi) + 1e-15
-            assert 1 - math.cos(phi) - 1e-15 <= v[1]
-            assert w[0] <= phi - math.sin(phi) + 1e-15
-            assert phi - math.sin(phi) - 1e-15 <= w[1]
+            assert s.lo <= math.sin(phi) + 1e-15
+            assert math.sin(phi) - 1e-15 <= s.hi
+            assert v.lo <= 1 - math.cos(phi) + 1e-15
+            assert 1 - math.cos(phi) - 1e-15 <= v.hi
+            assert w.lo <= phi - math.sin(phi) + 1e-15
+            assert phi - math.sin(phi) - 1e-15 <= w.hi
