@@ -24,6 +24,7 @@ are gone, compiled code is simply not kept.
 from __future__ import annotations
 
 import contextlib
+import functools
 import hashlib
 import inspect
 import os
@@ -798,11 +799,19 @@ def _generic(stub: Any, proof: bool, inlined: bool, default: Callable[..., Any] 
             key = first.count
         return methods.get(key, default)
 
-    extending.overload(stub, jit_options=options, strict=False)(choose)
+    @functools.wraps(stub)
+    def chosen(first: Any, *rest: Any) -> Any:
+        """Run the method in Python, on the numbers of Python: a method made of formulas alone knows no others."""
+        method = methods.get(type(first), default)
+        if method is None:
+            raise MapError("the argument", type(first).__name__, "a class with a method", "add one")
+        return method(first, *rest)
+
+    extending.overload(chosen, jit_options=options, strict=False)(choose)
 
     def on(key: type | int, method: Callable[..., Any]) -> None:
         methods[key] = _with_helpers(getattr(method, "py_func", method), proof)
 
-    stub.on = on
-    stub.methods = methods
-    return stub
+    made: Any = chosen
+    made.on, made.methods = on, methods
+    return made

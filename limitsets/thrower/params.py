@@ -142,16 +142,20 @@ def gather(params: Throw, side: int) -> Side:
     )
 
 
-@generic
+def _divided(part: Any, momentum: Any) -> Any:
+    return momentum / part.inertia
+
+
+@generic(default=_divided)
 def per_inertia(part: Any, momentum: Any) -> Any:
     """Divide an angular momentum about the left vertex by the moment of inertia there."""
 
 
-def _per_inertia(part: Side, momentum: float) -> float:
+def _multiplied(part: Side, momentum: float) -> float:
     return momentum * part.per_inertia
 
 
-per_inertia.on(Side, _per_inertia)
+per_inertia.on(Side, _multiplied)
 
 
 FLIGHTS = {"exact": Exact, "small-angle": SmallAngle, "small-angle-2": SmallAngle2}

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 from limitsets.interval import Interval
 from limitsets.interval.number import square_root
 from limitsets.jit import proof_kernel
-from limitsets.thrower.params import Throw, per_inertia
+from limitsets.thrower.params import Throw
 
 __all__ = ["SideBox", "gather_box", "with_kappa"]
 
@@ -75,11 +75,3 @@ def with_kappa(b: SideBox, lo: float, hi: float) -> SideBox:
         b.side,
         b.next,
     )
-
-
-@proof_kernel
-def _per_inertia(part: SideBox, momentum: Interval) -> Interval:
-    return momentum / part.inertia
-
-
-per_inertia.on(SideBox, _per_inertia)

@@ -1,7 +1,7 @@
 """The number that decides between jog and flip, on dual numbers: docs/model.md, flight, impact, decision.
 
-The kernels of `thrower` compute the same on floats, one machine word per number.  Here the impact angle is found by
-them, refined, and differentiated by the implicit function theorem, d phi = -df / (df/dphi).
+The formulas of the impact are those of `thrower.impact`.  The impact angle is found by the kernels, refined here, and
+differentiated by the implicit function theorem, d phi = -df / (df/dphi).
 """
 
 from __future__ import annotations
@@ -10,6 +10,9 @@ import math
 from typing import NamedTuple
 
 from limitsets.inverse.critical.dual import Dual, cosine, sine, square_root
+from limitsets.thrower.impact import margin, strike
+from limitsets.thrower.params import FLIGHTS, FLIPS
+from limitsets.thrower.turn import Turned
 
 __all__ = ["Decision", "Part", "decided"]
 
@@ -20,13 +23,28 @@ SMALL = 0.5
 
 
 class Part(NamedTuple):
-    """One side of a part, as `limitsets.inverse.critical.seeded.Numbers` holds it."""
+    """One side of a part, as `limitsets.inverse.critical.seeded.Numbers` holds it; names are those of `params.Side`."""
 
     a: Dual
     d: Dual
     rho: Dual
     kappa: Dual
     h: Dual
+
+    @property
+    def ell(self) -> Dual:
+        """Distance of the centre of mass from the left vertex."""
+        return square_root(self.a**2 + self.d**2)
+
+    @property
+    def rho2(self) -> Dual:
+        """Squared radius of gyration."""
+        return self.rho**2
+
+    @property
+    def inertia(self) -> Dual:
+        """Moment of inertia about the left vertex, per mass."""
+        return self.rho2 + self.a**2 + self.d**2
 
 
 class Decision(NamedTuple):
@@ -62,15 +80,14 @@ def decided(flight: str, flip: str, part: Part, x: Dual, phi: float) -> Decision
         The impact angle to rounding [rad]; not used at small angles.
     """
     steepness = -1.0
+    at = None
     if flight == "exact":
         angle, steepness = _angle(part, x, phi)
-        omega, barrier = _exact(part, x, angle)
-    else:
-        omega, barrier = _small(part, x)
-    inertia = part.rho * part.rho + part.a * part.a + part.d * part.d
-    kinetic = inertia * omega * omega / 2.0
-    towards = -1.0 if flip == "signed" and omega.value < 0.0 else 1.0
-    return Decision(kinetic * towards - barrier, kinetic.value + abs(barrier.value), steepness)
+        at = Turned(angle, sine(angle), 1.0 - cosine(angle), None)
+    omega, barrier = strike(FLIGHTS[flight](), part, x, at)
+    decides: Dual = margin(FLIPS[flip](), part.inertia, omega, barrier)
+    kinetic = 0.5 * part.inertia.value * omega.value**2
+    return Decision(decides, kinetic + abs(barrier.value), steepness)
 
 
 def _short_of_arc(phi: float) -> float:
@@ -106,25 +123,3 @@ def _angle(part: Part, x: Dual, phi: float) -> tuple[Dual, float]:
     if not slope < 0.0:
         return Dual(phi, f.slope * math.nan), 0.0
     return Dual(phi, -f.slope / slope), slope / size
-
-
-def _exact(part: Part, x: Dual, phi: Dual) -> tuple[Dual, Dual]:
-    """Rate after the impact, and the energy still to be climbed: negative past the vertex."""
-    a, d, kappa = part.a, part.d, part.kappa
-    s, c = sine(phi), cosine(phi)
-    right, above = a * c - d * s, a * s + d * c
-    ell = square_root(a * a + d * d)
-    inertia = part.rho * part.rho + a * a + d * d
-    omega = (part.rho * part.rho + right * (x - kappa * phi) + above * (part.h + d)) / inertia
-    past = -1.0 if right.value < 0.0 else 1.0
-    if above.value > 0.0:  # ell - H = X^2 / (ell + H) keeps its digits near the top
-        return omega, kappa * (right * right / (ell + above)) * past
-    return omega, kappa * (ell - above) * past
-
-
-def _small(part: Part, x: Dual) -> tuple[Dual, Dual]:
-    a, d = part.a, part.d
-    rest = part.rho * part.rho + d * d + d * part.h
-    omega = (rest - a * (x - a * 2.0)) / (part.rho * part.rho + a * a + d * d)
-    ell = square_root(a * a + d * d)
-    return omega, part.kappa * (a * a / (ell + d)) - a * (x - a) * 2.0

@@ -71,6 +71,15 @@ class Dual:
             return Dual(quotient, (self.slope - quotient * other.slope) / other.value)
         return Dual(self.value / other, self.slope / other)
 
+    def __pow__(self, count: int) -> Dual:
+        return Dual(self.value**count, count * self.value ** (count - 1) * self.slope)
+
+    def __abs__(self) -> Dual:
+        return -self if self.value < 0.0 else self
+
+    def __gt__(self, other: float) -> bool:
+        return self.value > other
+
     def __rtruediv__(self, other: float) -> Dual:
         quotient = other / self.value
         return Dual(quotient, -quotient / self.value * self.slope)
