@@ -16,7 +16,7 @@ import pytest
 
 import limitsets as ls
 from limitsets.maps import images
-from limitsets.proofs.recheck import recheck
+from limitsets.checker import recheck
 from tests.bench.measure import limit, take_turns, versus
 from tests.bench.python_proofs import cells, with_arb
 from tests.proofs import forge, test_recheck

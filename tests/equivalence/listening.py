@@ -9,12 +9,12 @@ from typing import Any
 
 import pytest
 
-CHECKERS = ("lone_recheck", "limitsets.proofs.recheck")
+CHECKERS = ("lone_checker", "limitsets.checker")
 
 
 @pytest.hookimpl(trylast=True)
 def pytest_collection_modifyitems() -> None:
-    import limitsets.proofs.recheck  # noqa: F401
+    import limitsets.checker  # noqa: F401
 
     log = Path(os.environ["LIMITSETS_CHECKED"])
 

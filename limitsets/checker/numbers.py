@@ -1,0 +1,285 @@
+"""NUMBERS"""
+
+import math
+import re
+from decimal import ROUND_CEILING, ROUND_FLOOR, Context
+from fractions import Fraction
+from typing import Any, NamedTuple
+
+import numpy as np
+from flint import arb, fmpq
+
+PRECISION = 100  # bits of every ball
+Arb = Any  # flint.arb has no stubs
+Array = np.ndarray[Any, np.dtype[Any]]
+Pair = tuple[float, float]
+HALF, ZERO, ONE = arb(0.5), arb(0), arb(1)
+
+
+class BadFileError(Exception):
+    """The file is not a certificate that can be read."""
+
+
+def require(condition: bool, message: str) -> None:
+    """Raise BadFileError unless the condition holds."""
+    if not condition:
+        raise BadFileError(message)
+
+
+class UnprovedError(Exception):
+    """What a section says was not proved."""
+
+
+def prove(condition: bool, message: str) -> None:
+    """Raise UnprovedError unless the condition holds."""
+    if not condition:
+        raise UnprovedError(message)
+
+
+def plain(text: object, most: int = 80) -> str:
+    """Clean the text of a stranger: without control characters, fit to be printed, and cut where all can see it."""
+    whole = str(text)
+    shown = "".join(c if c.isprintable() and c.isascii() else "?" for c in whole[:most])
+    return shown + ("... (cut)" if len(whole) > most else "")
+
+
+def exact(value: Fraction) -> Arb:
+    """Enclose a rational number."""
+    return arb(fmpq(value.numerator, value.denominator))
+
+
+def span(lo: Fraction, hi: Fraction) -> Arb:
+    """Enclose an interval."""
+    return exact(lo) if lo == hi else exact(lo).union(exact(hi))
+
+
+def float_below(value: Arb) -> float:
+    """Round down."""
+    prove(value.is_finite(), "an image is not bounded")
+    x = float(value.lower())
+    while not arb(x) <= value:
+        x = math.nextafter(x, -math.inf)
+    return x
+
+
+def float_above(value: Arb) -> float:
+    """Round up."""
+    return -float_below(-value)
+
+
+def sine_cosine(phi: Arb) -> tuple[Arb, Arb]:
+    """Enclose both over a wide ball, by the mean value theorem: Arb's own are as wide as the angle."""
+    sin, cos = phi.sin_cos()
+    middle = phi.mid()
+    at, off = middle.sin_cos(), phi - middle
+    return at[0] + cos * off, at[1] - sin * off
+
+
+class Rising:
+    """A ball with its derivatives by some quantities, for the mean value theorem."""
+
+    __slots__ = ("by", "x")
+
+    def __init__(self, x: Arb, by: list[Arb]):
+        self.x, self.by = x, by
+
+    def __neg__(self) -> "Rising":
+        return Rising(-self.x, [-d for d in self.by])
+
+    def __add__(self, other: Any) -> "Rising":
+        if isinstance(other, Rising):
+            return Rising(self.x + other.x, [d + e for d, e in zip(self.by, other.by, strict=True)])
+        return Rising(self.x + other, self.by)
+
+    def __sub__(self, other: Any) -> "Rising":
+        return self.__add__(-other)
+
+    def __rsub__(self, other: Any) -> "Rising":
+        return (-self).__add__(other)
+
+    def __mul__(self, other: Any) -> "Rising":
+        if isinstance(other, Rising):
+            pairs = zip(self.by, other.by, strict=True)
+            return Rising(self.x * other.x, [d * other.x + self.x * e for d, e in pairs])
+        return Rising(self.x * other, [d * other for d in self.by])
+
+    def __truediv__(self, other: Any) -> "Rising":
+        if isinstance(other, Rising):
+            ratio, pairs = self.x / other.x, zip(self.by, other.by, strict=True)
+            return Rising(ratio, [(d - ratio * e) / other.x for d, e in pairs])
+        return Rising(self.x / other, [d / other for d in self.by])
+
+    def __rtruediv__(self, other: Any) -> "Rising":
+        ratio = other / self.x
+        return Rising(ratio, [-ratio * d / self.x for d in self.by])
+
+    def __pow__(self, two: int) -> "Rising":
+        return Rising(self.x**two, [two * self.x ** (two - 1) * d for d in self.by])
+
+    def sqrt(self) -> "Rising":
+        """Take the square root."""
+        root = self.x.sqrt()
+        return Rising(root, [d / (2 * root) for d in self.by])
+
+    def sin_cos(self) -> "tuple[Rising, Rising]":
+        """Take sine and cosine."""
+        sin, cos = self.x.sin_cos()
+        return Rising(sin, [cos * d for d in self.by]), Rising(cos, [-sin * d for d in self.by])
+
+    def __abs__(self) -> "Rising":  # of use in x |x| only, where the sign of 0 does not matter
+        sign = ONE if self.x > 0 else -ONE if self.x < 0 else ONE.union(-ONE)
+        return Rising(abs(self.x), [sign * d for d in self.by])
+
+    def __gt__(self, other: Any) -> bool:
+        return bool(self.x > (other.x if isinstance(other, Rising) else other))
+
+    __radd__, __rmul__ = __add__, __mul__
+
+
+DECIMAL = r"[+-]?(?:[0-9]{1,100}(?:\.[0-9]{0,100})?|\.[0-9]{1,100})(?:[eE][+-]?[0-9]{1,3})?"
+NUMBER = re.compile(rf" *({DECIMAL})(?: +|(?=%))([a-z%/^0-9]{{1,8}}) *")  # as a scene may be written
+INCH = Fraction(254, 10_000)
+METRIC = {"m": Fraction(1), "cm": Fraction(1, 100), "mm": Fraction(1, 1000), "um": Fraction(1, 10**6)}
+LENGTHS = {**METRIC, "in": INCH, "ft": 12 * INCH}
+POUND = Fraction(45359237, 10**8)
+UNITS: dict[str, dict[str, Fraction]] = {
+    "length": LENGTHS,
+    "angle": {"rad": Fraction(1), "deg": Fraction(1, 180)},  # degrees as multiples of pi
+    "speed": {"rad/s": Fraction(1), "deg/s": Fraction(1, 180), "rpm": Fraction(1, 30)},
+    "acceleration": {f"{unit}/s^2": factor for unit, factor in LENGTHS.items()},
+    "mass": {
+        "t": Fraction(1000),
+        "kg": Fraction(1),
+        "g": Fraction(1, 1000),
+        "mg": Fraction(1, 10**6),
+        "lb": POUND,
+    },
+    "density": {"kg/m^2": Fraction(1), "g/cm^2": Fraction(10)},  # of a plate's area; and of its volume:
+    "bulk": {"kg/m^3": Fraction(1), "g/cm^3": Fraction(1000)},
+    "share": {"%": Fraction(1, 100)},
+}
+KINDS = " ".join(UNITS)
+BY_PI = ("deg", "deg/s", "rpm")
+LONGEST_TEXT = 64  # signs of a quantity: a longer text is not read, so that none is cut where it is shown
+
+
+def decimal(value: Fraction) -> str:
+    """Write a rational number as the decimal that it is; one that is none as a fraction, which is exact as well."""
+    over, twos, fives = value.denominator, 0, 0
+    while over % 2 == 0:
+        over, twos = over // 2, twos + 1
+    while over % 5 == 0:
+        over, fives = over // 5, fives + 1
+    if over != 1:
+        return f"{value.numerator}/{value.denominator}"
+    places = max(twos, fives)
+    digits = str(abs(value.numerator) * 2 ** (places - twos) * 5 ** (places - fives))
+    sign, kept = "-" if value < 0 else "", digits.rstrip("0")
+    if not kept:
+        return "0"
+    exponent = len(digits) - 1 - places  # of the first digit
+    if -7 < exponent < 16:
+        digits = digits.rjust(places + 1, "0")
+        whole, rest = digits[: len(digits) - places], digits[len(digits) - places :]
+        return sign + whole + (f".{rest}" if rest else "")
+    return f"{sign}{kept[0]}{'.' + kept[1:] if kept[1:] else ''}e{exponent}"
+
+
+def rounded(value: float, *, up: bool, digits: int = 9) -> str:
+    """Write a float with few digits, rounded up or down."""
+    return str(Context(digits, ROUND_CEILING if up else ROUND_FLOOR).create_decimal(value))
+
+
+class Quantity(NamedTuple):
+    """An interval in basic units (metre, radian, second, kilogram), exact; in multiples of pi where `pi` says so."""
+
+    lo: Fraction
+    hi: Fraction
+    pi: bool
+    unit: str
+
+    def ball(self) -> Arb:
+        """Enclose it in a ball."""
+        return span(self.lo, self.hi) * (arb.pi() if self.pi else 1)
+
+    def ends(self) -> list[Arb]:
+        """Enclose its two ends."""
+        return [exact(end) * (arb.pi() if self.pi else 1) for end in (self.lo, self.hi)]
+
+    def __str__(self) -> str:
+        """Write what was read, from the numbers and not from the text."""
+        factor = next(kind[self.unit] for kind in UNITS.values() if self.unit in kind)
+        lo, hi = (f"{decimal(end / factor)} {self.unit}" for end in (self.lo, self.hi))
+        return lo if self.lo == self.hi else f"every value in [{lo}, {hi}]"
+
+
+def quantity(value: object, kinds: str, where: str) -> Quantity:
+    """Read a quantity, `"5.75 in"` or a pair of such, of one of the kinds named; a half of one is read already."""
+    if isinstance(value, Quantity):  # `halves` put it there: nothing that stands in a file is one
+        return value
+    pair = value if isinstance(value, list) else [value, value]
+    require(len(pair) == 2, f"{where}: an interval has two ends")
+    read = []
+    for text in pair:
+        words = text if isinstance(text, str) and len(text) <= LONGEST_TEXT else ""
+        tidy = words == " ".join(words.split()) != ""
+        require(
+            tidy, f"{where}: {plain(text)} is not text of at most {LONGEST_TEXT} signs, with single blanks"
+        )
+        found = NUMBER.fullmatch(words)
+        require(found is not None, f"{where}: {plain(text)} is not a decimal number and a unit")
+        assert found is not None
+        size = abs(Fraction(found[1]))
+        ordinary = size == 0 or Fraction(1, 10**300) <= size <= 10**12
+        require(ordinary, f"{where}: {plain(text)} is not 0 or of a size from 1e-300 to 1e12")
+        factors = [UNITS[kind][found[2]] for kind in kinds.split() if found[2] in UNITS[kind]]
+        require(len(factors) == 1, f"{where}: {plain(found[2])} is not a unit of {kinds}")
+        read.append((Fraction(found[1]) * factors[0], found[2]))
+    (lo, unit), (hi, other) = read
+    require((unit in BY_PI) == (other in BY_PI), f"{where}: mixes degrees and radians")
+    require(lo <= hi, f"{where}: the interval is empty")
+    return Quantity(lo, hi, unit in BY_PI, unit)
+
+
+def table(value: object, where: str, needed: str, optional: str = "") -> dict[str, Any]:
+    """Return a JSON object that has the keys needed and no others but the optional ones."""
+    require(isinstance(value, dict), f"{where} is not an object")
+    assert isinstance(value, dict)
+    missing = [key for key in needed.split() if key not in value]
+    require(not missing, f"{where}: {', '.join(missing)} missing")
+    odd = [key for key in value if key not in needed.split() + optional.split()]
+    require(not odd, f"{where}: unknown key {plain(' '.join(odd))}")
+    return value
+
+
+def rows(value: object, where: str, least: int, most: int) -> list[Any]:
+    """Return a JSON array of a fitting length."""
+    fits = isinstance(value, list) and least <= len(value) <= most
+    require(fits, f"{where} is not a list of a fitting length")
+    assert isinstance(value, list)
+    return value
+
+
+def by_side(value: object, where: str, n_sides: int) -> list[Any]:
+    """Read an object with one entry for each side."""
+    names = [str(i) for i in range(n_sides)]
+    known = table(value, where, " ".join(names))
+    return [known[name] for name in names]
+
+
+def read_side(value: object, n_sides: int) -> int:
+    """Read the number of a side."""
+    require(type(value) is int and 0 <= value < n_sides, "a side is not a number of one")
+    assert isinstance(value, int)
+    return value
+
+
+def hex_float(text: object, where: str) -> float:
+    """Read a float in Python's hexadecimal form."""
+    form = r"-?0x[01]\.[0-9a-f]{1,13}p[+-][0-9]{1,4}"
+    fits = isinstance(text, str) and re.fullmatch(form, text) is not None
+    require(fits, f"{where} is not a hexadecimal number")
+    try:
+        return float.fromhex(str(text))
+    except OverflowError:
+        raise BadFileError(f"{where} is too large") from None
