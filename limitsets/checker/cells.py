@@ -1,4 +1,8 @@
-"""CELLS"""
+"""The cells: their structure and their ranks, and what every single cell claims.
+
+docs/certificates.md, "What it rests on", numbers 1 (cover) and 5 (whole numbers) by integers alone; 2 (landing), 3
+(decision), 4 (images) and the slope in balls, cell by cell, shared among processes where there are many cells.
+"""
 
 import math
 import multiprocessing
@@ -37,7 +41,7 @@ Targets = tuple[Pair, Pair]  # the ends of the target cells of a jog and of a fl
 
 
 def range_max(values: Array, first: Array, last: Array) -> Array:
-    """Maxima of values[first..last], by the table of maxima over windows of length 2^k, one k at a time."""
+    """Return max(values[first..last]) of each range, from maxima over windows of length 2^k, one k at a time."""
     level = np.frexp((last - first + 1).astype(np.float64))[1] - 1  # floor(log2), exact for integers
     out = np.zeros(len(first), dtype=np.int64)
     window = values.astype(np.int64)
@@ -49,7 +53,7 @@ def range_max(values: Array, first: Array, last: Array) -> Array:
 
 
 def check_structure(c: Cells, scene: Scene, least_rank: int) -> str:
-    """Check what every claim needs: order of the edges, brackets, branches, targets; "" or what fails."""
+    """Check order of the edges, brackets, branches and targets, which every claim needs; "" or what fails."""
     n_sides = len(c.edges)
     for i, edges in enumerate(c.edges):
         if not (np.diff(edges) > 0).all():
@@ -129,14 +133,14 @@ def extents(c: Cells) -> str:
 
 
 class Failure(NamedTuple):
-    """What was not proved: `kind` is "image" or "slope" for a cell, and text for people."""
+    """The reason why a cell is not proved: its kind, "image" or "slope", and a text for people."""
 
     kind: str
     text: str
 
 
 class Box(NamedTuple):
-    """A piece of a cell, of kappa and of all else, a bracket of the impact angle over it, how often each was halved."""
+    """A piece of a cell, of kappa and of the scene; a bracket of the impact angle there; how often each was halved."""
 
     scene: Scene
     x0: Arb
@@ -150,9 +154,9 @@ class Box(NamedTuple):
     in_s: int
 
     def halves(self, side: int, of: str) -> list["Box"]:
-        """Halve it in what matters more to the angle, x, kappa or a quantity; [] if it has been halved enough.
+        """Halve the box in x, in kappa or in a quantity, whichever widens the angle most; [] at the limits of halving.
 
-        `of`: what is too wide, the "decision" or the "image".
+        `of` is what is too wide: the "decision" or the "image".
         """
         xm = arb(float((HALF * (self.x0 + self.x1)).mid()))
         km = arb(float((HALF * (self.k0 + self.k1)).mid()))
@@ -169,13 +173,13 @@ class Box(NamedTuple):
         return []
 
     def of(self, scene: Scene, side: int) -> "Box":
-        """Make it one of a narrower scene: the bracket stays, what depends on the angle is narrower."""
+        """Return the box for a narrower scene: the bracket stays, the functions of the angle get narrower."""
         low, high = (at_angle(scene.sides[side], at.p) for at in (self.low, self.high))
         return self._replace(scene=scene, low=low, high=high, in_s=self.in_s + 1)
 
 
 def check_bracket(s: Side, box: "Box") -> str:
-    """Check a bracket of phi: f rises with x and falls with kappa, so that it holds if it does at two corners."""
+    """Check a bracket of phi at two corners of a box, which is enough: f rises with x and falls with kappa."""
     if not positive_until(s, box.x0, box.k1, box.low):
         return f"f > 0 up to phi = {float(box.low.p)!r} is not proved at x = {float(box.x0)!r}"
     if not flight(box.x1, box.k0, box.high) < 0:
@@ -185,12 +189,12 @@ def check_bracket(s: Side, box: "Box") -> str:
 
 def check_cell(
     scene: Scene, side: int, x: tuple[float, float], phi: tuple[float, float],
-    targets: tuple[tuple[float, float], tuple[float, float]], least: Arb | None,
+    targets: Targets, least: Arb | None,
 ) -> tuple[Failure | None, int]:  # fmt: skip
-    """Prove what the certificate says about one cell; the failure or None, and the number of boxes looked at.
+    """Prove the statements about one cell; the failure or None, and the number of boxes looked at.
 
-    `targets` are the ends of the target cells of a jog and of a flip: (nan, nan) where the branch is excluded, so
-    that nothing lies inside; an upper end inf stands for the arm's length.
+    `targets` are (nan, nan) where the branch is excluded, so that no image lies inside; an upper end inf stands for
+    the arm's length.
     """
     k_lo, k_hi = scene.k_lo, scene.k_hi
     s = scene.sides[side]
@@ -272,7 +276,7 @@ def check_target(s: Side, branch: int, lo: Arb, hi: Arb, target: Pair) -> str:
 
 
 class Task(NamedTuple):
-    """Some cells of one side: ends, brackets and ends of the targets, as arrays of rows."""
+    """Some cells of one side, with their ends, brackets and the ends of their targets, one row for each."""
 
     box: int
     side: int
@@ -281,21 +285,23 @@ class Task(NamedTuple):
     least: float | None
 
 
-SETUP: list[Any] = []  # of this process: the scenes as written, and the noise
-SCENES: dict[int, Scene] = {}  # balls do not travel between processes, so each reads the scenes it needs anew
+# Balls cannot be sent to another process: each process keeps the JSON of the scenes and the noise, and reads the scenes
+# that it needs.
+SETUP: list[Any] = []
+SCENES: dict[int, Scene] = {}
 
 
 def prepare(raw: list[object], noise: object) -> None:
-    """Set up a worker."""
+    """Set up a process that checks cells."""
     flint.ctx.prec = PRECISION
     SETUP[:] = raw, noise
     SCENES.clear()
 
 
 def check_task(task: Task) -> tuple[int, Failure | None, int]:
-    """Find the first cell of a task that is not proved, and what fails; and count the boxes looked at."""
+    """Return the first cell of a task that is not proved (-1 if there is none), what fails, and the number of boxes."""
     if task.box not in SCENES:
-        SCENES.clear()  # with all its halves
+        SCENES.clear()  # together with their halves
         SCENES[task.box] = read_scene(SETUP[0][task.box], SETUP[1])
     scene = SCENES[task.box]
     least = None if task.least is None else arb(task.least)
@@ -310,7 +316,7 @@ def check_task(task: Task) -> tuple[int, Failure | None, int]:
 
 
 def tasks_of(c: Cells, scene: Scene, box: int, chosen: Array, least: float | None) -> Iterator[Task]:
-    """Cut the chosen cells (ascending) into tasks of one side each."""
+    """Cut the chosen cells, which ascend, into tasks of one side each."""
     lower, upper = c.lower(), c.upper()
     short, long = (float(end) for end in scene.arm)
     short = short if Fraction(short) <= scene.arm[0] else math.nextafter(short, -math.inf)
@@ -318,22 +324,22 @@ def tasks_of(c: Cells, scene: Scene, box: int, chosen: Array, least: float | Non
     for side in range(len(c.edges)):
         own = chosen[c.side[chosen] == side]
         for part in np.array_split(own, max(1, -(-len(own) // CHUNK))):
-            rows = np.full((len(part), 8), math.nan)
-            rows[:, 0], rows[:, 1], rows[:, 2:4] = lower[part], upper[part], c.phi[part]
+            table = np.full((len(part), 8), math.nan)
+            table[:, 0], table[:, 1], table[:, 2:4] = lower[part], upper[part], c.phi[part]
             for column, array in ((4, c.jog[part]), (6, c.flip[part])):
                 q = np.flatnonzero(array[:, 0] >= 0)
-                rows[q, column] = lower[array[q, 0]]
+                table[q, column] = lower[array[q, 0]]
                 ends = upper[array[q, 1]]
-                # where the shortest arm ends before the cells, its end counts
-                rows[q, column + 1] = np.where((ends > short) | (ends >= long), math.inf, ends)
+                # where the shortest arm ends before the target cells do, the image has to end at the arm's end
+                table[q, column + 1] = np.where((ends > short) | (ends >= long), math.inf, ends)
             if len(part):
-                yield Task(box, side, part, rows, least)
+                yield Task(box, side, part, table, least)
 
 
 @contextmanager
 def deaf_children() -> Iterator[None]:
-    """Let processes that are started in here leave Ctrl-C to this one."""
-    if threading.current_thread() is not threading.main_thread():  # only that one may say what a signal does
+    """Start processes that leave Ctrl-C to this one."""
+    if threading.current_thread() is not threading.main_thread():  # only the main thread may set a signal
         yield
         return
     before = signal.signal(signal.SIGINT, signal.SIG_IGN)
@@ -344,7 +350,7 @@ def deaf_children() -> Iterator[None]:
 
 
 class Crew:
-    """The processes that check cells, or this one alone; they are started for large certificates only."""
+    """The processes that check cells: this one alone, and others too for large certificates."""
 
     def __init__(
         self, raw: list[object], noise: object, workers: int, progress: Callable[[int], None] | None
@@ -355,9 +361,11 @@ class Crew:
         prepare(raw, noise)
 
     def run(self, tasks: list[Task]) -> tuple[int, Failure] | None:
-        """Return the first cell, in the order of the tasks, that is not proved, and what fails there; or None."""
+        """Return the first cell that is not proved, in the order of the tasks, and what fails there; or None."""
         if self.workers > 1 and self.pool is None and sum(len(t.cells) for t in tasks) > SMALL:
-            context = multiprocessing.get_context("spawn")
+            # never by fork, which copies locks that other threads hold
+            method = multiprocessing.get_start_method(allow_none=True)
+            context = multiprocessing.get_context("forkserver" if method == "forkserver" else "spawn")
             self.pool = ProcessPoolExecutor(self.workers, context, prepare, self.setup)
         try:
             with deaf_children():
@@ -369,14 +377,14 @@ class Crew:
                     return cell, failure
                 if self.progress is not None:
                     self.progress(self.done)
-        except BrokenProcessPool:  # processes cannot be started here, as from a script without a main guard
+        except BrokenProcessPool:  # they cannot be started here, as in a script without a main guard
             self.close()
             self.workers = 1
             return self.run(tasks)
         return None
 
     def close(self) -> None:
-        """End the processes."""
+        """End the other processes."""
         if self.pool is not None:
             self.pool.shutdown(cancel_futures=True)
             self.pool = None

@@ -1,4 +1,7 @@
-"""CLAIMS"""
+"""The claims of a file: how each is read, checked and put in words.
+
+docs/certificates.md, "What is claimed", and the end of "Goals, end points, orbits" for what each claim rests on.
+"""
 
 import math
 from typing import Any
@@ -15,17 +18,17 @@ from .orbits import check_orbits, orbits_statement, read_orbits
 from .refutations import check_refuted, read_refutation, statement_of_refutation
 from .scene import Scene, over_halves
 
-SECTIONS = {  # the claims that are known, and the keys of their sections
+SECTIONS = {  # the known claims, and the keys of their sections
     "attracts-all": "near_joint max_rank",
     "invariant": "",
     "trapping": "",
-    "goal": "kind",  # and what that kind needs, see GOALS
+    "goal": "kind",  # further keys depend on the kind, see GOALS
     "expanding": "least_slope",
     "end-points": "images ends pieces",
     "cycles": "cycles complete",
     "refuted": "goal nominal tolerance",
 }
-MORE_KEYS = {"refuted": "recurs start throws"}  # that a section may have besides
+MORE_KEYS = {"refuted": "recurs start throws"}  # further keys that a section may have
 Failed = tuple[list[str], str]  # the claims that fail, and the reason
 
 
@@ -55,7 +58,7 @@ def read_claims(
 
 
 def read_section(name: str, section: dict[str, Any], n_sides: int) -> dict[str, Any]:
-    """Read the numbers of a section."""
+    """Read the section of any claim but `goal`."""
     if name == "attracts-all":
         q, fixed = read_near_hinge(section["near_joint"], n_sides)
         require(type(section["max_rank"]) is int, "max_rank is not an integer")
@@ -76,7 +79,7 @@ def read_section(name: str, section: dict[str, Any], n_sides: int) -> dict[str, 
 def check_box_claims(
     scene: Scene, c: Cells, box: int, claims: dict[str, dict[str, Any]], crew: Crew
 ) -> list[Failed]:
-    """Check all claims for one box: those that fail, each with the reason."""
+    """Check all claims for one box; return those that fail, with the reason."""
     failed: list[Failed] = []
     if "refuted" in claims:
         bad = check_refuted(scene, claims["refuted"])
@@ -88,7 +91,7 @@ def check_box_claims(
 def check_cell_claims(
     scene: Scene, c: Cells, box: int, claims: dict[str, dict[str, Any]], crew: Crew
 ) -> list[Failed]:
-    """Check the claims about cells: first the integers, then decision, images and slope of every cell concerned."""
+    """Check the claims about cells: first by integers, then decision, images and slope of the cells concerned."""
     goal, attracts = claims.get("goal"), claims.get("attracts-all")
     first_version = goal is not None and goal["starts"] is None
     bad = check_structure(c, scene, 0 if first_version else -1) or check_components(c)
@@ -127,7 +130,7 @@ def check_throws_of_cells(
     scene: Scene, c: Cells, box: int, claims: dict[str, dict[str, Any]],
     about: tuple[list[str], list[str]], crew: Crew,
 ) -> list[Failed]:  # fmt: skip
-    """Check the throws from the attracting cells, and then from the others that the claims `about` them need.
+    """Check the throws from the attracting cells, then from the others: claims about all of them, and about the ranked.
 
     Images are proved to lie strictly inside the union of their target cells (or at most at the arm's length), so
     that "invariant" already gives "trapping".
@@ -181,5 +184,5 @@ def statement_of(name: str, section: dict[str, Any], noisy: bool) -> str:
 
 
 def entropy_of(least: float) -> str:
-    """Write the logarithm, rounded down by more than its error."""
+    """Write the logarithm of a slope, rounded down by more than its error."""
     return rounded(math.log(least) * (1 - 2.0**-40), up=False, digits=6)

@@ -1,4 +1,7 @@
-"""ENDS"""
+"""The end points of the limit set: throws of intervals, and images of the attracting cells.
+
+docs/certificates.md, "Goals, end points, orbits", numbers 10 (pieces), 11 (outer ends) and 12 (inner ends).
+"""
 
 import itertools
 import math
@@ -29,15 +32,15 @@ from .numbers import (
 from .scene import Scene, Side
 
 MOST_ENDS, MOST_PIECES, MOST_IMAGES = 400, 4_000, 20_000
-MOST_THROWN = 100_000  # boxes, for one claim: a section that needs more is refused
+MOST_THROWN = 100_000  # boxes that `Throws` throws for one claim: a section that needs more is refused
 END_KEYS = ("outer", "inner", "inner", "outer")
-# Brackets of the impact are so narrow, relative to the angle; or so where R - a is less than a millionth of a.
+# The relative width of brackets of the impact angle; the second where R - a is less than a millionth of a.
 ROOT, WIDER_ROOT = arb(2) ** -70, arb(2) ** -45
 Intervals = list[list[Pair]]  # closed intervals by side, ascending and disjoint
 
 
 class Piece(NamedTuple):
-    """A part of the attracting cells: the branch there (2: either) and the sign of dR'/dR (0: none is claimed)."""
+    """A part of the attracting cells, with the branch there (2: either) and the sign of dR'/dR (0: none is claimed)."""
 
     side: int
     lo: float
@@ -46,7 +49,7 @@ class Piece(NamedTuple):
     sign: int
 
     def name(self) -> str:
-        """Name it, for people."""
+        """Name the piece, for people."""
         return f"side {self.side}, x in [{self.lo!r}, {self.hi!r}]"
 
 
@@ -95,7 +98,7 @@ def read_pieces(value: object, n_sides: int) -> list[list[Piece]]:
 
 
 class Thrown(NamedTuple):
-    """Throws from a box: the decision (0, 1, or 2: not settled), bounds of R'(jog), and dR'/dR or None."""
+    """The result of throws from a box: the decision (2: not settled), bounds of R'(jog), and dR'/dR or None."""
 
     decision: int
     lo: Arb
@@ -104,7 +107,7 @@ class Thrown(NamedTuple):
 
 
 def beside_root(s: Side, x: Arb, kappa: Arb, before: bool) -> Angle:
-    """Find an angle that is proved to lie just before, or just after, the impact at x."""
+    """Find an angle that is proved to lie just before the impact at x, or just after it."""
     if not s.exact:
         p = 2 * (x - s.a) / (kappa - s.small_d)
         p = p.lower() if before else p.upper()
@@ -114,14 +117,14 @@ def beside_root(s: Side, x: Arb, kappa: Arb, before: bool) -> Angle:
     x0, k = float(x), float(kappa)
     right = (x0 + math.sqrt(x0 * x0 + 2 * k * (d + math.hypot(a, d)))) / k  # f < 0 there
     p = arb(guess_root(s.floats, s.exact, x0, k, right) if 0 < right < 1e3 else math.nan)
-    for tried in range(8):  # two will do, but where the floats are poor: next to the joint
+    for tried in range(8):  # two are enough, except next to the joint, where the floats are poor
         f = flight(x, kappa, at_angle(s, p))
         sin, cos = p.sin_cos()
         p = (p - f / (x - s.a * cos + s.d * sin - kappa * p)).mid()
         root = ROOT if tried < 6 else WIDER_ROOT
         at = at_angle(s, (p * (ONE - root if before else ONE + root)).mid())
         f = flight(x, kappa, at)
-        # x > a and f concave: positive up to its one positive root and negative from there on
+        # with x > a and f concave, f is positive up to its one positive root and negative beyond
         right_side = bool(f > 0 if before else f < 0) and bool(at.p > 0 and at.p < FULL_TURN)
         if right_side or not p.is_finite():
             break
@@ -130,7 +133,7 @@ def beside_root(s: Side, x: Arb, kappa: Arb, before: bool) -> Angle:
 
 
 class Throws:
-    """Throws of points and boxes from one scene, counted."""
+    """Throws of points and boxes from one scene, with a limit on their number."""
 
     def __init__(self, scene: Scene):
         self.scene, self.left = scene, MOST_THROWN
@@ -158,7 +161,7 @@ class Throws:
         return Thrown(decision, whole, whole, slope)
 
     def interval(self, side: int, x0: Arb, x1: Arb) -> Thrown:
-        """Throw an interval; where dR'/dR has a sign the images of its ends bound all of them."""
+        """Throw an interval; where dR'/dR has a sign the images of the ends bound all images."""
         k0, k1 = self.scene.k_lo, self.scene.k_hi
         t = self.box(side, x0, x1, k0, k1)
         if x0 < x1 and t.slope is not None and (t.slope > 0 or t.slope < 0):
@@ -168,14 +171,14 @@ class Throws:
         return t
 
     def point(self, side: int, x: float) -> Thrown:
-        """Throw one point, once."""
+        """Throw one point, at the first call only."""
         if (side, x) not in self.points:
             self.points[side, x] = self.interval(side, arb(x), arb(x))
         return self.points[side, x]
 
 
 def joined(intervals: list[Pair]) -> list[Pair]:
-    """Intervals of closed intervals, ascending."""
+    """Return the union of closed intervals, ascending."""
     union: list[Pair] = []
     for lo, hi in sorted(intervals):
         if union and lo <= union[-1][1]:
@@ -186,7 +189,7 @@ def joined(intervals: list[Pair]) -> list[Pair]:
 
 
 def meeting(one: list[Pair], other: list[Pair]) -> list[Pair]:
-    """Intersection of two unions, ascending."""
+    """Return the intersection of two unions, ascending."""
     common = []
     i = k = 0
     while i < len(one) and k < len(other):
@@ -244,7 +247,7 @@ def halved_box(x0: Arb, x1: Arb, k0: Arb, k1: Arb) -> list[tuple[Arb, Arb, Arb, 
 
 
 def parts_of(throws: Throws, union: Intervals, pieces: list[list[Piece]]) -> Iterator[tuple[int, Piece]]:
-    """Cut a union at the borders of the pieces; each part with the number of the interval it is of."""
+    """Cut a union at the borders of the pieces; yield each part with the number of its interval."""
     for intervals, own in zip(union, pieces, strict=True):
         at = 0
         for owner, (lo, hi) in enumerate(intervals):
@@ -279,8 +282,8 @@ def image_outward(throws: Throws, union: Intervals, pieces: list[list[Piece]]) -
 def image_inward(throws: Throws, union: Intervals, pieces: list[list[Piece]]) -> Intervals:
     """Return a union that lies in the image of another.
 
-    On neighbouring pieces of one branch the map is continuous, f being concave.  So all between the images of two of
-    their points is covered (intermediate values).  Pieces without a branch give nothing.
+    On neighbouring pieces of one branch the map is continuous, because f is concave.  So it takes all values between
+    its values at two of their points (intermediate values).  Pieces without a branch give nothing.
     """
     n = len(union)
     images: Intervals = [[] for _ in range(n)]
@@ -345,7 +348,7 @@ def check_ends(scene: Scene, c: Cells, section: dict[str, Any]) -> str:
 
 
 def ends_statement(section: dict[str, Any], noisy: bool) -> str:
-    """Put the claim of end points in words: the numbers are those that are checked."""
+    """Put the claim of end points in words, with the numbers that are checked."""
     noise = ", with whatever speeds of the noise" if noisy else ""
     after = f"after {section['images']} throws or more they lie within the outer ends"
     always = "and always they hold all between the inner ends"

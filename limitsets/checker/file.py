@@ -1,4 +1,7 @@
-"""FILE"""
+"""The file: a zip of a header and arrays.  docs/certificates.md, "The file".
+
+Sizes, depths and hashes are checked before anything is believed, and nothing is unpickled or evaluated.
+"""
 
 import hashlib
 import itertools
@@ -19,7 +22,7 @@ from .numbers import Array, BadFileError, plain, require
 
 
 def stored_entries(data: memoryview, most: int, what: str) -> dict[str, memoryview]:
-    """Find the entries of an uncompressed zip, as views of its bytes; refuse anything out of the ordinary."""
+    """Find the entries of an uncompressed zip, as views of its bytes; refuse every unusual zip."""
 
     def ordinary(condition: bool, message: str) -> None:
         require(condition, f"{what}: {message}")
@@ -39,28 +42,28 @@ def stored_entries(data: memoryview, most: int, what: str) -> dict[str, memoryvi
         _, _, flags, method, _, _, crc, packed, full, n, extra, note, _, _, _, offset = fields
         name = bytes(data[at + 46 : at + 46 + n])
         at += 46 + n + extra + note
-        shown = plain(name.decode("latin-1"))
-        ordinary(method == 0 and packed == full, f"entry {shown} is compressed; only stored ones are read")
-        ordinary(flags & ~0x0800 == 0 and name.isascii(), f"entry {shown} has unusual flags or an odd name")
-        ordinary(shown not in entries, f"entry {shown} occurs twice")
-        local = bytes(data[offset : offset + 30])  # what stands before the entry itself
-        ordinary(offset + 30 <= start and local[:4] == b"PK\3\4", f"entry {shown} is damaged")
+        entry = plain(name.decode("latin-1"))
+        ordinary(method == 0 and packed == full, f"entry {entry} is compressed; only stored ones are read")
+        ordinary(flags & ~0x0800 == 0 and name.isascii(), f"entry {entry} has unusual flags or an odd name")
+        ordinary(entry not in entries, f"entry {entry} occurs twice")
+        local = bytes(data[offset : offset + 30])  # the header in front of the entry
+        ordinary(offset + 30 <= start and local[:4] == b"PK\3\4", f"entry {entry} is damaged")
         n_local, extra_local = struct.unpack("<2H", local[26:])
         begin = offset + 30 + n_local + extra_local
         same = local[8:10] == b"\0\0" and bytes(data[offset + 30 : offset + 30 + n_local]) == name
-        ordinary(same and begin + full <= start, f"entry {shown} is damaged")
-        entries[shown] = data[begin : begin + full]
+        ordinary(same and begin + full <= start, f"entry {entry} is damaged")
+        entries[entry] = data[begin : begin + full]
         spans.append((offset, begin + full))
         if full <= 4 << 20:  # larger ones are covered by the hashes of the arrays
-            ordinary(zlib.crc32(entries[shown]) == crc, f"entry {shown} is damaged (checksum)")
+            ordinary(zlib.crc32(entries[entry]) == crc, f"entry {entry} is damaged (checksum)")
     ordinary(at == end, "damaged directory")
     ordinary(all(a[1] <= b[0] for a, b in itertools.pairwise(sorted(spans))), "entries overlap")
     return entries
 
 
 def parse_json(raw: bytes) -> dict[str, Any]:
-    """Parse the header; depth, numbers and repeated keys are limited before and while it is read."""
-    # "*+" keeps no way back: ten times as fast on a file of nothing but quotes
+    """Parse the header, with limits on its depth and its numbers; a repeated key is refused."""
+    # possessive repetition ("*+") never goes back: ten times as fast on a file of nothing but quotes
     bare = np.frombuffer(re.sub(rb'"[^"\\]*+(?:\\.[^"\\]*+)*+"?', b"", raw, flags=re.DOTALL), dtype=np.uint8)
     opened = np.isin(bare, (0x5B, 0x7B)).astype(np.int32) - np.isin(bare, (0x5D, 0x7D))
     require(int(np.cumsum(opened).max(initial=0)) <= 24, "header.json is nested too deeply")
@@ -92,7 +95,7 @@ NPY = re.compile(
 
 
 def read_array(entry: memoryview, name: str, dtype: str, columns: int, said: object) -> Array:
-    """Read one array from the bytes of a .npy file: of the type its name asks for, with the hash that is said."""
+    """Read one array from the bytes of a .npy file; type, shape and hash must be those in the header."""
     require(
         len(entry) >= 10 and bytes(entry[:8]) == b"\x93NUMPY\1\0", f"array {name} is not a .npy, version 1"
     )
@@ -115,7 +118,7 @@ def read_array(entry: memoryview, name: str, dtype: str, columns: int, said: obj
 
 
 def open_certificate(path: str | os.PathLike[str]) -> tuple[dict[str, Any], dict[str, memoryview]]:
-    """Return the header and the entries of the arrays."""
+    """Return the header of a certificate, and the entries that hold its arrays."""
     try:
         with Path(path).open("rb") as file:
             size = os.fstat(file.fileno()).st_size
@@ -133,7 +136,7 @@ def open_certificate(path: str | os.PathLike[str]) -> tuple[dict[str, Any], dict
 
 @dataclass
 class Cells:
-    """The arrays of one box, cells of all sides one after another."""
+    """The arrays of one box; the cells of all sides stand one after another."""
 
     edges: list[Array]
     jog: Array
@@ -143,7 +146,7 @@ class Cells:
     component: Array
     phi: Array
     side: Array = field(init=False)
-    start: Array = field(init=False)  # the first cell of each side, and the number of cells
+    start: Array = field(init=False)  # the first cell of each side; at the end the number of all cells
 
     def __post_init__(self) -> None:
         counts = [len(edges) - 1 for edges in self.edges]
@@ -151,11 +154,11 @@ class Cells:
         self.side = np.repeat(np.arange(len(counts)), counts)
 
     def lower(self) -> Array:
-        """Lower ends of all cells."""
+        """Return the lower ends of all cells."""
         return np.concatenate([edges[:-1] for edges in self.edges])
 
     def upper(self) -> Array:
-        """Upper ends of all cells."""
+        """Return the upper ends of all cells."""
         return np.concatenate([edges[1:] for edges in self.edges])
 
     def name(self, cell: int) -> str:
@@ -166,7 +169,7 @@ class Cells:
 
 
 def read_cells(entries: dict[str, memoryview], said: dict[str, Any], prefix: str, sides: int) -> Cells:
-    """Read the arrays of one box and see that their shapes fit each other."""
+    """Read the arrays of one box, and check that their lengths fit each other."""
 
     def read(name: str, dtype: str, columns: int = 1) -> Array:
         require(f"{prefix}{name}.npy" in entries, f"array {prefix}{name} is missing")

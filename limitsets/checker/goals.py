@@ -1,4 +1,7 @@
-"""GOALSDOC"""
+"""The goals: what each asks of the attracting cells, or from anywhere on the arm.
+
+docs/certificates.md, "Goals", and what `goal` rests on in "Goals, end points, orbits".
+"""
 
 import math
 from fractions import Fraction
@@ -34,7 +37,7 @@ GOALS = {  # the kinds that are known, and the keys of their sections; from_anyw
 
 
 def read_asked(section: object, n_sides: int, version: int) -> dict[str, Any]:
-    """Read the section of a goal: what is asked, and for which starts."""
+    """Read the section of a goal, with the starts for which it is claimed."""
     starts = "starts thinning near_joint lost" if version > 1 else ""
     known = table(section, "section of goal", "kind", f"{GOAL_KEYS} {starts}")
     own = {key: value for key, value in known.items() if key not in starts.split()}
@@ -44,7 +47,7 @@ def read_asked(section: object, n_sides: int, version: int) -> dict[str, Any]:
 
 
 def read_goal(section: dict[str, Any], n_sides: int) -> dict[str, Any]:
-    """Read a goal; `all`: whether it is about throws from all cells, not from the attracting ones alone."""
+    """Read a goal; its entry `all` is true if it is about throws from all cells, not from the attracting ones alone."""
 
     def whole(value: object, least: int, most: int, what: str) -> int:
         fits = type(value) is int and least <= value < most
@@ -76,7 +79,7 @@ def read_goal(section: dict[str, Any], n_sides: int) -> dict[str, Any]:
 
 
 def goal_of_scene(scene: dict[str, Any], n_sides: int) -> dict[str, Any] | None:
-    """Read a scene's own goal, as its section would be."""
+    """Read a scene's own goal, in the form of a section."""
     if scene.get("goal") is None:
         return None
     known = table(scene["goal"], "scene.goal", "", " ".join([*GOALS, "from_anywhere"]))
@@ -96,7 +99,7 @@ def goal_of_scene(scene: dict[str, Any], n_sides: int) -> dict[str, Any] | None:
 
 
 def asked(goal: dict[str, Any]) -> tuple[Any, ...]:
-    """Say what a goal asks, to compare it: kind, x in metres, side, and the rest."""
+    """Return what a goal asks, for comparison: kind, x in metres, side, and the rest."""
     x = goal["x"].lo if "x" in goal else None
     words = (goal.get("side"), goal.get("every"), goal.get("order"))
     return (goal["kind"], goal["all"], x, *words)
@@ -209,7 +212,7 @@ def check_flip_order(c: Cells, goal: dict[str, Any]) -> str:
 
 
 def statement_of_goal(goal: dict[str, Any], noisy: bool) -> str:
-    """Put a goal in words, `starts` being those for which it is proved."""
+    """Put a goal in words; its `starts` are those for which it is proved."""
     starts = goal["starts"] or (Starts("every") if goal["all"] else ATTRACTING)
     place = starts_in_words(starts, noisy)
     into = f"; into the attracting cells comes, and there stays, {place}"

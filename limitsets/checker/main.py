@@ -1,4 +1,4 @@
-"""MAIN"""
+"""The command line: `python -m limitsets.checker FILE`; docs/certificates.md, "Checking one"."""
 
 import argparse
 import json

@@ -1,4 +1,8 @@
-"""MODEL"""
+"""The model: every formula of a throw, in balls.
+
+docs/certificates.md, "What it rests on", numbers 2 (landing) and 3 (decision), "The surface above the joint" for the
+throw told by its impact angle, and number 10 for the slope.  `FORMULAS` are the words for what is computed here.
+"""
 
 import math
 from typing import Any, NamedTuple
@@ -42,28 +46,33 @@ class Angle(NamedTuple):
 
 
 def at_angle(s: Side, p: Arb) -> Angle:
-    """Evaluate what depends on the angle alone."""
+    """Evaluate the functions of the angle alone."""
     if s.exact:
         sin, cos = p.sin_cos()
-        back = 1 - cos  # a and d once each: they may be wide
+        back = 1 - cos  # so that a and d, which may be wide, stand once each
         return Angle(p, s.d * back - s.a * sin, s.a * back - s.d * (p - sin) - s.h * p)
     return Angle(p, (HALF * s.small_d * p - s.a) * p, -s.h * p)
 
 
 def flight(x: Arb, kappa: Arb, at: Angle) -> Arb:
-    """Evaluate f at one angle: positive before the impact."""
+    """Evaluate f at one angle; f is positive before the impact."""
     return (x - HALF * kappa * at.p) * at.p + at.g
 
 
+def rise_of_jog(s: Side, sin: Arb, cos: Arb) -> Arb:
+    """Evaluate D' at an angle with this sine and cosine."""
+    return s.a * sin - s.d * (1 - cos) - s.h if s.exact else -s.h
+
+
 def over_angles(s: Side, phi: Arb, R: Arb, kappa: Arb) -> tuple[int, Arb, Arb]:
-    """Over a box: the decision (0 jog, 1 flip, 2 not settled), D'(phi), and df/dphi."""
+    """Return over a box: the decision (0 jog, 1 flip, 2 not settled), D'(phi), and df/dphi."""
     if s.exact:
         sin, cos = sine_cosine(phi)
         H = s.a * sin + s.d * cos
         X = s.a * cos - s.d * sin
         fall = R - kappa * phi
         spin = s.rho2 + X * fall + H * s.hd  # M om
-        return decide_exact(s, spin, X, H, kappa), s.a * sin - s.d * (1 - cos) - s.h, fall - X
+        return decide_exact(s, spin, X, H, kappa), rise_of_jog(s, sin, cos), fall - X
     spin = s.rho2 - s.a * R + 2 * s.a * s.a + s.d * s.d + s.d * s.h
     V = kappa * (s.ell - s.d) - 2 * s.a * (R - s.a)
     F = spin * (abs(spin) if s.signed else spin) * s.over_2m - V
@@ -73,8 +82,8 @@ def over_angles(s: Side, phi: Arb, R: Arb, kappa: Arb) -> tuple[int, Arb, Arb]:
 def decide_exact(s: Side, spin: Arb, X: Arb, H: Arb, kappa: Arb) -> int:
     """Decide by the flip criterion of the exact model over a box.
 
-    X^2 + H^2 = ell^2 gives ell - H = X^2/(ell + H): the right of it is narrow where H > 0, and next to H = -ell only
-    the left is; both hold wherever they are defined.
+    X^2 + H^2 = ell^2 gives ell - H = X^2/(ell + H).  The right-hand side is narrow where H > 0, the left-hand side next
+    to H = -ell; both hold wherever they are defined.
     """
     V = kappa * barrier(s.ell, X, H, s.signed)
     F = spin * (abs(spin) if s.signed else spin) * s.over_2m - V
@@ -84,10 +93,10 @@ def decide_exact(s: Side, spin: Arb, X: Arb, H: Arb, kappa: Arb) -> int:
 
 
 def barrier(ell: Any, X: Any, H: Any, signed: bool) -> Any:
-    """Evaluate V/kappa = ell - H, with the sign of X where that counts."""
+    """Evaluate V/kappa = ell - H, with the sign of X in the signed criterion."""
     top, below_it = ell + H, ell - H
     if signed and not X > 0:
-        below_it = -below_it if -X > 0 else None  # of either sign
+        below_it = -below_it if -X > 0 else None  # the sign is not known
     if not top > 0:
         return arb("nan") if below_it is None else below_it
     above_it = X * (abs(X) if signed else X) / top
@@ -97,7 +106,7 @@ def barrier(ell: Any, X: Any, H: Any, signed: bool) -> Any:
 
 
 class Ratios(NamedTuple):
-    """Of an angle p in [0, 3]: sin(p)/p, V = (1 - cos p)/p^2 and W = (p - sin p)/p^3."""
+    """An angle p in [0, 3], with sin(p)/p, V = (1 - cos p)/p^2 and W = (p - sin p)/p^3."""
 
     p: Arb
     sine: Arb
@@ -106,13 +115,13 @@ class Ratios(NamedTuple):
 
 
 def ratios(p: Arb) -> Ratios:
-    """Evaluate them; W between the sums 1/6 - p^2/120 (+ p^4/5040), whose terms alternate and fall for p^2 < 42."""
+    """Evaluate the ratios; W lies between 1/6 - p^2/120 and + p^4/5040 of a series that alternates and falls (p^2 < 42)."""
     low = ONE / 6 - p * p / 120
     return Ratios(p, p.sinc(), HALF * (HALF * p).sinc() ** 2, low.union(low + p**4 / 5040))
 
 
 def landing_at(s: Side, r: Ratios, kappa: Arb) -> Arb:
-    """Evaluate R(p), the start whose f has the root p: f = (R - R(p)) p."""
+    """Evaluate R(p), the start whose f has the root p, for f = (R - R(p)) p."""
     return s.a * r.sine + r.p * (HALF * kappa - s.d * r.V)
 
 
@@ -132,16 +141,16 @@ def gain_slope(a: Arb, d: Arb, r: Ratios) -> Arb:
 
 
 def slope_over(s: Side, phi: Arb, kappa: Arb, rise: Arb, f_slope: Arb) -> Arb | None:
-    """Enclose dR'/dR over a bracket of the angle; None where one root in it for each R, growing with R, is not proved.
+    """Enclose dR'/dR over a bracket of the angle; None where it is not proved that each R has one root in the bracket.
 
-    f(p) = (R - R(p)) p, so that dphi/dR = 1/R'(phi) where R(p) rises: kappa, a and d stand there once, and R does not.
-    By df/dphi it is -phi/(df/dphi).
+    f(p) = (R - R(p)) p gives dphi/dR = 1/R'(phi) where R(p) rises; there kappa, a and d stand once, and R does not.
+    df/dphi < 0 gives dphi/dR = -phi/(df/dphi).
     """
     if not s.exact:
         return ONE - 2 * s.h / (kappa - s.small_d)
     steep = its_slope(s, ratios(phi), kappa) if phi < 3 else ZERO
     wide, narrow = (ONE + rise / steep if steep > 0 else None), None
-    if f_slope < 0:  # better where the box is small, for R(p) is a series that ends
+    if f_slope < 0:  # narrower where the box is small: the series for R(p) is cut off
         narrow = ONE - rise * phi / f_slope
     if wide is None or narrow is None:
         return narrow if wide is None else wide
@@ -159,9 +168,7 @@ def positive_until(s: Side, x: Arb, kappa: Arb, end: Angle) -> bool:
     if s.concave:
         return True
     m = s.ell + kappa
-    t = arb(
-        float(((x - s.a) / m).lower())
-    )  # f(u) >= u (x - a - m u/2) > 0 for u <= (x - a)/m, and t rounds near
+    t = arb(float(((x - s.a) / m).lower()))  # f(u) >= u (x - a - m u/2) > 0 for u <= (x - a)/m; t is rounded
     if not x - s.a - HALF * m * t > 0:
         return False
     for _ in range(1000):
@@ -180,19 +187,19 @@ def positive_until(s: Side, x: Arb, kappa: Arb, end: Angle) -> bool:
     return False
 
 
-# Brackets this far beyond a guess: where a and d are wide their balls' radii, which have 30 bits, hide anything less.
+# A bracket ends this far beyond a guess.  Where a and d are wide the second is needed: a ball's radius has 30 bits.
 SLACKS = (2.0**-40, 2.0**-26)
 
 
-def guess_root(floats: tuple[float, ...], exact: bool, x: float, kappa: float, p: float) -> float:
-    """Newton in floats from p; believed by nobody."""
+def guess_root(floats: tuple[float, ...], is_exact: bool, x: float, kappa: float, p: float) -> float:
+    """Guess the impact angle by Newton's method in floats, from p on; no proof rests on it."""
     first_a, d, small, a_past = floats
-    if not exact:
+    if not is_exact:
         return 2.0 * (x - first_a) / (kappa - small)
     last = math.inf
     for k in range(
         100
-    ):  # next to the joint the angle is far smaller than where it begins, and is halved at first
+    ):  # next to the joint the root is far smaller than p, and the first steps only halve the guess
         sin, cos = math.sin(p), math.cos(p)
         a = first_a if sin > 0 else a_past
         slope = x - a * cos + d * sin - kappa * p
@@ -207,7 +214,7 @@ def guess_root(floats: tuple[float, ...], exact: bool, x: float, kappa: float, p
 
 
 def root_above(s: Side, x: Arb, kappa: Arb, at: Angle) -> Angle:
-    """Find an angle that the impact at x comes before, for this kappa and larger ones: `at` or a proved better one."""
+    """Return an angle proved to come after the impact at x, for this kappa and larger ones: `at` or a nearer one."""
     p = guess_root(s.late, s.exact, float(x.mid()), float(kappa.mid()), float(at.p.mid()))
     for slack in SLACKS:
         if 0 < p * (1 + slack) < at.p:
@@ -218,7 +225,7 @@ def root_above(s: Side, x: Arb, kappa: Arb, at: Angle) -> Angle:
 
 
 def root_below(s: Side, x: Arb, kappa: Arb, at: Angle, start: Arb) -> Angle:
-    """Find an angle that the impact at x comes after, for this kappa and smaller ones: `at` or a proved better one."""
+    """Return an angle proved to come before the impact at x, for this kappa and smaller ones: `at` or a nearer one."""
     p = guess_root(s.early, s.exact, float(x.mid()), float(kappa.mid()), float(start.mid()))
     for slack in SLACKS:
         if at.p < p * (1 - slack) < FULL_TURN:

@@ -1,4 +1,7 @@
-"""NEAR"""
+"""Near the hinge: starts before the first cell of a side.
+
+docs/certificates.md, "What it rests on", number 6 (near the joint), and "The surface above the joint".
+"""
 
 from fractions import Fraction
 from typing import Any
@@ -17,6 +20,7 @@ from .model import (
     landing_at,
     over_angles,
     ratios,
+    rise_of_jog,
     root_above,
 )
 from .numbers import HALF, ONE, ZERO, Arb, Pair, by_side, hex_float, require, rounded, rows, table
@@ -24,7 +28,7 @@ from .scene import Scene, Side, over_halves
 
 
 def read_near_hinge(value: object, n_sides: int) -> tuple[list[float], list[Pair | None]]:
-    """Read what is said of starts before the first cell of each side."""
+    """Read the claims about starts before the first cell: factors q, and brackets of fixed points or None, by side."""
     near = by_side(value, "near_joint", n_sides)
     each = [table(one, "near_joint", "q", "fixed_point") for one in near]
     fixed = [read_bracket(one["fixed_point"]) if "fixed_point" in one else None for one in each]
@@ -32,7 +36,7 @@ def read_near_hinge(value: object, n_sides: int) -> tuple[list[float], list[Pair
 
 
 def read_bracket(value: object) -> tuple[float, float]:
-    """Read two numbers that enclose one."""
+    """Read two numbers that enclose a fixed point."""
     lo, hi = (hex_float(end, "fixed_point") for end in rows(value, "fixed_point", 2, 2))
     require(lo <= hi, "fixed_point is an empty interval")
     return lo, hi
@@ -101,12 +105,12 @@ def check_everywhere(c: Cells, scene: Scene) -> str:
         edge = float(edges[0])
         near = over_halves(scene, check_thrown_out, i, edge)
         if near:
-            return f"side {i}, near the joint, x in (a, {float(edges[0])!r}]: {near}"
+            return f"side {i}, near the joint, x in (a, {edge!r}]: {near}"
     return ""
 
 
 def check_thrown_out(scene: Scene, side: int, edge: float) -> str:
-    """Check that starts up to the edge are thrown outward, by whatever factor; "" or what fails."""
+    """Check that starts up to the edge are thrown outward, by any factor above 1; "" or what fails."""
     s = scene.sides[side]
     gain = -2 * s.h / (scene.k_hi - s.small_d)
     q = float((1 + gain * (1 - 2.0**-20)).lower())
@@ -114,7 +118,7 @@ def check_thrown_out(scene: Scene, side: int, edge: float) -> str:
 
 
 def fixed_angles(s: Side) -> tuple[Ratios, Ratios] | None:
-    """Find angles with E < 0 at the first and E > 0 at the second for all parameters: guessed by Newton, proved."""
+    """Find two angles, proved E < 0 at the first and E > 0 at the second for all parameters; None if Newton fails."""
     found = []
     for sign, a, d, h in (
         (-1, s.a.upper(), s.d.lower(), s.h.lower()),
@@ -140,7 +144,7 @@ def fixed_angles(s: Side) -> tuple[Ratios, Ratios] | None:
 
 
 def last_angle(s: Side, x: float, k_lo: Arb) -> Ratios | None:
-    """Find an angle p with R(p) > x for all parameters."""
+    """Find an angle p, proved R(p) > x for all parameters; None if there is none near the guess."""
     guess = guess_root(s.late, s.exact, x, float(k_lo), 4 * (x - s.floats[0]) / float(k_lo) + 0.1)
     for k in range(20):
         p = guess * (1 + 2.0 ** (2 * k - 38))
@@ -206,8 +210,7 @@ def check_growth_beyond(s: Side, k_hi: Arb, first: Arb, top: Arb, q: float) -> s
     pieces = 16
     for k in range(pieces):
         r = ratios((first + (top - first) * k / pieces).union(first + (top - first) * (k + 1) / pieces))
-        sin, cos = r.p.sin_cos()
-        rise = s.a * sin - s.d * (1 - cos) - s.h
+        rise = rise_of_jog(s, *r.p.sin_cos())
         if not (q > 1 and rise > 0 and rise >= (arb(q) - 1) * its_slope(s, r, k_hi)):
             return f"R' - R* >= q (R - R*) is not proved for q = {q!r}"
     return ""
@@ -216,7 +219,7 @@ def check_growth_beyond(s: Side, k_hi: Arb, first: Arb, top: Arb, q: float) -> s
 def check_below_cells(
     scene: Scene, side: int, edge: float, q: float, said: tuple[float, float] | None
 ) -> str:
-    """Check what is said of starts before the first cell: whichever the sign of h asks for; "" or what fails."""
+    """Check the claims about starts before the first cell, which depend on the sign of h; "" or what fails."""
     s = scene.sides[side]
     if s.h > 0:
         if said is None:
@@ -231,6 +234,7 @@ def check_below_cells(
 
 def fixed_points_in_words(section: dict[str, Any], noisy: bool) -> str:
     """Put attracts-all in words where the arm's surface is above the joint."""
+    factor = rounded(min(section["q"]), up=False)
     said = "; ".join(f"side {i}: [{lo!r}, {hi!r}]" for i, (lo, hi) in enumerate(section["fixed"]))
     if noisy:
         what = (
@@ -238,16 +242,12 @@ def fixed_points_in_words(section: dict[str, Any], noisy: bool) -> str:
         )
         beyond, before, rest = "hi_i", "lo_i", "; nothing is claimed of starts between lo_i and hi_i"
     else:
-        what, beyond, before, rest = (
-            "the jog has an unstable fixed point R*_i in an interval",
-            "R*_i",
-            "R*_i",
-            "",
-        )
+        what = "the jog has an unstable fixed point R*_i in an interval"
+        beyond, before, rest = "R*_i", "R*_i", ""
     return (
         f"attracts-all, with the arm's surface above the joint: on every side i {what} ({said});"
         f" every start {beyond} < x <= arm.length on every side i enters the attracting cells and stays in them, within"
         f" {section['max_rank']} throws where x is in the cells; nearer to it x - {beyond} grows by a factor of at"
-        f" least {rounded(min(section['q']), up=False)} with every throw; every start a_i < x < {before} stays on side i"
+        f" least {factor} with every throw; every start a_i < x < {before} stays on side i"
         f" and tends to a_i{rest}"
     )

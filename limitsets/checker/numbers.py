@@ -1,4 +1,8 @@
-"""NUMBERS"""
+"""Numbers, texts and quantities: what all other files are made of.
+
+Balls are those of Arb: the computation holds for every number in a ball, and a comparison of balls is true only if it
+is true for all numbers in them.  docs/certificates.md, "Checking one", says how numbers are read and printed.
+"""
 
 import math
 import re
@@ -27,7 +31,7 @@ def require(condition: bool, message: str) -> None:
 
 
 class UnprovedError(Exception):
-    """What a section says was not proved."""
+    """A section says something that was not proved."""
 
 
 def prove(condition: bool, message: str) -> None:
@@ -37,10 +41,10 @@ def prove(condition: bool, message: str) -> None:
 
 
 def plain(text: object, most: int = 80) -> str:
-    """Clean the text of a stranger: without control characters, fit to be printed, and cut where all can see it."""
+    """Clean the text of a stranger for printing: replace control characters, and mark where a long text is cut."""
     whole = str(text)
-    shown = "".join(c if c.isprintable() and c.isascii() else "?" for c in whole[:most])
-    return shown + ("... (cut)" if len(whole) > most else "")
+    clean = "".join(c if c.isprintable() and c.isascii() else "?" for c in whole[:most])
+    return clean + ("... (cut)" if len(whole) > most else "")
 
 
 def exact(value: Fraction) -> Arb:
@@ -54,7 +58,7 @@ def span(lo: Fraction, hi: Fraction) -> Arb:
 
 
 def float_below(value: Arb) -> float:
-    """Round down."""
+    """Round a ball down, to a float that is not above any of its numbers."""
     prove(value.is_finite(), "an image is not bounded")
     x = float(value.lower())
     while not arb(x) <= value:
@@ -63,12 +67,12 @@ def float_below(value: Arb) -> float:
 
 
 def float_above(value: Arb) -> float:
-    """Round up."""
+    """Round a ball up, to a float that is not below any of its numbers."""
     return -float_below(-value)
 
 
 def sine_cosine(phi: Arb) -> tuple[Arb, Arb]:
-    """Enclose both over a wide ball, by the mean value theorem: Arb's own are as wide as the angle."""
+    """Enclose sine and cosine by the mean value theorem: over a wide ball Arb's own results are as wide as the ball."""
     sin, cos = phi.sin_cos()
     middle = phi.mid()
     at, off = middle.sin_cos(), phi - middle
@@ -76,7 +80,7 @@ def sine_cosine(phi: Arb) -> tuple[Arb, Arb]:
 
 
 class Rising:
-    """A ball with its derivatives by some quantities, for the mean value theorem."""
+    """A ball with its derivatives by several quantities, for the mean value theorem."""
 
     __slots__ = ("by", "x")
 
@@ -117,16 +121,16 @@ class Rising:
         return Rising(self.x**two, [two * self.x ** (two - 1) * d for d in self.by])
 
     def sqrt(self) -> "Rising":
-        """Take the square root."""
+        """Take the square root, with its derivatives."""
         root = self.x.sqrt()
         return Rising(root, [d / (2 * root) for d in self.by])
 
     def sin_cos(self) -> "tuple[Rising, Rising]":
-        """Take sine and cosine."""
+        """Take sine and cosine, with their derivatives."""
         sin, cos = self.x.sin_cos()
         return Rising(sin, [cos * d for d in self.by]), Rising(cos, [-sin * d for d in self.by])
 
-    def __abs__(self) -> "Rising":  # of use in x |x| only, where the sign of 0 does not matter
+    def __abs__(self) -> "Rising":  # only ever used in x |x|, where the sign of 0 does not matter
         sign = ONE if self.x > 0 else -ONE if self.x < 0 else ONE.union(-ONE)
         return Rising(abs(self.x), [sign * d for d in self.by])
 
@@ -137,7 +141,7 @@ class Rising:
 
 
 DECIMAL = r"[+-]?(?:[0-9]{1,100}(?:\.[0-9]{0,100})?|\.[0-9]{1,100})(?:[eE][+-]?[0-9]{1,3})?"
-NUMBER = re.compile(rf" *({DECIMAL})(?: +|(?=%))([a-z%/^0-9]{{1,8}}) *")  # as a scene may be written
+NUMBER = re.compile(rf" *({DECIMAL})(?: +|(?=%))([a-z%/^0-9]{{1,8}}) *")  # as a scene writes a quantity
 INCH = Fraction(254, 10_000)
 METRIC = {"m": Fraction(1), "cm": Fraction(1, 100), "mm": Fraction(1, 1000), "um": Fraction(1, 10**6)}
 LENGTHS = {**METRIC, "in": INCH, "ft": 12 * INCH}
@@ -154,17 +158,17 @@ UNITS: dict[str, dict[str, Fraction]] = {
         "mg": Fraction(1, 10**6),
         "lb": POUND,
     },
-    "density": {"kg/m^2": Fraction(1), "g/cm^2": Fraction(10)},  # of a plate's area; and of its volume:
-    "bulk": {"kg/m^3": Fraction(1), "g/cm^3": Fraction(1000)},
+    "density": {"kg/m^2": Fraction(1), "g/cm^2": Fraction(10)},  # mass per area of a plate
+    "bulk": {"kg/m^3": Fraction(1), "g/cm^3": Fraction(1000)},  # mass per volume
     "share": {"%": Fraction(1, 100)},
 }
 KINDS = " ".join(UNITS)
 BY_PI = ("deg", "deg/s", "rpm")
-LONGEST_TEXT = 64  # signs of a quantity: a longer text is not read, so that none is cut where it is shown
+LONGEST_TEXT = 64  # signs of a quantity: a longer text is refused, so that `plain` cuts no quantity
 
 
 def decimal(value: Fraction) -> str:
-    """Write a rational number as the decimal that it is; one that is none as a fraction, which is exact as well."""
+    """Write a rational number exactly: as a decimal where it is one, else as a fraction."""
     over, twos, fives = value.denominator, 0, 0
     while over % 2 == 0:
         over, twos = over // 2, twos + 1
@@ -199,23 +203,23 @@ class Quantity(NamedTuple):
     unit: str
 
     def ball(self) -> Arb:
-        """Enclose it in a ball."""
+        """Enclose the interval in a ball."""
         return span(self.lo, self.hi) * (arb.pi() if self.pi else 1)
 
     def ends(self) -> list[Arb]:
-        """Enclose its two ends."""
+        """Enclose the two ends of the interval."""
         return [exact(end) * (arb.pi() if self.pi else 1) for end in (self.lo, self.hi)]
 
     def __str__(self) -> str:
-        """Write what was read, from the numbers and not from the text."""
+        """Write the interval from its numbers, not from the text in the file."""
         factor = next(kind[self.unit] for kind in UNITS.values() if self.unit in kind)
         lo, hi = (f"{decimal(end / factor)} {self.unit}" for end in (self.lo, self.hi))
         return lo if self.lo == self.hi else f"every value in [{lo}, {hi}]"
 
 
 def quantity(value: object, kinds: str, where: str) -> Quantity:
-    """Read a quantity, `"5.75 in"` or a pair of such, of one of the kinds named; a half of one is read already."""
-    if isinstance(value, Quantity):  # `halves` put it there: nothing that stands in a file is one
+    """Read a quantity of one of the kinds named: a text like `"5.75 in"`, or a pair of such texts for an interval."""
+    if isinstance(value, Quantity):  # `Scene.halves` put it there: JSON holds no such object
         return value
     pair = value if isinstance(value, list) else [value, value]
     require(len(pair) == 2, f"{where}: an interval has two ends")
@@ -242,7 +246,7 @@ def quantity(value: object, kinds: str, where: str) -> Quantity:
 
 
 def table(value: object, where: str, needed: str, optional: str = "") -> dict[str, Any]:
-    """Return a JSON object that has the keys needed and no others but the optional ones."""
+    """Return a JSON object that has all keys needed, and no others than these and the optional ones."""
     require(isinstance(value, dict), f"{where} is not an object")
     assert isinstance(value, dict)
     missing = [key for key in needed.split() if key not in value]

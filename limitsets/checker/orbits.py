@@ -1,4 +1,7 @@
-"""ORBITS"""
+"""Periodic orbits in the attracting cells.
+
+docs/certificates.md, "Goals, end points, orbits", number 13.
+"""
 
 from typing import Any, NamedTuple
 
@@ -13,7 +16,7 @@ MOST_ORBITS, LONGEST = 200, 1_000  # orbits in a section, and throws of one
 
 
 class Orbit(NamedTuple):
-    """A periodic orbit as it is claimed: where it begins, the branches, and its multiplier."""
+    """A periodic orbit as the certificate claims it: an interval of starts, the branches, and its multiplier."""
 
     side: int
     lo: float
@@ -42,7 +45,7 @@ def read_orbits(section: dict[str, Any], n_sides: int) -> dict[str, Any]:
 
 
 class Followed(NamedTuple):
-    """Starts along an itinerary: side and bounds of every state, the last one after all throws, and dR/dR(start)."""
+    """The states of starts along an itinerary, with side and bounds of each; and the slope of all throws together."""
 
     states: list[tuple[int, Arb, Arb]]
     slope: Arb
@@ -68,8 +71,8 @@ def prove_orbit(throws: Throws, cells: Intervals | None, orbit: Orbit) -> Follow
     """Prove one periodic orbit: with G the throws along the itinerary, G(R) - R changes sign in the interval.
 
     Along the interval all decisions are those of the itinerary and f is concave, so that G is the map and continuous.
-    |G'| > 1 or < 1 on it: G(R) - R is monotone and the orbit alone.  The attracting cells, if it has to lie in them,
-    are invariant: one point of the orbit in them is enough.
+    |G'| > 1 or |G'| < 1 on the interval: G(R) - R is monotone, and the orbit is the only one.  The attracting cells, if
+    the orbit has to lie in them, are invariant: one point of the orbit in them is enough.
     """
     if cells is not None:
         here: Intervals = [[] for _ in cells]
@@ -97,7 +100,7 @@ def meets(one: tuple[int, Arb, Arb], other: tuple[int, Arb, Arb]) -> bool:
 
 
 def check_orbits(scene: Scene, c: Cells, section: dict[str, Any]) -> str:
-    """Prove that all of the periodic orbits exist, and are different; "" or what fails."""
+    """Check that all periodic orbits exist and are different; "" or what fails."""
     cells, throws = attracting(c), Throws(scene)
     proved: list[Followed] = []
     for orbit in section["orbits"]:

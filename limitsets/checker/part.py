@@ -1,4 +1,7 @@
-"""PART"""
+"""The part: where its sides lie, its centre of mass, and its radius of gyration.
+
+docs/certificates.md, "What is claimed", names the parameters; docs/model.md has the geometry.
+"""
 
 from collections.abc import Callable
 from fractions import Fraction
@@ -17,14 +20,14 @@ def ends_of(value: object, where: str, unit: Fraction) -> tuple[Fraction, Fracti
 def narrow_part(part: object, unit: Fraction) -> tuple[list[tuple[Any, ...]], Arb]:
     """Enclose (a_i, d_i, L_i, a_i + L_next - a_next) of every side, and rho.
 
-    Where lengths or masses are intervals a formula that names one of them twice is too wide: f(c) + f'(box) (q - c) is
-    narrower.
+    A formula that names an interval twice gives too wide a ball.  The mean value theorem, f(c) + f'(box) (q - c), gives
+    a narrower one.
     """
 
-    def plain(value: object, where: str) -> Arb:
+    def as_ball(value: object, where: str) -> Arb:
         return span(*ends_of(value, where, unit))
 
-    plain_rests, rho = read_part(part, unit, plain)
+    plain_rests, rho = read_part(part, unit, as_ball)
     wide: dict[int, tuple[int, Fraction, Fraction]] = {}
 
     def look(value: object, where: str) -> Arb:
@@ -39,12 +42,12 @@ def narrow_part(part: object, unit: Fraction) -> tuple[list[tuple[Any, ...]], Ar
 
     def middle(value: object, where: str) -> Arb:
         known = wide.get(id(value))
-        return plain(value, where) if known is None else exact((known[1] + known[2]) / 2)
+        return as_ball(value, where) if known is None else exact((known[1] + known[2]) / 2)
 
     def rising(value: object, where: str) -> Any:
         known = wide.get(id(value))
         own = None if known is None else known[0]
-        return Rising(plain(value, where), [ONE if k == own else ZERO for k in range(len(wide))])
+        return Rising(as_ball(value, where), [ONE if k == own else ZERO for k in range(len(wide))])
 
     centre, rho_centre = read_part(part, unit, middle)
     steep, rho_steep = read_part(part, unit, rising)
@@ -68,7 +71,7 @@ def narrow_part(part: object, unit: Fraction) -> tuple[list[tuple[Any, ...]], Ar
 def read_part(
     part: Any, unit: Fraction, read: Callable[[object, str], Any]
 ) -> tuple[list[tuple[Any, ...]], Any]:
-    """Compute (a_i, d_i, L_i, a_i + L_next - a_next) of every side, and rho, in whatever arithmetic `read` gives."""
+    """Compute (a_i, d_i, L_i, a_i + L_next - a_next) of every side, and rho, in the arithmetic of `read`."""
     vertices = read_polygon(part, read)
     n = len(vertices)
     mass = part["mass"]
@@ -93,7 +96,7 @@ def read_part(
         with_e, across_e = ex * ux + ey * uy, ux * ey - uy * ex
         a = x * ux + y * uy + along * with_e - above * across_e  # the centre is start + along e + above n
         d = ux * y - uy * x + along * across_e + above * with_e
-        # what stands in the scene is narrower than what is computed, where something is known to a tolerance only
+        # with a tolerance a number of the scene is narrower than the same number computed
         a, d = (along, above) if i == own else (a, d)
         long = read(part["sides"][i], "part.sides") if "sides" in part else long
         rests.append((a, d, long))
@@ -130,7 +133,7 @@ def read_polygon(part: object, read: Callable[[object, str], Any]) -> list[tuple
 
 
 def side_frame(vertices: list[tuple[Arb, Arb]], i: int) -> tuple[tuple[Arb, Arb], tuple[Arb, Arb], Arb]:
-    """Left end, unit vector to the right end, and length of side i."""
+    """Return left end, unit vector to the right end, and length of side i."""
     n = len(vertices)
     left, right = vertices[-i % n], vertices[(1 - i) % n]
     dx, dy = right[0] - left[0], right[1] - left[1]
@@ -171,7 +174,7 @@ def read_plate(
 
 
 def read_lengths(part: object, unit: Fraction) -> list[tuple[int, str, Arb]]:
-    """List what is known of the lengths of the part that are intervals, in the order in which they are read."""
+    """List the lengths of the part that are intervals, in the order in which they are read: id, name and ball."""
     found: dict[int, tuple[int, str, Arb]] = {}
 
     def look(value: object, where: str) -> Arb:

@@ -1,4 +1,7 @@
-"""REFUT"""
+"""Orbits that refute a goal, because they come back or because the goal speaks of every throw.
+
+docs/certificates.md, "Refutations".
+"""
 
 import itertools
 from typing import Any
@@ -27,13 +30,13 @@ from .orbits import Orbit, prove_orbit, read_orbits
 from .scene import Scene, quantities, read_scene
 from .starts import INSIDE
 
-MOST_THROWS = 100_000  # of an orbit that refutes
+MOST_THROWS = 100_000  # throws of an orbit that refutes
 RECURS = (
     "cycle",
     "closed",
     "once",
-)  # why an orbit refutes: it is periodic, it closes with noise, once is enough
-BROKEN = {  # keys of a goal that an orbit may refute, besides from_anywhere, and what is said of the orbit
+)  # why an orbit refutes: it is periodic, it closes with noise, or once is enough
+BROKEN = {  # the goals that an orbit may refute: their keys besides from_anywhere, and words for the orbit
     "oriented_beyond": ("kind x side", "comes to lie beyond x = {text} on another side than {side}"),
     "reaches": ("kind x side every_orbit", "never comes to rest on side {side} at x >= {text}"),
     "flip_order": ("kind order", "does not follow the order {order} of sides"),
@@ -64,7 +67,7 @@ def read_refutation(section: dict[str, Any], n_sides: int) -> dict[str, Any]:
 
 
 def read_broken_goal(value: object) -> dict[str, Any]:
-    """Read the section of the goal that is refuted, with the counts that no refutation needs."""
+    """Read the section of the goal that is refuted; counts of throws and jogs, which it has not, are set to 0."""
     kind = value.get("kind") if isinstance(value, dict) else None
     require(isinstance(kind, str) and kind in BROKEN, "refuted.goal: not a kind that an orbit refutes")
     goal = table(value, "refuted.goal", BROKEN[str(kind)][0], "from_anywhere")
@@ -73,7 +76,7 @@ def read_broken_goal(value: object) -> dict[str, Any]:
 
 
 def read_passing(section: dict[str, Any], why: str, n_sides: int) -> dict[str, Any]:
-    """Read the start of an orbit, and what each throw was like."""
+    """Read an orbit that is thrown from its start: the start, and kappa and landing of each throw."""
     require({"start", "throws"} <= set(section), "refuted: start or throws are missing")
     start = table(section["start"], "refuted.start", "x side")
     throws = [read_throw(each) for each in rows(section["throws"], "refuted.throws", 1, MOST_THROWS)]
@@ -86,7 +89,7 @@ def read_passing(section: dict[str, Any], why: str, n_sides: int) -> dict[str, A
 
 
 def read_throw(value: object) -> tuple[Any, Any]:
-    """Read what a throw was like: kappa, two values between which it lies, or None; how far off it landed, or None."""
+    """Read kappa of a throw, or two values between which kappa lies, or None; and how far off it landed, or None."""
     one = table(value, "a throw", "kappa landing")
     kappa, landing = one["kappa"], one["landing"]
     if isinstance(kappa, list):
@@ -99,7 +102,7 @@ def read_throw(value: object) -> tuple[Any, Any]:
 
 
 def check_deviations(scene: Scene, section: dict[str, Any]) -> str:
-    """Check that the scene deviates from the nominal values by no more than is said; "" or what fails."""
+    """Check that the scene deviates from the nominal values by no more than the tolerance; "" or what fails."""
     flat = dict(quantities(scene.raw))
     for name, text in section["tolerance"].items():
         square = name == "throw.speed" and "throw.kappa" in flat
@@ -124,7 +127,7 @@ def check_deviations(scene: Scene, section: dict[str, Any]) -> str:
 
 
 def check_refuted(scene: Scene, section: dict[str, Any]) -> str:
-    """Throw the orbit again in balls, whatever the cells are; "" or what fails."""
+    """Throw the orbit again in balls, without the cells; "" or what fails."""
     why, goal = section["why"], section["goal"]
     if not why:
         return "it shows a passing orbit only: a goal is refuted by one that comes back"
@@ -150,7 +153,7 @@ def check_refuted(scene: Scene, section: dict[str, Any]) -> str:
 
 
 def periodic(scene: Scene, orbit: Orbit) -> list[State]:
-    """Prove a periodic orbit of the scene without noise, which is one of the sequences allowed; its states."""
+    """Prove a periodic orbit of the scene without noise, which is one of the sequences allowed; return its states."""
     quiet = read_scene({**scene.raw, "effects": {}}, None)
     prove(all(s.concave for s in quiet.sides), "kappa > ell is not proved")
     states = prove_orbit(Throws(quiet), None, orbit).states
@@ -161,7 +164,7 @@ def periodic(scene: Scene, orbit: Orbit) -> list[State]:
 
 
 def thrown_again(scene: Scene, section: dict[str, Any]) -> list[State]:
-    """Prove every throw of an orbit, and that it comes back exactly to its start where that is said; its states."""
+    """Prove every throw of an orbit, and that a closed orbit comes back exactly to its start; return the states."""
     side, x = section["side"], arb(section["x"])
     throws = Throws(scene)
     states = [(side, x, x)]
@@ -184,7 +187,7 @@ def thrown_again(scene: Scene, section: dict[str, Any]) -> list[State]:
 
 
 def kappa_of_throw(scene: Scene, said: Any, number: int) -> tuple[Any, ...]:
-    """Return the kappas of a throw: one, or two with their union before them; all are proved to be of the noise."""
+    """Return kappa of a throw, or for two values their union and both; all are proved to lie within the noise."""
     varies = isinstance(scene.noise, dict) and bool({"throw.speed", "gravity.tilt"} & set(scene.noise))
     kappa = said if isinstance(said, tuple) else () if said is None else (said,)
     prove(varies or not kappa, f"the kappa of throw {number} is not within the noise: it is known")
@@ -200,7 +203,7 @@ def kappa_of_throw(scene: Scene, said: Any, number: int) -> tuple[Any, ...]:
 def images_of_throw(
     throws: Throws, side: int, x: Arb, kappa: tuple[Any, ...], shift: Arb, number: int
 ) -> tuple[list[Arb], int]:
-    """Enclose where a throw lands for each of some kappas, and its branch, which is proved."""
+    """Enclose where a throw lands, for each kappa given, and return its branch, which is proved."""
     images = []
     for k in kappa:
         thrown = throws.box(side, x.lower(), x.upper(), k.lower(), k.upper())
@@ -213,8 +216,8 @@ def images_of_throw(
 def comes_back(scene: Scene, start: Arb, images: list[Arb], landing: Arb | None) -> bool:
     """Whether a throw can land exactly on the start.
 
-    By the noise of the landing, if it spans the distance from all of the enclosed place; or between two values of kappa
-    whose places lie on either side: f being concave the place moves continuously with kappa.
+    The noise of the landing spans the distance from all of the enclosed place to the start; or the places for two
+    values of kappa lie on either side of the start, and the place moves continuously with kappa as f is concave.
     """
     if len(images) == 1:
         return landing is None and bool(abs(images[0] - start) <= scene.sides[0].landing.lower())
@@ -224,7 +227,7 @@ def comes_back(scene: Scene, start: Arb, images: list[Arb], landing: Arb | None)
 
 
 def breaks(scene: Scene, goal: dict[str, Any], states: list[State]) -> bool:
-    """Whether an orbit that comes back to its first state violates a goal, whichever number each ball stands for."""
+    """Whether an orbit that comes back to its first state violates a goal, for all numbers in the balls."""
     if goal["kind"] == "flip_order":
         order, sides = goal["order"], [side for side, _, _ in states]
         allowed = set(zip(order, [*order[1:], order[0]], strict=True))
@@ -249,7 +252,7 @@ def left_or_beyond(scene: Scene, goal: dict[str, Any], last: State) -> str:
 
 
 def statement_of_refutation(section: dict[str, Any]) -> str:
-    """Put it in words."""
+    """Put a refutation in words."""
     near = ", ".join(
         f"{plain(name)} within {quantity(dev, KINDS, 'tolerance')} of"
         f" {quantity(section['nominal'][name], KINDS, 'nominal')}"

@@ -1,4 +1,7 @@
-"""REPORT"""
+"""A file from first to last, and the report about it.
+
+docs/certificates.md, "Checking one": the words of a verdict, and what is printed.
+"""
 
 import math
 import os
@@ -19,8 +22,8 @@ from .numbers import KINDS, PRECISION, BadFileError, plain, quantity, require, r
 from .scene import Scene, check_parameters, check_tolerance, over_halves, quantities, read_scene
 from .starts import ATTRACTING, first_version_starts, shares
 
-MOST_OPEN = 0.01  # of the arm may be open where a goal is proved from some x on
-WORDS = {  # of a verdict, in JSON and for people
+MOST_OPEN = 0.01  # the share of the arm that may be open where a goal is proved from some x on
+WORDS = {  # the verdicts, in JSON and for people
     "proved": "PROVED",
     "proved-on-cells": "PROVED ON CELLS",
     "refuted": "REFUTED",
@@ -33,10 +36,10 @@ EXITS = {"proved": 0, "proved-on-cells": 1, "refuted": 1, "failed": 1, "bad file
 
 @dataclass
 class Report:
-    """What became of a certificate: `claims` has (claim, a word of `WORDS`, reason); `starts` are those of the goal.
+    """The verdict on a certificate: `claims` has (claim, a word of `WORDS`, reason); `starts` are those of the goal.
 
-    `share` is that of the arm for whose starts the goal is proved, `explained` that of starts which are proved to be
-    lost or to creep to the joint: both are lower bounds, and `open` is an upper one of what remains.
+    `share` of the arm has the starts for which the goal is proved, `explained` the starts that are proved to be lost or
+    to creep to the joint: both are lower bounds.  `open` is an upper bound of the rest.
     """
 
     verdict: str = "failed"
@@ -164,7 +167,7 @@ def check_certificate(
 
 
 def describe(report: Report, file: Certificate) -> str:
-    """Tell what the certificate relies on and for which scenes it is; returns the gap in its tolerance, or ""."""
+    """Say what the certificate relies on, and for which scenes; return "" or the gap in its tolerance."""
     flight, flip = file.model
     kind = "exact" if flight == "exact" else "small"
     report.relied_on.append(f"the formulas of the map throw, version 1, flight {flight}, flip {flip}")
@@ -186,7 +189,7 @@ def describe(report: Report, file: Certificate) -> str:
 
 
 def failed_at_once(file: Certificate, gap: str, own: dict[str, Any] | None) -> dict[str, str]:
-    """Find the claims that fail whatever the cells are, by name the reason; `own` is the scene's own goal."""
+    """Find the claims that fail without a look at the cells, with the reasons; `own` is the scene's own goal."""
     claims = file.claims
     failed = dict.fromkeys(claims, gap) if gap else {}
     if file.noise is not None and "cycles" in claims:
@@ -228,7 +231,7 @@ def check_boxes(file: Certificate, crew: Crew, failed: dict[str, str]) -> None:
 
 
 def conclude(report: Report, file: Certificate, failed: dict[str, str], own: dict[str, Any] | None) -> None:
-    """Put claims and verdicts into the report."""
+    """Put the claims in words and the verdicts into the report."""
     claims = file.claims
     if "goal" in claims and "goal" not in failed:
         if "attracts-all" in failed and not claims["goal"]["all"]:
@@ -242,11 +245,15 @@ def conclude(report: Report, file: Certificate, failed: dict[str, str], own: dic
     if own is not None and not {"goal", "refuted"} & set(claims):
         report.statement.append("of the scene's own goal nothing is claimed")
     report.claims = [(name, *state_of(report, name, failed)) for name in claims] + file.unknown
-    states = [state for _, state, _ in report.claims]
-    worst = ("failed", "not rechecked", "refuted", "proved-on-cells")
-    report.verdict = next((word for word in worst if word in states), "proved")
-    report.verdict = "failed" if report.verdict == "not rechecked" else report.verdict
+    report.verdict = verdict_of([state for _, state, _ in report.claims])
     report.reason = next((f"{name}: {why}" for name, state, why in report.claims if why), "")
+
+
+def verdict_of(states: list[str]) -> str:
+    """Return the worst state of a claim; one that is not rechecked makes the verdict "failed"."""
+    if "failed" in states or "not rechecked" in states:
+        return "failed"
+    return next((word for word in ("refuted", "proved-on-cells") if word in states), "proved")
 
 
 def state_of(report: Report, name: str, failed: dict[str, str]) -> tuple[str, str]:
@@ -261,7 +268,7 @@ def state_of(report: Report, name: str, failed: dict[str, str]) -> tuple[str, st
 
 
 def tell_starts(report: Report, goal: dict[str, Any], scenes: list[Scene], cells: list[Cells]) -> None:
-    """Fill in for which starts the goal is proved, and how much of the arm they are: the least of all boxes."""
+    """Fill in the starts for which the goal is proved, and their share of the arm, the least of all boxes."""
     goal["starts"] = starts = goal["starts"] or goal.get("found") or ATTRACTING
     both = []
     for scene, c in zip(scenes, cells, strict=True):
@@ -274,19 +281,19 @@ def tell_starts(report: Report, goal: dict[str, Any], scenes: list[Scene], cells
 
 
 def on_cells_in_words(report: Report) -> str:
-    """Say for which starts a goal is proved that is not proved for all it might be."""
+    """Say for which starts a goal is proved, where that is not for all starts."""
     which = "in the cells" if report.starts == "cells" else "from some x on"
     return f"proved for starts {which} only, {100 * (report.share or 0.0):.4g} % of the arm or more: the rest is open"
 
 
 def value_in_words(value: object, name: str) -> str:
-    """Write what a scene says, from the numbers that were read."""
+    """Write a value of the scene; a quantity is written from its numbers, not from its text."""
     if isinstance(value, str | list):
         return str(quantity(value, KINDS, name))
     return plain(value)
 
 
 def deviations_in_words(deviations: object) -> str:
-    """Write noise or a tolerance, from the numbers that were read."""
+    """Write noise or a tolerance, from the numbers and not from the texts."""
     known = table(deviations, "deviations", "", " ".join(deviations) if isinstance(deviations, dict) else "")
     return ", ".join(f"{plain(name)} within {quantity(text, KINDS, name)}" for name, text in known.items())

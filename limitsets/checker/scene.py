@@ -1,4 +1,7 @@
-"""SCENE"""
+"""The scene: the part on the arm, kappa with its noise, and the tolerance that the boxes cover.
+
+docs/certificates.md, "What is claimed": the exact scene, a tolerance, noise at every throw.
+"""
 
 import bisect
 import copy
@@ -37,7 +40,7 @@ G0 = Fraction(980665, 100_000)
 
 @dataclass(slots=True)
 class Side:
-    """What the throw from one side depends on, as balls (`small_d` is d in small-angle-2 and 0 otherwise)."""
+    """The parameters of throws from one side, as balls (`small_d` is d in small-angle-2 and 0 otherwise)."""
 
     a: Arb
     d: Arb
@@ -55,23 +58,15 @@ class Side:
     landing: Arb = ZERO  # a part lands within this of where the throw would put it
     over_2m: Arb = ZERO
     floats: tuple[float, ...] = (0.0, 0.0, 0.0, 0.0)  # a, d, small_d, a past half a turn: for guesses only
-    early: tuple[float, ...] = (
-        0.0,
-        0.0,
-        0.0,
-        0.0,
-    )  # those of the earliest impact, and of the latest: f has -a sin p,
-    late: tuple[float, ...] = (
-        0.0,
-        0.0,
-        0.0,
-        0.0,
-    )  # so that a large a hastens it up to p = pi and delays it from there
+    # the same four for the earliest impact, and for the latest: f has the term -a sin p, so that a large a hastens the
+    # impact up to p = pi and delays it beyond
+    early: tuple[float, ...] = (0.0, 0.0, 0.0, 0.0)
+    late: tuple[float, ...] = (0.0, 0.0, 0.0, 0.0)
 
 
 @dataclass(slots=True)
 class Scene:
-    """Enclosures of all that a scene says, lengths in the unit of arm.length."""
+    """Enclosures of everything in a scene, with lengths in the unit of arm.length."""
 
     sides: list[Side]
     k_lo: Arb  # kappa at its smallest, noise included; both ends are exact points
@@ -79,24 +74,27 @@ class Scene:
     rho: Arb
     arm: tuple[Fraction, Fraction]
     unit: str
-    raw: dict[str, Any] = field(default_factory=dict)  # what it was read from, and the noise
+    raw: dict[str, Any] = field(
+        default_factory=dict
+    )  # the JSON of the scene; `noise` is that of the certificate
     noise: object = None
-    loose: float = 0.0  # how wide its sides' enclosures are together, as far as `halves` can narrow them
+    loose: float = 0.0  # the widths of all sides' enclosures together; 0 where `halves` cannot narrow them
     parts: "dict[tuple[str, int], list[Scene]]" = field(
         default_factory=dict
-    )  # its halves, once they are asked for
+    )  # the halves that `halves` returned
 
     def cuts(self) -> list[str]:
-        """Name the quantities of part and arm that are intervals; kappa is halved apart, the arm ends where it ends."""
+        """Name the intervals of part and arm that `halves` may halve; kappa and arm.length are not among them."""
         known = [(name, value) for name, value in quantities(self.raw) if name.startswith(("part.", "arm.s"))]
-        halved = [name for name, value in known if isinstance(value, Quantity) and value.lo < value.hi]
-        return halved + [name for name, value in known if isinstance(value, list)]
+        again = [name for name, value in known if isinstance(value, Quantity) and value.lo < value.hi]
+        return again + [name for name, value in known if isinstance(value, list)]
 
     def halves(self, of: str = "", side: int = 0) -> "list[Scene]":
-        """Return two scenes that hold it together, [] if it is a point: halved in what narrows its enclosures most.
+        """Return two scenes that together hold this one, or [] if no quantity is an interval.
 
-        A quantity is halved, not a_i or d_i: they and the lengths go together.  `of`: what is wanted narrower, on one
-        side; everything on all sides by default.
+        The quantity that is halved is the one whose halves have the narrowest enclosures: of the "decision" or the
+        "image" of one side, as `of` says, or of everything by default.  Not a_i or d_i are halved: they depend on each
+        other and on the lengths.
         """
         key = (of, side)
         if self.loose > 0 and key not in self.parts:
@@ -107,7 +105,7 @@ class Scene:
         return self.parts.get(key, [])
 
     def width(self, of: str = "", side: int = 0) -> float:
-        """Say how wide the enclosures are: all, or those that the decision or the image of one side depends on."""
+        """Return the width of all enclosures, or of those in the decision or the image of one side."""
         if not of:
             return self.loose
         s = self.sides[side]
@@ -131,7 +129,7 @@ def quantities(value: object, where: str = "") -> Iterator[tuple[str, object]]:
 
 
 def halved(raw: dict[str, Any], name: str) -> Iterator[dict[str, Any]]:
-    """Cut one quantity of a scene that was read in two halves."""
+    """Yield a scene twice, with either half of one of its intervals."""
     words = re.findall(r"[^.\[\]]+", name)
 
     def place(tree: Any) -> tuple[Any, Any]:
@@ -153,7 +151,7 @@ def halved(raw: dict[str, Any], name: str) -> Iterator[dict[str, Any]]:
 
 
 def over_halves(scene: Scene, check: Callable[..., str], *more: Any) -> str:
-    """Check something that is said of all parameters, by halves where it fails of them together; what fails, or ""."""
+    """Check a statement about all parameters, half by half where the check fails for the whole; "" or what fails."""
     stack, tried = [(scene, 0)], 0
     while stack:
         piece, depth = stack.pop()
@@ -223,7 +221,7 @@ SCATTER = {"speed": ("throw.speed", "share speed"), "landing": ("landing.x", "le
 
 
 def read_noise(noise: object, name: str, kinds: str) -> Quantity:
-    """Read by how much a quantity differs from throw to throw; a share of it where the unit is %."""
+    """Read by how much a quantity varies from throw to throw: a share of the quantity where the unit is %."""
     if noise is None:
         return NONE
     known = table(noise, "noise", "", "throw.speed gravity.tilt landing.x")
@@ -234,7 +232,7 @@ def read_noise(noise: object, name: str, kinds: str) -> Quantity:
 
 
 def check_spread(scene: dict[str, Any], noise: object) -> None:
-    """Check that no effects are on but a bounded spread, and that this is in the noise that is claimed."""
+    """Check that the scene has no effect but a bounded spread, and that the spread is in the noise claimed."""
     effects = scene.get("effects", {})
     on = (
         {name: how for name, how in effects.items() if how}
@@ -261,12 +259,12 @@ def check_spread(scene: dict[str, Any], noise: object) -> None:
 
 
 def share_and_more(dev: Quantity) -> tuple[Arb, Arb]:
-    """Split a deviation: a share of the quantity, or so much of it in its own unit."""
+    """Return a deviation as a share of the quantity and as an amount in its unit; one of the two is 0."""
     return (dev.ball(), ZERO) if dev.unit == "%" else (ZERO, dev.ball())
 
 
 def tilted(tilts: list[Arb], dev: Quantity) -> list[Arb]:
-    """Least and largest tilt with its noise, proved to lie between level and upright, where the sine rises."""
+    """Return the least and largest tilt with noise, proved to lie between 0 and 90 degrees, where the sine rises."""
     share, more = share_and_more(dev)
     ends = [tilts[0] * (1 - share) - more, tilts[1] * (1 + share) + more]
     steep = bool(ends[0] > 0) and bool(ends[1] < arb.pi() / 2)
@@ -279,7 +277,7 @@ def read_kappa(scene: dict[str, Any], noise: object, unit: Fraction) -> tuple[Ar
 
     Where kappa is given the noise of the tilt multiplies it by sin(tilt') / sin(tilt).  With a share s that is
     sin((1 +- s) t) / sin(t), whose logarithm has the slope (1 +- s) cot((1 +- s) t) - cot(t), and u cot(u t) falls with
-    u; with so much more, cos(m) +- cot(t) sin(m).  Either is farthest from 1 at the smallest tilt allowed.
+    u; with an amount m it is cos(m) +- cot(t) sin(m).  Both are farthest from 1 at the smallest tilt allowed.
     """
     throw = table(scene["throw"], "throw", "", "kappa speed")
     require(len(throw) == 1, "throw: either kappa or speed")
@@ -313,9 +311,9 @@ def read_kappa(scene: dict[str, Any], noise: object, unit: Fraction) -> tuple[Ar
 
 
 def check_parameters(scene: Scene, said: object, where: str) -> str:
-    """Check that each enclosure lies inside the interval the producer says it computed with; else what does not.
+    """Check that each enclosure lies inside the interval that the producer computed with; "" or what does not.
 
-    No proof rests on it, it tells a file that was put together wrongly: so it may be a little wider.
+    No proof rests on this check, which only finds files that were put together wrongly: so a little slack is allowed.
     """
     names = "a d length kappa surface_height arm_length radius_of_gyration"
     said = table(said, f"{where} parameters", names)
@@ -327,8 +325,7 @@ def check_parameters(scene: Scene, said: object, where: str) -> str:
         pairs = rows(said[key], key, len(balls), len(balls)) if key in ("a", "d", "length") else [said[key]]
         for i, (ball, pair) in enumerate(zip(balls, pairs, strict=True)):
             lo, hi = (arb(hex_float(text, key)) for text in rows(pair, key, 2, 2))
-            # a ball's radius has 30 bits; and where the formulas of a part with a tolerance bend, a ball is wider than
-            # an interval may be
+            # a ball's radius has 30 bits; and over a tolerance a ball may be wider than the producer's interval
             slack = (hi - lo) * 2.0**-10 + (abs(hi) * 2.0**-26 if scene.loose > 0 else ZERO)
             if not (ball >= lo - slack and ball <= hi + slack):
                 return f"parameter {key} {i}: the scene gives {ball.str(17)}, not in [{lo.str(17)}, {hi.str(17)}]"
@@ -357,17 +354,21 @@ def check_tolerance(raw: list[Any], tolerance: object) -> tuple[dict[str, str], 
         key, own = values_in_boxes(flat, name, dev)
         require(key not in ranges, "tolerance names one quantity twice")
         ranges[key] = own
-        lo, hi = min(q.lo for q in own), max(q.hi for q in own)
+        lo, hi = hull(own)
         told[key] = str(own[0]._replace(lo=lo, hi=hi)) if lo < hi else f"every value in [{own[0]}, {own[0]}]"
         if not as_wide_as(dev, own[0], lo, hi, name, key):
             return told, f"the boxes do not cover the tolerance of {plain(name)}"
     if not same_but_for(list(ranges), raw, flat):
         return told, "the boxes differ in something else than the tolerance"
     boxes = [[(own[b].lo, own[b].hi) for own in ranges.values()] for b in range(len(raw))]
-    whole = [(min(q.lo for q in own), max(q.hi for q in own)) for own in ranges.values()]
-    if not covered(whole, boxes):
+    if not covered([hull(own) for own in ranges.values()], boxes):
         return told, "the boxes leave a gap in the tolerance"
     return told, ""
+
+
+def hull(values: list[Quantity]) -> tuple[Fraction, Fraction]:
+    """Return the ends of the smallest interval that holds all values."""
+    return min(q.lo for q in values), max(q.hi for q in values)
 
 
 def values_in_boxes(flat: list[dict[str, object]], name: str, dev: Quantity) -> tuple[str, list[Quantity]]:

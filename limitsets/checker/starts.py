@@ -1,4 +1,7 @@
-"""STARTS"""
+"""For which starts a goal holds: those proved to come to the attracting cells.
+
+docs/certificates.md, "For which starts": falling, passing and thin cells, and starts that are lost.
+"""
 
 import math
 from fractions import Fraction
@@ -9,7 +12,7 @@ from flint import arb
 
 from .cells import first_bad, range_max
 from .file import Cells
-from .model import at_angle, landing_at, over_angles, ratios, root_above
+from .model import at_angle, landing_at, over_angles, ratios, rise_of_jog, root_above
 from .near_hinge import check_below_cells, near_angle, near_landing, read_near_hinge
 from .numbers import (
     HALF,
@@ -38,11 +41,11 @@ VARYING = ("throw", "gravi")  # how the names of the quantities begin that kappa
 
 
 class Starts(NamedTuple):
-    """For which starts a goal is claimed: "every", "almost-every", "from" (beyond x on each side) or "cells".
+    """The starts for which a goal is claimed: "every", "almost-every", "from" (beyond x on each side) or "cells".
 
-    `thinning`: rounds of it; `near`: factors and fixed points of starts below the first cells, where they are claimed;
-    `lost`: up to where, on each side, a worst sequence of landings takes a part to the joint; `only`: whether nothing
-    is claimed of other starts than those in the attracting cells.
+    `thinning` counts its rounds; `near` has factors and fixed points where starts before the first cells are claimed; a
+    worst sequence of landings takes starts up to `lost`, by side, to the joint; `only` the starts in the attracting
+    cells are claimed.
     """
 
     kind: str
@@ -57,7 +60,7 @@ class Starts(NamedTuple):
         return None if self.near is None else self.near[1][side]
 
 
-ATTRACTING = Starts("cells", only=True)  # as in certificates of version 1
+ATTRACTING = Starts("cells", only=True)  # a goal of version 1 that names no starts
 
 
 def read_starts(section: dict[str, Any], goal: dict[str, Any], n_sides: int) -> Starts:
@@ -78,26 +81,22 @@ def read_starts(section: dict[str, Any], goal: dict[str, Any], n_sides: int) -> 
         lost = [hex_float(each, "lost") for each in by_side(section["lost"], "lost", n_sides)]
     almost = goal["kind"] == "reaches" and not goal["every"]
     starts = Starts(kind, x, thinning, near, lost, only=almost and kind == "cells")
-    require_fitting(starts, goal, almost, n_sides)
+    require_fitting(starts, goal, almost, [starts.fixed(i) for i in range(n_sides)])
     return starts
 
 
-def require_fitting(starts: Starts, goal: dict[str, Any], almost: bool, n_sides: int) -> None:
-    """Require that the parts of a claim about starts fit each other and the goal."""
-    kind, x = starts.kind, starts.x
-    anywhere = (
-        goal["anywhere"] and goal["kind"] != "attracts_all"
-    )  # attracts_all is about every start in any case
-    points = [starts.fixed(i) for i in range(n_sides)]
+def require_fitting(starts: Starts, goal: dict[str, Any], almost: bool, points: list[Pair | None]) -> None:
+    """Require that the parts of a claim about starts fit each other and the goal; `points` are the fixed points."""
+    kind = starts.kind
+    anywhere = goal["anywhere"] and goal["kind"] != "attracts_all"  # which is about every start anyway
     require(starts.lost is None or kind in ("from", "cells"), f"starts {kind}: none of them are lost")
     if kind in ("every", "almost-every"):
         near = (starts.near is not None or anywhere) and not any(points)
         require(near, f"starts {kind}: near_joint does not say so")
         fits = (starts.thinning > 0) == (kind == "almost-every") or (almost and kind == "almost-every")
         require(fits, f"starts {kind} and thinning do not fit")
-    for i, point in enumerate(points):
-        beyond = x is None or point is None or x[i] >= point[1]
-        require(beyond, "starts before the end of a fixed point are claimed")
+    for x, point in zip(starts.x or (), points, strict=False):
+        require(point is None or x >= point[1], "starts before the end of a fixed point are claimed")
     require(not (almost and kind == "every"), "a goal of almost every orbit is claimed for every start")
     of = "almost-every" if almost else "every"
     require(kind == of or not anywhere, f"this goal from anywhere is one of starts {of}")
@@ -197,20 +196,17 @@ def level_cells(c: Cells, scene: Scene) -> tuple[Array, str]:
 
 
 def check_passing(scene: Scene, side: int, phi: list[float]) -> str:
-    """Check that jogs with angles in the bracket all move one way by more than the landing scatters; "" or not."""
+    """Check that jogs with angles in the bracket all go one way by more than the landing scatters; "" or what fails."""
     s = scene.sides[side]
     low, high = at_angle(s, arb(phi[0])), at_angle(s, arb(phi[1]))
-    rise = -s.h
-    if s.exact:
-        sin, cos = sine_cosine(low.p.union(high.p))
-        rise = s.a * sin - s.d * (1 - cos) - s.h
+    rise = rise_of_jog(s, *sine_cosine(low.p.union(high.p)))
     moved = low.D.union(high.D) if rise > 0 else low.D + rise * ZERO.union(high.p - low.p)
     one_way = moved > s.landing or moved < -s.landing
     return "" if one_way else "a jog is not proved to move it one way"
 
 
 def leading_to(c: Cells, cells: Array) -> Array:
-    """Find the cells that lead to some cells, and these themselves."""
+    """Find the cells from which some orbit may lead to the cells given, and these cells."""
     found, count = cells.copy(), -1
     while count != int(found.sum()):
         count = int(found.sum())
@@ -224,14 +220,15 @@ def leading_to(c: Cells, cells: Array) -> Array:
 def check_lost(scene: Scene, side: int, end: float) -> str:
     """Check that a worst sequence of landings takes every start in (a, end] to the joint; "" or what fails.
 
-    Told by the angle p: a start R(p, kappa) is thrown by D(p).  Where the throw is a jog with D < e for all p up to an
-    angle after the impact at the end, landings that fall short by e bring the part inward, by a least step: to x <= a.
+    A start R(p, kappa), told by its impact angle p, is thrown by D(p).  Where the throw is a jog with D < e for all p up
+    to an angle after the impact at the end, landings that fall short by e bring the part inward, by a least step: to
+    x <= a.
     """
     s, x = scene.sides[side], arb(end)
     if not s.landing > 0:
         return "without noise of the landing place no part is lost by it"
     if x <= s.a:
-        return ""  # nothing is said
+        return ""  # there are no such starts
     if not (x > s.a and x <= s.arm):
         return "they do not lie on the arm"
     kappa = kappa_of_worst(scene)
@@ -263,19 +260,15 @@ def kappa_of_worst(scene: Scene) -> Arb:
 
 
 def check_short(s: Side, lo: Arb, hi: Arb) -> str:
-    """Check that jogs with these angles move a part by less than the landing scatters; "" or not."""
-    rise = (
-        s.a * sine_cosine(lo.union(hi))[0] - s.d * (1 - sine_cosine(lo.union(hi))[1]) - s.h
-        if s.exact
-        else -s.h
-    )
+    """Check that jogs with angles in [lo, hi] go outward by less than the landing scatters; "" or what fails."""
+    rise = rise_of_jog(s, *sine_cosine(lo.union(hi)))
     end = at_angle(s, hi).D
     moved = end if rise > 0 else end - rise * ZERO.union(hi - lo)
     return "" if moved < s.landing else "a jog may move a part outward by more than the landing scatters"
 
 
 def shares(c: Cells, scene: Scene, starts: Starts, cells: Array) -> tuple[float, float]:
-    """Bound, from below, the share of the arm whose starts are claimed, and of those explained: lost, or creeping."""
+    """Bound from below the shares of the arm whose starts are claimed, and whose starts are lost or creep inward."""
     if starts.kind in ("every", "almost-every"):
         return 1.0, 0.0
     whole = claimed = explained = 0.0
@@ -296,7 +289,7 @@ def shares(c: Cells, scene: Scene, starts: Starts, cells: Array) -> tuple[float,
 
 
 def first_version_starts(scene: Scene, c: Cells, claims: dict[str, dict[str, Any]]) -> None:
-    """Find for which starts a goal of version 1 is proved: "attracts-all" in the same file brings them to the cells."""
+    """Find the starts of a goal of version 1, which "attracts-all" in the same file brings to the attracting cells."""
     goal, attracts = claims.get("goal"), claims.get("attracts-all")
     if goal is None or goal.get("found") == ATTRACTING:
         return
@@ -314,12 +307,11 @@ def first_version_starts(scene: Scene, c: Cells, claims: dict[str, dict[str, Any
 
 
 def starts_in_words(starts: Starts, noisy: bool) -> str:
-    """Put the starts in words: the numbers are those that are checked."""
+    """Put the starts in words, with the numbers that are checked."""
     some = "every start a_i < x <= arm.length on every side i"
     if starts.x is not None:
-        some = "every start with " + ", or ".join(
-            f"{x!r} < x <= arm.length on side {i}" for i, x in enumerate(starts.x)
-        )
+        beyond = [f"{x!r} < x <= arm.length on side {i}" for i, x in enumerate(starts.x)]
+        some = f"every start with {', or '.join(beyond)}"
     elif starts.kind == "cells":
         before = ", and before the first cells" if starts.near is not None else ""
         some = f"every start in the cells that have a rank{before}"
@@ -328,14 +320,13 @@ def starts_in_words(starts: Starts, noisy: bool) -> str:
 
 
 def explained_in_words(starts: Starts) -> list[str]:
-    """Put in words what becomes of starts that are not claimed."""
+    """Say what becomes of starts that are not claimed."""
     lines = []
     for i in range(len(starts.lost or (starts.near or ([], []))[0])):
         fixed = starts.fixed(i)
         if fixed is not None:
             lines.append(f"    side {i}: starts a_{i} < x < {fixed[0]!r} stay on it and creep to a_{i}")
         elif starts.lost is not None:
-            lines.append(
-                f"    side {i}: each start a_{i} < x <= {starts.lost[i]!r} is lost by a worst sequence of landings"
-            )
+            lost = f"each start a_{i} < x <= {starts.lost[i]!r} is lost by a worst sequence of landings"
+            lines.append(f"    side {i}: {lost}")
     return lines

@@ -1,4 +1,7 @@
-"""THINNING"""
+"""Which cells come to the cells wanted: all orbits (backward reachability), or almost all (thinning).
+
+docs/certificates.md, "Goals, end points, orbits", numbers 7 (peeling) and 8 (thinning).
+"""
 
 import itertools
 import math
@@ -8,7 +11,7 @@ from flint import arb
 
 from .cells import first_bad
 from .file import Cells
-from .model import at_angle, over_angles, root_above, root_below, slope_over
+from .model import at_angle, over_angles, rise_of_jog, root_above, root_below, slope_over
 from .near_hinge import near_angle
 from .numbers import ZERO, Arb, Array
 from .scene import Scene, Side
@@ -17,10 +20,10 @@ MOST_EDGES = 20_000_000  # pairs of a cell and a target, for one thinning
 
 
 def not_arriving(c: Cells, ways: list[Array], cells: Array, wanted: Array, throws: int) -> Array:
-    """Find the cells whose orbits are not proved to come to the wanted ones within so many throws.
+    """Find the cells from which orbits are not proved to come to the wanted cells within so many throws.
 
-    After k rounds every orbit from a cell that is done comes to a wanted one within k throws: all of its targets were
-    done a round before.  A throw that is not one of the ways has arrived.
+    Backward reachability: after k rounds every orbit from a cell that is done comes to a wanted cell within k throws,
+    because all targets of the cell were done a round before.  A throw that is none of the ways has arrived.
     """
     done = cells & wanted
     for _ in range(throws):
@@ -59,15 +62,16 @@ def steepness(
 
 
 def check_thinning(c: Cells, scene: Scene, left: Array, throws: int, kind: Array) -> str:
-    """Check that almost every orbit leaves some cells, or comes to some of another kind; "" or what fails.
+    """Check that almost every orbit leaves the cells `left`, or comes to cells of another kind; "" or what fails.
 
-    Spread starts evenly over the cells, and look at those that have not left them.  After a throw their density is, at
+    Spread starts evenly over the cells, and look at the starts that have not left.  After a throw their density is, at
     y, the sum over all x thrown to y of the density at x over dR'/dR.  On neighbouring cells of a side where that slope
     is positive a jog rises and is continuous, and so is a flip: at most one x for each run of such cells and branch.
     The density is bounded by numbers, one for each cell; those at a target are at most the sum, over runs and branches,
     of the largest number over slope that leads to it.  This rises with the numbers and is proportional to them, so once
-    all are below 1 they fall to 0 by repetition, and what never leaves has length zero.  Slopes are lower bounds, sums
-    of floats are taken 2^-30 too large.  What comes to another kind has left: each kind has a round of its own.
+    all are below 1 they fall to 0 by repetition, and the starts that never leave have length zero.  Slopes are lower
+    bounds; sums of floats are taken 2^-30 too large.  An orbit that comes to another kind of cells has left: the kinds
+    are looked at apart.
     """
     steep = np.full(len(left), math.nan)
     lower, upper = c.lower(), c.upper()
@@ -107,7 +111,7 @@ def check_thinning(c: Cells, scene: Scene, left: Array, throws: int, kind: Array
         gone |= worst < 1
         if gone.all():
             return ""
-        density[cells[gone[number]]] = 0.0  # no other kind hangs on it
+        density[cells[gone[number]]] = 0.0  # no other kind depends on this one
         if not (density < 1e100).all():
             break
     return f"what has not arrived is not proved to thin out within {throws} throws"
@@ -116,9 +120,9 @@ def check_thinning(c: Cells, scene: Scene, left: Array, throws: int, kind: Array
 def check_null(c: Cells, scene: Scene, cells: Array, near: bool) -> str:
     """Check that on some cells starts of length zero come from starts of length zero only; "" or what fails.
 
-    Where dR'/dR > 0 is proved on a cell each branch has an inverse with bounded slope.  Near the joint, where it is
-    asked, phi rises with R, be it by jumps; where D' > 0 on all angles possible R' = R + D(phi) grows at least as fast
-    as R.  Beyond the jog's fixed point that is proved already.
+    Where dR'/dR > 0 is proved on a cell each branch has an inverse with bounded slope.  Near the joint, which counts if
+    `near`, phi rises with R, possibly by jumps; where D' > 0 on all angles possible R' = R + D(phi) grows at least as
+    fast as R.  (Beyond a fixed point of the jog check_growth_beyond has proved it.)
     """
     lower, upper = c.lower(), c.upper()
     rises = np.ones(len(c.side), dtype=bool)
@@ -129,6 +133,6 @@ def check_null(c: Cells, scene: Scene, cells: Array, near: bool) -> str:
     for i, s in enumerate(scene.sides if near else ()):
         bound = near_angle(s, scene.k_lo, scene.k_hi, float(c.edges[i][0]))
         phi = ZERO.union(bound)
-        if not (-s.h > 0 if not s.exact else s.a * phi.sin() - s.d * (1 - phi.cos()) - s.h > 0):
+        if not rise_of_jog(s, phi.sin(), phi.cos()) > 0:
             return f"side {i}, near the joint: R' is not proved to rise with R"
     return first_bad(c, [(rises, "dR'/dR > 0 is not proved")])

@@ -1,4 +1,14 @@
-"""TWO"""
+"""Two throws with the same parameters, for `oriented_beyond` with `throws` 2.
+
+docs/certificates.md, "Goals, end points, orbits", number 9.  A throw with the impact angle p begins at x = P(p), where
+f = 0, and jogs to P(p) + D(p): no equation has to be solved.  Two throws are angles p and r with x'(p) + e = P(r), e
+the noise of the landing.  For weights v, w >= 0 and any u
+
+    x'' <= G = x'' + v m(p) + w m(r) + u (x' + e - P(r)),
+
+where m decides the branch, its sign turned so that m >= 0 where the branch is taken.  The value of G at a point of a
+box and its derivatives over the box bound G there.
+"""
 
 import itertools
 from collections.abc import Iterator
@@ -34,7 +44,7 @@ MOST_PAIRS = 20_000  # boxes, for one kind of two throws
 
 
 class Two(NamedTuple):
-    """Two throws: the side they begin on, and their branches (0 jog, 1 flip)."""
+    """Two throws in turn: the side they begin on, and their branches (0 jog, 1 flip)."""
 
     side: int
     first: int
@@ -42,7 +52,7 @@ class Two(NamedTuple):
 
 
 def check_two_throws(c: Cells, scene: Scene, bad: Array, x: float) -> str:
-    """Check that second throws, parameters kept, end beyond x in no attracting cell called bad; "" or what fails."""
+    """Check that two throws with the same parameters never end beyond x in the bad cells; "" or what fails."""
     names = scene.noise if isinstance(scene.noise, dict) else {}
     if set(names) - {"landing.x"}:
         return "with noise of the throw no two throws have the same parameters"
@@ -72,7 +82,7 @@ def check_two_throws(c: Cells, scene: Scene, bad: Array, x: float) -> str:
 
 
 def kinds_of_two(c: Cells, bad: Array) -> Iterator[tuple[Two, list[Pair]]]:
-    """Two throws from attracting cells that may end in the bad ones, and the ranges of both angles."""
+    """Yield each kind of two throws from attracting cells that may end in bad ones, with the ranges of both angles."""
     inside = c.component >= 0
     ways = (c.jog, c.flip)
     for second, first in itertools.product((0, 1), (0, 1)):
@@ -154,7 +164,7 @@ def weights_of(terms: Terms) -> list[Arb] | None:
 
 
 def weigh(at: Array, slopes: Array) -> list[float]:
-    """Propose weights in floats: a corner of least |...|, where three derivatives or weights are nothing."""
+    """Propose v, w and u in floats: the corner (three derivatives or weights are 0) with the least bound."""
     lines = np.concatenate([slopes, [[0, 0], [1, 0], [0, 1], [0, 0]]], axis=1)
     three = np.array([t for t in itertools.combinations(range(lines.shape[1]), 3) if t[0] <= AT_SECOND])
     matrix = np.moveaxis(lines[1:, three], 0, 2)
@@ -186,7 +196,7 @@ def bound_of_sum(
 
 
 def two_throws(scene: Scene, kind: Two, lengths: list[int], v: list[Any]) -> list[Any]:
-    """Compute x'', what decides in both throws, signed, and x' + e - P(r)."""
+    """Compute the four terms of G in any arithmetic: x'', m(p), m(r), and x' + e - P(r)."""
     known = dict(zip(lengths, v[AT_LENGTHS:], strict=True))
     unit = LENGTHS[scene.unit]
 
@@ -203,7 +213,7 @@ def two_throws(scene: Scene, kind: Two, lengths: list[int], v: list[Any]) -> lis
 
 
 def by_angle(scene: Scene, rest: Any, rho: Any, kappa: Any, h: Any, p: Any) -> tuple[Any, Any, Any]:
-    """Compute P, R'(jog) and what decides (flip where it is positive), of a throw with the angle p."""
+    """Compute P(p), R'(jog), and the value that decides (a flip where it is positive), of a throw with the angle p."""
     a, d = rest[0], rest[1]
     s = scene.sides[0]
     ell2 = a**2 + d**2
