@@ -115,7 +115,7 @@ class Ratios(NamedTuple):
 
 
 def ratios(p: Arb) -> Ratios:
-    """Evaluate the ratios; W lies between 1/6 - p^2/120 and + p^4/5040 of a series that alternates and falls (p^2 < 42)."""
+    """Evaluate the ratios; W by two sums of 1/6 - p^2/120 + p^4/5040 - ..., which alternates and falls for p^2 < 42."""
     low = ONE / 6 - p * p / 120
     return Ratios(p, p.sinc(), HALF * (HALF * p).sinc() ** 2, low.union(low + p**4 / 5040))
 

@@ -49,7 +49,7 @@ State = tuple[int, Arb, Arb]  # side, and bounds of x
 def read_refutation(section: dict[str, Any], n_sides: int) -> dict[str, Any]:
     """Read an orbit that refutes a goal: why it comes back, and either a cycle or a start with its throws."""
     nominal, tolerance = section["nominal"], section["tolerance"]
-    goal = read_broken_goal(section["goal"], n_sides)
+    goal = read_broken_goal(section["goal"])
     same = isinstance(nominal, dict) and isinstance(tolerance, dict) and set(nominal) == set(tolerance)
     fits = same and len(nominal) <= 64
     require(fits, "refuted: nominal values and tolerance do not name the same quantities")

@@ -220,8 +220,8 @@ def leading_to(c: Cells, cells: Array) -> Array:
 def check_lost(scene: Scene, side: int, end: float) -> str:
     """Check that a worst sequence of landings takes every start in (a, end] to the joint; "" or what fails.
 
-    A start R(p, kappa), told by its impact angle p, is thrown by D(p).  Where the throw is a jog with D < e for all p up
-    to an angle after the impact at the end, landings that fall short by e bring the part inward, by a least step: to
+    A start R(p, kappa), told by its impact angle p, is thrown by D(p).  Where the throw is a jog with D < e for all p
+    up to an angle after the impact at the end, landings that fall short by e bring the part inward, by a least step: to
     x <= a.
     """
     s, x = scene.sides[side], arb(end)

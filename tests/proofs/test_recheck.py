@@ -5,13 +5,9 @@ It is loaded from its folder, as a stranger would have it; the certificates come
 
 import importlib.util
 import io
-import json
 import math
-import os
 import random
-import shutil
 import struct
-import subprocess
 import sys
 import time
 import zipfile
@@ -883,13 +879,17 @@ def test_the_march_finds_the_smallest_root_where_f_is_not_concave():
         if (f > 0).all():
             continue
         root = p[np.argmax(f <= 0)]
-        below = checker.model.positive_until(s, arb(x), scene.k_hi, checker.model.at_angle(s, arb(root * (1 - 1e-3))))
+        below = checker.model.positive_until(
+            s, arb(x), scene.k_hi, checker.model.at_angle(s, arb(root * (1 - 1e-3)))
+        )
         near_graze = f[p < root].min() < 1e-6 and not s.concave
         assert below or near_graze
         for q in (root * 1.001, p[f > 0][-1]):
             if q > root:
                 refused += 1
-                assert not checker.model.positive_until(s, arb(x), scene.k_hi, checker.model.at_angle(s, arb(q)))
+                assert not checker.model.positive_until(
+                    s, arb(x), scene.k_hi, checker.model.at_angle(s, arb(q))
+                )
     assert refused > 50
 
 
@@ -900,45 +900,3 @@ def test_range_max_is_the_maximum():
     last = np.minimum(699, first + (rng.exponential(60, 3000)).astype(int))
     want = [values[a : b + 1].max() for a, b in zip(first, last, strict=True)]
     assert (checker.cells.range_max(values, first, last) == want).all()
-
-
-# ------------------------------------------------------------------------------------------------------- a lone file
-
-
-def run(script, *arguments):
-    environment = {key: value for key, value in os.environ.items() if key != "PYTHONPATH"}
-    return subprocess.run(
-        [sys.executable, str(script), *map(str, arguments)],
-        capture_output=True,
-        text=True,
-        check=False,
-        cwd=script.parent,
-        env=environment,
-    )
-
-
-def test_it_imports_nothing_of_the_package():
-    text = SOURCE.read_text(encoding="utf-8")
-    assert "import limitsets" not in text
-    assert "from limitsets" not in text
-    assert "eval(" not in text.replace("literal_eval(", "eval(")
-    assert "allow_pickle" not in text
-
-
-def test_it_runs_as_a_lone_file_in_several_processes(good, tmp_path):
-    script = tmp_path / "recheck.py"
-    shutil.copy(SOURCE, script)
-    script.write_text(script.read_text().replace("SMALL = 20_000", "SMALL = 100"))
-    done = run(script, good["designed"].write(tmp_path / "good.proof.zip"), "--workers", 2)
-    assert done.returncode == 0, done.stderr
-    assert done.stdout.rstrip().endswith("PROVED")
-    f = good["designed"].copy()
-    f.arrays["0.phi"][-3, 1] *= 0.999
-    done = run(script, f.seal().write(tmp_path / "wrong.proof.zip"), "--json", "--workers", 2)
-    assert done.returncode == 1
-    assert json.loads(done.stdout)["verdict"] == "failed"
-    (tmp_path / "no.zip").write_bytes(b"no")
-    done = run(script, tmp_path / "no.zip")
-    assert done.returncode == 2
-    assert done.stdout.count("\n") < 6
-    assert not done.stderr

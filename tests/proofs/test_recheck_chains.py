@@ -332,5 +332,8 @@ def test_what_neither_rises_nor_falls_costs_its_derivative(monkeypatch):
     box = list(zip(lo.tolist(), hi.tolist(), strict=True))
     ids = [own for own, _, _ in known]
     for x in (middle + 1e-5, top - 1e-5):
-        assert checker.two_throws.pair_stays(read, checker.two_throws.Two(*kind), ids, box, arb(x)) == checker.two_throws.AT_SECOND
+        assert (
+            checker.two_throws.pair_stays(read, checker.two_throws.Two(*kind), ids, box, arb(x))
+            == checker.two_throws.AT_SECOND
+        )
     assert checker.two_throws.pair_stays(read, checker.two_throws.Two(*kind), ids, box, arb(top + 0.5)) == -1

@@ -117,7 +117,10 @@ def test_numbers_no_scene_has(text):
 
 def test_equal_numbers_in_other_words():
     for text in (".5 in", "0.5 in", "+.5 in", "5e-1 in", "50.e-002 in"):
-        assert checker.numbers.quantity(text, "length", "x").lo == checker.numbers.quantity("12.7 mm", "length", "x").lo
+        assert (
+            checker.numbers.quantity(text, "length", "x").lo
+            == checker.numbers.quantity("12.7 mm", "length", "x").lo
+        )
 
 
 # --------------------------------------------------------------------------------- throws, against 40 digits
@@ -152,7 +155,10 @@ def test_images_of_unions_hold_samples_and_are_held(good):
     pieces = checker.end_points.read_ends(sections(f)[0], 3)["pieces"]
     union = [[(15.5, 17.25)], [(13.0, 14.0), (15.0, 16.0)], [(9.0, 21.0)]]
     throws = checker.end_points.Throws(scene)
-    outer, inner = (image(throws, union, pieces) for image in (checker.end_points.image_outward, checker.end_points.image_inward))
+    outer, inner = (
+        image(throws, union, pieces)
+        for image in (checker.end_points.image_outward, checker.end_points.image_inward)
+    )
     step = 1e-4
     found = [[], [], []]
     for side, intervals in enumerate(union):
@@ -526,7 +532,9 @@ def test_where_there_may_be_several_impacts_nothing_is_proved(good, tmp_path):
     cells = checker.file.Cells([f.arrays[f"0.edges.{i}"] for i in range(3)], *[
         f.arrays[f"0.{name}"] for name in ("jog", "flip", "branch", "rank", "component", "phi")])  # fmt: skip
     ends, cycles = sections(f)
-    assert "several impacts" in checker.end_points.check_ends(scene, cells, checker.end_points.read_ends(ends, 3))
+    assert "several impacts" in checker.end_points.check_ends(
+        scene, cells, checker.end_points.read_ends(ends, 3)
+    )
     assert "kappa > ell" in checker.orbits.check_orbits(scene, cells, checker.orbits.read_orbits(cycles, 3))
 
 

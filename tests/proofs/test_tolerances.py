@@ -107,7 +107,9 @@ def reread(path):
     header, entries = checker.file.open_certificate(path)
     said = header["arrays"]
     arrays = {
-        key: checker.file.read_array(entries[f"{key}.npy"], key, about["dtype"], (about["shape"] + [1])[1], about)
+        key: checker.file.read_array(
+            entries[f"{key}.npy"], key, about["dtype"], (about["shape"] + [1])[1], about
+        )
         for key, about in said.items()
     }
     return forge.Forged(header, arrays)
