@@ -14,7 +14,8 @@ proves each of these anew, for all x in the cell and all parameters allowed, and
 
 The files follow docs/certificates.md, and each imports only from those before it:
 
-    numbers      balls, derivatives, texts and quantities: everything is made of these
+    balls        the arithmetic of every proof
+    texts        texts, quantities and JSON
     file         the zip, the header and the arrays                               "The file"
     part         side by side, what the part is like
     scene        the part on the arm, kappa, noise and tolerance                  "What is claimed"

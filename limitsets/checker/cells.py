@@ -19,6 +19,7 @@ import flint
 import numpy as np
 from flint import arb
 
+from .balls import HALF, PRECISION, ZERO, Arb, Array, Pair
 from .file import Cells
 from .model import (
     FULL_TURN,
@@ -31,8 +32,8 @@ from .model import (
     root_below,
     slope_over,
 )
-from .numbers import HALF, PRECISION, ZERO, Arb, Array, Pair, rounded
 from .scene import DEPTH, Scene, Side, over_halves, read_scene
+from .texts import rounded
 
 MOST_BOXES = 20_000  # pieces of one cell: a certificate that needs more is refused
 CHUNK = 2_000  # cells handed to a worker at once

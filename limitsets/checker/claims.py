@@ -13,10 +13,10 @@ from .end_points import check_ends, ends_statement, read_ends
 from .file import Cells
 from .goals import GOALS, check_goal, read_asked, statement_of_goal
 from .near_hinge import check_below_cells, fixed_points_in_words, read_near_hinge
-from .numbers import hex_float, plain, require, rounded, rows, table
 from .orbits import check_orbits, orbits_statement, read_orbits
 from .refutations import check_refuted, read_refutation, statement_of_refutation
 from .scene import Scene, over_halves
+from .texts import hex_float, plain, require, rounded, rows, table
 
 SECTIONS = {  # the known claims, and the keys of their sections
     "attracts-all": "near_joint max_rank",

@@ -18,7 +18,8 @@ from typing import Any
 
 import numpy as np
 
-from .numbers import Array, BadFileError, plain, require
+from .balls import Array
+from .texts import BadFileError, plain, require
 
 
 def stored_entries(data: memoryview, most: int, what: str) -> dict[str, memoryview]:

@@ -12,7 +12,6 @@ import numpy as np
 from .cells import check_ranks, first_bad, range_max
 from .file import Cells
 from .near_hinge import check_everywhere, near_landing
-from .numbers import LENGTHS, quantity, require, rows, table
 from .scene import Scene
 from .starts import (
     ATTRACTING,
@@ -23,6 +22,7 @@ from .starts import (
     read_starts,
     starts_in_words,
 )
+from .texts import LENGTHS, quantity, require, rows, table
 from .thinning import check_null, check_thinning, not_arriving
 from .two_throws import check_two_throws
 

@@ -6,8 +6,8 @@ import sys
 import time
 from dataclasses import asdict
 
-from .numbers import plain
 from .report import EXITS, WORDS, Report, recheck
+from .texts import plain
 
 
 def show(report: Report, file: str) -> None:

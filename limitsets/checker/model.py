@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 from flint import arb
 
-from .numbers import HALF, ONE, ZERO, Arb, Rising, sine_cosine
+from .balls import HALF, ONE, ZERO, Arb, Rising, sine_cosine
 from .scene import Side
 
 FORMULAS = {

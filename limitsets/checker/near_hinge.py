@@ -8,6 +8,7 @@ from typing import Any
 
 from flint import arb
 
+from .balls import HALF, ONE, ZERO, Arb, Pair
 from .file import Cells
 from .model import (
     Ratios,
@@ -23,8 +24,8 @@ from .model import (
     rise_of_jog,
     root_above,
 )
-from .numbers import HALF, ONE, ZERO, Arb, Pair, by_side, hex_float, require, rounded, rows, table
 from .scene import Scene, Side, over_halves
+from .texts import by_side, hex_float, require, rounded, rows, table
 
 
 def read_near_hinge(value: object, n_sides: int) -> tuple[list[float], list[Pair | None]]:

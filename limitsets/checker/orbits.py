@@ -7,10 +7,11 @@ from typing import Any, NamedTuple
 
 from flint import arb
 
+from .balls import ONE, ZERO, Arb, Pair, UnprovedError, prove
 from .end_points import Intervals, Throws, attracting, first_outside
 from .file import Cells
-from .numbers import ONE, ZERO, Arb, Pair, UnprovedError, hex_float, prove, read_side, require, rows, table
 from .scene import Scene
+from .texts import hex_float, read_side, require, rows, table
 
 MOST_ORBITS, LONGEST = 200, 1_000  # orbits in a section, and throws of one
 

@@ -7,7 +7,8 @@ from collections.abc import Callable
 from fractions import Fraction
 from typing import Any
 
-from .numbers import ONE, ZERO, Arb, Rising, exact, quantity, require, rows, span, table
+from .balls import ONE, ZERO, Arb, Rising, exact, span
+from .texts import quantity, require, rows, table
 
 
 def ends_of(value: object, where: str, unit: Fraction) -> tuple[Fraction, Fraction]:

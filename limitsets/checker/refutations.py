@@ -8,27 +8,13 @@ from typing import Any
 
 from flint import arb
 
+from .balls import ZERO, Arb, UnprovedError, exact, prove
 from .end_points import Throws
 from .goals import read_goal
-from .numbers import (
-    KINDS,
-    LENGTHS,
-    ZERO,
-    Arb,
-    UnprovedError,
-    exact,
-    hex_float,
-    plain,
-    prove,
-    quantity,
-    read_side,
-    require,
-    rows,
-    table,
-)
 from .orbits import Orbit, prove_orbit, read_orbits
 from .scene import Scene, quantities, read_scene
 from .starts import INSIDE
+from .texts import KINDS, LENGTHS, hex_float, plain, quantity, read_side, require, rows, table
 
 MOST_THROWS = 100_000  # throws of an orbit that refutes
 RECURS = (

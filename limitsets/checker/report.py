@@ -13,14 +13,15 @@ from typing import Any
 
 import flint
 
+from .balls import PRECISION
 from .cells import Crew, extents
 from .claims import check_box_claims, read_claims, statement_of
 from .file import Cells, open_certificate, read_cells
 from .goals import asked, goal_of_scene
 from .model import FORMULAS
-from .numbers import KINDS, PRECISION, BadFileError, plain, quantity, require, rows, table
 from .scene import Scene, check_parameters, check_tolerance, over_halves, quantities, read_scene
 from .starts import ATTRACTING, first_version_starts, shares
+from .texts import KINDS, BadFileError, plain, quantity, require, rows, table
 
 MOST_OPEN = 0.01  # the share of the arm that may be open where a goal is proved from some x on
 WORDS = {  # the verdicts, in JSON and for people

@@ -13,24 +13,9 @@ from typing import Any
 
 from flint import arb
 
-from .numbers import (
-    HALF,
-    KINDS,
-    LENGTHS,
-    ONE,
-    ZERO,
-    Arb,
-    Quantity,
-    exact,
-    hex_float,
-    plain,
-    quantity,
-    require,
-    rows,
-    span,
-    table,
-)
+from .balls import HALF, ONE, ZERO, Arb, exact, span
 from .part import narrow_part
+from .texts import KINDS, LENGTHS, Quantity, hex_float, plain, quantity, require, rows, table
 
 DEPTH = 12  # a cell is halved at most so often in x, so often in kappa, and so often in all else that is an interval
 MOST_HALVES = 1_000  # pieces of a tolerance, for one check that is not of a cell

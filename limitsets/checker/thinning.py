@@ -9,11 +9,11 @@ import math
 import numpy as np
 from flint import arb
 
+from .balls import ZERO, Arb, Array
 from .cells import first_bad
 from .file import Cells
 from .model import at_angle, over_angles, rise_of_jog, root_above, root_below, slope_over
 from .near_hinge import near_angle
-from .numbers import ZERO, Arb, Array
 from .scene import Scene, Side
 
 MOST_EDGES = 20_000_000  # pairs of a cell and a target, for one thinning

@@ -1,6 +1,6 @@
 """`limitsets.recheck`: the checker, called from Python; every writer of certificates calls it too.
 
-The checker needs python-flint, which only it needs, so nothing else imports it.
+The checker alone needs python-flint, so it is imported where it is called.
 """
 
 from __future__ import annotations

@@ -201,7 +201,7 @@ def test_sine_and_cosine_over_wide_balls():
     for _ in range(300):
         middle, radius = float(random.uniform(-7, 7)), float(10 ** random.uniform(-12, 0.5))
         ball = arb(middle, radius)
-        sin, cos = checker.numbers.sine_cosine(ball)
+        sin, cos = checker.balls.sine_cosine(ball)
         for share in (-1.0, 1.0, *random.uniform(-1, 1, 10).tolist()):
             at = mpf(middle) + mpf(share) * mpf(radius)
             for found, value in ((sin, mp.sin(at)), (cos, mp.cos(at))):
@@ -240,7 +240,7 @@ def read_wide(model, landing):
     scene, wide = boxed(written("paper-designed", model), WIDTHS)
     noise = {"landing.x": f"{landing!r} in"} if landing else None
     read = checker.scene.read_scene(copy.deepcopy(wide), noise)
-    known = checker.part.read_lengths(read.raw["part"], checker.numbers.LENGTHS[read.unit])
+    known = checker.part.read_lengths(read.raw["part"], checker.texts.LENGTHS[read.unit])
     return scene, read, known
 
 

@@ -111,15 +111,15 @@ def test_numbers_as_a_scene_may_write_them(tmp_path, old, new):
 
 @pytest.mark.parametrize("text", [". in", "5.5.5 in", ".e5 in", "1e13 in", "1e-301 in", "1e9999 in", "5in"])
 def test_numbers_no_scene_has(text):
-    with pytest.raises(checker.numbers.BadFileError):
-        checker.numbers.quantity(text, "length", "x")
+    with pytest.raises(checker.texts.BadFileError):
+        checker.texts.quantity(text, "length", "x")
 
 
 def test_equal_numbers_in_other_words():
     for text in (".5 in", "0.5 in", "+.5 in", "5e-1 in", "50.e-002 in"):
         assert (
-            checker.numbers.quantity(text, "length", "x").lo
-            == checker.numbers.quantity("12.7 mm", "length", "x").lo
+            checker.texts.quantity(text, "length", "x").lo
+            == checker.texts.quantity("12.7 mm", "length", "x").lo
         )
 
 
@@ -433,7 +433,7 @@ def test_an_orbit_outside_of_the_attracting_cells_is_none_in_them(good):
     (orbit, *_) = checker.orbits.read_orbits(sections(good["designed"])[1], 3)["orbits"]
     checker.orbits.prove_orbit(throws, [[(orbit.lo, orbit.hi)], [], []], orbit)
     for cells in ([[], [], []], [[(orbit.lo + 1e-12, orbit.hi)], [(0.0, 30.0)], [(0.0, 30.0)]]):
-        with pytest.raises(checker.numbers.UnprovedError, match="not in the attracting cells"):
+        with pytest.raises(checker.balls.UnprovedError, match="not in the attracting cells"):
             checker.orbits.prove_orbit(throws, cells, orbit)
 
 
@@ -443,7 +443,7 @@ def test_an_itinerary_that_the_map_does_not_take_is_none():
     m = forge.Plain(forge.scene("designed"))
     cycle = forge.refined(m, np.array([1, 1, *[0] * 11, 1]), 6.0, 26.0)
     (orbit,) = checker.orbits.read_orbits({"cycles": [cycle], "complete": False}, 3)["orbits"]
-    with pytest.raises(checker.numbers.UnprovedError, match="throw 14: that it is a flip is not proved"):
+    with pytest.raises(checker.balls.UnprovedError, match="throw 14: that it is a flip is not proved"):
         checker.orbits.prove_orbit(throws, [[(0.0, 30.0)]] * 3, orbit)
 
 
@@ -526,7 +526,7 @@ def test_where_there_may_be_several_impacts_nothing_is_proved(good, tmp_path):
     raw = forge.scene("designed")
     raw["throw"]["kappa"] = "2.3 in"
     scene = checker.scene.read_scene(raw, None)
-    with pytest.raises(checker.numbers.UnprovedError, match="not bracketed"):
+    with pytest.raises(checker.balls.UnprovedError, match="not bracketed"):
         checker.end_points.Throws(scene).point(2, 6.0)
     f = good["designed"]
     cells = checker.file.Cells([f.arrays[f"0.edges.{i}"] for i in range(3)], *[
@@ -546,7 +546,7 @@ def test_the_impact_is_bracketed_next_to_the_joint():
         raw = case(seed).scene
         try:
             scene = checker.scene.read_scene(raw, None)
-        except checker.numbers.BadFileError:  # the part does not rest on all of its sides
+        except checker.texts.BadFileError:  # the part does not rest on all of its sides
             continue
         for s in scene.sides:
             x = arb(float(s.a) + float(s.arm - s.a) * 10 ** rng.uniform(-7, -2))
