@@ -12,6 +12,7 @@ angle phi and either falls back ("jog") or over that vertex on side i+1 ("flip")
 cells.  For every cell it says how the throw decides, where the images lie and what bracket holds phi; the checker
 proves each of these anew, for all x in the cell and all parameters allowed, and follows the integers to the claims.
 
+A function that checks a statement returns "" where it proves the statement, and else the reason in words for people.
 The files follow docs/certificates.md, and each imports only from those before it:
 
     balls        the arithmetic of every proof

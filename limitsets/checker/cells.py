@@ -54,7 +54,7 @@ def range_max(values: Array, first: Array, last: Array) -> Array:
 
 
 def check_structure(c: Cells, scene: Scene, least_rank: int) -> str:
-    """Check order of the edges, brackets, branches and targets, which every claim needs; "" or what fails."""
+    """Check order of the edges, brackets, branches and targets, which every claim needs; "" or the reason."""
     n_sides = len(c.edges)
     for i, edges in enumerate(c.edges):
         if not (np.diff(edges) > 0).all():
@@ -85,7 +85,7 @@ def first_bad(c: Cells, checks: list[tuple[Array, str]]) -> str:
 
 
 def check_components(c: Cells) -> str:
-    """Check that component cells map into cells of their own component; "" or what fails."""
+    """Check that component cells map into cells of their own component; "" or the reason."""
     if not (c.component >= 0).any():
         return "there are no attracting cells"
     for array, what in ((c.jog, "jog"), (c.flip, "flip")):
@@ -102,7 +102,7 @@ def check_components(c: Cells) -> str:
 
 
 def check_ranks(c: Cells, scene: Scene, max_rank: int) -> str:
-    """Check that the cells reach to the arm's end and the rank falls off the components; "" or what fails."""
+    """Check that the cells reach to the arm's end and the rank falls off the components; "" or the reason."""
     for i, edges in enumerate(c.edges):
         if Fraction(float(edges[-1])) < scene.arm[1]:
             return f"side {i}: the cells end before arm.length"
@@ -264,7 +264,7 @@ def jog_over(s: Side, box: Box, rise: Arb, slope: Arb | None) -> tuple[Arb, Arb]
 
 
 def check_target(s: Side, branch: int, lo: Arb, hi: Arb, target: Pair) -> str:
-    """Check that the image [lo, hi] of a branch lies inside its target cells; "" or what fails."""
+    """Check that the image [lo, hi] of a branch lies inside its target cells; "" or the reason."""
     left, right = target
     if lo > left and (hi <= s.arm if right == math.inf else hi < right):
         return ""
@@ -300,7 +300,7 @@ def prepare(raw: list[object], noise: object) -> None:
 
 
 def check_task(task: Task) -> tuple[int, Failure | None, int]:
-    """Return the first cell of a task that is not proved (-1 if there is none), what fails, and the number of boxes."""
+    """Return the first cell of a task that is not proved (-1 if there is none), the reason, and the number of boxes."""
     if task.box not in SCENES:
         SCENES.clear()  # together with their halves
         SCENES[task.box] = read_scene(SETUP[0][task.box], SETUP[1])
@@ -362,7 +362,7 @@ class Crew:
         prepare(raw, noise)
 
     def run(self, tasks: list[Task]) -> tuple[int, Failure] | None:
-        """Return the first cell that is not proved, in the order of the tasks, and what fails there; or None."""
+        """Return the first cell that is not proved, in the order of the tasks, and the reason; or None."""
         if self.workers > 1 and self.pool is None and sum(len(t.cells) for t in tasks) > SMALL:
             # never by fork, which copies locks that other threads hold
             method = multiprocessing.get_start_method(allow_none=True)

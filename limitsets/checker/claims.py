@@ -11,7 +11,7 @@ import numpy as np
 from .cells import Crew, check_components, check_ranks, check_structure, tasks_of
 from .end_points import check_ends, ends_statement, read_ends
 from .file import Cells
-from .goals import GOALS, check_goal, read_asked, statement_of_goal
+from .goals import GOALS, check_goal, read_goal_claim, statement_of_goal
 from .near_hinge import check_below_cells, fixed_points_in_words, read_near_hinge
 from .orbits import check_orbits, orbits_statement, read_orbits
 from .refutations import check_refuted, read_refutation, statement_of_refutation
@@ -50,7 +50,7 @@ def read_claims(
         else:
             require(name not in known, f"claim {name} is made twice")
             if name == "goal":
-                known[name] = read_asked(section, n_sides, version)
+                known[name] = read_goal_claim(section, n_sides, version)
             else:
                 section = table(section, f"section of {name}", SECTIONS[name], MORE_KEYS.get(name, ""))
                 known[name] = read_section(name, section, n_sides)
@@ -117,23 +117,26 @@ def check_cell_claims(
 
 
 def check_attracts_all(c: Cells, scene: Scene, section: dict[str, Any]) -> str:
-    """Check ranks and the starts near the joint; "" or what fails."""
+    """Check ranks and the starts near the joint; "" or the reason."""
     bad = check_ranks(c, scene, section["max_rank"])
+    if bad:
+        return bad
     for i, (q, said) in enumerate(zip(section["q"], section["fixed"], strict=True)):
         edge = float(c.edges[i][0])
-        near = "" if bad else over_halves(scene, check_below_cells, i, edge, q, said)
-        bad = bad or (f"side {i}, near the joint, x in (a, {edge!r}]: {near}" if near else "")
-    return bad
+        near = over_halves(scene, check_below_cells, i, edge, q, said)
+        if near:
+            return f"side {i}, near the joint, x in (a, {edge!r}]: {near}"
+    return ""
 
 
 def check_throws_of_cells(
     scene: Scene, c: Cells, box: int, claims: dict[str, dict[str, Any]],
     about: tuple[list[str], list[str]], crew: Crew,
 ) -> list[Failed]:  # fmt: skip
-    """Check the throws from the attracting cells, then from the others: claims about all of them, and about the ranked.
+    """Check the throws from the attracting cells, then those from the others that some claim needs.
 
-    Images are proved to lie strictly inside the union of their target cells (or at most at the arm's length), so
-    that "invariant" already gives "trapping".
+    `about`: the claims about all cells, and the claims about the cells with a rank.  Images are proved to lie strictly
+    inside the union of their target cells (or at most at the arm's length), so that "invariant" gives "trapping".
     """
     failed: list[Failed] = []
     least = claims["expanding"]["least"] if "expanding" in claims else None

@@ -298,7 +298,7 @@ def image_inward(throws: Throws, union: Intervals, pieces: list[list[Piece]]) ->
 
 
 def check_ends(scene: Scene, c: Cells, section: dict[str, Any]) -> str:
-    """Prove the end points from the attracting cells N, which are invariant; "" or what fails.
+    """Prove the end points from the attracting cells N, which are invariant; "" or the reason.
 
     Outer: A(0) = N, A(n+1) = F(A(n)) & A(n), rounded outward, holds the image of N under n + 1 throws, whatever kappas
     of the noise they have.  Inner: B lies in N and in its own image F(B), for each kappa: so in every image of N.

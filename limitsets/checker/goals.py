@@ -36,7 +36,7 @@ GOALS = {  # the kinds that are known, and the keys of their sections; from_anyw
 }
 
 
-def read_asked(section: object, n_sides: int, version: int) -> dict[str, Any]:
+def read_goal_claim(section: object, n_sides: int, version: int) -> dict[str, Any]:
     """Read the section of a goal, with the starts for which it is claimed."""
     starts = "starts thinning near_joint lost" if version > 1 else ""
     known = table(section, "section of goal", "kind", f"{GOAL_KEYS} {starts}")
@@ -98,7 +98,7 @@ def goal_of_scene(scene: dict[str, Any], n_sides: int) -> dict[str, Any] | None:
     return read_goal(section, n_sides)
 
 
-def asked(goal: dict[str, Any]) -> tuple[Any, ...]:
+def content_of_goal(goal: dict[str, Any]) -> tuple[Any, ...]:
     """Return what a goal asks, for comparison: kind, x in metres, side, and the rest."""
     x = goal["x"].lo if "x" in goal else None
     words = (goal.get("side"), goal.get("every"), goal.get("order"))
@@ -106,7 +106,7 @@ def asked(goal: dict[str, Any]) -> tuple[Any, ...]:
 
 
 def check_goal(c: Cells, scene: Scene, goal: dict[str, Any]) -> str:
-    """Check a goal by the integers, given that all images are what the certificate says; "" or what fails."""
+    """Check a goal by the integers, given that all images are what the certificate says; "" or the reason."""
     starts = goal["starts"]
     everywhere = goal["all"] if starts is None else goal["anywhere"] and goal["kind"] != "attracts_all"
     bad = check_everywhere(c, scene) if everywhere else ""
@@ -128,7 +128,7 @@ def check_goal(c: Cells, scene: Scene, goal: dict[str, Any]) -> str:
 
 
 def check_oriented(c: Cells, scene: Scene, goal: dict[str, Any]) -> str:
-    """Check that no attracting cell, or no target of any cell, of another side reaches beyond x; "" or what fails."""
+    """Check that no attracting cell, or no target of any cell, of another side reaches beyond x; "" or the reason."""
     beyond = goal["x"].lo / LENGTHS[scene.unit]
     x = float(beyond)
     if Fraction(x) > beyond:
@@ -156,7 +156,7 @@ def check_oriented(c: Cells, scene: Scene, goal: dict[str, Any]) -> str:
 
 
 def check_reaches(c: Cells, scene: Scene, goal: dict[str, Any]) -> str:
-    """Check that orbits come to rest at x or beyond on the side, every one or almost every one; "" or what fails."""
+    """Check that orbits come to rest at x or beyond on the side, every one or almost every one; "" or the reason."""
     least = goal["x"].lo / LENGTHS[scene.unit]
     x = float(least)
     if Fraction(x) < least:
@@ -176,7 +176,7 @@ def check_reaches(c: Cells, scene: Scene, goal: dict[str, Any]) -> str:
 
 
 def check_one_component(c: Cells) -> str:
-    """Check that each attracting cell leads to every other through targets; "" or what fails."""
+    """Check that each attracting cell leads to every other through targets; "" or the reason."""
     inside = c.component >= 0
     start = np.zeros(len(inside), dtype=bool)
     start[np.argmax(inside)] = True

@@ -125,7 +125,7 @@ def landing_at(s: Side, r: Ratios, kappa: Arb) -> Arb:
     return s.a * r.sine + r.p * (HALF * kappa - s.d * r.V)
 
 
-def its_slope(s: Side, r: Ratios, kappa: Arb) -> Arb:
+def landing_slope(s: Side, r: Ratios, kappa: Arb) -> Arb:
     """Evaluate dR(p)/dp = kappa/2 - a (V - W) p - d (sin p/p - V)."""
     return HALF * kappa - s.a * (r.V - r.W) * r.p - s.d * (r.sine - r.V)
 
@@ -148,7 +148,7 @@ def slope_over(s: Side, phi: Arb, kappa: Arb, rise: Arb, f_slope: Arb) -> Arb | 
     """
     if not s.exact:
         return ONE - 2 * s.h / (kappa - s.small_d)
-    steep = its_slope(s, ratios(phi), kappa) if phi < 3 else ZERO
+    steep = landing_slope(s, ratios(phi), kappa) if phi < 3 else ZERO
     wide, narrow = (ONE + rise / steep if steep > 0 else None), None
     if f_slope < 0:  # narrower where the box is small: the series for R(p) is cut off
         narrow = ONE - rise * phi / f_slope

@@ -17,8 +17,8 @@ from .model import (
     gain_at,
     gain_slope,
     guess_root,
-    its_slope,
     landing_at,
+    landing_slope,
     over_angles,
     ratios,
     rise_of_jog,
@@ -62,7 +62,7 @@ def near_landing(s: Side, k_lo: Arb, k_hi: Arb, edge: float) -> Arb:
 
 
 def check_near_hinge(s: Side, k_lo: Arb, k_hi: Arb, edge: float, q: float) -> str:
-    """Prove on (a, edge] that a throw is a decided jog and R' - a >= q (R - a), R' <= arm; "" or what fails.
+    """Prove on (a, edge] that a throw is a decided jog and R' - a >= q (R - a), R' <= arm; "" or the reason.
 
     f = (R - a) phi + a (phi - sin phi) + d (1 - cos phi) - (kappa/2) phi^2 and both brackets are >= 0, so f > 0 for
     phi < 2 (R - a)/kappa: the impact comes later than that.  f rises with R, so f(bound) < 0 at the edge bounds it
@@ -89,7 +89,7 @@ def check_near_hinge(s: Side, k_lo: Arb, k_hi: Arb, edge: float, q: float) -> st
 
 
 def check_all_jog(s: Side, kappa: Arb, x: Arb, bound: Arb) -> str:
-    """Prove that throws from (a, x] with impact angles up to the bound are jogs; "" or what fails."""
+    """Prove that throws from (a, x] with impact angles up to the bound are jogs; "" or the reason."""
     R, pieces = s.a.union(x), 64
     for k in range(pieces):
         phi = (bound * k / pieces).union(bound * (k + 1) / pieces)
@@ -99,7 +99,7 @@ def check_all_jog(s: Side, kappa: Arb, x: Arb, bound: Arb) -> str:
 
 
 def check_everywhere(c: Cells, scene: Scene) -> str:
-    """Check that every start on the arm is in a cell, or near the joint and thrown outward; "" or what fails."""
+    """Check that every start on the arm is in a cell, or near the joint and thrown outward; "" or the reason."""
     for i, edges in enumerate(c.edges):
         if Fraction(float(edges[-1])) < scene.arm[1]:
             return f"side {i}: the cells end before arm.length"
@@ -111,7 +111,7 @@ def check_everywhere(c: Cells, scene: Scene) -> str:
 
 
 def check_thrown_out(scene: Scene, side: int, edge: float) -> str:
-    """Check that starts up to the edge are thrown outward, by any factor above 1; "" or what fails."""
+    """Check that starts up to the edge are thrown outward, by any factor above 1; "" or the reason."""
     s = scene.sides[side]
     gain = -2 * s.h / (scene.k_hi - s.small_d)
     q = float((1 + gain * (1 - 2.0**-20)).lower())
@@ -157,7 +157,7 @@ def last_angle(s: Side, x: float, k_lo: Arb) -> Ratios | None:
 
 
 def check_fixed_point(s: Side, k_lo: Arb, k_hi: Arb, edge: float, q: float, said: tuple[float, float]) -> str:
-    """Prove the claims about starts up to the edge where the arm's surface is above the joint; "" or what fails.
+    """Prove the claims about starts up to the edge where the arm's surface is above the joint; "" or the reason.
 
     The claims are: on (a, edge] a throw is a jog; the jog has one fixed point R* there, with said[0] <= R* <= said[1];
     starts in (a, R*) tend to a; and R' - R* >= q (R - R*), R' <= arm on (R*, edge].
@@ -196,7 +196,7 @@ def check_jogs_up_to(s: Side, k_lo: Arb, k_hi: Arb, top: Arb) -> str:
     for k in range(pieces):
         ends = ratios(top * k / pieces), ratios(top * (k + 1) / pieces)
         r = ratios(ends[0].p.union(ends[1].p))
-        if not (its_slope(s, r, k_lo) > 0 and gain_slope(s.a, s.d, r) > 0):
+        if not (landing_slope(s, r, k_lo) > 0 and gain_slope(s.a, s.d, r) > 0):
             return "the fixed point of the jog is not proved to be the only one"
         if not HALF * k_lo - s.h + s.a * (r.V - r.W) * r.p - s.d * (r.V + ONE - r.sine) > 0:
             return "R' > a is not proved"
@@ -212,7 +212,7 @@ def check_growth_beyond(s: Side, k_hi: Arb, first: Arb, top: Arb, q: float) -> s
     for k in range(pieces):
         r = ratios((first + (top - first) * k / pieces).union(first + (top - first) * (k + 1) / pieces))
         rise = rise_of_jog(s, *r.p.sin_cos())
-        if not (q > 1 and rise > 0 and rise >= (arb(q) - 1) * its_slope(s, r, k_hi)):
+        if not (q > 1 and rise > 0 and rise >= (arb(q) - 1) * landing_slope(s, r, k_hi)):
             return f"R' - R* >= q (R - R*) is not proved for q = {q!r}"
     return ""
 
@@ -220,7 +220,7 @@ def check_growth_beyond(s: Side, k_hi: Arb, first: Arb, top: Arb, q: float) -> s
 def check_below_cells(
     scene: Scene, side: int, edge: float, q: float, said: tuple[float, float] | None
 ) -> str:
-    """Check the claims about starts before the first cell, which depend on the sign of h; "" or what fails."""
+    """Check the claims about starts before the first cell, which depend on the sign of h; "" or the reason."""
     s = scene.sides[side]
     if s.h > 0:
         if said is None:

@@ -101,7 +101,7 @@ def meets(one: tuple[int, Arb, Arb], other: tuple[int, Arb, Arb]) -> bool:
 
 
 def check_orbits(scene: Scene, c: Cells, section: dict[str, Any]) -> str:
-    """Check that all periodic orbits exist and are different; "" or what fails."""
+    """Check that all periodic orbits exist and are different; "" or the reason."""
     cells, throws = attracting(c), Throws(scene)
     proved: list[Followed] = []
     for orbit in section["orbits"]:

@@ -21,7 +21,7 @@ RECURS = (
     "cycle",
     "closed",
     "once",
-)  # why an orbit refutes: it is periodic, it closes with noise, or once is enough
+)  # an orbit refutes because it is periodic, closes with noise, or once is enough
 BROKEN = {  # the goals that an orbit may refute: their keys besides from_anywhere, and words for the orbit
     "oriented_beyond": ("kind x side", "comes to lie beyond x = {text} on another side than {side}"),
     "reaches": ("kind x side every_orbit", "never comes to rest on side {side} at x >= {text}"),
@@ -53,7 +53,7 @@ def read_refutation(section: dict[str, Any], n_sides: int) -> dict[str, Any]:
 
 
 def read_broken_goal(value: object) -> dict[str, Any]:
-    """Read the section of the goal that is refuted; counts of throws and jogs, which it has not, are set to 0."""
+    """Read the section of the goal that is refuted; the counts of throws and jogs in it are set to 0."""
     kind = value.get("kind") if isinstance(value, dict) else None
     require(isinstance(kind, str) and kind in BROKEN, "refuted.goal: not a kind that an orbit refutes")
     goal = table(value, "refuted.goal", BROKEN[str(kind)][0], "from_anywhere")
@@ -88,7 +88,7 @@ def read_throw(value: object) -> tuple[Any, Any]:
 
 
 def check_deviations(scene: Scene, section: dict[str, Any]) -> str:
-    """Check that the scene deviates from the nominal values by no more than the tolerance; "" or what fails."""
+    """Check that the scene deviates from the nominal values by no more than the tolerance; "" or the reason."""
     flat = dict(quantities(scene.raw))
     for name, text in section["tolerance"].items():
         square = name == "throw.speed" and "throw.kappa" in flat
@@ -113,7 +113,7 @@ def check_deviations(scene: Scene, section: dict[str, Any]) -> str:
 
 
 def check_refuted(scene: Scene, section: dict[str, Any]) -> str:
-    """Throw the orbit again in balls, without the cells; "" or what fails."""
+    """Throw the orbit again in balls, without the cells; "" or the reason."""
     why, goal = section["why"], section["goal"]
     if not why:
         return "it shows a passing orbit only: a goal is refuted by one that comes back"
@@ -226,7 +226,7 @@ def breaks(scene: Scene, goal: dict[str, Any], states: list[State]) -> bool:
 
 
 def left_or_beyond(scene: Scene, goal: dict[str, Any], last: State) -> str:
-    """Check that a state is off the arm, or beyond x on another side; "" or what fails."""
+    """Check that a state is off the arm, or beyond x on another side; "" or the reason."""
     side, lo, hi = last
     s = scene.sides[side]
     if goal["kind"] != "oriented_beyond":

@@ -17,7 +17,7 @@ from .balls import PRECISION
 from .cells import Crew, extents
 from .claims import check_box_claims, read_claims, statement_of
 from .file import Cells, open_certificate, read_cells
-from .goals import asked, goal_of_scene
+from .goals import content_of_goal, goal_of_scene
 from .model import FORMULAS
 from .scene import Scene, check_parameters, check_tolerance, over_halves, quantities, read_scene
 from .starts import ATTRACTING, first_version_starts, shares
@@ -199,7 +199,7 @@ def failed_at_once(file: Certificate, gap: str, own: dict[str, Any] | None) -> d
         failed["end-points"] = "the landing place moves at every throw: not with noise of it"
     for name in {"goal", "refuted"} & set(claims):
         goal = claims[name].get("goal", claims[name])
-        if own is not None and asked(goal) != asked(own):
+        if own is not None and content_of_goal(goal) != content_of_goal(own):
             failed[name] = "the scene in this file has another goal of its own"
     return failed
 

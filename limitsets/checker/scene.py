@@ -59,14 +59,10 @@ class Scene:
     rho: Arb
     arm: tuple[Fraction, Fraction]
     unit: str
-    raw: dict[str, Any] = field(
-        default_factory=dict
-    )  # the JSON of the scene; `noise` is that of the certificate
-    noise: object = None
+    raw: dict[str, Any] = field(default_factory=dict)  # the JSON of the scene
+    noise: object = None  # the JSON of the noise
     loose: float = 0.0  # the widths of all sides' enclosures together; 0 where `halves` cannot narrow them
-    parts: "dict[tuple[str, int], list[Scene]]" = field(
-        default_factory=dict
-    )  # the halves that `halves` returned
+    parts: "dict[tuple[str, int], list[Scene]]" = field(default_factory=dict)  # known halves
 
     def cuts(self) -> list[str]:
         """Name the intervals of part and arm that `halves` may halve; kappa and arm.length are not among them."""
@@ -136,7 +132,7 @@ def halved(raw: dict[str, Any], name: str) -> Iterator[dict[str, Any]]:
 
 
 def over_halves(scene: Scene, check: Callable[..., str], *more: Any) -> str:
-    """Check a statement about all parameters, half by half where the check fails for the whole; "" or what fails."""
+    """Check a statement about all parameters, half by half where the check fails for the whole; "" or the reason."""
     stack, tried = [(scene, 0)], 0
     while stack:
         piece, depth = stack.pop()
@@ -157,48 +153,48 @@ def read_scene(raw: object, noise: object) -> Scene:
     arm = table(scene["arm"], "arm", "surface_height length")
     reach = quantity(arm["length"], "length", "arm.length")
     unit = LENGTHS[reach.unit]
-
-    def length(value: object, where: str) -> Arb:
-        q = quantity(value, "length", where)
-        return span(q.lo / unit, q.hi / unit)
-
     rests, rho = narrow_part(scene["part"], unit)
     require(bool(rho > 0), "the radius of gyration is not positive")
-    rho2 = rho * rho
-
     k_lo, k_hi = read_kappa(scene, noise, unit)
     scatter = read_noise(noise, "landing.x", "length").ball() / exact(unit)
-    model = table(scene["model"], "model", "flight flip")
-    known = model["flight"] in ("exact", "small-angle", "small-angle-2") and model["flip"] in (
-        "signed",
-        "energy",
-    )
-    require(known, "the model is not one that is known")
-    is_exact, is_signed = model["flight"] == "exact", model["flip"] == "signed"
+    flight, flip = read_model(scene["model"])
     require(reach.lo > 0, "arm.length is not positive")
-    h = length(arm["surface_height"], "arm.surface_height")
-    reach_ball = span(reach.lo / unit, reach.hi / unit)
+    height = quantity(arm["surface_height"], "length", "arm.surface_height")
+    h, ends = span(height.lo / unit, height.hi / unit), (reach.lo / unit, reach.hi / unit)
     sides = []
     for i, (a, d, long, shift) in enumerate(rests):
         require(bool(a > 0) and bool(a < long) and bool(d > 0), f"the part does not rest on side {i}")
-        sides.append(Side(a, d, long, h, rho2, reach_ball, is_exact, is_signed, shift=shift))
-    for side in sides:
-        side.ell = (side.a**2 + side.d**2).sqrt()
-        side.hd = side.h + side.d
-        side.over_2m = HALF / (side.rho2 + side.ell**2)
-        side.landing = scatter
-        side.small_d = side.d if model["flight"] == "small-angle-2" else ZERO
-        side.concave = bool(k_lo > side.ell) or not side.exact
-        a_lo, a, a_hi = (float(end) for end in (side.a.lower(), side.a.mid(), side.a.upper()))
-        side.floats = (a, float(side.d.mid()), float(side.small_d.mid()), a)
-        side.early = (a_hi, float(side.d.lower()), float(side.small_d.lower()), a_lo)
-        side.late = (a_lo, float(side.d.upper()), float(side.small_d.upper()), a_hi)
-        require(bool(k_lo > side.small_d), "small-angle-2 needs kappa > d")
-    ends = reach.lo / unit, reach.hi / unit
+        side = Side(a, d, long, h, rho * rho, span(*ends), flight == "exact", flip == "signed")
+        side.shift, side.landing = shift, scatter
+        side.small_d = d if flight == "small-angle-2" else ZERO
+        complete(side, k_lo)
+        sides.append(side)
+    require(all(bool(k_lo > side.small_d) for side in sides), "small-angle-2 needs kappa > d")
     whole = Scene(sides, k_lo, k_hi, rho, ends, reach.unit, scene, noise)
     if whole.cuts():
         whole.loose = sum(float(ball.rad()) for s in sides for ball in (s.a, s.d, s.h, s.shift, whole.rho))
     return whole
+
+
+def read_model(value: object) -> tuple[str, str]:
+    """Read flight and flip of the model."""
+    model = table(value, "model", "flight flip")
+    flight, flip = model["flight"], model["flip"]
+    known = flight in ("exact", "small-angle", "small-angle-2") and flip in ("signed", "energy")
+    require(known, "the model is not one that is known")
+    return flight, flip
+
+
+def complete(side: Side, k_lo: Arb) -> None:
+    """Fill in the parameters that follow from the others."""
+    side.ell = (side.a**2 + side.d**2).sqrt()
+    side.hd = side.h + side.d
+    side.over_2m = HALF / (side.rho2 + side.ell**2)
+    side.concave = bool(k_lo > side.ell) or not side.exact
+    a_lo, a, a_hi = (float(end) for end in (side.a.lower(), side.a.mid(), side.a.upper()))
+    side.floats = (a, float(side.d.mid()), float(side.small_d.mid()), a)
+    side.early = (a_hi, float(side.d.lower()), float(side.small_d.lower()), a_lo)
+    side.late = (a_lo, float(side.d.upper()), float(side.small_d.upper()), a_hi)
 
 
 NONE = Quantity(Fraction(0), Fraction(0), False, "")
@@ -296,7 +292,7 @@ def read_kappa(scene: dict[str, Any], noise: object, unit: Fraction) -> tuple[Ar
 
 
 def check_parameters(scene: Scene, said: object, where: str) -> str:
-    """Check that each enclosure lies inside the interval that the producer computed with; "" or what does not.
+    """Check that each enclosure lies inside the interval that the producer computed with; "" or the reason.
 
     No proof rests on this check, which only finds files that were put together wrongly: so a little slack is allowed.
     """
@@ -321,7 +317,7 @@ Ends = list[tuple[Fraction, Fraction]]
 
 
 def check_tolerance(raw: list[Any], tolerance: object) -> tuple[dict[str, str], str]:
-    """Check that the boxes cover the tolerance: the range of each quantity for people, and what fails.
+    """Check that the boxes cover the tolerance: the range of each quantity for people; "" or the reason.
 
     The boxes agree in everything but the quantities named.  Together they cover the smallest box that holds all of
     them, and that box must be as wide as the tolerance around some middle.

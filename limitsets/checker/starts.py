@@ -20,9 +20,8 @@ from .texts import Quantity, by_side, hex_float, require, table
 from .thinning import check_null, check_thinning
 
 MOST_COUNTED = 100_000  # throws, or rounds, that a goal may count
-INSIDE = (
-    arb(2) ** -80
-)  # a stated kappa keeps this share of itself from the ends of its noise, which have 100 bits
+# A stated kappa keeps this share of itself from the ends of its noise, which are known to 100 bits.
+INSIDE = arb(2) ** -80
 VARYING = ("throw", "gravi")  # how the names of the quantities begin that kappa is computed from
 
 
@@ -90,7 +89,7 @@ def require_fitting(starts: Starts, goal: dict[str, Any], almost: bool, points: 
 
 
 def check_starts(c: Cells, scene: Scene, goal: dict[str, Any], starts: Starts) -> str:
-    """Check that the starts claimed come into the attracting cells, given all images; "" or what fails.
+    """Check that the starts claimed come into the attracting cells, given all images; "" or the reason.
 
     Let G be the cells with a rank.  No orbit leaves them, and off the components the rank never rises: so in the end it
     stays what it is.  It cannot stay where it falls along every target; nor for ever in a cell that only leads to
@@ -112,7 +111,7 @@ def check_starts(c: Cells, scene: Scene, goal: dict[str, Any], starts: Starts) -
 
 
 def check_starts_of_side(c: Cells, scene: Scene, starts: Starts, side: int) -> str:
-    """Check that the starts claimed on a side lie in cells with a rank or near the joint; "" or what fails."""
+    """Check that the starts claimed on a side lie in cells with a rank or near the joint; "" or the reason."""
     edges, near = c.edges[side], starts.near
     first, own = float(edges[0]), c.rank[c.start[side] : c.start[side + 1]] >= 0
     since = None if starts.x is None else starts.x[side]
@@ -139,7 +138,7 @@ def check_starts_of_side(c: Cells, scene: Scene, starts: Starts, side: int) -> s
 
 
 def check_arrival(c: Cells, scene: Scene, starts: Starts, almost: bool) -> str:
-    """Check that orbits from the cells with a rank arrive, every one or almost every one; "" or what fails."""
+    """Check that orbits from the cells with a rank arrive, every one or almost every one; "" or the reason."""
     stuck, bad = level_cells(c, scene)
     if bad:
         return bad
@@ -158,7 +157,7 @@ def check_arrival(c: Cells, scene: Scene, starts: Starts, almost: bool) -> str:
 
 
 def level_cells(c: Cells, scene: Scene) -> tuple[Array, str]:
-    """Find the cells of Z: off the components, those in which an orbit may stay at its rank; and what fails."""
+    """Find the cells of Z: off the components, those in which an orbit may stay at its rank; "" or the reason."""
     inside, claimed = c.component >= 0, c.rank >= 0
     level = np.zeros(len(inside), dtype=bool)
     alone = np.ones(len(inside), dtype=bool)  # no other cell than itself has its rank among its targets
@@ -182,7 +181,7 @@ def level_cells(c: Cells, scene: Scene) -> tuple[Array, str]:
 
 
 def check_passing(scene: Scene, side: int, phi: list[float]) -> str:
-    """Check that jogs with angles in the bracket all go one way by more than the landing scatters; "" or what fails."""
+    """Check that jogs with angles in the bracket all go one way by more than the landing scatters; "" or the reason."""
     s = scene.sides[side]
     low, high = at_angle(s, arb(phi[0])), at_angle(s, arb(phi[1]))
     rise = rise_of_jog(s, *sine_cosine(low.p.union(high.p)))
@@ -204,7 +203,7 @@ def leading_to(c: Cells, cells: Array) -> Array:
 
 
 def check_lost(scene: Scene, side: int, end: float) -> str:
-    """Check that a worst sequence of landings takes every start in (a, end] to the joint; "" or what fails.
+    """Check that a worst sequence of landings takes every start in (a, end] to the joint; "" or the reason.
 
     A start R(p, kappa), told by its impact angle p, is thrown by D(p).  Where the throw is a jog with D < e for all p
     up to an angle after the impact at the end, landings that fall short by e bring the part inward, by a least step: to
@@ -246,7 +245,7 @@ def kappa_of_worst(scene: Scene) -> Arb:
 
 
 def check_short(s: Side, lo: Arb, hi: Arb) -> str:
-    """Check that jogs with angles in [lo, hi] go outward by less than the landing scatters; "" or what fails."""
+    """Check that jogs with angles in [lo, hi] go outward by less than the landing scatters; "" or the reason."""
     rise = rise_of_jog(s, *sine_cosine(lo.union(hi)))
     end = at_angle(s, hi).D
     moved = end if rise > 0 else end - rise * ZERO.union(hi - lo)

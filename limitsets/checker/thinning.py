@@ -62,16 +62,16 @@ def steepness(
 
 
 def check_thinning(c: Cells, scene: Scene, left: Array, throws: int, kind: Array) -> str:
-    """Check that almost every orbit leaves the cells `left`, or comes to cells of another kind; "" or what fails.
+    """Check that almost every orbit leaves the cells `left`, or comes to cells of another kind; "" or the reason.
 
-    Spread starts evenly over the cells, and look at the starts that have not left.  After a throw their density is, at
-    y, the sum over all x thrown to y of the density at x over dR'/dR.  On neighbouring cells of a side where that slope
-    is positive a jog rises and is continuous, and so is a flip: at most one x for each run of such cells and branch.
-    The density is bounded by numbers, one for each cell; those at a target are at most the sum, over runs and branches,
-    of the largest number over slope that leads to it.  This rises with the numbers and is proportional to them, so once
-    all are below 1 they fall to 0 by repetition, and the starts that never leave have length zero.  Slopes are lower
-    bounds; sums of floats are taken 2^-30 too large.  An orbit that comes to another kind of cells has left: the kinds
-    are looked at apart.
+    A bound of densities under the Perron-Frobenius operator.  Spread starts evenly over the cells, and look at those
+    that have not left.  After a throw their density is, at y, the sum over all x thrown to y of the density at x over
+    dR'/dR.  On neighbouring cells of a side where that slope is positive a jog rises and is continuous, and so is a
+    flip: at most one x for each run of such cells and branch.  The density is bounded by numbers, one for each cell;
+    those at a target are at most the sum, over runs and branches, of the largest number over slope that leads to it.
+    This rises with the numbers and is proportional to them, so once all are below 1 they fall to 0 by repetition, and
+    the starts that never leave have length zero.  Slopes are lower bounds; sums of floats are taken 2^-30 too large.
+    An orbit that comes to another kind of cells has left: the kinds are looked at apart.
     """
     steep = np.full(len(left), math.nan)
     lower, upper = c.lower(), c.upper()
@@ -82,21 +82,10 @@ def check_thinning(c: Cells, scene: Scene, left: Array, throws: int, kind: Array
     if bad:
         return bad
     cells = np.flatnonzero(left)
-    run = np.cumsum((np.diff(cells, prepend=-2) > 1) | (np.diff(c.side[cells], prepend=-1) != 0))
-    froms, tos, groups = [], [], []
-    for branch, array in enumerate((c.jog, c.flip)):
-        q = np.flatnonzero(array[cells, 0] >= 0)
-        first, last = array[cells[q], 0].astype(np.int64), array[cells[q], 1].astype(np.int64)
-        if int((last - first + 1).sum()) > MOST_EDGES:
-            return "there are too many targets"
-        for step in range(int((last - first).max(initial=-1)) + 1):
-            to = first + step
-            some = (to <= last) & left[np.minimum(to, len(left) - 1)]
-            some[some] &= kind[cells[q][some]] == kind[to[some]]
-            froms.append(cells[q][some])
-            tos.append(to[some])
-            groups.append(2 * run[q][some] + branch)
-    source, to, group = (np.concatenate([np.zeros(0, np.int64), *part]) for part in (froms, tos, groups))
+    found = links_within(c, left, cells, kind)
+    if found is None:
+        return "there are too many targets"
+    source, to, group = found
     slots, slot = np.unique(to * (2 * len(cells) + 2) + group, return_inverse=True)
     owner = slots // (2 * len(cells) + 2)
     density: Array = left.astype(np.float64)
@@ -117,8 +106,31 @@ def check_thinning(c: Cells, scene: Scene, left: Array, throws: int, kind: Array
     return f"what has not arrived is not proved to thin out within {throws} throws"
 
 
+def links_within(c: Cells, left: Array, cells: Array, kind: Array) -> tuple[Array, Array, Array] | None:
+    """List the throws within cells of one kind: the cell, its target, and a number for its run and branch.
+
+    `cells` are the cells `left`, ascending.  None if there are too many.
+    """
+    run = np.cumsum((np.diff(cells, prepend=-2) > 1) | (np.diff(c.side[cells], prepend=-1) != 0))
+    froms, tos, groups = [], [], []
+    for branch, array in enumerate((c.jog, c.flip)):
+        q = np.flatnonzero(array[cells, 0] >= 0)
+        first, last = array[cells[q], 0].astype(np.int64), array[cells[q], 1].astype(np.int64)
+        if int((last - first + 1).sum()) > MOST_EDGES:
+            return None
+        for step in range(int((last - first).max(initial=-1)) + 1):
+            to = first + step
+            some = (to <= last) & left[np.minimum(to, len(left) - 1)]
+            some[some] &= kind[cells[q][some]] == kind[to[some]]
+            froms.append(cells[q][some])
+            tos.append(to[some])
+            groups.append(2 * run[q][some] + branch)
+    source, to, group = (np.concatenate([np.zeros(0, np.int64), *part]) for part in (froms, tos, groups))
+    return source, to, group
+
+
 def check_null(c: Cells, scene: Scene, cells: Array, near: bool) -> str:
-    """Check that on some cells starts of length zero come from starts of length zero only; "" or what fails.
+    """Check that on some cells starts of length zero come from starts of length zero only; "" or the reason.
 
     Where dR'/dR > 0 is proved on a cell each branch has an inverse with bounded slope.  Near the joint, which counts if
     `near`, phi rises with R, possibly by jumps; where D' > 0 on all angles possible R' = R + D(phi) grows at least as

@@ -40,7 +40,7 @@ class Two(NamedTuple):
 
 
 def check_two_throws(c: Cells, scene: Scene, bad: Array, x: float) -> str:
-    """Check that two throws with the same parameters never end beyond x in the bad cells; "" or what fails."""
+    """Check that two throws with the same parameters never end beyond x in the bad cells; "" or the reason."""
     names = scene.noise if isinstance(scene.noise, dict) else {}
     if set(names) - {"landing.x"}:
         return "with noise of the throw no two throws have the same parameters"
