@@ -58,6 +58,20 @@ def test_the_checker_imports_nothing_of_ours():
         assert imported_names(source) <= {*sys.stdlib_module_names, "numpy", "flint"}
 
 
+def test_every_name_of_the_checker_is_defined_once():
+    """In one of its files, once: a second definition would silently change what the first one's readers see."""
+    defined = []
+    for source in (PACKAGE / "checker").glob("*.py"):
+        for node in ast.parse(source.read_text(encoding="utf-8")).body:
+            if isinstance(node, ast.FunctionDef | ast.ClassDef):
+                defined.append(node.name)
+            elif isinstance(node, ast.Assign | ast.AnnAssign):
+                stored = (each for each in ast.walk(node) if isinstance(each, ast.Name))
+                defined += [each.id for each in stored if isinstance(each.ctx, ast.Store)]
+    assert {name for name in defined if defined.count(name) > 1} == set()
+    assert "PRECISION" in defined
+
+
 @pytest.mark.parametrize("source", SOURCES, ids=lambda path: str(path.relative_to(PACKAGE)))
 def test_only_the_engine_room_imports_pymunk(source):
     assert "pymunk" not in imported_names(source) or source.parent == PACKAGE / "engine"
