@@ -80,12 +80,12 @@ def check_box_claims(
     scene: Scene, c: Cells, box: int, claims: dict[str, dict[str, Any]], crew: Crew
 ) -> list[Failed]:
     """Check all claims for one box; return those that fail, with the reason."""
-    failed: list[Failed] = []
-    if "refuted" in claims:
-        bad = check_refuted(scene, claims["refuted"])
-        failed += [(["refuted"], bad)] if bad else []
-    of_cells = {name: section for name, section in claims.items() if name != "refuted"}
-    return failed + (check_cell_claims(scene, c, box, of_cells, crew) if of_cells else [])
+    if "refuted" not in claims:
+        return check_cell_claims(scene, c, box, claims, crew)
+    bad = check_refuted(scene, claims["refuted"])
+    failed = [(["refuted"], bad)] if bad else []
+    others = {name: section for name, section in claims.items() if name != "refuted"}
+    return failed + (check_cell_claims(scene, c, box, others, crew) if others else [])
 
 
 def check_cell_claims(
