@@ -40,6 +40,9 @@ bench: .venv/bench.stamp  ## the benchmarks, with their rivals in the same run
 docs: .venv/dev.stamp  ## the reference, from the docstrings, into docs/api
 	$(PY) docs/build.py
 
+checker: $(PY)  ## the recheck of certificates in one file to copy away, dist/recheck.pyz
+	$(PY) limitsets/checker/build.py dist/recheck.pyz
+
 studies: .venv/dev.stamp  ## run every study again, writing its figures and numbers
 	set -e; for study in studies/*/study.py studies/*/effects.py; do $(PY) $$study; done
 
@@ -72,4 +75,4 @@ $(PY):
 	echo "or name it: make PYTHON=/path/to/python3.12" >&2; \
 	exit 1
 
-.PHONY: help analyse test lint types contracts bench docs studies notebooks check clean
+.PHONY: help analyse test lint types contracts bench docs checker studies notebooks check clean

@@ -70,6 +70,7 @@ PACKAGE = Path(__file__).resolve().parent
 # Rooms without kernels: editing a picture must not throw away every compiled loop.  An import contract keeps
 # them from importing this file.
 KERNEL_FREE = {
+    "checker",
     "scene",
     "goals",
     "engine",
@@ -81,9 +82,6 @@ KERNEL_FREE = {
     "report",
     "cli",
 }
-
-# And the checker of certificates, which imports nothing of the package; a test sees to that.
-LONE_CHECKER = "proofs/recheck.py"
 
 # Digests kept side by side; older ones are deleted when a new one appears.
 KEPT_DIGESTS = 8
@@ -99,7 +97,7 @@ def _package_digest() -> str:
     digest = hashlib.sha256(f"{numba.__version__} {np.__version__} {sys.version_info[:2]}".encode())
     for file in sorted(PACKAGE.rglob("*.py")):
         path = file.relative_to(PACKAGE)
-        if path.parts[0] not in KERNEL_FREE and path.as_posix() != LONE_CHECKER:
+        if path.parts[0] not in KERNEL_FREE:
             digest.update(path.as_posix().encode() + b"\0" + file.read_bytes() + b"\0")
     return digest.hexdigest()[:24]
 

@@ -54,8 +54,22 @@ def test_only_jit_imports_numba(source):
 
 def test_the_checker_imports_nothing_of_ours():
     """So that it can be copied, shares no error with the prover, and cannot reach compiled code."""
-    checker = PACKAGE / "proofs" / "recheck.py"
-    assert imported_names(checker) <= {*sys.stdlib_module_names, "numpy", "flint"}
+    for source in (PACKAGE / "checker").glob("*.py"):
+        assert imported_names(source) <= {*sys.stdlib_module_names, "numpy", "flint"}
+
+
+def test_every_name_of_the_checker_is_defined_once():
+    """In one of its files, once: a second definition would silently change what the first one's readers see."""
+    defined = []
+    for source in (PACKAGE / "checker").glob("*.py"):
+        for node in ast.parse(source.read_text(encoding="utf-8")).body:
+            if isinstance(node, ast.FunctionDef | ast.ClassDef):
+                defined.append(node.name)
+            elif isinstance(node, ast.Assign | ast.AnnAssign):
+                stored = (each for each in ast.walk(node) if isinstance(each, ast.Name))
+                defined += [each.id for each in stored if isinstance(each.ctx, ast.Store)]
+    assert {name for name in defined if defined.count(name) > 1} == set()
+    assert "PRECISION" in defined
 
 
 @pytest.mark.parametrize("source", SOURCES, ids=lambda path: str(path.relative_to(PACKAGE)))

@@ -31,7 +31,7 @@ def recheck(
 
         raise AnswerError("the certificate", str(file), "one that limitsets certify wrote", report.reason)
 
-    from limitsets.proofs.recheck import EXITS, show
+    from limitsets.checker import EXITS, show
 
     def text() -> None:
         show(report, str(file))

@@ -1,6 +1,6 @@
-"""`limitsets.recheck`: the lone checker of `recheck.py`, called from Python; whoever writes a certificate asks it too.
+"""`limitsets.recheck`: the checker, called from Python; every writer of certificates calls it too.
 
-The checker needs python-flint, which only it needs, so nothing else imports it.
+The checker alone needs python-flint, so it is imported where it is called.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 from limitsets.errors import AnswerError
 
 if TYPE_CHECKING:
-    from limitsets.proofs.recheck import Report
+    from limitsets.checker import Report
 
 __all__ = ["DeniedError", "recheck", "require_confirmed"]
 
@@ -123,6 +123,6 @@ def recheck(
             "python-flint",
             "pip install python-flint",
         )
-    from limitsets.proofs.recheck import recheck as check
+    from limitsets.checker import recheck as check
 
     return check(path, workers, progress)

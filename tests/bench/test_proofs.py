@@ -15,8 +15,8 @@ import numpy as np
 import pytest
 
 import limitsets as ls
+from limitsets.checker import recheck
 from limitsets.maps import images
-from limitsets.proofs.recheck import recheck
 from tests.bench.measure import limit, take_turns, versus
 from tests.bench.python_proofs import cells, with_arb
 from tests.proofs import forge, test_recheck

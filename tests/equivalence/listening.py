@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 import os
+import re
 import sys
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-CHECKERS = ("lone_recheck", "limitsets.proofs.recheck")
+CHECKERS = ("lone_checker", "limitsets.checker")
 
 
 @pytest.hookimpl(trylast=True)
 def pytest_collection_modifyitems() -> None:
-    import limitsets.proofs.recheck  # noqa: F401
+    import limitsets.checker  # noqa: F401
 
     log = Path(os.environ["LIMITSETS_CHECKED"])
 
@@ -23,7 +24,7 @@ def pytest_collection_modifyitems() -> None:
             report = check(*words, **more)
             test = os.environ.get("PYTEST_CURRENT_TEST", "").rsplit(" ", 1)[0]
             with log.open("a") as file:
-                said = (report.verdict, report.reason, report.claims)
+                said = (report.verdict, re.sub("pytest-[0-9]+", "pytest", report.reason), report.claims)
                 file.write(f"{test}\t{said!r}".replace("\n", " ") + "\n")
             return report
 

@@ -8,5 +8,5 @@ def precision(request):
     """The checker sets it in `recheck` and in its workers; tests of its parts need it as well."""
     import flint
 
-    with flint.ctx.workprec(request.module.checker.PRECISION):
+    with flint.ctx.workprec(request.module.checker.balls.PRECISION):
         yield

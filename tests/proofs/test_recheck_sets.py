@@ -111,13 +111,16 @@ def test_numbers_as_a_scene_may_write_them(tmp_path, old, new):
 
 @pytest.mark.parametrize("text", [". in", "5.5.5 in", ".e5 in", "1e13 in", "1e-301 in", "1e9999 in", "5in"])
 def test_numbers_no_scene_has(text):
-    with pytest.raises(checker.BadFileError):
-        checker.quantity(text, "length", "x")
+    with pytest.raises(checker.texts.BadFileError):
+        checker.texts.quantity(text, "length", "x")
 
 
 def test_equal_numbers_in_other_words():
     for text in (".5 in", "0.5 in", "+.5 in", "5e-1 in", "50.e-002 in"):
-        assert checker.quantity(text, "length", "x").lo == checker.quantity("12.7 mm", "length", "x").lo
+        assert (
+            checker.texts.quantity(text, "length", "x").lo
+            == checker.texts.quantity("12.7 mm", "length", "x").lo
+        )
 
 
 # --------------------------------------------------------------------------------- throws, against 40 digits
@@ -127,7 +130,7 @@ def test_equal_numbers_in_other_words():
 def test_throws_and_their_slopes_at_40_digits(model):
     name = f"paper-{model}-angle" if "small" in model else f"paper-{model}"
     part = Part("paper-designed-small-angle" if model == "small" else name)
-    throws = checker.Throws(checker.read_scene(forge.scene(model), None))
+    throws = checker.end_points.Throws(checker.scene.read_scene(forge.scene(model), None))
     rng = np.random.default_rng(4)
     h = part.kappa * 0 + 1e-12
     for _ in range(20):
@@ -148,11 +151,14 @@ def test_throws_and_their_slopes_at_40_digits(model):
 def test_images_of_unions_hold_samples_and_are_held(good):
     """Outward: every sampled image is inside.  Inward: between samples there are no gaps wider than their steps."""
     f = good["designed"]
-    m, scene = forge.Plain(forge.scene("designed")), checker.read_scene(forge.scene("designed"), None)
-    pieces = checker.read_ends(sections(f)[0], 3)["pieces"]
+    m, scene = forge.Plain(forge.scene("designed")), checker.scene.read_scene(forge.scene("designed"), None)
+    pieces = checker.end_points.read_ends(sections(f)[0], 3)["pieces"]
     union = [[(15.5, 17.25)], [(13.0, 14.0), (15.0, 16.0)], [(9.0, 21.0)]]
-    throws = checker.Throws(scene)
-    outer, inner = (image(throws, union, pieces) for image in (checker.image_outward, checker.image_inward))
+    throws = checker.end_points.Throws(scene)
+    outer, inner = (
+        image(throws, union, pieces)
+        for image in (checker.end_points.image_outward, checker.end_points.image_inward)
+    )
     step = 1e-4
     found = [[], [], []]
     for side, intervals in enumerate(union):
@@ -170,7 +176,7 @@ def test_images_of_unions_hold_samples_and_are_held(good):
         for lo, hi in inner[k]:
             assert np.diff(x[(x > lo) & (x < hi)], prepend=lo, append=hi).max() < 3 * step
     undecided = [[piece._replace(branch=2) for piece in own] for own in pieces]
-    assert checker.image_inward(throws, union, undecided) == [[], [], []]
+    assert checker.end_points.image_inward(throws, union, undecided) == [[], [], []]
     assert sum(hi - lo for part in outer for lo, hi in part) < 1e-6 + sum(
         hi - lo for part in inner for lo, hi in part
     )
@@ -179,9 +185,9 @@ def test_images_of_unions_hold_samples_and_are_held(good):
 def test_intersections_of_unions():
     one, other = [(0.0, 2.0), (3.0, 5.0), (6.0, 7.0)], [(1.0, 4.0), (5.0, 5.5), (6.5, 9.0)]
     want = [(1.0, 2.0), (3.0, 4.0), (5.0, 5.0), (6.5, 7.0)]
-    assert checker.meeting(one, other) == checker.meeting(other, one) == want
-    assert checker.first_outside([[(3.5, 4.0)]], [other]) == ""
-    assert checker.first_outside([[(3.5, 4.5)]], [other]) == "side 0, x in [3.5, 4.5]"
+    assert checker.end_points.meeting(one, other) == checker.end_points.meeting(other, one) == want
+    assert checker.end_points.first_outside([[(3.5, 4.0)]], [other]) == ""
+    assert checker.end_points.first_outside([[(3.5, 4.5)]], [other]) == "side 0, x in [3.5, 4.5]"
 
 
 # ------------------------------------------------------------------------------------------- what is made false
@@ -423,22 +429,22 @@ def test_what_fails_is_named_and_the_rest_is_proved(good, tmp_path):
 
 
 def test_an_orbit_outside_of_the_attracting_cells_is_none_in_them(good):
-    throws = checker.Throws(checker.read_scene(forge.scene("designed"), None))
-    (orbit, *_) = checker.read_orbits(sections(good["designed"])[1], 3)["orbits"]
-    checker.prove_orbit(throws, [[(orbit.lo, orbit.hi)], [], []], orbit)
+    throws = checker.end_points.Throws(checker.scene.read_scene(forge.scene("designed"), None))
+    (orbit, *_) = checker.orbits.read_orbits(sections(good["designed"])[1], 3)["orbits"]
+    checker.orbits.prove_orbit(throws, [[(orbit.lo, orbit.hi)], [], []], orbit)
     for cells in ([[], [], []], [[(orbit.lo + 1e-12, orbit.hi)], [(0.0, 30.0)], [(0.0, 30.0)]]):
-        with pytest.raises(checker.UnprovedError, match="not in the attracting cells"):
-            checker.prove_orbit(throws, cells, orbit)
+        with pytest.raises(checker.balls.UnprovedError, match="not in the attracting cells"):
+            checker.orbits.prove_orbit(throws, cells, orbit)
 
 
 def test_an_itinerary_that_the_map_does_not_take_is_none():
     """Two flips, eleven jogs and a flip have a fixed point; but from the last of its points the part jogs."""
-    throws = checker.Throws(checker.read_scene(forge.scene("designed"), None))
+    throws = checker.end_points.Throws(checker.scene.read_scene(forge.scene("designed"), None))
     m = forge.Plain(forge.scene("designed"))
     cycle = forge.refined(m, np.array([1, 1, *[0] * 11, 1]), 6.0, 26.0)
-    (orbit,) = checker.read_orbits({"cycles": [cycle], "complete": False}, 3)["orbits"]
-    with pytest.raises(checker.UnprovedError, match="throw 14: that it is a flip is not proved"):
-        checker.prove_orbit(throws, [[(0.0, 30.0)]] * 3, orbit)
+    (orbit,) = checker.orbits.read_orbits({"cycles": [cycle], "complete": False}, 3)["orbits"]
+    with pytest.raises(checker.balls.UnprovedError, match="throw 14: that it is a flip is not proved"):
+        checker.orbits.prove_orbit(throws, [[(0.0, 30.0)]] * 3, orbit)
 
 
 def test_orbits_are_of_one_speed(tmp_path):
@@ -510,7 +516,7 @@ def test_absurd_sizes_give_one_clear_line_at_once(good, tmp_path):
 
 @pytest.mark.parametrize(("claim", "most"), [("end-points", 150), ("cycles", 100)])
 def test_work_is_limited(good, tmp_path, monkeypatch, claim, most):
-    monkeypatch.setattr(checker, "MOST_THROWN", most)
+    monkeypatch.setattr(checker.end_points, "MOST_THROWN", most)
     reasons = {word: why for word, _, why in verdict(good["designed"], tmp_path).claims}
     assert f"more than {most} boxes would be needed" in reasons[claim]
 
@@ -519,15 +525,17 @@ def test_where_there_may_be_several_impacts_nothing_is_proved(good, tmp_path):
     """kappa < ell: f may have several roots, and the impact angle may jump."""
     raw = forge.scene("designed")
     raw["throw"]["kappa"] = "2.3 in"
-    scene = checker.read_scene(raw, None)
-    with pytest.raises(checker.UnprovedError, match="not bracketed"):
-        checker.Throws(scene).point(2, 6.0)
+    scene = checker.scene.read_scene(raw, None)
+    with pytest.raises(checker.balls.UnprovedError, match="not bracketed"):
+        checker.end_points.Throws(scene).point(2, 6.0)
     f = good["designed"]
-    cells = checker.Cells([f.arrays[f"0.edges.{i}"] for i in range(3)], *[
+    cells = checker.file.Cells([f.arrays[f"0.edges.{i}"] for i in range(3)], *[
         f.arrays[f"0.{name}"] for name in ("jog", "flip", "branch", "rank", "component", "phi")])  # fmt: skip
     ends, cycles = sections(f)
-    assert "several impacts" in checker.check_ends(scene, cells, checker.read_ends(ends, 3))
-    assert "kappa > ell" in checker.check_orbits(scene, cells, checker.read_orbits(cycles, 3))
+    assert "several impacts" in checker.end_points.check_ends(
+        scene, cells, checker.end_points.read_ends(ends, 3)
+    )
+    assert "kappa > ell" in checker.orbits.check_orbits(scene, cells, checker.orbits.read_orbits(cycles, 3))
 
 
 def test_the_impact_is_bracketed_next_to_the_joint():
@@ -537,16 +545,16 @@ def test_the_impact_is_bracketed_next_to_the_joint():
     for seed in range(60):
         raw = case(seed).scene
         try:
-            scene = checker.read_scene(raw, None)
-        except checker.BadFileError:  # the part does not rest on all of its sides
+            scene = checker.scene.read_scene(raw, None)
+        except checker.texts.BadFileError:  # the part does not rest on all of its sides
             continue
         for s in scene.sides:
             x = arb(float(s.a) + float(s.arm - s.a) * 10 ** rng.uniform(-7, -2))
             if not (s.exact and s.concave and x > s.a):
                 continue
-            low, high = (checker.beside_root(s, x, scene.k_lo, before) for before in (True, False))
-            assert checker.flight(x, scene.k_lo, low) > 0
-            assert checker.flight(x, scene.k_lo, high) < 0
+            low, high = (checker.end_points.beside_root(s, x, scene.k_lo, before) for before in (True, False))
+            assert checker.model.flight(x, scene.k_lo, low) > 0
+            assert checker.model.flight(x, scene.k_lo, high) < 0
             assert high.p - low.p < low.p * arb(2) ** -20
             tried += 1
     assert tried > 40

@@ -104,10 +104,12 @@ def proved(tmp_path_factory):
 
 def reread(path):
     """A certificate as one that can be spoiled."""
-    header, entries = checker.open_certificate(path)
+    header, entries = checker.file.open_certificate(path)
     said = header["arrays"]
     arrays = {
-        key: checker.read_array(entries[f"{key}.npy"], key, about["dtype"], (about["shape"] + [1])[1], about)
+        key: checker.file.read_array(
+            entries[f"{key}.npy"], key, about["dtype"], (about["shape"] + [1])[1], about
+        )
         for key, about in said.items()
     }
     return forge.Forged(header, arrays)
@@ -141,7 +143,7 @@ def test_halves_hold_the_whole_together_and_narrow_it():
     raw["part"]["mass"]["center"]["along"] = ["4.2 in", "4.25 in"]
     raw["part"]["sides"][0] = ["5.74 in", "5.76 in"]
     raw["arm"]["surface_height"] = ["-0.2001 in", "-0.1999 in"]
-    whole = checker.read_scene(copy.deepcopy(raw), None)
+    whole = checker.scene.read_scene(copy.deepcopy(raw), None)
     pieces = [whole]
     for _ in range(6):
         pieces = [half for piece in pieces for half in piece.halves()]
@@ -149,9 +151,9 @@ def test_halves_hold_the_whole_together_and_narrow_it():
     assert all(piece.loose < 0.3 * whole.loose for piece in pieces)
 
     def ends(piece, name):
-        value = dict(checker.quantities(piece.raw))[name]
-        q = checker.quantity(value, "length", name)
-        return q.lo / checker.INCH, q.hi / checker.INCH
+        value = dict(checker.scene.quantities(piece.raw))[name]
+        q = checker.texts.quantity(value, "length", name)
+        return q.lo / checker.texts.INCH, q.hi / checker.texts.INCH
 
     names = ("part.mass.center.along", "part.sides[0]", "arm.surface_height")
     volume = sum(np.prod([float(hi - lo) for lo, hi in (ends(p, n) for n in names)]) for p in pieces)

@@ -200,7 +200,7 @@ def boxes_by_cutting(random, whole, count):
 
 @pytest.mark.parametrize("axes", [1, 2, 5, 9])
 def test_a_cover_is_seen_and_a_gap_is(axes):
-    from limitsets.proofs.recheck import covered
+    from limitsets.checker.scene import covered
 
     random = np.random.default_rng(axes)
     whole = [(Fraction(0), Fraction(1))] * axes
@@ -215,7 +215,7 @@ def test_a_cover_is_seen_and_a_gap_is(axes):
 
 
 def test_a_pinwheel_is_covered_though_no_cut_parts_its_boxes():
-    from limitsets.proofs.recheck import covered
+    from limitsets.checker.scene import covered
 
     def box(a, b, c, d):
         return [(Fraction(a), Fraction(b)), (Fraction(c), Fraction(d))]

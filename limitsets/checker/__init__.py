@@ -1,0 +1,41 @@
+"""Check a proof certificate of a throw-and-catch feeder: written from the physics, not from the prover.
+
+    python recheck.pyz FILE [--json] [--workers N]      # this package, packed in one file by `make checker`
+    python -m limitsets.checker FILE                    # the same
+
+The checker needs Python, numpy and python-flint, and nothing else of the package that wrote the certificate.  It
+believes integer comparisons, exact rationals, and signs of balls that Arb computed.  A certificate comes from a
+stranger: it is data, and the checker neither evaluates nor unpickles it nor uses it as a path.
+
+The proof is about one throw map: a part rests on side i at x = R, the arm throws it, it lands on its left vertex at the
+angle phi and either falls back ("jog") or over that vertex on side i+1 ("flip").  The certificate cuts every side into
+cells.  For every cell it says how the throw decides, where the images lie and what bracket holds phi; the checker
+proves each of these anew, for all x in the cell and all parameters allowed, and follows the integers to the claims.
+
+A function that checks a statement returns "" where it proves the statement, and else the reason in words for people.
+The files follow docs/certificates.md, and each imports only from those before it:
+
+    balls        the arithmetic of every proof
+    texts        texts, quantities and JSON
+    file         the zip, the header and the arrays                               "The file"
+    part         side by side, what the part is like
+    scene        the part on the arm, kappa, noise and tolerance                  "What is claimed"
+    model        the formulas of a throw
+    cells        structure and ranks; decision, landing and images of every cell  1 to 5
+    near_hinge   starts before the first cell                                     6, "The surface above the joint"
+    thinning     backward reachability and thinning                               7, 8
+    starts       the starts for which a goal holds                                "For which starts"
+    two_throws   two throws with the same parameters                              9
+    goals        the goals                                                        "Goals"
+    end_points   end points of the limit set                                      10 to 12
+    orbits       periodic orbits                                                  13
+    refutations  orbits that refute a goal                                        "Refutations"
+    claims       the claims of a file, and what each needs
+    report       a file from first to last, and the report about it
+    main         the command line
+"""
+
+from .main import show
+from .report import EXITS, Report, recheck
+
+__all__ = ["EXITS", "Report", "recheck", "show"]

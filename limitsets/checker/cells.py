@@ -1,0 +1,391 @@
+"""The cells: their structure and their ranks, and what every single cell claims.
+
+docs/certificates.md, "What it rests on", numbers 1 (cover) and 5 (whole numbers) by integers alone; 2 (landing), 3
+(decision), 4 (images) and the slope in balls, cell by cell, shared among processes where there are many cells.
+"""
+
+import math
+import multiprocessing
+import signal
+import threading
+from collections.abc import Callable, Iterator
+from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
+from fractions import Fraction
+from typing import Any, NamedTuple
+
+import flint
+import numpy as np
+from flint import arb
+
+from .balls import HALF, PRECISION, ZERO, Arb, Array, Pair
+from .file import Cells
+from .model import (
+    FULL_TURN,
+    Angle,
+    at_angle,
+    flight,
+    over_angles,
+    positive_until,
+    root_above,
+    root_below,
+    slope_over,
+)
+from .scene import DEPTH, Scene, Side, over_halves, read_scene
+from .texts import rounded
+
+MOST_BOXES = 20_000  # pieces of one cell: a certificate that needs more is refused
+CHUNK = 2_000  # cells handed to a worker at once
+SMALL = 20_000  # up to so many cells no other process is started
+Targets = tuple[Pair, Pair]  # the ends of the target cells of a jog and of a flip
+
+
+def range_max(values: Array, first: Array, last: Array) -> Array:
+    """Return max(values[first..last]) of each range, from maxima over windows of length 2^k, one k at a time."""
+    level = np.frexp((last - first + 1).astype(np.float64))[1] - 1  # floor(log2), exact for integers
+    out = np.zeros(len(first), dtype=np.int64)
+    window = values.astype(np.int64)
+    for k in range(int(level.max(initial=0)) + 1):
+        q = np.flatnonzero(level == k)
+        out[q] = np.maximum(window[first[q]], window[last[q] - (1 << k) + 1])
+        window = np.maximum(window[: -(1 << k)], window[1 << k :])
+    return out
+
+
+def check_structure(c: Cells, scene: Scene, least_rank: int) -> str:
+    """Check order of the edges, brackets, branches and targets, which every claim needs; "" or the reason."""
+    n_sides = len(c.edges)
+    for i, edges in enumerate(c.edges):
+        if not (np.diff(edges) > 0).all():
+            return f"side {i}: the edges of the cells do not ascend"
+        if not arb(float(edges[0])) > scene.sides[i].a:
+            return f"side {i}: the cells begin left of a_{i}"
+    lo, hi = c.phi[:, 0], c.phi[:, 1]
+    checks = [
+        ((lo > 0) & (lo < hi) & (hi <= FULL_TURN), "the bracket of phi is not one"),
+        ((c.branch >= 0) & (c.branch <= 2), "the branch is not 0, 1 or 2"),
+        (c.component >= -1, "the component is below -1"),
+        (c.rank >= least_rank, f"the rank is below {least_rank}"),
+    ]
+    for array, mine, target in ((c.jog, 0, c.side), (c.flip, 1, (c.side + 1) % n_sides)):
+        first, last = array[:, 0], array[:, 1]
+        inside = (first >= c.start[target]) & (first <= last) & (last < c.start[target + 1])
+        fits = np.where((c.branch == mine) | (c.branch == 2), inside, (first == -1) & (last == -1))
+        checks.append((fits, f"its branch and the target cells of a {('jog', 'flip')[mine]} do not fit"))
+    return first_bad(c, checks)
+
+
+def first_bad(c: Cells, checks: list[tuple[Array, str]]) -> str:
+    """Name the first cell at which one of the checks does not hold."""
+    for good, what in checks:
+        if not good.all():
+            return f"{c.name(int(np.argmin(good)))}: {what}"
+    return ""
+
+
+def check_components(c: Cells) -> str:
+    """Check that component cells map into cells of their own component; "" or the reason."""
+    if not (c.component >= 0).any():
+        return "there are no attracting cells"
+    for array, what in ((c.jog, "jog"), (c.flip, "flip")):
+        q = np.flatnonzero((array[:, 0] >= 0) & (c.component >= 0))
+        first, last = array[q, 0], array[q, 1]
+        own = c.component[q]
+        good = np.ones(len(c.component), dtype=bool)
+        highest, lowest = range_max(c.component, first, last), -range_max(-c.component, first, last)
+        good[q] = (highest == own) & (lowest == own)
+        bad = first_bad(c, [(good, f"a {what} may leave its component")])
+        if bad:
+            return bad
+    return ""
+
+
+def check_ranks(c: Cells, scene: Scene, max_rank: int) -> str:
+    """Check that the cells reach to the arm's end and the rank falls off the components; "" or the reason."""
+    for i, edges in enumerate(c.edges):
+        if Fraction(float(edges[-1])) < scene.arm[1]:
+            return f"side {i}: the cells end before arm.length"
+    inside = c.component >= 0
+    checks = [(~inside | (c.rank == 0), "a cell of a component has a rank above 0")]
+    checks.append((c.rank >= 0, "nothing is claimed of starts in it: its rank is -1"))
+    for array, what in ((c.jog, "jog"), (c.flip, "flip")):
+        q = np.flatnonzero((array[:, 0] >= 0) & ~inside)
+        good = np.ones(len(inside), dtype=bool)
+        good[q] = range_max(c.rank, array[q, 0], array[q, 1]) < c.rank[q]
+        checks.append((good, f"the rank does not fall along a {what}"))
+    checks.append((c.rank <= max_rank, f"its rank is above max_rank = {max_rank}"))
+    return first_bad(c, checks)
+
+
+def extents(c: Cells) -> str:
+    """List the attracting cells as intervals, for people."""
+    parts = []
+    for i, edges in enumerate(c.edges):
+        own = np.concatenate([[False], c.component[c.start[i] : c.start[i + 1]] >= 0, [False]])
+        ends = np.flatnonzero(np.diff(own.astype(np.int8)))
+        spans = [
+            f"[{rounded(edges[a], up=False)}, {rounded(edges[b], up=True)}]"
+            for a, b in ends.reshape(-1, 2)[:6]
+        ]
+        more = " ..." if len(ends) > 12 else ""
+        parts.append(f"side {i}: {' u '.join(spans) or 'none'}{more}")
+    return "; ".join(parts)
+
+
+class Failure(NamedTuple):
+    """The reason why a cell is not proved: its kind, "image" or "slope", and a text for people."""
+
+    kind: str
+    text: str
+
+
+class Box(NamedTuple):
+    """A piece of a cell, of kappa and of the scene; a bracket of the impact angle there; how often each was halved."""
+
+    scene: Scene
+    x0: Arb
+    x1: Arb
+    k0: Arb
+    k1: Arb
+    low: Angle
+    high: Angle
+    in_x: int
+    in_k: int
+    in_s: int
+
+    def halves(self, side: int, of: str) -> list["Box"]:
+        """Halve the box in x, in kappa or in a quantity, whichever widens the angle most; [] at the limits of halving.
+
+        `of` is what is too wide: the "decision" or the "image".
+        """
+        xm = arb(float((HALF * (self.x0 + self.x1)).mid()))
+        km = arb(float((HALF * (self.k0 + self.k1)).mid()))
+        by_x = self.in_x < DEPTH and self.x0 < xm and xm < self.x1
+        by_k = self.in_k < DEPTH and self.k0 < km and km < self.k1
+        of_x = float(self.x1 - self.x0) if by_x else 0.0
+        of_k = float(HALF * self.high.p * (self.k1 - self.k0)) if by_k else 0.0
+        if self.in_s < DEPTH and self.scene.loose > 0 and self.scene.width(of, side) > max(of_x, of_k):
+            return [self.of(half, side) for half in self.scene.halves(of, side)]
+        if by_k and of_k >= of_x:
+            return [self._replace(k0=km, in_k=self.in_k + 1), self._replace(k1=km, in_k=self.in_k + 1)]
+        if by_x:
+            return [self._replace(x0=xm, in_x=self.in_x + 1), self._replace(x1=xm, in_x=self.in_x + 1)]
+        return []
+
+    def of(self, scene: Scene, side: int) -> "Box":
+        """Return the box for a narrower scene: the bracket stays, the functions of the angle get narrower."""
+        low, high = (at_angle(scene.sides[side], at.p) for at in (self.low, self.high))
+        return self._replace(scene=scene, low=low, high=high, in_s=self.in_s + 1)
+
+
+def check_bracket(s: Side, box: "Box") -> str:
+    """Check a bracket of phi at two corners of a box, which is enough: f rises with x and falls with kappa."""
+    if not positive_until(s, box.x0, box.k1, box.low):
+        return f"f > 0 up to phi = {float(box.low.p)!r} is not proved at x = {float(box.x0)!r}"
+    if not flight(box.x1, box.k0, box.high) < 0:
+        return f"f < 0 at phi = {float(box.high.p)!r} is not proved at x = {float(box.x1)!r}"
+    return ""
+
+
+def check_cell(
+    scene: Scene, side: int, x: tuple[float, float], phi: tuple[float, float],
+    targets: Targets, least: Arb | None,
+) -> tuple[Failure | None, int]:  # fmt: skip
+    """Prove the statements about one cell; the failure or None, and the number of boxes looked at.
+
+    `targets` are (nan, nan) where the branch is excluded, so that no image lies inside; an upper end inf stands for
+    the arm's length.
+    """
+    k_lo, k_hi = scene.k_lo, scene.k_hi
+    s = scene.sides[side]
+    first = Box(
+        scene, arb(x[0]), arb(x[1]), k_lo, k_hi, at_angle(s, arb(phi[0])), at_angle(s, arb(phi[1])), 0, 0, 0
+    )
+    bad = check_bracket(s, first)
+    if bad and scene.loose > 0:
+        bad = over_halves(scene, lambda half: check_bracket(half.sides[side], first.of(half, side)))
+    if bad:
+        return Failure("image", bad), 1
+    stack, boxes = [first], 0
+    while stack:
+        box = stack.pop()
+        boxes += 1
+        failure = check_box(box.scene.sides[side], box, targets, least)
+        if failure is not None:
+            halves = box.halves(side, "decision" if failure.text.endswith("is not excluded") else "image")
+            if not halves or boxes + len(stack) > MOST_BOXES:
+                return failure, boxes
+            for half in halves:
+                s = half.scene.sides[side]
+                high = root_above(s, half.x1, half.k0, half.high)
+                low = root_below(s, half.x0, half.k1, half.low, high.p)
+                stack.append(half._replace(low=low, high=high))
+    return None, boxes
+
+
+def check_box(s: Side, box: Box, targets: Targets, least: Arb | None) -> Failure | None:
+    """Check decision, images and slope over a box.  Noise of the landing place moves an image, and decides nothing."""
+    phi, R = box.low.p.union(box.high.p), box.x0.union(box.x1)
+    kappa = box.k0.union(box.k1)
+    decision, rise, f_slope = over_angles(s, phi, R, kappa)
+    slope = None
+    if least is not None or not rise > 0:
+        slope = slope_over(s, phi, kappa, rise, f_slope)
+    lo, hi = jog_over(s, box, rise, slope)
+    lo, hi = lo - s.landing, hi + s.landing
+    for branch in (0, 1) if decision == 2 else (decision,):
+        if branch == 1:
+            lo, hi = lo - s.shift, hi - s.shift
+        bad = check_target(s, branch, lo, hi, targets[branch])
+        if bad:
+            return Failure("image", bad)
+    if least is not None and not (slope is not None and (slope >= least or -slope >= least)):
+        return Failure("slope", "its slope is not proved to be as large as claimed")
+    return None
+
+
+def jog_over(s: Side, box: Box, rise: Arb, slope: Arb | None) -> tuple[Arb, Arb]:
+    """Bound R'(jog) = R + D(phi) over a box from below and from above; `rise` encloses D', and `slope` dR'/dR.
+
+    Where D' > 0 both terms are largest at the upper ends.  Otherwise, where R' is proved to rise with R at each kappa,
+    its extremes lie at the ends of the cell, and the mean value theorem encloses D there from a bracket of phi at that
+    end.  Otherwise the mean value theorem encloses R' over the box.
+    """
+    _, x0, x1, k0, k1, low, high, _, _, _ = box
+    if rise > 0:
+        return x0 + low.D, x1 + high.D
+    if slope is not None and slope > 0:
+        lo = x0 + low.D + rise * ZERO.union(root_above(s, x0, k0, high).p - low.p)
+        hi = x1 + high.D - rise * ZERO.union(high.p - root_below(s, x1, k1, low, high.p).p)
+        return lo, hi
+    whole = x0.union(x1) + low.D + rise * (low.p.union(high.p) - low.p)
+    return whole, whole
+
+
+def check_target(s: Side, branch: int, lo: Arb, hi: Arb, target: Pair) -> str:
+    """Check that the image [lo, hi] of a branch lies inside its target cells; "" or the reason."""
+    left, right = target
+    if lo > left and (hi <= s.arm if right == math.inf else hi < right):
+        return ""
+    what = ("jog", "flip")[branch]
+    if math.isnan(left):
+        return f"a {what} is not excluded"
+    image = f"[{float(lo.lower())!r}, {float(hi.upper())!r}]"
+    end = "arm.length" if right == math.inf else repr(right)
+    return f"the image of a {what}, {image}, is not proved to lie in ({left!r}, {end})"
+
+
+class Task(NamedTuple):
+    """Some cells of one side, with their ends, brackets and the ends of their targets, one row for each."""
+
+    box: int
+    side: int
+    cells: Array
+    rows: Array  # x0, x1, phi_lo, phi_hi, jog lo, jog hi, flip lo, flip hi
+    least: float | None
+
+
+# Balls cannot be sent to another process: each process keeps the JSON of the scenes and the noise, and reads the scenes
+# that it needs.
+SETUP: list[Any] = []
+SCENES: dict[int, Scene] = {}
+
+
+def prepare(raw: list[object], noise: object) -> None:
+    """Set up a process that checks cells."""
+    flint.ctx.prec = PRECISION
+    SETUP[:] = raw, noise
+    SCENES.clear()
+
+
+def check_task(task: Task) -> tuple[int, Failure | None, int]:
+    """Return the first cell of a task that is not proved (-1 if there is none), the reason, and the number of boxes."""
+    if task.box not in SCENES:
+        SCENES.clear()  # together with their halves
+        SCENES[task.box] = read_scene(SETUP[0][task.box], SETUP[1])
+    scene = SCENES[task.box]
+    least = None if task.least is None else arb(task.least)
+    total = 0
+    for cell, (x0, x1, p0, p1, j0, j1, f0, f1) in zip(task.cells.tolist(), task.rows.tolist(), strict=True):
+        targets = ((j0, j1), (f0, f1))
+        failure, boxes = check_cell(scene, task.side, (x0, x1), (p0, p1), targets, least)
+        total += boxes
+        if failure is not None:
+            return cell, failure, total
+    return -1, None, total
+
+
+def tasks_of(c: Cells, scene: Scene, box: int, chosen: Array, least: float | None) -> Iterator[Task]:
+    """Cut the chosen cells, which ascend, into tasks of one side each."""
+    lower, upper = c.lower(), c.upper()
+    short, long = (float(end) for end in scene.arm)
+    short = short if Fraction(short) <= scene.arm[0] else math.nextafter(short, -math.inf)
+    long = long if Fraction(long) >= scene.arm[1] else math.nextafter(long, math.inf)
+    for side in range(len(c.edges)):
+        own = chosen[c.side[chosen] == side]
+        for part in np.array_split(own, max(1, -(-len(own) // CHUNK))):
+            table = np.full((len(part), 8), math.nan)
+            table[:, 0], table[:, 1], table[:, 2:4] = lower[part], upper[part], c.phi[part]
+            for column, array in ((4, c.jog[part]), (6, c.flip[part])):
+                q = np.flatnonzero(array[:, 0] >= 0)
+                table[q, column] = lower[array[q, 0]]
+                ends = upper[array[q, 1]]
+                # where the shortest arm ends before the target cells do, the image has to end at the arm's end
+                table[q, column + 1] = np.where((ends > short) | (ends >= long), math.inf, ends)
+            if len(part):
+                yield Task(box, side, part, table, least)
+
+
+@contextmanager
+def deaf_children() -> Iterator[None]:
+    """Start processes that leave Ctrl-C to this one."""
+    if threading.current_thread() is not threading.main_thread():  # only the main thread may set a signal
+        yield
+        return
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, signal.SIG_DFL if before is None else before)
+
+
+class Crew:
+    """The processes that check cells: this one alone, and others too for large certificates."""
+
+    def __init__(
+        self, raw: list[object], noise: object, workers: int, progress: Callable[[int], None] | None
+    ):
+        self.setup, self.workers, self.progress = (raw, noise), workers, progress
+        self.done = self.boxes = 0
+        self.pool: ProcessPoolExecutor | None = None
+        prepare(raw, noise)
+
+    def run(self, tasks: list[Task]) -> tuple[int, Failure] | None:
+        """Return the first cell that is not proved, in the order of the tasks, and the reason; or None."""
+        if self.workers > 1 and self.pool is None and sum(len(t.cells) for t in tasks) > SMALL:
+            # never by fork, which copies locks that other threads hold
+            method = multiprocessing.get_start_method(allow_none=True)
+            context = multiprocessing.get_context("forkserver" if method == "forkserver" else "spawn")
+            self.pool = ProcessPoolExecutor(self.workers, context, prepare, self.setup)
+        try:
+            with deaf_children():
+                results = map(check_task, tasks) if self.pool is None else self.pool.map(check_task, tasks)
+            for task, (cell, failure, boxes) in zip(tasks, results, strict=True):
+                self.done += len(task.cells)
+                self.boxes += boxes
+                if failure is not None:
+                    return cell, failure
+                if self.progress is not None:
+                    self.progress(self.done)
+        except BrokenProcessPool:  # they cannot be started here, as in a script without a main guard
+            self.close()
+            self.workers = 1
+            return self.run(tasks)
+        return None
+
+    def close(self) -> None:
+        """End the other processes."""
+        if self.pool is not None:
+            self.pool.shutdown(cancel_futures=True)
+            self.pool = None

@@ -1,0 +1,191 @@
+"""The claims of a file: how each is read, checked and put in words.
+
+docs/certificates.md, "What is claimed", and the end of "Goals, end points, orbits" for what each claim rests on.
+"""
+
+import math
+from typing import Any
+
+import numpy as np
+
+from .cells import Crew, check_components, check_ranks, check_structure, tasks_of
+from .end_points import check_ends, ends_statement, read_ends
+from .file import Cells
+from .goals import GOALS, check_goal, read_goal_claim, statement_of_goal
+from .near_hinge import check_below_cells, fixed_points_in_words, read_near_hinge
+from .orbits import check_orbits, orbits_statement, read_orbits
+from .refutations import check_refuted, read_refutation, statement_of_refutation
+from .scene import Scene, over_halves
+from .texts import hex_float, plain, require, rounded, rows, table
+
+SECTIONS = {  # the known claims, and the keys of their sections
+    "attracts-all": "near_joint max_rank",
+    "invariant": "",
+    "trapping": "",
+    "goal": "kind",  # further keys depend on the kind, see GOALS
+    "expanding": "least_slope",
+    "end-points": "images ends pieces",
+    "cycles": "cycles complete",
+    "refuted": "goal nominal tolerance",
+}
+MORE_KEYS = {"refuted": "recurs start throws"}  # further keys that a section may have
+Failed = tuple[list[str], str]  # the claims that fail, and the reason
+
+
+def read_claims(
+    value: object, n_sides: int, version: int
+) -> tuple[dict[str, dict[str, Any]], list[tuple[str, str, str]]]:
+    """Read the claims that can be checked, name -> section, and those that cannot."""
+    known: dict[str, dict[str, Any]] = {}
+    unknown = []
+    for claim in rows(value, "claims", 1, 100):
+        table(claim, "a claim", "claim", "section")
+        name, section = claim["claim"], claim.get("section")
+        if not isinstance(name, str) or name not in SECTIONS:
+            unknown.append((plain(name), "not rechecked", "this checker does not know the claim"))
+        elif section is None:
+            unknown.append((name, "not rechecked", "the claim has no section"))
+        elif name == "goal" and isinstance(section, dict) and section.get("kind") not in list(GOALS):
+            unknown.append((name, "not rechecked", "this checker does not know the kind of goal"))
+        else:
+            require(name not in known, f"claim {name} is made twice")
+            if name == "goal":
+                known[name] = read_goal_claim(section, n_sides, version)
+            else:
+                section = table(section, f"section of {name}", SECTIONS[name], MORE_KEYS.get(name, ""))
+                known[name] = read_section(name, section, n_sides)
+    return known, unknown
+
+
+def read_section(name: str, section: dict[str, Any], n_sides: int) -> dict[str, Any]:
+    """Read the section of any claim but `goal`."""
+    if name == "attracts-all":
+        q, fixed = read_near_hinge(section["near_joint"], n_sides)
+        require(type(section["max_rank"]) is int, "max_rank is not an integer")
+        return {"q": q, "fixed": fixed, "max_rank": section["max_rank"]}
+    if name == "expanding":
+        least = hex_float(section["least_slope"], "least_slope")
+        require(least > 1, "least_slope is not above 1")
+        return {"least": least}
+    if name == "end-points":
+        return read_ends(section, n_sides)
+    if name == "cycles":
+        return read_orbits(section, n_sides)
+    if name == "refuted":
+        return read_refutation(section, n_sides)
+    return {}
+
+
+def check_box_claims(
+    scene: Scene, c: Cells, box: int, claims: dict[str, dict[str, Any]], crew: Crew
+) -> list[Failed]:
+    """Check all claims for one box; return those that fail, with the reason."""
+    if "refuted" not in claims:
+        return check_cell_claims(scene, c, box, claims, crew)
+    bad = check_refuted(scene, claims["refuted"])
+    failed = [(["refuted"], bad)] if bad else []
+    others = {name: section for name, section in claims.items() if name != "refuted"}
+    return failed + (check_cell_claims(scene, c, box, others, crew) if others else [])
+
+
+def check_cell_claims(
+    scene: Scene, c: Cells, box: int, claims: dict[str, dict[str, Any]], crew: Crew
+) -> list[Failed]:
+    """Check the claims about cells: first by integers, then decision, images and slope of the cells concerned."""
+    goal, attracts = claims.get("goal"), claims.get("attracts-all")
+    first_version = goal is not None and goal["starts"] is None
+    bad = check_structure(c, scene, 0 if first_version else -1) or check_components(c)
+    if bad:
+        return [(list(claims), bad)]
+    failed: list[Failed] = []
+    wide, some = [], []  # claims about throws from all cells, and from those that have a rank
+    if goal is not None:
+        bad = check_goal(c, scene, goal)
+        if bad:
+            failed.append((["goal"], bad))
+        elif (first_version and goal["all"]) or (goal["anywhere"] and goal["kind"] != "attracts_all"):
+            wide.append("goal")
+        elif not first_version:
+            some.append("goal")
+    if attracts is not None:
+        bad = check_attracts_all(c, scene, attracts)
+        if bad:
+            failed.append((["attracts-all"], bad))
+        else:
+            wide.append("attracts-all")
+    return failed + check_throws_of_cells(scene, c, box, claims, (wide, some), crew)
+
+
+def check_attracts_all(c: Cells, scene: Scene, section: dict[str, Any]) -> str:
+    """Check ranks and the starts near the joint; "" or the reason."""
+    bad = check_ranks(c, scene, section["max_rank"])
+    if bad:
+        return bad
+    for i, (q, said) in enumerate(zip(section["q"], section["fixed"], strict=True)):
+        edge = float(c.edges[i][0])
+        near = over_halves(scene, check_below_cells, i, edge, q, said)
+        if near:
+            return f"side {i}, near the joint, x in (a, {edge!r}]: {near}"
+    return ""
+
+
+def check_throws_of_cells(
+    scene: Scene, c: Cells, box: int, claims: dict[str, dict[str, Any]],
+    about: tuple[list[str], list[str]], crew: Crew,
+) -> list[Failed]:  # fmt: skip
+    """Check the throws from the attracting cells, then those from the others that some claim needs.
+
+    `about`: the claims about all cells, and the claims about the cells with a rank.  Images are proved to lie strictly
+    inside the union of their target cells (or at most at the arm's length), so that "invariant" gives "trapping".
+    """
+    failed: list[Failed] = []
+    least = claims["expanding"]["least"] if "expanding" in claims else None
+    inside = np.flatnonzero(c.component >= 0)
+    found = crew.run(list(tasks_of(c, scene, box, inside, least)))
+    if found is not None and found[1].kind == "slope":
+        failed.append((["expanding"], f"{c.name(found[0])}: {found[1].text}"))
+        found = crew.run(list(tasks_of(c, scene, box, inside, None)))
+    if found is not None:
+        return [*failed, (list(claims), f"{c.name(found[0])}: {found[1].text}")]
+    for name, check in (("end-points", check_ends), ("cycles", check_orbits)):
+        bad = check(scene, c, claims[name]) if name in claims else ""
+        failed += [([name], bad)] if bad else []
+    wide, some = about
+    for names, mask in ((wide + some, c.rank >= 0), (wide, c.rank < 0)):
+        chosen = np.flatnonzero((c.component < 0) & mask)
+        found = crew.run(list(tasks_of(c, scene, box, chosen, None))) if names else None
+        if found is not None:
+            return [*failed, (names, f"{c.name(found[0])}: {found[1].text}")]
+    return failed
+
+
+def statement_of(name: str, section: dict[str, Any], noisy: bool) -> str:
+    """Put a claim in words."""
+    if name == "attracts-all":
+        if None not in section["fixed"]:
+            return fixed_points_in_words(section, noisy)
+        return (
+            f"attracts-all: every start a_i < x <= arm.length on every side i enters the attracting cells and stays in"
+            f" them, within {section['max_rank']} throws where x is in the cells; nearer to the joint x - a_i grows by"
+            f" a factor of at least {rounded(min(section['q']), up=False)} with every throw"
+        )
+    if name == "goal":
+        return statement_of_goal(section, noisy)
+    if name == "expanding":
+        least = section["least"]
+        entropy = "" if noisy else f"; topological entropy >= ln({least!r}) >= {entropy_of(least)}"
+        return f"expanding: |dR'/dR| >= {least!r} on the attracting cells{entropy}"
+    if name == "end-points":
+        return ends_statement(section, noisy)
+    if name == "cycles":
+        return orbits_statement(section)
+    if name == "refuted":
+        return statement_of_refutation(section)
+    if name == "trapping":
+        return "trapping: the attracting cells are mapped into their interior (relative to x <= arm.length)"
+    return "invariant: no throw leaves the attracting cells, nor the component it starts in"
+
+
+def entropy_of(least: float) -> str:
+    """Write the logarithm of a slope, rounded down by more than its error."""
+    return rounded(math.log(least) * (1 - 2.0**-40), up=False, digits=6)

@@ -1,0 +1,249 @@
+"""The goals: what each asks of the attracting cells, or from anywhere on the arm.
+
+docs/certificates.md, "Goals", and what `goal` rests on in "Goals, end points, orbits".
+"""
+
+import math
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+
+from .cells import check_ranks, first_bad, range_max
+from .file import Cells
+from .near_hinge import check_everywhere, near_landing
+from .scene import Scene
+from .starts import (
+    ATTRACTING,
+    MOST_COUNTED,
+    Starts,
+    check_starts,
+    explained_in_words,
+    read_starts,
+    starts_in_words,
+)
+from .texts import LENGTHS, quantity, require, rows, table
+from .thinning import check_null, check_thinning, not_arriving
+from .two_throws import check_two_throws
+
+GOAL_KEYS = "x side every_orbit throws order jogs from_anywhere"
+GOALS = {  # the kinds that are known, and the keys of their sections; from_anywhere may come with each
+    "oriented_beyond": "kind x side",
+    "reaches": "kind x side every_orbit throws",
+    "attracts_all": "kind",
+    "flip_order": "kind order jogs",
+    "stays_on_arm": "kind",
+}
+
+
+def read_goal_claim(section: object, n_sides: int, version: int) -> dict[str, Any]:
+    """Read the section of a goal, with the starts for which it is claimed."""
+    starts = "starts thinning near_joint lost" if version > 1 else ""
+    known = table(section, "section of goal", "kind", f"{GOAL_KEYS} {starts}")
+    own = {key: value for key, value in known.items() if key not in starts.split()}
+    more = "from_anywhere throws" if own["kind"] == "oriented_beyond" else "from_anywhere"
+    goal = read_goal(table(own, "section of goal", GOALS[own["kind"]], more), n_sides)
+    return goal | {"starts": read_starts(known, goal, n_sides) if version > 1 else None}
+
+
+def read_goal(section: dict[str, Any], n_sides: int) -> dict[str, Any]:
+    """Read a goal; its entry `all` is true if it is about throws from all cells, not from the attracting ones alone."""
+
+    def whole(value: object, least: int, most: int, what: str) -> int:
+        fits = type(value) is int and least <= value < most
+        require(fits, f"goal.{what} is not a whole number as it should be")
+        return int(str(value))
+
+    kind, anywhere = section["kind"], section.get("from_anywhere", False)
+    require(isinstance(anywhere, bool), "goal.from_anywhere is neither true nor false")
+    goal = {"kind": kind, "anywhere": anywhere, "all": anywhere or kind == "attracts_all"}
+    if "x" in section:
+        x = quantity(section["x"], "length", "goal.x")
+        require(x.lo == x.hi, "goal.x is not one number")
+        goal |= {"x": x, "text": str(x), "side": whole(section["side"], 0, n_sides, "side")}
+    if kind == "oriented_beyond":
+        goal["throws"] = whole(section.get("throws", 0), 0, 3, "throws")
+        require(
+            goal["throws"] in (0, 2) and not (anywhere and goal["throws"]), "goal.throws is neither 0 nor 2"
+        )
+    if kind == "reaches":
+        require(isinstance(section["every_orbit"], bool), "goal.every_orbit is neither true nor false")
+        goal |= {
+            "every": section["every_orbit"],
+            "throws": whole(section["throws"], 0, MOST_COUNTED, "throws"),
+        }
+    if kind == "flip_order":
+        order = [whole(i, 0, n_sides, "order") for i in rows(section["order"], "goal.order", 1, 64)]
+        goal |= {"order": order, "jogs": whole(section["jogs"], 0, MOST_COUNTED, "jogs")}
+    return goal
+
+
+def goal_of_scene(scene: dict[str, Any], n_sides: int) -> dict[str, Any] | None:
+    """Read a scene's own goal, in the form of a section."""
+    if scene.get("goal") is None:
+        return None
+    known = table(scene["goal"], "scene.goal", "", " ".join([*GOALS, "from_anywhere"]))
+    kinds = [key for key in known if key != "from_anywhere"]
+    require(len(kinds) == 1, "scene.goal does not name one goal")
+    kind, value = kinds[0], known[kinds[0]]
+    section = {"kind": kind, "from_anywhere": known.get("from_anywhere", False)}
+    if kind in ("oriented_beyond", "reaches"):
+        more = "every_orbit" if kind == "reaches" else ""
+        section |= table(value, f"scene.goal.{kind}", "x side", more)
+        section |= {"every_orbit": section.get("every_orbit", False), "throws": 0} if more else {}
+    elif kind == "flip_order":
+        section |= {"order": value, "jogs": 0}
+    else:
+        require(value is True, f"scene.goal.{kind} is not true")
+    return read_goal(section, n_sides)
+
+
+def content_of_goal(goal: dict[str, Any]) -> tuple[Any, ...]:
+    """Return what a goal asks, for comparison: kind, x in metres, side, and the rest."""
+    x = goal["x"].lo if "x" in goal else None
+    words = (goal.get("side"), goal.get("every"), goal.get("order"))
+    return (goal["kind"], goal["all"], x, *words)
+
+
+def check_goal(c: Cells, scene: Scene, goal: dict[str, Any]) -> str:
+    """Check a goal by the integers, given that all images are what the certificate says; "" or the reason."""
+    starts = goal["starts"]
+    everywhere = goal["all"] if starts is None else goal["anywhere"] and goal["kind"] != "attracts_all"
+    bad = check_everywhere(c, scene) if everywhere else ""
+    if not bad and starts is not None:
+        bad = check_starts(c, scene, goal, starts)
+    elif not bad and goal["all"] and goal["kind"] in ("attracts_all", "flip_order"):
+        bad = check_ranks(c, scene, int(c.rank.max()))
+    if bad:
+        return bad
+    if goal["kind"] == "oriented_beyond":
+        return check_oriented(c, scene, goal)
+    if goal["kind"] == "reaches":
+        return check_reaches(c, scene, goal)
+    if goal["kind"] == "attracts_all":
+        return check_one_component(c)
+    if goal["kind"] == "flip_order":
+        return check_flip_order(c, goal)
+    return ""  # stays_on_arm says only that images lie in cells
+
+
+def check_oriented(c: Cells, scene: Scene, goal: dict[str, Any]) -> str:
+    """Check that no attracting cell, or no target of any cell, of another side reaches beyond x; "" or the reason."""
+    beyond = goal["x"].lo / LENGTHS[scene.unit]
+    x = float(beyond)
+    if Fraction(x) > beyond:
+        x = math.nextafter(x, -math.inf)  # the largest float that is not above
+    wrong = (c.side != goal["side"]) & (c.upper() > x)
+    if not goal["anywhere"]:
+        wrong &= c.component >= 0
+        if goal["throws"] and wrong.any():
+            return check_two_throws(c, scene, wrong, x)
+        return first_bad(
+            c, [(~wrong, f"an attracting cell of another side reaches beyond x = {float(beyond)!r}")]
+        )
+    for array, what in ((c.jog, "jog"), (c.flip, "flip")):
+        q = np.flatnonzero(array[:, 0] >= 0)
+        good = np.ones(len(wrong), dtype=bool)
+        good[q] = range_max(wrong.astype(np.int64), array[q, 0], array[q, 1]) == 0
+        bad = first_bad(c, [(good, f"a {what} may end beyond x = {float(beyond)!r} on another side")])
+        if bad:
+            return bad
+    for i, edges in enumerate(c.edges):
+        edge = float(edges[0])
+        if i != goal["side"] and not near_landing(scene.sides[i], scene.k_lo, scene.k_hi, edge) <= x:
+            return f"side {i}, near the joint: a throw may end beyond x = {float(beyond)!r}"
+    return ""
+
+
+def check_reaches(c: Cells, scene: Scene, goal: dict[str, Any]) -> str:
+    """Check that orbits come to rest at x or beyond on the side, every one or almost every one; "" or the reason."""
+    least = goal["x"].lo / LENGTHS[scene.unit]
+    x = float(least)
+    if Fraction(x) < least:
+        x = math.nextafter(x, math.inf)  # the smallest float that is not below
+    wanted = (c.side == goal["side"]) & (c.lower() >= x)
+    inside = c.component >= 0
+    if goal["every"]:
+        everything = np.ones(len(inside), dtype=bool)
+        cells = everything if goal["anywhere"] else inside
+        late = not_arriving(c, [c.jog, c.flip], cells, wanted, goal["throws"])
+        return first_bad(c, [(~late, f"{goal['throws']} throws are not proved to be enough")])
+    if goal["anywhere"] and goal["starts"] is None:
+        bad = check_ranks(c, scene, int(c.rank.max())) or check_null(c, scene, ~inside, True)
+        if bad:
+            return bad
+    return check_thinning(c, scene, inside & ~wanted, goal["throws"], np.zeros(len(inside), dtype=np.int32))
+
+
+def check_one_component(c: Cells) -> str:
+    """Check that each attracting cell leads to every other through targets; "" or the reason."""
+    inside = c.component >= 0
+    start = np.zeros(len(inside), dtype=bool)
+    start[np.argmax(inside)] = True
+    ways = [(array, np.flatnonzero((array[:, 0] >= 0) & inside)) for array in (c.jog, c.flip)]
+    forward, backward = start.copy(), start.copy()
+    while True:
+        before = int(forward.sum()) + int(backward.sum())
+        count = np.concatenate([[0], np.cumsum(backward)])
+        marks = np.zeros(len(inside) + 1, dtype=np.int64)
+        for array, q in ways:
+            own = q[forward[q]]
+            np.add.at(marks, array[own, 0], 1)
+            np.add.at(marks, array[own, 1] + 1, -1)
+            backward[q] |= count[array[q, 1] + 1] > count[array[q, 0]]
+        forward |= np.cumsum(marks[:-1]) > 0
+        if int(forward.sum()) + int(backward.sum()) == before:
+            break
+    connected = ~inside | (forward & backward)
+    return first_bad(c, [(connected, "an attracting cell is not of one component with the first")])
+
+
+def check_flip_order(c: Cells, goal: dict[str, Any]) -> str:
+    """Check that orbits from the attracting cells come to the sides in the order asked, again and again."""
+    order, n, inside = goal["order"], len(c.edges), c.component >= 0
+    if len(order) == 1 and not goal["anywhere"]:
+        return first_bad(c, [(~inside | (c.side == order[0]), "an attracting cell lies on another side")])
+    follows = all((a + 1) % n == b for a, b in zip(order, order[1:] + order[:1], strict=True))
+    if len(order) != n or not follows:
+        return "the order is not that in which flips lead from side to side"
+    # one more than the jogs in a row: the throw after them is a flip, or there is none
+    late = not_arriving(c, [c.jog], inside, np.zeros(len(inside), dtype=bool), goal["jogs"] + 1)
+    return first_bad(c, [(~late, f"{goal['jogs'] + 1} jogs in a row are not excluded")])
+
+
+def statement_of_goal(goal: dict[str, Any], noisy: bool) -> str:
+    """Put a goal in words; its `starts` are those for which it is proved."""
+    starts = goal["starts"] or (Starts("every") if goal["all"] else ATTRACTING)
+    place = starts_in_words(starts, noisy)
+    into = f"; into the attracting cells comes, and there stays, {place}"
+    if starts.only:
+        place, into = "every start in the attracting cells", ""
+    if goal["anywhere"]:
+        into = ""
+    here = place if goal["anywhere"] else "every start in the attracting cells"
+    if goal["kind"] == "oriented_beyond":
+        cells = "after two throws with the same parameters in" if goal["throws"] else "in"
+        where = f"after a throw from {place}" if goal["anywhere"] else f"{cells} the attracting cells"
+        words = f"{where}, x > {goal['text']} implies side {goal['side']}{into}"
+    elif goal["kind"] == "reaches":
+        there = f"comes to rest on side {goal['side']} at x >= {goal['text']}"
+        most = f"after {goal['throws']} throws at most where x is in the cells"
+        almost = f"{place}{but_for_length_zero(starts, noisy)} {there}"
+        words = f"{here} {there}, {most}{into}" if goal["every"] else almost
+    elif goal["kind"] == "attracts_all":
+        words = f"{place} enters one component of attracting cells, connected by its images, and stays in it"
+    elif goal["kind"] == "flip_order":
+        order = " ".join(map(str, goal["order"]))
+        again = f"comes to lie on the sides in the order {order}, again and again"
+        stays = f"stays on side {order}" if len(goal["order"]) == 1 else again
+        words = f"from {here} the part {stays}{into}"
+    else:
+        words = f"from {place} no throw leads off the arm or to x <= a_i"
+    return "\n".join([f"goal: {words}", *explained_in_words(starts)])
+
+
+def but_for_length_zero(starts: Starts, noisy: bool) -> str:
+    """Name the starts excepted from a goal of almost every orbit, unless the starts in words have them already."""
+    if starts.thinning:
+        return ""
+    return ", but for starts of total length zero" + (", others for other throws" if noisy else "")

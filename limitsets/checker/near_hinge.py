@@ -1,0 +1,254 @@
+"""Near the hinge: starts before the first cell of a side.
+
+docs/certificates.md, "What it rests on", number 6 (near the joint), and "The surface above the joint".
+"""
+
+from fractions import Fraction
+from typing import Any
+
+from flint import arb
+
+from .balls import HALF, ONE, ZERO, Arb, Pair
+from .file import Cells
+from .model import (
+    Ratios,
+    at_angle,
+    flight,
+    gain_at,
+    gain_slope,
+    guess_root,
+    landing_at,
+    landing_slope,
+    over_angles,
+    ratios,
+    rise_of_jog,
+    root_above,
+)
+from .scene import Scene, Side, over_halves
+from .texts import by_side, hex_float, require, rounded, rows, table
+
+
+def read_near_hinge(value: object, n_sides: int) -> tuple[list[float], list[Pair | None]]:
+    """Read the claims about starts before the first cell: factors q, and brackets of fixed points or None, by side."""
+    near = by_side(value, "near_joint", n_sides)
+    each = [table(one, "near_joint", "q", "fixed_point") for one in near]
+    fixed = [read_bracket(one["fixed_point"]) if "fixed_point" in one else None for one in each]
+    return [hex_float(one["q"], "q") for one in each], fixed
+
+
+def read_bracket(value: object) -> tuple[float, float]:
+    """Read two numbers that enclose a fixed point."""
+    lo, hi = (hex_float(end, "fixed_point") for end in rows(value, "fixed_point", 2, 2))
+    require(lo <= hi, "fixed_point is an empty interval")
+    return lo, hi
+
+
+def near_angle(s: Side, k_lo: Arb, k_hi: Arb, edge: float) -> Arb:
+    """Bound the impact angle of throws from (a, edge] by a sign of f, which rises with R; nan if no bound is found."""
+    x = arb(edge)
+    bound = arb(float((2 * (x - s.a) / (k_hi - s.small_d)).upper()))
+    for _ in range(21):
+        if flight(x, k_lo, at_angle(s, bound)) < 0:
+            return bound
+        bound = bound * 1.25
+    return arb("nan")
+
+
+def near_landing(s: Side, k_lo: Arb, k_hi: Arb, edge: float) -> Arb:
+    """Bound where throws from (a, edge] land: R' <= R - h phi + a phi^2/2."""
+    bound = near_angle(s, k_lo, k_hi, edge)
+    bound = root_above(s, arb(edge), k_lo, at_angle(s, bound)).p if bound.is_finite() else bound
+    return arb(edge) + abs(s.h) * bound + HALF * s.a * bound**2 + s.landing
+
+
+def check_near_hinge(s: Side, k_lo: Arb, k_hi: Arb, edge: float, q: float) -> str:
+    """Prove on (a, edge] that a throw is a decided jog and R' - a >= q (R - a), R' <= arm; "" or the reason.
+
+    f = (R - a) phi + a (phi - sin phi) + d (1 - cos phi) - (kappa/2) phi^2 and both brackets are >= 0, so f > 0 for
+    phi < 2 (R - a)/kappa: the impact comes later than that.  f rises with R, so f(bound) < 0 at the edge bounds it
+    from above.  R' - R = -h phi + a (1 - cos phi) - d (phi - sin phi) >= -h phi + phi^2 (a/2 - a phi^2/24 - d phi/6)
+    and <= -h phi + a phi^2/2.  Small angles: phi = 2 (R - a)/(kappa - small_d) and R' - R = -h phi.
+    """
+    x, height = arb(edge), -s.h
+    if not s.landing <= 0:
+        return "with noise of the landing place a part near the joint may land at x <= a"
+    if not height > 0:
+        return "the arm's surface is not below the joint"
+    if not x > s.a:
+        return "the cells begin left of a"
+    bound = near_angle(s, k_lo, k_hi, edge)
+    if not bound < 1:
+        return "the impact angle is not bounded"
+    if s.exact and not HALF * s.a - s.a * bound**2 / 24 - s.d * bound / 6 > 0:
+        return "a (1 - cos phi) >= d (phi - sin phi) is not proved"
+    if not (q > 1 and q <= 1 + 2 * height / (k_hi - s.small_d)):
+        return f"R' - a >= q (R - a) is not proved for q = {q!r}"
+    if not x + height * bound + HALF * (s.a if s.exact else ZERO) * bound**2 <= s.arm:
+        return "R' <= arm.length is not proved"
+    return check_all_jog(s, k_lo.union(k_hi), x, bound)
+
+
+def check_all_jog(s: Side, kappa: Arb, x: Arb, bound: Arb) -> str:
+    """Prove that throws from (a, x] with impact angles up to the bound are jogs; "" or the reason."""
+    R, pieces = s.a.union(x), 64
+    for k in range(pieces):
+        phi = (bound * k / pieces).union(bound * (k + 1) / pieces)
+        if over_angles(s, phi, R, kappa)[0] != 0:
+            return "a jog is not proved"
+    return ""
+
+
+def check_everywhere(c: Cells, scene: Scene) -> str:
+    """Check that every start on the arm is in a cell, or near the joint and thrown outward; "" or the reason."""
+    for i, edges in enumerate(c.edges):
+        if Fraction(float(edges[-1])) < scene.arm[1]:
+            return f"side {i}: the cells end before arm.length"
+        edge = float(edges[0])
+        near = over_halves(scene, check_thrown_out, i, edge)
+        if near:
+            return f"side {i}, near the joint, x in (a, {edge!r}]: {near}"
+    return ""
+
+
+def check_thrown_out(scene: Scene, side: int, edge: float) -> str:
+    """Check that starts up to the edge are thrown outward, by any factor above 1; "" or the reason."""
+    s = scene.sides[side]
+    gain = -2 * s.h / (scene.k_hi - s.small_d)
+    q = float((1 + gain * (1 - 2.0**-20)).lower())
+    return check_near_hinge(s, scene.k_lo, scene.k_hi, edge, q)
+
+
+def fixed_angles(s: Side) -> tuple[Ratios, Ratios] | None:
+    """Find two angles, proved E < 0 at the first and E > 0 at the second for all parameters; None if Newton fails."""
+    found = []
+    for sign, a, d, h in (
+        (-1, s.a.upper(), s.d.lower(), s.h.lower()),
+        (1, s.a.lower(), s.d.upper(), s.h.upper()),
+    ):
+        p = 2 * h / a
+        for _ in range(60):
+            r = ratios(p)
+            slope = gain_slope(a, d, r).mid()
+            if not (slope > 0 and p < 3):
+                return None
+            p = (p - gain_at(a, d, h, r).mid() / slope).mid()
+        if not (p > 0 and p < 3):
+            return None
+        for k in range(10):
+            r = ratios(arb(float(p) * (1 + sign * 2.0 ** (3 * k - 46))))
+            if sign * gain_at(s.a, s.d, s.h, r) > 0:
+                break
+        else:
+            return None
+        found.append(r)
+    return found[0], found[1]
+
+
+def last_angle(s: Side, x: float, k_lo: Arb) -> Ratios | None:
+    """Find an angle p, proved R(p) > x for all parameters; None if there is none near the guess."""
+    guess = guess_root(s.late, s.exact, x, float(k_lo), 4 * (x - s.floats[0]) / float(k_lo) + 0.1)
+    for k in range(20):
+        p = guess * (1 + 2.0 ** (2 * k - 38))
+        if 0 < p < 3:
+            r = ratios(arb(p))
+            if landing_at(s, r, k_lo) > arb(x):
+                return r
+    return None
+
+
+def check_fixed_point(s: Side, k_lo: Arb, k_hi: Arb, edge: float, q: float, said: tuple[float, float]) -> str:
+    """Prove the claims about starts up to the edge where the arm's surface is above the joint; "" or the reason.
+
+    The claims are: on (a, edge] a throw is a jog; the jog has one fixed point R* there, with said[0] <= R* <= said[1];
+    starts in (a, R*) tend to a; and R' - R* >= q (R - R*), R' <= arm on (R*, edge].
+
+    f(p) = (R - R(p)) p.  Where dR/dp > 0 on (0, top] and R(top) > edge, each start in (a, edge] has one root there, its
+    first, and they grow together: the angle tells everything.  dE/dp > 0 with E < 0 at one angle and E > 0 at a later
+    one leaves one zero p* between, R* = R(p*); E has the sign of p - p*.
+    """
+    if not s.exact:
+        return "every jog goes inward in this flight, where the arm's surface is above the joint"
+    angles, last = fixed_angles(s), last_angle(s, edge, k_lo)
+    if angles is None or last is None:
+        return "the fixed point of the jog is not found"
+    before, after = angles
+    least, most = landing_at(s, before, k_lo), landing_at(s, after, k_hi)
+    if not (before.p < after.p and after.p < last.p and most < arb(edge)):
+        return "the cells do not begin beyond the fixed point of the jog"
+    if not (least >= arb(said[0]) and most <= arb(said[1])):
+        return f"the fixed point of the jog is not proved to lie in [{said[0]!r}, {said[1]!r}]"
+    bad = check_jogs_up_to(s, k_lo, k_hi, last.p) or check_growth_beyond(s, k_hi, before.p, last.p, q)
+    if bad:
+        return bad
+    if not arb(edge) + at_angle(s, last.p).D <= s.arm:
+        return "R' <= arm.length is not proved"
+    return ""
+
+
+def check_jogs_up_to(s: Side, k_lo: Arb, k_hi: Arb, top: Arb) -> str:
+    """Check for all angles in (0, top] that dR/dp > 0, dE/dp > 0, R' > a, and that the throw is a jog.
+
+    (R' - a)/p = kappa/2 - h + a (V - W) p - d (V + 1 - sin p/p) > 0 keeps a jog right of a: below R* starts fall and
+    stay above a, to a limit, which is a fixed point and so a.  (With another kappa at every throw they fall too: by a
+    least step on any closed interval in there.)
+    """
+    kappa, pieces = k_lo.union(k_hi), 256
+    for k in range(pieces):
+        ends = ratios(top * k / pieces), ratios(top * (k + 1) / pieces)
+        r = ratios(ends[0].p.union(ends[1].p))
+        if not (landing_slope(s, r, k_lo) > 0 and gain_slope(s.a, s.d, r) > 0):
+            return "the fixed point of the jog is not proved to be the only one"
+        if not HALF * k_lo - s.h + s.a * (r.V - r.W) * r.p - s.d * (r.V + ONE - r.sine) > 0:
+            return "R' > a is not proved"
+        R = landing_at(s, ends[0], k_lo).union(landing_at(s, ends[1], k_hi))
+        if over_angles(s, r.p, R, kappa)[0] != 0:
+            return "a jog is not proved"
+    return ""
+
+
+def check_growth_beyond(s: Side, k_hi: Arb, first: Arb, top: Arb, q: float) -> str:
+    """Check on [first, top] that dD/dR = (dD/dp)/(dR/dp) >= q - 1, with R' - R = D(p) and D = 0 at R*."""
+    pieces = 16
+    for k in range(pieces):
+        r = ratios((first + (top - first) * k / pieces).union(first + (top - first) * (k + 1) / pieces))
+        rise = rise_of_jog(s, *r.p.sin_cos())
+        if not (q > 1 and rise > 0 and rise >= (arb(q) - 1) * landing_slope(s, r, k_hi)):
+            return f"R' - R* >= q (R - R*) is not proved for q = {q!r}"
+    return ""
+
+
+def check_below_cells(
+    scene: Scene, side: int, edge: float, q: float, said: tuple[float, float] | None
+) -> str:
+    """Check the claims about starts before the first cell, which depend on the sign of h; "" or the reason."""
+    s = scene.sides[side]
+    if s.h > 0:
+        if said is None:
+            return "the arm's surface is above the joint, and no fixed point of the jog is given"
+        if not s.landing <= 0:
+            return "with noise of the landing place a part may come to either side of the jog's fixed point"
+        return check_fixed_point(s, scene.k_lo, scene.k_hi, edge, q, said)
+    if said is not None:
+        return "a fixed point of the jog is given, but the arm's surface is not above the joint"
+    return check_near_hinge(s, scene.k_lo, scene.k_hi, edge, q)
+
+
+def fixed_points_in_words(section: dict[str, Any], noisy: bool) -> str:
+    """Put attracts-all in words where the arm's surface is above the joint."""
+    factor = rounded(min(section["q"]), up=False)
+    said = "; ".join(f"side {i}: [{lo!r}, {hi!r}]" for i, (lo, hi) in enumerate(section["fixed"]))
+    if noisy:
+        what = (
+            "for each speed of the noise the jog has an unstable fixed point, all in an interval [lo_i, hi_i]"
+        )
+        beyond, before, rest = "hi_i", "lo_i", "; nothing is claimed of starts between lo_i and hi_i"
+    else:
+        what = "the jog has an unstable fixed point R*_i in an interval"
+        beyond, before, rest = "R*_i", "R*_i", ""
+    return (
+        f"attracts-all, with the arm's surface above the joint: on every side i {what} ({said});"
+        f" every start {beyond} < x <= arm.length on every side i enters the attracting cells and stays in them, within"
+        f" {section['max_rank']} throws where x is in the cells; nearer to it x - {beyond} grows by a factor of at"
+        f" least {factor} with every throw; every start a_i < x < {before} stays on side i"
+        f" and tends to a_i{rest}"
+    )

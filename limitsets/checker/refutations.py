@@ -1,0 +1,264 @@
+"""Orbits that refute a goal, because they come back or because the goal speaks of every throw.
+
+docs/certificates.md, "Refutations".
+"""
+
+import itertools
+from typing import Any
+
+from flint import arb
+
+from .balls import ZERO, Arb, UnprovedError, exact, prove
+from .end_points import Throws
+from .goals import read_goal
+from .orbits import Orbit, prove_orbit, read_orbits
+from .scene import Scene, quantities, read_scene
+from .starts import INSIDE
+from .texts import KINDS, LENGTHS, hex_float, plain, quantity, read_side, require, rows, table
+
+MOST_THROWS = 100_000  # throws of an orbit that refutes
+RECURS = (
+    "cycle",
+    "closed",
+    "once",
+)  # an orbit refutes because it is periodic, closes with noise, or once is enough
+BROKEN = {  # the goals that an orbit may refute: their keys besides from_anywhere, and words for the orbit
+    "oriented_beyond": ("kind x side", "comes to lie beyond x = {text} on another side than {side}"),
+    "reaches": ("kind x side every_orbit", "never comes to rest on side {side} at x >= {text}"),
+    "flip_order": ("kind order", "does not follow the order {order} of sides"),
+    "stays_on_arm": ("kind", "leaves the arm"),
+    "attracts_all": ("kind", "leaves the arm"),
+}
+State = tuple[int, Arb, Arb]  # side, and bounds of x
+
+
+def read_refutation(section: dict[str, Any], n_sides: int) -> dict[str, Any]:
+    """Read an orbit that refutes a goal: why it comes back, and either a cycle or a start with its throws."""
+    nominal, tolerance = section["nominal"], section["tolerance"]
+    goal = read_broken_goal(section["goal"])
+    same = isinstance(nominal, dict) and isinstance(tolerance, dict) and set(nominal) == set(tolerance)
+    fits = same and len(nominal) <= 64
+    require(fits, "refuted: nominal values and tolerance do not name the same quantities")
+    found = {"goal": read_goal(goal, n_sides), "nominal": nominal, "tolerance": tolerance, "why": ""}
+    if "recurs" in section:
+        recurs = table(section["recurs"], "refuted.recurs", "", " ".join(RECURS))
+        require(len(recurs) == 1, "refuted.recurs is not one of cycle, closed and once")
+        (found["why"],) = recurs
+        if found["why"] == "cycle":
+            require(not {"start", "throws"} & set(section), "refuted: a cycle has no start and no throws")
+            (orbit,) = read_orbits({"cycles": [recurs["cycle"]], "complete": False}, n_sides)["orbits"]
+            return found | {"orbit": orbit}
+        require(recurs[found["why"]] is True, "refuted.recurs is not true")
+    return found | read_passing(section, found["why"], n_sides)
+
+
+def read_broken_goal(value: object) -> dict[str, Any]:
+    """Read the section of the goal that is refuted; the counts of throws and jogs in it are set to 0."""
+    kind = value.get("kind") if isinstance(value, dict) else None
+    require(isinstance(kind, str) and kind in BROKEN, "refuted.goal: not a kind that an orbit refutes")
+    goal = table(value, "refuted.goal", BROKEN[str(kind)][0], "from_anywhere")
+    counts: dict[str, Any] = {"reaches": {"throws": 0}, "flip_order": {"jogs": 0}}.get(str(kind), {})
+    return counts | goal
+
+
+def read_passing(section: dict[str, Any], why: str, n_sides: int) -> dict[str, Any]:
+    """Read an orbit that is thrown from its start: the start, and kappa and landing of each throw."""
+    require({"start", "throws"} <= set(section), "refuted: start or throws are missing")
+    start = table(section["start"], "refuted.start", "x side")
+    throws = [read_throw(each) for each in rows(section["throws"], "refuted.throws", 1, MOST_THROWS)]
+    spans = [number for number, (kappa, _) in enumerate(throws) if isinstance(kappa, tuple)]
+    closes = why == "closed" and spans == [len(throws) - 1]
+    last = not spans or not why or closes
+    require(last, "two values of kappa are those of the throw that closes an orbit")
+    x, side = hex_float(start["x"], "refuted.start.x"), read_side(start["side"], n_sides)
+    return {"x": x, "side": side, "throws": throws}
+
+
+def read_throw(value: object) -> tuple[Any, Any]:
+    """Read kappa of a throw, or two values between which kappa lies, or None; and how far off it landed, or None."""
+    one = table(value, "a throw", "kappa landing")
+    kappa, landing = one["kappa"], one["landing"]
+    if isinstance(kappa, list):
+        low, high = (hex_float(end, "kappa") for end in rows(kappa, "kappa", 2, 2))
+        require(low < high, "kappa is an empty interval")
+        kappa = arb(low), arb(high)
+    elif kappa is not None:
+        kappa = arb(hex_float(kappa, "kappa"))
+    return kappa, None if landing is None else arb(hex_float(landing, "landing"))
+
+
+def check_deviations(scene: Scene, section: dict[str, Any]) -> str:
+    """Check that the scene deviates from the nominal values by no more than the tolerance; "" or the reason."""
+    flat = dict(quantities(scene.raw))
+    for name, text in section["tolerance"].items():
+        square = name == "throw.speed" and "throw.kappa" in flat
+        key = "throw.kappa" if square else name
+        require(key in flat, f"refuted: {plain(name)} is not a quantity of the scene")
+        q, nominal = quantity(flat[key], KINDS, key), quantity(section["nominal"][name], KINDS, key)
+        dev = quantity(text, KINDS, "tolerance")
+        require(dev.lo == dev.hi >= 0 and nominal.lo == nominal.hi, "refuted: a deviation is not one number")
+        if dev.unit == "%":
+            power = 2 if square else 1
+            low, high = nominal.lo * (1 - dev.lo), nominal.lo * (1 + dev.lo)
+            if square:
+                require(dev.lo < 1, "refuted: a deviation of 100 %")
+                low, high = nominal.lo / (1 + dev.lo) ** power, nominal.lo / (1 - dev.lo) ** power
+            low, high = min(low, high), max(low, high)
+        else:
+            require(not square and dev.pi == q.pi == nominal.pi, f"refuted: {plain(name)} is in another unit")
+            low, high = nominal.lo - dev.lo, nominal.lo + dev.lo
+        if q.pi != nominal.pi or not low <= q.lo <= q.hi <= high:
+            return f"{plain(name)} is not within {plain(text)} of {plain(section['nominal'][name])}"
+    return ""
+
+
+def check_refuted(scene: Scene, section: dict[str, Any]) -> str:
+    """Throw the orbit again in balls, without the cells; "" or the reason."""
+    why, goal = section["why"], section["goal"]
+    if not why:
+        return "it shows a passing orbit only: a goal is refuted by one that comes back"
+    bad = check_deviations(scene, section)
+    if bad:
+        return bad
+    once = goal["kind"] in ("stays_on_arm", "attracts_all")
+    if once or (goal["kind"] == "oriented_beyond" and goal["anywhere"]):
+        if why != "once":
+            return "an orbit that comes back is not what refutes this goal"
+    elif why == "once":
+        return "once is not enough: the goal does not speak of every throw from every start"
+    try:
+        states = periodic(scene, section["orbit"]) if why == "cycle" else thrown_again(scene, section)
+        if why == "once":
+            return left_or_beyond(scene, goal, states[-1])
+        prove(breaks(scene, goal, states), "no state of the orbit violates the goal")
+    except UnprovedError as error:
+        return str(error)
+    if goal["kind"] == "reaches" and not goal["every"] and not (why == "cycle" and section["orbit"].attracts):
+        return "the goal speaks of almost every start, and the orbit is not proved to attract"
+    return ""
+
+
+def periodic(scene: Scene, orbit: Orbit) -> list[State]:
+    """Prove a periodic orbit of the scene without noise, which is one of the sequences allowed; return its states."""
+    quiet = read_scene({**scene.raw, "effects": {}}, None)
+    prove(all(s.concave for s in quiet.sides), "kappa > ell is not proved")
+    states = prove_orbit(Throws(quiet), None, orbit).states
+    for side, lo, hi in states:
+        s = quiet.sides[side]
+        prove(bool(lo > s.a and hi <= s.arm), "a point of the periodic orbit is not proved to lie on the arm")
+    return states
+
+
+def thrown_again(scene: Scene, section: dict[str, Any]) -> list[State]:
+    """Prove every throw of an orbit, and that a closed orbit comes back exactly to its start; return the states."""
+    side, x = section["side"], arb(section["x"])
+    throws = Throws(scene)
+    states = [(side, x, x)]
+    for number, (said, landing) in enumerate(section["throws"], 1):
+        s = scene.sides[side]
+        prove(bool(x > s.a and x <= s.arm), f"the part does not lie on the arm before throw {number}")
+        kappa = kappa_of_throw(scene, said, number)
+        shift = ZERO if landing is None else landing
+        prove(bool(abs(shift) <= s.landing), f"throw {number} lands farther off than the noise allows")
+        images, branch = images_of_throw(throws, side, x, kappa, shift, number)
+        side = (side + branch) % len(scene.sides)
+        if number == len(section["throws"]) and section["why"] == "closed":
+            prove(side == states[0][0], "the last throw ends on another side")
+            back = comes_back(scene, states[0][1], images, landing)
+            prove(back, "that the last throw comes back is not proved")
+            return states
+        x = images[0]
+        states.append((side, x.lower(), x.upper()))
+    return states
+
+
+def kappa_of_throw(scene: Scene, said: Any, number: int) -> tuple[Any, ...]:
+    """Return kappa of a throw, or for two values their union and both; all are proved to lie within the noise."""
+    varies = isinstance(scene.noise, dict) and bool({"throw.speed", "gravity.tilt"} & set(scene.noise))
+    kappa = said if isinstance(said, tuple) else () if said is None else (said,)
+    prove(varies or not kappa, f"the kappa of throw {number} is not within the noise: it is known")
+    prove(bool(kappa) or not varies, f"throw {number} does not say its kappa")
+    for k in kappa:
+        within = k > scene.k_lo * (1 + INSIDE) and k < scene.k_hi * (1 - INSIDE)
+        prove(bool(within), f"the kappa of throw {number} is not within the noise")
+    if len(kappa) > 1:
+        return (kappa[0].union(kappa[1]), *kappa)
+    return kappa or (scene.k_lo.union(scene.k_hi),)
+
+
+def images_of_throw(
+    throws: Throws, side: int, x: Arb, kappa: tuple[Any, ...], shift: Arb, number: int
+) -> tuple[list[Arb], int]:
+    """Enclose where a throw lands, for each kappa given, and return its branch, which is proved."""
+    images = []
+    for k in kappa:
+        thrown = throws.box(side, x.lower(), x.upper(), k.lower(), k.upper())
+        prove(thrown.decision != 2, f"the decision of throw {number} is not settled")
+        turned = throws.scene.sides[side].shift if thrown.decision == 1 else ZERO
+        images.append(thrown.lo.union(thrown.hi) + shift - turned)
+    return images, thrown.decision
+
+
+def comes_back(scene: Scene, start: Arb, images: list[Arb], landing: Arb | None) -> bool:
+    """Whether a throw can land exactly on the start.
+
+    The noise of the landing spans the distance from all of the enclosed place to the start; or the places for two
+    values of kappa lie on either side of the start, and the place moves continuously with kappa as f is concave.
+    """
+    if len(images) == 1:
+        return landing is None and bool(abs(images[0] - start) <= scene.sides[0].landing.lower())
+    _, first, last = images
+    parted = bool(first < start and last > start) or bool(first > start and last < start)
+    return parted and all(s.concave for s in scene.sides)
+
+
+def breaks(scene: Scene, goal: dict[str, Any], states: list[State]) -> bool:
+    """Whether an orbit that comes back to its first state violates a goal, for all numbers in the balls."""
+    if goal["kind"] == "flip_order":
+        order, sides = goal["order"], [side for side, _, _ in states]
+        allowed = set(zip(order, [*order[1:], order[0]], strict=True))
+        flips = [(a, b) for a, b in itertools.pairwise([*sides, sides[0]]) if a != b]
+        return bool(set(flips) - allowed) or (not flips and len(set(order)) > 1)
+    x = goal["x"].ball() / exact(LENGTHS[scene.unit])
+    if goal["kind"] == "oriented_beyond":
+        return any(side != goal["side"] and bool(lo > x) for side, lo, _ in states)
+    return all(side != goal["side"] or bool(hi < x) for side, _, hi in states)
+
+
+def left_or_beyond(scene: Scene, goal: dict[str, Any], last: State) -> str:
+    """Check that a state is off the arm, or beyond x on another side; "" or the reason."""
+    side, lo, hi = last
+    s = scene.sides[side]
+    if goal["kind"] != "oriented_beyond":
+        off = bool(hi <= s.a or lo > s.arm)
+        return "" if off else f"the orbit ends on side {side} at x = {lo.union(hi).str(12)}, on the arm"
+    if breaks(scene, goal, [last]) and hi <= s.arm:
+        return ""
+    return f"the orbit ends on side {side} at x = {lo.union(hi).str(12)}, which the goal allows"
+
+
+def statement_of_refutation(section: dict[str, Any]) -> str:
+    """Put a refutation in words."""
+    near = ", ".join(
+        f"{plain(name)} within {quantity(dev, KINDS, 'tolerance')} of"
+        f" {quantity(section['nominal'][name], KINDS, 'nominal')}"
+        for name, dev in section["tolerance"].items()
+    )
+    goal = section["goal"]
+    order = " ".join(map(str, goal.get("order", ())))
+    broken = BROKEN[goal["kind"]][1].format(text=goal.get("text"), side=goal.get("side"), order=order)
+    if section["why"] == "cycle":
+        o = section["orbit"]
+        of = "almost every start" if o.attracts else "every start"
+        orbit = f"a periodic orbit, of {len(o.word)} throws, with a place x in [{o.lo!r}, {o.hi!r}] on side {o.side}"
+        what = f"not from {of}: {orbit}, which {'attracts' if o.attracts else 'repels'}, {broken}"
+    else:
+        start = f"x = {section['x']!r} on side {section['side']}"
+        number = f"{len(section['throws'])} throws"
+        if section["why"] == "closed":
+            what = (
+                f"not for every sequence of throws: an orbit of {number} from {start} back to there {broken}"
+            )
+        else:
+            what = f"not from every start on the arm: the orbit from {start}, of {number}, {broken}"
+    return f"refuted: {what}" + (f"; {near}" if near else "")

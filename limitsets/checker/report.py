@@ -1,0 +1,300 @@
+"""A file from first to last, and the report about it.
+
+docs/certificates.md, "Checking one": the words of a verdict, and what is printed.
+"""
+
+import math
+import os
+import re
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+import flint
+
+from .balls import PRECISION
+from .cells import Crew, extents
+from .claims import check_box_claims, read_claims, statement_of
+from .file import Cells, open_certificate, read_cells
+from .goals import content_of_goal, goal_of_scene
+from .model import FORMULAS
+from .scene import Scene, check_parameters, check_tolerance, over_halves, quantities, read_scene
+from .starts import ATTRACTING, first_version_starts, shares
+from .texts import KINDS, BadFileError, plain, quantity, require, rows, table
+
+MOST_OPEN = 0.01  # the share of the arm that may be open where a goal is proved from some x on
+WORDS = {  # the verdicts, in JSON and for people
+    "proved": "PROVED",
+    "proved-on-cells": "PROVED ON CELLS",
+    "refuted": "REFUTED",
+    "failed": "FAILED",
+    "not rechecked": "NOT RECHECKED",
+    "bad file": "BAD FILE",
+}
+EXITS = {"proved": 0, "proved-on-cells": 1, "refuted": 1, "failed": 1, "bad file": 2}
+
+
+@dataclass
+class Report:
+    """The verdict on a certificate: `claims` has (claim, a word of `WORDS`, reason); `starts` are those of the goal.
+
+    `share` of the arm has the starts for which the goal is proved, `explained` the starts that are proved to be lost or
+    to creep to the joint: both are lower bounds.  `open` is an upper bound of the rest.
+    """
+
+    verdict: str = "failed"
+    claims: list[tuple[str, str, str]] = field(default_factory=list)
+    starts: Any = None
+    share: float | None = None
+    explained: float | None = None
+    open: float | None = None
+    statement: list[str] = field(default_factory=list)
+    parameters: dict[str, str] = field(default_factory=dict)
+    relied_on: list[str] = field(default_factory=list)
+    reason: str = ""
+    seconds: float = 0.0
+    cells: int = 0
+    boxes: int = 0
+
+
+@dataclass
+class Certificate:
+    """The content of a file: read, and not yet believed."""
+
+    version: int
+    model: tuple[str, str]  # flight and flip
+    raw: list[dict[str, Any]]  # the scene of each box, as written
+    parameters: list[object]  # of each box, as the producer computed them
+    noise: object
+    tolerance: object
+    scenes: list[Scene]
+    cells: list[Cells]
+    claims: dict[str, dict[str, Any]]  # those that can be checked
+    unknown: list[tuple[str, str, str]]  # and those that cannot
+
+
+def read_certificate(path: str | os.PathLike[str]) -> Certificate:
+    """Read a file; raises BadFileError."""
+    header, entries = open_certificate(path)
+    needed = "format version map noise boxes claims arrays tolerance"
+    table(header, "header.json", needed, "state producer")
+    version = header["version"]
+    right = header["format"] == "limitsets-proof" and type(version) is int and version in (1, 2)
+    require(right, "the format is not limitsets-proof, version 1 or 2")
+    the_map = table(header["map"], "map", "name version flight flip", "formulas")
+    first = type(the_map["version"]) is int and the_map["version"] == 1
+    require(the_map["name"] == "throw" and first, "the map is not throw, version 1")
+    model = (the_map["flight"], the_map["flip"])
+    boxes = rows(header["boxes"], "boxes", 1, 5_000)
+    prefixes = [table(b, "a box", "scene parameters prefix")["prefix"] for b in boxes]
+    named = all(isinstance(p, str) and re.fullmatch(r"[0-9]{1,6}\.", p) for p in prefixes)
+    require(named and len(set(prefixes)) == len(boxes), "the prefixes of the boxes are not as they should be")
+    raw = [b["scene"] for b in boxes]
+    scenes = [read_scene(scene, header["noise"]) for scene in raw]
+    same = all(model == (scene["model"]["flight"], scene["model"]["flip"]) for scene in raw)
+    require(same, "map and scene name different models")
+    require(isinstance(header["arrays"], dict), "arrays is not an object")
+    n_sides = len(scenes[0].sides)
+    require(all(len(s.sides) == n_sides for s in scenes), "the boxes do not have the same number of sides")
+    cells = [read_cells(entries, header["arrays"], prefix, n_sides) for prefix in prefixes]
+    require_no_more_arrays(header["arrays"], entries, prefixes, n_sides)
+    claims, unknown = read_claims(header["claims"], n_sides, version)
+    parameters = [b["parameters"] for b in boxes]
+    noise, tolerance = header["noise"], header["tolerance"]
+    return Certificate(version, model, raw, parameters, noise, tolerance, scenes, cells, claims, unknown)
+
+
+def require_no_more_arrays(
+    said: dict[str, Any], entries: dict[str, memoryview], prefixes: list[str], n_sides: int
+) -> None:
+    """Require that header and file hold the arrays of the boxes and no others."""
+    expected = {p + name for p in prefixes for name in ["jog", "flip", "branch", "rank", "component", "phi"]}
+    expected |= {f"{p}edges.{i}" for p in prefixes for i in range(n_sides)}
+    require(set(said) == expected, "the header describes arrays that do not belong there")
+    named = set(entries) == {f"{name}.npy" for name in expected}
+    require(named, "arrays.npz holds entries that do not belong there")
+
+
+def recheck(
+    path: str | os.PathLike[str],
+    workers: int | None = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> Report:
+    """Check the certificate in a file.
+
+    Parameters
+    ----------
+    path
+        The file.
+    workers
+        Number of processes; all processors of this process if None.  Small certificates are checked in this one.
+    progress
+        Called now and then with the number of cells done and the number of all.
+    """
+    begun = time.perf_counter()
+    report = Report()
+    if workers is None:
+        workers = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    before = flint.ctx.prec
+    flint.ctx.prec = PRECISION
+    try:
+        check_certificate(path, workers, progress, report)
+    except BadFileError as error:
+        report = Report(verdict="bad file", reason=str(error))
+    finally:
+        flint.ctx.prec = before
+    report.seconds = time.perf_counter() - begun
+    return report
+
+
+def check_certificate(
+    path: str | os.PathLike[str], workers: int, progress: Callable[[int, int], None] | None, report: Report
+) -> None:
+    """Fill in the report; raises BadFileError."""
+    file = read_certificate(path)
+    gap = describe(report, file)
+    own = goal_of_scene(file.raw[0], len(file.scenes[0].sides))
+    failed = failed_at_once(file, gap, own)
+    work = work_of(file)
+    told = None if progress is None else (lambda done: progress(min(done, work), work))
+    crew = Crew(list(file.raw), file.noise, workers, told)
+    try:
+        check_boxes(file, crew, failed)
+    finally:
+        crew.close()
+    report.boxes = crew.boxes
+    conclude(report, file, failed, own)
+
+
+def describe(report: Report, file: Certificate) -> str:
+    """Say what the certificate relies on, and for which scenes; return "" or the gap in its tolerance."""
+    flight, flip = file.model
+    kind = "exact" if flight == "exact" else "small"
+    report.relied_on.append(f"the formulas of the map throw, version 1, flight {flight}, flip {flip}")
+    for key in ("always", flight, kind, f"{kind} {flip}"):
+        report.relied_on += [line for line in FORMULAS[key] if line not in report.relied_on]
+    report.relied_on.append(
+        f"the ball arithmetic of python-flint {flint.__version__} (Arb), numpy and Python"
+    )
+    for name, value in quantities(file.raw[0]):
+        report.parameters[plain(name)] = value_in_words(value, name)
+    ranges, gap = check_tolerance(file.raw, file.tolerance)
+    report.parameters |= ranges
+    if file.tolerance is not None:
+        report.parameters["tolerance (fixed but unknown)"] = deviations_in_words(file.tolerance)
+    noise = "none" if file.noise is None else deviations_in_words(file.noise)
+    report.parameters["noise (at every throw)"] = noise
+    report.cells = sum(len(c.side) for c in file.cells)
+    return gap
+
+
+def failed_at_once(file: Certificate, gap: str, own: dict[str, Any] | None) -> dict[str, str]:
+    """Find the claims that fail without a look at the cells, with the reasons; `own` is the scene's own goal."""
+    claims = file.claims
+    failed = dict.fromkeys(claims, gap) if gap else {}
+    if file.noise is not None and "cycles" in claims:
+        failed["cycles"] = "the orbit of the one throw is not that of the other: not with noise"
+    if not all(side.landing <= 0 for scene in file.scenes for side in scene.sides) and "end-points" in claims:
+        failed["end-points"] = "the landing place moves at every throw: not with noise of it"
+    for name in {"goal", "refuted"} & set(claims):
+        goal = claims[name].get("goal", claims[name])
+        if own is not None and content_of_goal(goal) != content_of_goal(own):
+            failed[name] = "the scene in this file has another goal of its own"
+    return failed
+
+
+def work_of(file: Certificate) -> int:
+    """Count the cells whose throws are checked, for the progress bar."""
+    everywhere = "attracts-all" in file.claims or file.claims.get("goal", {}).get("all", False)
+    ranked = "goal" in file.claims and file.version > 1
+    return sum(
+        len(c.side) if everywhere else int(((c.component >= 0) | (ranked & (c.rank >= 0))).sum())
+        for c in file.cells
+    )
+
+
+def check_boxes(file: Certificate, crew: Crew, failed: dict[str, str]) -> None:
+    """Check all claims for box after box, until all have failed; `failed` gets the first reason of each."""
+    claims = file.claims
+    for k, (scene, c) in enumerate(zip(file.scenes, file.cells, strict=True)):
+        bad = over_halves(scene, check_parameters, file.parameters[k], f"box {k}")
+        where = f"box {k}, " if len(file.scenes) > 1 else ""
+        found = [(list(claims), bad)] if bad else check_box_claims(scene, c, k, claims, crew)
+        for names, reason in found:
+            for name in names:
+                failed.setdefault(name, where + reason)
+        if file.version == 1 and not {"goal", "attracts-all"} & set(failed):
+            first_version_starts(scene, c, claims)
+        scene.parts.clear()  # room
+        if len(failed) == len(claims):
+            break
+
+
+def conclude(report: Report, file: Certificate, failed: dict[str, str], own: dict[str, Any] | None) -> None:
+    """Put the claims in words and the verdicts into the report."""
+    claims = file.claims
+    if "goal" in claims and "goal" not in failed:
+        if "attracts-all" in failed and not claims["goal"]["all"]:
+            claims["goal"].pop("found", None)
+        tell_starts(report, claims["goal"], file.scenes, file.cells)
+    noisy = file.noise is not None
+    report.statement = [statement_of(name, section, noisy) for name, section in claims.items()]
+    if set(claims) - {"refuted"}:  # a refutation does not speak of the cells: they are not checked for it
+        which = " (first box)" if len(file.cells) > 1 else ""
+        report.statement.append(f"attracting cells: {extents(file.cells[0])}{which}")
+    if own is not None and not {"goal", "refuted"} & set(claims):
+        report.statement.append("of the scene's own goal nothing is claimed")
+    report.claims = [(name, *state_of(report, name, failed)) for name in claims] + file.unknown
+    report.verdict = verdict_of([state for _, state, _ in report.claims])
+    report.reason = next((f"{name}: {why}" for name, state, why in report.claims if why), "")
+
+
+def verdict_of(states: list[str]) -> str:
+    """Return the worst state of a claim; one that is not rechecked makes the verdict "failed"."""
+    if "failed" in states or "not rechecked" in states:
+        return "failed"
+    return next((word for word in ("refuted", "proved-on-cells") if word in states), "proved")
+
+
+def state_of(report: Report, name: str, failed: dict[str, str]) -> tuple[str, str]:
+    """Say what became of a claim, a word of `WORDS`, and why."""
+    if failed.get(name):
+        return "failed", failed[name]
+    if name == "refuted":
+        return "refuted", ""
+    if name == "goal" and (report.starts == "cells" or (report.open or 0.0) > MOST_OPEN):
+        return "proved-on-cells", on_cells_in_words(report)
+    return "proved", ""
+
+
+def tell_starts(report: Report, goal: dict[str, Any], scenes: list[Scene], cells: list[Cells]) -> None:
+    """Fill in the starts for which the goal is proved, and their share of the arm, the least of all boxes."""
+    goal["starts"] = starts = goal["starts"] or goal.get("found") or ATTRACTING
+    both = []
+    for scene, c in zip(scenes, cells, strict=True):
+        some = c.component >= 0 if starts.only else c.rank >= 0
+        both.append(shares(c, scene, starts, some))
+    beyond = None if starts.x is None else {str(i): x for i, x in enumerate(starts.x)}
+    report.starts = starts.kind if beyond is None else {"from": beyond}
+    report.share, report.explained = (math.floor(min(each) * 1e6) / 1e6 for each in zip(*both, strict=True))
+    report.open = math.ceil((1 - min(claimed + known for claimed, known in both)) * 1e6) / 1e6
+
+
+def on_cells_in_words(report: Report) -> str:
+    """Say for which starts a goal is proved, where that is not for all starts."""
+    which = "in the cells" if report.starts == "cells" else "from some x on"
+    return f"proved for starts {which} only, {100 * (report.share or 0.0):.4g} % of the arm or more: the rest is open"
+
+
+def value_in_words(value: object, name: str) -> str:
+    """Write a value of the scene; a quantity is written from its numbers, not from its text."""
+    if isinstance(value, str | list):
+        return str(quantity(value, KINDS, name))
+    return plain(value)
+
+
+def deviations_in_words(deviations: object) -> str:
+    """Write noise or a tolerance, from the numbers and not from the texts."""
+    known = table(deviations, "deviations", "", " ".join(deviations) if isinstance(deviations, dict) else "")
+    return ", ".join(f"{plain(name)} within {quantity(text, KINDS, name)}" for name, text in known.items())

@@ -1,0 +1,317 @@
+"""For which starts a goal holds: those proved to come to the attracting cells.
+
+docs/certificates.md, "For which starts": falling, passing and thin cells, and starts that are lost.
+"""
+
+import math
+from fractions import Fraction
+from typing import Any, NamedTuple
+
+import numpy as np
+from flint import arb
+
+from .balls import HALF, ZERO, Arb, Array, Pair, exact, float_above, float_below, sine_cosine
+from .cells import first_bad, range_max
+from .file import Cells
+from .model import at_angle, landing_at, over_angles, ratios, rise_of_jog, root_above
+from .near_hinge import check_below_cells, near_angle, near_landing, read_near_hinge
+from .scene import MOST_HALVES, Scene, Side, over_halves, quantities
+from .texts import Quantity, by_side, hex_float, require, table
+from .thinning import check_null, check_thinning
+
+MOST_COUNTED = 100_000  # throws, or rounds, that a goal may count
+# A stated kappa keeps this share of itself from the ends of its noise, which are known to 100 bits.
+INSIDE = arb(2) ** -80
+VARYING = ("throw", "gravi")  # how the names of the quantities begin that kappa is computed from
+
+
+class Starts(NamedTuple):
+    """The starts for which a goal is claimed: "every", "almost-every", "from" (beyond x on each side) or "cells".
+
+    `thinning` counts its rounds; `near` has factors and fixed points where starts before the first cells are claimed; a
+    worst sequence of landings takes starts up to `lost`, by side, to the joint; `only` the starts in the attracting
+    cells are claimed.
+    """
+
+    kind: str
+    x: list[float] | None = None
+    thinning: int = 0
+    near: tuple[list[float], list[Pair | None]] | None = None
+    lost: list[float] | None = None
+    only: bool = False
+
+    def fixed(self, side: int) -> Pair | None:
+        """Return the bracket of the jog's fixed point on a side, where one is named."""
+        return None if self.near is None else self.near[1][side]
+
+
+ATTRACTING = Starts("cells", only=True)  # a goal of version 1 that names no starts
+
+
+def read_starts(section: dict[str, Any], goal: dict[str, Any], n_sides: int) -> Starts:
+    """Read for which starts a goal is claimed."""
+    require("starts" in section, "goal.starts is missing")
+    said, kind = section["starts"], section["starts"]
+    x = None
+    if isinstance(said, dict):
+        table(said, "goal.starts", "from")
+        kind, x = "from", [hex_float(each, "goal.starts") for each in by_side(said["from"], "from", n_sides)]
+    require(kind in ("every", "almost-every", "from", "cells"), "goal.starts is none that is known")
+    thinning = section.get("thinning", 0)
+    fits = type(thinning) is int and (0 < thinning < MOST_COUNTED if "thinning" in section else True)
+    require(fits, "goal.thinning is not a number of rounds")
+    near = read_near_hinge(section["near_joint"], n_sides) if "near_joint" in section else None
+    lost = None
+    if "lost" in section:
+        lost = [hex_float(each, "lost") for each in by_side(section["lost"], "lost", n_sides)]
+    almost = goal["kind"] == "reaches" and not goal["every"]
+    starts = Starts(kind, x, thinning, near, lost, only=almost and kind == "cells")
+    require_fitting(starts, goal, almost, [starts.fixed(i) for i in range(n_sides)])
+    return starts
+
+
+def require_fitting(starts: Starts, goal: dict[str, Any], almost: bool, points: list[Pair | None]) -> None:
+    """Require that the parts of a claim about starts fit each other and the goal; `points` are the fixed points."""
+    kind = starts.kind
+    anywhere = goal["anywhere"] and goal["kind"] != "attracts_all"  # which is about every start anyway
+    require(starts.lost is None or kind in ("from", "cells"), f"starts {kind}: none of them are lost")
+    if kind in ("every", "almost-every"):
+        near = (starts.near is not None or anywhere) and not any(points)
+        require(near, f"starts {kind}: near_joint does not say so")
+        fits = (starts.thinning > 0) == (kind == "almost-every") or (almost and kind == "almost-every")
+        require(fits, f"starts {kind} and thinning do not fit")
+    for x, point in zip(starts.x or (), points, strict=False):
+        require(point is None or x >= point[1], "starts before the end of a fixed point are claimed")
+    require(not (almost and kind == "every"), "a goal of almost every orbit is claimed for every start")
+    of = "almost-every" if almost else "every"
+    require(kind == of or not anywhere, f"this goal from anywhere is one of starts {of}")
+    require(kind != "cells" or goal["kind"] != "attracts_all", "attracts_all of some cells")
+
+
+def check_starts(c: Cells, scene: Scene, goal: dict[str, Any], starts: Starts) -> str:
+    """Check that the starts claimed come into the attracting cells, given all images; "" or the reason.
+
+    Let G be the cells with a rank.  No orbit leaves them, and off the components the rank never rises: so in the end it
+    stays what it is.  It cannot stay where it falls along every target; nor for ever in a cell that only leads to
+    itself and to lower ranks, while each jog from it moves the part one way by more than the landing scatters.  What is
+    left, Z, has to thin out, rank by rank; and starts of length zero have to come from starts of length zero only.
+    """
+    if starts.only:
+        return ""
+    almost = goal["kind"] == "reaches" and not goal["every"]
+    if goal["kind"] == "attracts_all" and starts.near is not None and any(starts.near[1]):
+        return "parts near the joint creep to it: there are two basins"
+    for side in range(len(c.edges)):
+        bad = check_starts_of_side(c, scene, starts, side)
+        if bad:
+            return bad
+    if goal["anywhere"] and not (goal["kind"] == "flip_order" or almost):
+        return ""  # the goal asks something of every throw, or of a number of throws: no orbit has to arrive
+    return check_arrival(c, scene, starts, almost)
+
+
+def check_starts_of_side(c: Cells, scene: Scene, starts: Starts, side: int) -> str:
+    """Check that the starts claimed on a side lie in cells with a rank or near the joint; "" or the reason."""
+    edges, near = c.edges[side], starts.near
+    first, own = float(edges[0]), c.rank[c.start[side] : c.start[side + 1]] >= 0
+    since = None if starts.x is None else starts.x[side]
+    needed = np.zeros(len(own), dtype=bool)
+    if starts.kind != "cells":
+        if Fraction(float(edges[-1])) < scene.arm[1]:
+            return f"side {side}: the cells end before arm.length"
+        needed = edges[1:] > (-math.inf if since is None else since)
+    if since is not None and near is None and not since >= first:
+        return f"side {side}: starts are claimed that lie before the cells"
+    if near is not None:
+        bad = over_halves(scene, check_below_cells, side, first, near[0][side], near[1][side])
+        if bad:
+            return f"side {side}, near the joint, x in (a, {first!r}]: {bad}"
+        needed |= edges[:-1] <= float_above(near_landing(scene.sides[side], scene.k_lo, scene.k_hi, first))
+    if not own[needed].all():
+        cell = int(c.start[side]) + int(np.argmax(needed & ~own))
+        return f"{c.name(cell)}: nothing is claimed of starts in it: its rank is -1"
+    if starts.lost is not None:
+        bad = over_halves(scene, check_lost, side, starts.lost[side])
+        if bad:
+            return f"side {side}, starts up to x = {starts.lost[side]!r}: {bad}"
+    return ""
+
+
+def check_arrival(c: Cells, scene: Scene, starts: Starts, almost: bool) -> str:
+    """Check that orbits from the cells with a rank arrive, every one or almost every one; "" or the reason."""
+    stuck, bad = level_cells(c, scene)
+    if bad:
+        return bad
+    if stuck.any():
+        if not starts.thinning:
+            return first_bad(c, [(~stuck, "the rank does not fall along a throw")])
+        bad = check_thinning(c, scene, stuck, starts.thinning, c.rank)
+        if bad:
+            return bad
+    if not (stuck.any() or almost):
+        return ""
+    claimed = c.rank >= 0
+    some = claimed if almost else leading_to(c, stuck)
+    outward = starts.near is not None and not any(starts.near[1])
+    return check_null(c, scene, some & claimed & ~(c.component >= 0), outward)
+
+
+def level_cells(c: Cells, scene: Scene) -> tuple[Array, str]:
+    """Find the cells of Z: off the components, those in which an orbit may stay at its rank; "" or the reason."""
+    inside, claimed = c.component >= 0, c.rank >= 0
+    level = np.zeros(len(inside), dtype=bool)
+    alone = np.ones(len(inside), dtype=bool)  # no other cell than itself has its rank among its targets
+    checks = [(~inside | (c.rank == 0), "a cell of a component has a rank other than 0")]
+    for array, what in ((c.jog, "jog"), (c.flip, "flip")):
+        q = np.flatnonzero((array[:, 0] >= 0) & claimed & ~inside)
+        first, last = array[q, 0], array[q, 1]
+        most, least = range_max(c.rank, first, last), -range_max(-c.rank, first, last)
+        stays, falls = np.ones(len(inside), dtype=bool), np.ones(len(inside), dtype=bool)
+        stays[q], falls[q] = least >= 0, most <= c.rank[q]
+        checks.append((stays, f"a {what} may lead to a cell with the rank -1"))
+        checks.append((falls, f"the rank may rise along a {what}"))
+        level[q] |= most == c.rank[q]
+        for lo, hi in ((first, np.minimum(last, q - 1)), (np.maximum(first, q + 1), last)):
+            some = lo <= hi
+            alone[q[some]] &= range_max(c.rank, lo[some], hi[some]) < c.rank[q[some]]
+    bad = first_bad(c, checks)
+    for k in np.flatnonzero(level & alone).tolist() if not bad else ():
+        level[k] = bool(over_halves(scene, check_passing, int(c.side[k]), c.phi[k].tolist()))
+    return level, bad
+
+
+def check_passing(scene: Scene, side: int, phi: list[float]) -> str:
+    """Check that jogs with angles in the bracket all go one way by more than the landing scatters; "" or the reason."""
+    s = scene.sides[side]
+    low, high = at_angle(s, arb(phi[0])), at_angle(s, arb(phi[1]))
+    rise = rise_of_jog(s, *sine_cosine(low.p.union(high.p)))
+    moved = low.D.union(high.D) if rise > 0 else low.D + rise * ZERO.union(high.p - low.p)
+    one_way = moved > s.landing or moved < -s.landing
+    return "" if one_way else "a jog is not proved to move it one way"
+
+
+def leading_to(c: Cells, cells: Array) -> Array:
+    """Find the cells from which some orbit may lead to the cells given, and these cells."""
+    found, count = cells.copy(), -1
+    while count != int(found.sum()):
+        count = int(found.sum())
+        number = np.concatenate([[0], np.cumsum(found)])
+        for array in (c.jog, c.flip):
+            q = np.flatnonzero(array[:, 0] >= 0)
+            found[q] |= number[array[q, 1] + 1] > number[array[q, 0]]
+    return found
+
+
+def check_lost(scene: Scene, side: int, end: float) -> str:
+    """Check that a worst sequence of landings takes every start in (a, end] to the joint; "" or the reason.
+
+    A start R(p, kappa), told by its impact angle p, is thrown by D(p).  Where the throw is a jog with D < e for all p
+    up to an angle after the impact at the end, landings that fall short by e bring the part inward, by a least step: to
+    x <= a.
+    """
+    s, x = scene.sides[side], arb(end)
+    if not s.landing > 0:
+        return "without noise of the landing place no part is lost by it"
+    if x <= s.a:
+        return ""  # there are no such starts
+    if not (x > s.a and x <= s.arm):
+        return "they do not lie on the arm"
+    kappa = kappa_of_worst(scene)
+    bound = near_angle(s, kappa.lower(), kappa.upper(), end)
+    if not bound < 3:
+        return "the impact angle is not bounded"
+    top = root_above(s, x, kappa.lower(), at_angle(s, bound)).p
+    stack, looked = [(top * k / 64, top * (k + 1) / 64) for k in range(64)], 0
+    while stack:
+        lo, hi = stack.pop()
+        looked += 1
+        p = lo.union(hi)
+        R = landing_at(s, ratios(p), kappa) if s.exact else s.a + HALF * (kappa - s.small_d) * p
+        if over_angles(s, p, R, kappa)[0] == 0 and not check_short(s, lo, hi):
+            continue
+        if looked > MOST_HALVES:
+            return "that a jog falls short is not proved"
+        stack += [(lo, HALF * (lo + hi)), (HALF * (lo + hi), hi)]
+    return ""
+
+
+def kappa_of_worst(scene: Scene) -> Arb:
+    """Choose kappa for a worst sequence: one value of the noise, but all where kappa is known to a tolerance only."""
+    loose = any(
+        isinstance(value, list | Quantity) for name, value in quantities(scene.raw) if name[:5] in VARYING
+    )
+    inner = scene.k_lo * (1 + INSIDE), scene.k_hi * (1 - INSIDE)
+    return inner[1] if not loose and inner[0] < inner[1] else scene.k_lo.union(scene.k_hi)
+
+
+def check_short(s: Side, lo: Arb, hi: Arb) -> str:
+    """Check that jogs with angles in [lo, hi] go outward by less than the landing scatters; "" or the reason."""
+    rise = rise_of_jog(s, *sine_cosine(lo.union(hi)))
+    end = at_angle(s, hi).D
+    moved = end if rise > 0 else end - rise * ZERO.union(hi - lo)
+    return "" if moved < s.landing else "a jog may move a part outward by more than the landing scatters"
+
+
+def shares(c: Cells, scene: Scene, starts: Starts, cells: Array) -> tuple[float, float]:
+    """Bound from below the shares of the arm whose starts are claimed, and whose starts are lost or creep inward."""
+    if starts.kind in ("every", "almost-every"):
+        return 1.0, 0.0
+    whole = claimed = explained = 0.0
+    end = float_below(exact(scene.arm[0]))
+    for i, s in enumerate(scene.sides):
+        begin, fixed = float_above(s.a), starts.fixed(i)
+        whole += float_above(exact(scene.arm[1])) - float_below(s.a)
+        edges = np.minimum(c.edges[i], end)
+        since = -math.inf if starts.x is None else starts.x[i]
+        own = cells[c.start[i] : c.start[i + 1]]
+        claimed += float(np.clip(edges[1:] - np.maximum(edges[:-1], since), 0.0, None)[own].sum())
+        if starts.near is not None and not starts.only:
+            claimed += max(0.0, float(edges[0]) - max(begin if fixed is None else fixed[1], since))
+        until = fixed[0] if fixed is not None else begin if starts.lost is None else starts.lost[i]
+        explained += max(0.0, min(until, end) - begin)
+    room = 1 - 2.0**-30  # against the rounding of these sums
+    return claimed / whole * room, explained / whole * room
+
+
+def first_version_starts(scene: Scene, c: Cells, claims: dict[str, dict[str, Any]]) -> None:
+    """Find the starts of a goal of version 1, which "attracts-all" in the same file brings to the attracting cells."""
+    goal, attracts = claims.get("goal"), claims.get("attracts-all")
+    if goal is None or goal.get("found") == ATTRACTING:
+        return
+    almost = goal["kind"] == "reaches" and not goal["every"]
+    every = Starts("almost-every" if almost else "every")
+    found = every if goal["all"] else ATTRACTING
+    if attracts is not None and not goal["all"]:
+        fixed = attracts["fixed"]
+        found = every._replace(near=(attracts["q"], fixed))
+        if None not in fixed:
+            found = found._replace(kind="from", x=[point[1] for point in fixed])
+        if almost and check_null(c, scene, c.component < 0, not any(fixed)):
+            found = ATTRACTING
+    goal["found"] = found
+
+
+def starts_in_words(starts: Starts, noisy: bool) -> str:
+    """Put the starts in words, with the numbers that are checked."""
+    some = "every start a_i < x <= arm.length on every side i"
+    if starts.x is not None:
+        beyond = [f"{x!r} < x <= arm.length on side {i}" for i, x in enumerate(starts.x)]
+        some = f"every start with {', or '.join(beyond)}"
+    elif starts.kind == "cells":
+        before = ", and before the first cells" if starts.near is not None else ""
+        some = f"every start in the cells that have a rank{before}"
+    others = ", others for other throws" if noisy else ""
+    return some + (f", but for starts of total length zero{others}" if starts.thinning else "")
+
+
+def explained_in_words(starts: Starts) -> list[str]:
+    """Say what becomes of starts that are not claimed."""
+    lines = []
+    for i in range(len(starts.lost or (starts.near or ([], []))[0])):
+        fixed = starts.fixed(i)
+        if fixed is not None:
+            lines.append(f"    side {i}: starts a_{i} < x < {fixed[0]!r} stay on it and creep to a_{i}")
+        elif starts.lost is not None:
+            lost = f"each start a_{i} < x <= {starts.lost[i]!r} is lost by a worst sequence of landings"
+            lines.append(f"    side {i}: {lost}")
+    return lines
