@@ -49,6 +49,7 @@ from limitsets.errors import LimitsetsError, MapError
 
 __all__ = [
     "cover_foreign_class",
+    "entries_of",
     "formula",
     "generic",
     "kernel",
@@ -722,6 +723,10 @@ def formula(function: F) -> F:
     return function
 
 
+entries_of = numba.literal_unroll
+"""Loop over the entries of a tuple of several classes, in compiled code."""
+
+
 def number_class(numba_type: Any) -> type | None:
     """Class of a number that `number` made, as numba sees it; None for any other type."""
     return numba_type.cls if isinstance(numba_type, _NumberType) else None
@@ -792,7 +797,7 @@ def _generic(stub: Any, proof: bool, inlined: bool, default: Callable[..., Any] 
     options = {**{key: given[key] for key in _OVERLOAD}, "forceinline": inlined}
 
     def choose(first: Any, *rest: Any) -> Callable[..., Any] | None:
-        key: Any = named_tuple_class(first)
+        key: Any = type(None) if isinstance(first, types.NoneType) else named_tuple_class(first)
         if key is None and isinstance(first, types.UniTuple):
             key = first.count
         return methods.get(key, default)

@@ -6,26 +6,18 @@ comes to rest in more than two, the cell is said to be undecided, and whoever as
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 from limitsets.interval import Interval
-from limitsets.jit import generic, proof_kernel
+from limitsets.jit import entries_of, generic, proof_kernel
 from limitsets.maps.contract import fallback_box, image_box
 from limitsets.thrower.arrival_box import landed
 from limitsets.thrower.motion import FullThrow
-from limitsets.thrower.motion_box import NOTHING, FullSideBox, Ways, gather_full_box, no_way
+from limitsets.thrower.motion_box import NOTHING, FullSideBox, Ways, encloses, gather_full_box, no_way
 from limitsets.thrower.roll_box import rested
 from limitsets.thrower.throw_box import sure_throw_box, throw_box
 
 __all__ = ["full_fallback_box", "full_image_box", "full_ways", "gather_full_pair"]
-
-
-@proof_kernel
-def _bounded(spread: Any) -> bool:
-    if spread is None:
-        return True
-    return spread.law.bound < math.inf  # type: ignore[no-any-return]  # effects are Any
 
 
 @proof_kernel
@@ -43,26 +35,11 @@ def _none() -> Ways:
 
 
 @proof_kernel
-def _followed(
-    pivot: Any,
-    slip: Any,
-    bounce: Any,
-    drive: Any,
-    part: FullSideBox,
-    x: Interval,
-    phi: Interval,
-    jog: Interval,
-) -> Ways:
-    """Places of rest; with an effect that has no box twin what follows is never typed."""
-    if pivot is not None:
-        return _none()
-    if slip is not None:
-        return _none()
-    if bounce is not None:
-        return _none()
-    if drive is not None:
-        return _none()
-    return rested(part.effects.roll, part, landed(part.effects.landing, part, x, phi, jog))
+def _all_enclosed(effects: Any) -> bool:
+    enclosed = True
+    for effect in entries_of(effects):
+        enclosed = enclosed & encloses(effect)
+    return enclosed
 
 
 # Not inlined: images, replays and the argument near the joint would each compile it anew.
@@ -73,11 +50,9 @@ def full_ways(part: FullSideBox, x: Interval, state: int, phi: Interval, jog: In
 
 @proof_kernel
 def _full_ways(part: FullSideBox, x: Interval, state: int, phi: Interval, jog: Interval) -> Ways:
-    if (state == NOTHING) | (not _bounded(part.effects.spread)):
+    if (state == NOTHING) | (not _all_enclosed(part.effects)):
         return _none()
-    return _followed(
-        part.effects.pivot, part.effects.slip, part.effects.bounce, part.effects.drive, part, x, phi, jog
-    )
+    return rested(part.effects.roll, part, landed(part.effects.landing, part, x, phi, jog))
 
 
 full_ways.on(FullSideBox, _full_ways)

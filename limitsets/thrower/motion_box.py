@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from limitsets.interval import Interval
-from limitsets.jit import proof_kernel
+from limitsets.jit import generic, proof_kernel
 from limitsets.maps import codes
 from limitsets.thrower.motion import Effects, FullThrow
 from limitsets.thrower.params import Throw
@@ -28,6 +28,8 @@ __all__ = [
     "Ways",
     "box_of",
     "corner_box",
+    "enclosed",
+    "encloses",
     "gather_full_box",
     "no_way",
     "put",
@@ -70,6 +72,23 @@ class FullSideBox(NamedTuple):
     q_hi: NDArray[np.float64]
     effects: Effects
     waiting: NDArray[np.float64]
+
+
+def _not_enclosed(effect: Any) -> bool:
+    return False
+
+
+def enclosed(effect: Any) -> bool:
+    """Say of an effect that the box kernels follow it."""
+    return True
+
+
+@generic(proof=True, default=_not_enclosed)
+def encloses(effect: Any) -> bool:
+    """Whether the box kernels follow an effect; nothing is proved of throws with one whose file has not said so."""
+
+
+encloses.on(type(None), enclosed)
 
 
 class Way(NamedTuple):

@@ -16,6 +16,7 @@ from limitsets.jit import kernel
 from limitsets.thrower.effects.drive import pulled
 from limitsets.thrower.impact import jog_displacement
 from limitsets.thrower.motion import Arrival, FullSide, side_number
+from limitsets.thrower.motion_box import enclosed, encloses
 from limitsets.thrower.throw import settle
 from limitsets.thrower.turn import Turned, turn
 
@@ -96,3 +97,6 @@ def first_arrival(landing: Any, part: FullSide, x: float) -> tuple[Arrival, bool
         offset += part.corner[side_number(part, number)]
     psi = turn(max(phi - offset, 0.0))
     return Arrival(vertex, psi, moved, speed - (own.h + own.d), x - own.kappa * phi, 1.0), True
+
+
+encloses.on(Landing, enclosed)

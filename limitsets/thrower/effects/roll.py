@@ -18,6 +18,7 @@ from limitsets.jit import kernel
 from limitsets.thrower.effects.bounce import struck
 from limitsets.thrower.effects.drive import leant
 from limitsets.thrower.motion import Arrival, Contact, Face, FullSide, on_to_next, right_of, side_number
+from limitsets.thrower.motion_box import enclosed, encloses
 from limitsets.thrower.turn import turn
 
 __all__ = ["Roll", "next_arrival"]
@@ -81,3 +82,6 @@ def _lift(part: FullSide, foot: float, d: float) -> float:
     """Energy it takes from lying on a side to the top over one of its ends, which is `foot` left of the centre."""
     gravity, right, high = leant(part.effects.drive, part.own.kappa, foot, d)
     return gravity * right * right / (math.hypot(right, high) + high)  # ell - H
+
+
+encloses.on(Roll, enclosed)

@@ -17,6 +17,7 @@ from limitsets.errors import MapError
 from limitsets.jit import generic, kernel
 from limitsets.maps.counting_random import normal_pair, uniform_pair
 from limitsets.thrower.motion import Effects, FullThrow, at_kappa
+from limitsets.thrower.motion_box import encloses
 
 __all__ = ["Even", "Normal", "Spread", "moved_by", "spread_of", "spread_over"]
 
@@ -110,3 +111,10 @@ def spread_of(world: Any, how: str) -> Spread:
         )
     law = Even() if how == "bounded" else Normal()
     return Spread(law, 0.0 if speed is None else speed.value, 0.0 if landing is None else landing.value)
+
+
+def _bounded(spread: Spread) -> bool:
+    return spread.law.bound < math.inf  # type: ignore[no-any-return]  # laws are Any
+
+
+encloses.on(Spread, _bounded)

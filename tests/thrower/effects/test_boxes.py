@@ -5,6 +5,7 @@ Points are thrown by the point kernels, which have tests of their own; the boxes
 
 import math
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 import pytest
@@ -150,3 +151,18 @@ def test_of_other_effects_nothing_is_proved(effects):
     facts |= {"world": {"stroke": "5 deg", "scatter": {"speed": "0.4 %"}}, "effects": effects}
     case = ls.load(facts)
     assert enclosures(case.map, case.map, np.linspace(9.0, 20.0, 50), 2).lost.all()
+
+
+class Wind(NamedTuple):
+    """An effect that has not said that boxes follow it."""
+
+    strength: float
+
+
+@pytest.mark.parametrize("name", ["landing", "roll", "drive"])
+def test_nothing_is_proved_of_an_effect_that_no_box_kernel_names(name):
+    """It was enclosed as if it were the effect of that field, or absent."""
+    params = scene("paper-designed").map
+    params = params._replace(effects=params.effects._replace(**{name: Wind(1.0)}))
+    found = enclosures(params, params, np.linspace(8.0, 28.0, 100), 0)
+    assert found.lost.all()
