@@ -16,7 +16,7 @@ from limitsets.jit import proof_kernel
 from limitsets.maps import codes
 from limitsets.proofs.parameters import ParameterBox
 from limitsets.thrower.arrival_box import landed
-from limitsets.thrower.motion_box import gather_full_box
+from limitsets.thrower.motion_box import all_enclosed, gather_full_box
 from limitsets.thrower.roll_box import rested_one_way
 from limitsets.thrower.side_box import gather_box, with_kappa
 from limitsets.thrower.throw_box import NOTHING, sure_throw_box, throw_box
@@ -48,7 +48,7 @@ def _replay_full(lo_map: Any, hi_map: Any, kappa: Any, landing: Any, lo: Any, hi
         part = gather_full_box(lo_map, hi_map, side[k], Interval(kappa[0, k], kappa[1, k]))
         x = Interval(lo[k], hi[k])
         state, jog, phi, _, _ = sure_throw_box(part.own, x)
-        if state == NOTHING:
+        if (state == NOTHING) | (not all_enclosed(part.effects)):
             return k
         ways = rested_one_way(part.effects.roll, part, landed(part.effects.landing, part, x, phi, jog))
         if ways.number != 1:

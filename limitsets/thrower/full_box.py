@@ -9,11 +9,11 @@ from __future__ import annotations
 from typing import Any
 
 from limitsets.interval import Interval
-from limitsets.jit import entries_of, generic, proof_kernel
+from limitsets.jit import generic, proof_kernel
 from limitsets.maps.contract import fallback_box, image_box
 from limitsets.thrower.arrival_box import landed
 from limitsets.thrower.motion import FullThrow
-from limitsets.thrower.motion_box import NOTHING, FullSideBox, Ways, encloses, gather_full_box, no_way
+from limitsets.thrower.motion_box import NOTHING, FullSideBox, Ways, all_enclosed, gather_full_box, no_way
 from limitsets.thrower.roll_box import rested
 from limitsets.thrower.throw_box import sure_throw_box, throw_box
 
@@ -34,14 +34,6 @@ def _none() -> Ways:
     return Ways(NOTHING, ways.first, ways.second)
 
 
-@proof_kernel
-def _all_enclosed(effects: Any) -> bool:
-    enclosed = True
-    for effect in entries_of(effects):
-        enclosed = enclosed & encloses(effect)
-    return enclosed
-
-
 # Not inlined: images, replays and the argument near the joint would each compile it anew.
 @generic(proof=True, inlined=False)
 def full_ways(part: FullSideBox, x: Interval, state: int, phi: Interval, jog: Interval) -> Ways:
@@ -50,7 +42,7 @@ def full_ways(part: FullSideBox, x: Interval, state: int, phi: Interval, jog: In
 
 @proof_kernel
 def _full_ways(part: FullSideBox, x: Interval, state: int, phi: Interval, jog: Interval) -> Ways:
-    if (state == NOTHING) | (not _all_enclosed(part.effects)):
+    if (state == NOTHING) | (not all_enclosed(part.effects)):
         return _none()
     return rested(part.effects.roll, part, landed(part.effects.landing, part, x, phi, jog))
 

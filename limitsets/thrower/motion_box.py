@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from limitsets.interval import Interval
-from limitsets.jit import generic, proof_kernel
+from limitsets.jit import entries_of, generic, proof_kernel
 from limitsets.maps import codes
 from limitsets.thrower.motion import Effects, FullThrow
 from limitsets.thrower.params import Throw
@@ -26,6 +26,7 @@ __all__ = [
     "FullSideBox",
     "Way",
     "Ways",
+    "all_enclosed",
     "box_of",
     "corner_box",
     "enclosed",
@@ -89,6 +90,15 @@ def encloses(effect: Any) -> bool:
 
 
 encloses.on(type(None), enclosed)
+
+
+@proof_kernel
+def all_enclosed(effects: Any) -> bool:
+    """Whether the box kernels follow every effect that is there."""
+    every = True
+    for effect in entries_of(effects):
+        every = every & encloses(effect)
+    return every
 
 
 class Way(NamedTuple):

@@ -14,6 +14,8 @@ import limitsets as ls
 from limitsets.errors import SceneError
 from limitsets.graph.images.enclosed import enclosures
 from limitsets.maps import codes, images
+from limitsets.proofs.parameters import parameter_box
+from limitsets.proofs.replay import replay
 
 EFFECTS = {"landing": True, "roll": True}
 
@@ -166,3 +168,15 @@ def test_nothing_is_proved_of_an_effect_that_no_box_kernel_names(name):
     params = params._replace(effects=params.effects._replace(**{name: Wind(1.0)}))
     found = enclosures(params, params, np.linspace(8.0, 28.0, 100), 0)
     assert found.lost.all()
+
+
+def test_no_orbit_is_proved_with_an_effect_that_no_box_kernel_names():
+    given = scene("paper-designed")
+    box = parameter_box(given)
+    known = replay(box, (9.0, 9.0), 2, np.tile([[box.lo.kappa], [box.hi.kappa]], 3), np.zeros(3))
+    assert known[0].size == 4
+    lo, hi = (each._replace(effects=each.effects._replace(drive=Wind(1.0))) for each in (box.lo, box.hi))
+    other = replay(
+        replace(box, lo=lo, hi=hi), (9.0, 9.0), 2, np.tile([[box.lo.kappa], [box.hi.kappa]], 3), np.zeros(3)
+    )
+    assert other[0].size == 1
