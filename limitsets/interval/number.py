@@ -87,6 +87,8 @@ class Interval:
 
 # ---------------------------------------------------------------- the operators, on the kernels of pairs
 
+# One function for each: code that takes a kernel as an argument, or keeps one in a closure, is not cached on disk.
+
 
 def _ends(x: Any) -> Any:
     """Return an interval, or a plain number, as a pair."""
@@ -161,9 +163,6 @@ for _stub, _method in (
     (operator.truediv, _div),
     (operator.pow, _pow),
     (abs, _abs),
-    (min, _min),
-    (max, _max),
-    (math.sqrt, _sqrt),
 ):
     operation(_stub, Interval, _method)
 
@@ -198,7 +197,10 @@ def with_sign_of(x: Number, size: Number) -> Number:
 
 
 def where_positive(x: Number, yes: Number, no: Number) -> Number:
-    """Return `yes` where x > 0 (is proved), `no` elsewhere."""
+    """Choose between two forms of one number: `yes` where x > 0 (is proved), `no` elsewhere.
+
+    Where x has no proved sign the interval of `no` stands for both: so both have to be the same number there.
+    """
     return yes if x > 0.0 else no
 
 
@@ -216,12 +218,13 @@ def _where_positive(x: Any, yes: Any, no: Any) -> Interval:
     return Interval(yes.lo if sure else no.lo, yes.hi if sure else no.hi)
 
 
-operation(square_root, Interval, _sqrt)
-operation(smaller, Interval, _min)
-operation(larger, Interval, _max)
-operation(signed_square, float, signed_square)
-operation(with_sign_of, float, with_sign_of)
-operation(where_positive, float, where_positive)
-operation(signed_square, Interval, _signed_square)
-operation(with_sign_of, Interval, _with_sign_of)
-operation(where_positive, Interval, _where_positive)
+for _plain, _enclosed in (
+    (square_root, _sqrt),
+    (smaller, _min),
+    (larger, _max),
+    (signed_square, _signed_square),
+    (with_sign_of, _with_sign_of),
+    (where_positive, _where_positive),
+):
+    operation(_plain, float, _plain)  # as it stands
+    operation(_plain, Interval, _enclosed)
