@@ -39,8 +39,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from limitsets.errors import MapError
-from limitsets.jit import cover_foreign_class, generic
-from limitsets.maps import codes
+from limitsets.jit import cover_foreign_class
+from limitsets.maps import codes, derived, kernels
+from limitsets.maps.kernels import (
+    displacement,
+    fallback,
+    fallback_box,
+    image,
+    image_box,
+    image_on,
+    margin,
+    on_side,
+    on_side_box,
+    scattered,
+)
 
 __all__ = [
     "MapKind",
@@ -60,76 +72,6 @@ __all__ = [
     "require_sides",
     "scattered",
 ]
-
-
-def _same(params: Any, side: int) -> Any:
-    return params
-
-
-def _both(lo: Any, hi: Any, side: int) -> Any:
-    return lo, hi
-
-
-def _as_they_are(params: Any, start: int, step: int) -> Any:
-    return params
-
-
-def _no_fallback_box(params_lo: Any, params_hi: Any, lo: Any, hi: Any, side: int) -> Any:
-    return image_box(params_lo, params_hi, lo, hi, side)
-
-
-def _no_fallback(params: Any, x: Any, side: int) -> Any:
-    return x, side, codes.OUTSIDE_MODEL
-
-
-@generic
-def image(params: Any, x: Any, side: int) -> Any:
-    """One step: ``(x', side', code)``."""
-
-
-@generic
-def image_on(params: Any, x: Any, side: int, branch: int) -> Any:
-    """One step on a forced branch: ``(x', side', slope)``."""
-
-
-@generic(proof=True)
-def image_box(params_lo: Any, params_hi: Any, lo: Any, hi: Any, side: int) -> Any:
-    """Boxes that contain the image of a box, for every parameter between the two."""
-
-
-@generic(proof=True, inlined=False, default=_no_fallback_box)
-def fallback_box(params_lo: Any, params_hi: Any, lo: Any, hi: Any, side: int) -> Any:
-    """As `image_box`, slow and sure."""
-
-
-@generic(proof=True, default=_both)
-def on_side_box(params_lo: Any, params_hi: Any, side: int) -> Any:
-    """Return what `image_box` needs to know of one side, for both corners."""
-
-
-@generic(default=_same)
-def on_side(params: Any, side: int) -> Any:
-    """Return what the kernels need to know of one side."""
-
-
-@generic(inlined=False, default=_no_fallback)
-def fallback(params: Any, x: Any, side: int) -> Any:
-    """One step, slow and sure."""
-
-
-@generic
-def margin(params: Any, x: Any, side: int) -> Any:
-    """Return a number whose sign decides between branches 0 and 1."""
-
-
-@generic
-def displacement(params: Any, x: Any, side: int) -> Any:
-    """x' - x without cancellation."""
-
-
-@generic(default=_as_they_are)
-def scattered(params: Any, start: int, step: int) -> Any:
-    """Return the parameters of one step of one start."""
 
 
 EXITS_OF_A_MAP = {"outside": codes.OUTSIDE}
@@ -251,8 +193,8 @@ def register(
         "displacement": displacement,
         "scattered": scattered,
     }
-    kernels = {name: f for name, f in given.items() if f is not None}
-    for name, function in kernels.items():
+    mine = {name: f for name, f in given.items() if f is not None}
+    for name, function in mine.items():
         plain = getattr(function, "py_func", function)
         if (
             not callable(plain)
@@ -266,16 +208,19 @@ def register(
                 "move it out of the function",
             )
         _require_arguments(cls, name, plain)
-    cover_foreign_class(cls, list(kernels.values()))
-    for name, function in kernels.items():
-        globals()[name].on(cls, function)
+    cover_foreign_class(cls, list(mine.values()))
+    for name, function in mine.items():
+        getattr(kernels, "forced" if name == "image_on" else name).on(cls, function)
+    boxes = image_box is not None or derived.derive(
+        cls, forced=image_on is not None, decided=margin is not None, branches=len(branches)
+    )
     _KINDS[cls] = MapKind(
         cls.__name__,
         dimension,
         tuple(branches),
         {**(EXITS_OF_A_MAP if exits is None else exits), "undefined": codes.UNDEFINED},
         image_on is not None,
-        image_box is not None,
+        boxes,
         margin is not None,
         displacement is not None,
     )
