@@ -452,8 +452,8 @@ def _explained(error: Exception, cls: type) -> MapError:
     cause = re.sub(r", defined at .*", "", cause.removeprefix("TypingError: "))
     named = next((found for line in lines if (found := _KERNEL.search(line))), None)
     kernel = f"the kernel {named[1]} of {cls.__name__}" if named else f"a kernel of {cls.__name__}"
-    found = (re.match(r'File "(.*)", line (\d+)', line) for line in lines)
-    spots = ((Path(at[1]).resolve(), int(at[2])) for at in found if at)
+    places = (re.match(r'File "(.*)", line (\d+)', line) for line in lines)
+    spots = ((Path(at[1]).resolve(), int(at[2])) for at in places if at)
     own = (PACKAGE, Path(numba.__file__).parent)
     spot = next((at for at in spots if not any(folder in at[0].parents for folder in own)), None)
     place = f"{spot[0].name}, line {spot[1]}" if spot else ""
@@ -655,7 +655,7 @@ def number(*, twice: bool) -> Callable[[type[T]], type[T]]:
 
 
 def _number(cls: type[T]) -> type[T]:
-    first, second = _FIELDS[cls] = tuple(cls.__annotations__)
+    first, _ = _FIELDS[cls] = tuple(cls.__annotations__)
 
     def typer(context: Any) -> Any:
         def typed(one: Any, two: Any) -> Any:

@@ -41,11 +41,11 @@ from limitsets.interval.arithmetic import (
     sqrt,
     sub,
 )
+from limitsets.interval.dual import Dual, seed, slope_of, value_of
 from limitsets.interval.elementary import atan2, cos, sin
 from limitsets.interval.exponential import exp, tanh
 from limitsets.interval.guard import guard, rounding_is_sound
 from limitsets.interval.logarithm import log
-from limitsets.interval.dual import Dual, seed, slope_of, value_of
 from limitsets.interval.number import Interval, intervals_between
 
 __all__ = [

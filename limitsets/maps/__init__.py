@@ -14,7 +14,7 @@ from limitsets.maps.codes import (
     UNDECIDED,
     UNDEFINED,
 )
-from limitsets.maps.contract import MapKind, coerce, kind_of, register
+from limitsets.maps.contract import MapKind, coerce, has_slope, kind_of, register
 from limitsets.maps.critical import CriticalPoint, critical_points
 from limitsets.maps.drivers import Images, Orbit, advance, images, images_on, orbit
 from limitsets.maps.forced import along
@@ -58,6 +58,7 @@ __all__ = [
     "coerce",
     "critical_points",
     "domain_of",
+    "has_slope",
     "images",
     "images_on",
     "kind_of",

@@ -41,37 +41,8 @@ from numpy.typing import NDArray
 from limitsets.errors import MapError
 from limitsets.jit import cover_foreign_class
 from limitsets.maps import codes, derived, kernels
-from limitsets.maps.kernels import (
-    displacement,
-    fallback,
-    fallback_box,
-    image,
-    image_box,
-    image_on,
-    margin,
-    on_side,
-    on_side_box,
-    scattered,
-)
 
-__all__ = [
-    "MapKind",
-    "coerce",
-    "displacement",
-    "fallback",
-    "fallback_box",
-    "image",
-    "image_box",
-    "image_on",
-    "kind_of",
-    "margin",
-    "on_side",
-    "on_side_box",
-    "register",
-    "require_codes",
-    "require_sides",
-    "scattered",
-]
+__all__ = ["MapKind", "coerce", "has_slope", "kind_of", "register", "require_codes", "require_sides"]
 
 
 EXITS_OF_A_MAP = {"outside": codes.OUTSIDE}
@@ -211,8 +182,12 @@ def register(
     cover_foreign_class(cls, list(mine.values()))
     for name, function in mine.items():
         getattr(kernels, "forced" if name == "image_on" else name).on(cls, function)
-    boxes = image_box is not None or derived.derive(
-        cls, forced=image_on is not None, decided=margin is not None, branches=len(branches)
+    boxes = derived.derive(
+        cls,
+        forced=image_on is not None,
+        decided=margin is not None,
+        branches=len(branches),
+        boxes=image_box is not None,
     )
     _KINDS[cls] = MapKind(
         cls.__name__,
@@ -283,6 +258,23 @@ def kind_of(params: Any) -> MapKind:
             "register it with limitsets.register",
         )
     return kind
+
+
+_SLOPES: dict[type, bool] = {}
+
+
+def has_slope(params: Any) -> bool:
+    """Whether slopes of a map are known: it has `image_on`, or a smooth `image` of one branch that can be derived."""
+    kind, cls = kind_of(params), type(params)
+    if kind.has_image_on or len(kind.branches) > 1:
+        return kind.has_image_on
+    if cls not in _SLOPES:
+        try:
+            derived.try_slope(coerce(params), kind.dimension)
+            _SLOPES[cls] = True
+        except MapError:
+            _SLOPES[cls] = False
+    return _SLOPES[cls]
 
 
 def _fewest_entries(params: Any) -> int | None:

@@ -1,14 +1,14 @@
 """Proved boxes, and slopes, of any map from the source of its plain kernels.
 
-The kernels run on intervals and on intervals with a derivative (`limitsets.interval.Dual`).  One formula f on a box X of
-states, for a box of parameters, is enclosed by what these three have in common:
+The kernels run on intervals and on intervals with a derivative (`limitsets.interval.Dual`).  One formula f on a box X
+of states, for a box of parameters, is enclosed by what these three have in common:
 
 * f(X), each operation in turn.
 * Where df_i/dx_j has one sign on X for some j: f_i at the two ends of X_j, for all other coordinates as before.
 * The mean value form f(m) + sum_j df/dx_j(X) (X_j - m_j), with m the middle; asked where a sign is open.
 
-So the box of a map that is monotone on X is the range itself, but for rounding.  A map with two branches has a `margin`,
-enclosed in the same way: where its sign is proved there is one box, where it is open there are two.
+So the box of a map that is monotone on X is the range itself, but for rounding.  A map with two branches has a
+`margin`, enclosed in the same way: where its sign is proved there is one box, where it is open there are two.
 
 Source: Neumaier, "Interval Methods for Systems of Equations", 1990, sections 2.3 and 2.4.
 """
@@ -16,24 +16,35 @@ Source: Neumaier, "Interval Methods for Systems of Equations", 1990, sections 2.
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from dataclasses import dataclass
+from typing import Any, NamedTuple, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
 
 from limitsets.interval import Dual, Interval, intervals_between, slope_of, value_of
 from limitsets.interval.number import ends_of
-from limitsets.jit import generic, of_entries, proof_kernel
+from limitsets.jit import generic, kernel, of_entries, proof_kernel, take_mark
+from limitsets.maps import kernels
 from limitsets.maps.kernels import (
     entries_of,
     forced,
     image,
-    image_box,
+    image_on,
     margin,
     on_side,
     on_side_box,
+    pick,
     seeded,
     state_of,
 )
 
-__all__ = ["derive"]
+__all__ = ["MAYBE", "NEVER", "SURE", "UNKNOWN", "BranchBoxes", "branch_boxes", "derive", "try_slope"]
+
+Floats: TypeAlias = NDArray[np.float64]
+
+# Whether the map takes a branch on a box.
+UNKNOWN, NEVER, MAYBE, SURE = -1, 0, 1, 2
 
 
 NO_WITNESS = (0.0, 0.0)
@@ -73,6 +84,12 @@ def _decision(form: Decision, params: Any, x: Any) -> Any:
 def _on_branch(form: OnBranch, params: Any, x: Any) -> Any:
     found = forced(params, x, form.side, form.branch)
     return found[0], found[1]
+
+
+def _by_image(params: Any, x: Any, side: int, branch: int) -> Any:
+    """Return the image of a map of one branch that has `image` alone: method of `forced`."""
+    after, to, _ = image(params, x, side)
+    return after, to
 
 
 def _whole(form: Whole, params: Any, x: Any) -> Any:
@@ -144,7 +161,10 @@ def _columns(x: Any, k: int, form: Any, params: Any, box: Any) -> Any:
 def _component(form: Any, params: Any, x: Any, columns: Any, i: int) -> Interval:
     """Enclose coordinate i of a formula on a box on which values and derivatives are known."""
     found = columns[0][i].value
-    least, most = _at(form, params, _corner(x, columns, i, False)), _at(form, params, _corner(x, columns, i, True))
+    least, most = (
+        _at(form, params, _corner(x, columns, i, False)),
+        _at(form, params, _corner(x, columns, i, True)),
+    )
     lo, hi = max(found.lo, least[i].value.lo), min(found.hi, most[i].value.hi)
     open_sign = False
     for j in range(len(columns)):
@@ -184,46 +204,175 @@ def _box(lo: Any, hi: Any) -> Any:
     return _intervals(entries_of(lo), entries_of(hi))
 
 
+def _any_sign(params: Any, x: Any, side: int) -> Interval:
+    return Interval(-math.inf, math.inf)
+
+
+def _one_branch(params: Any, x: Any, side: int) -> Interval:
+    return Interval(-1.0, -1.0)
+
+
+def _margin(params: Any, x: Any, side: int) -> Interval:
+    form = Decision(side)
+    return _component(form, params, x, _columns(x, form, params, x), 0)
+
+
+def _on_branch_form(params: Any, side: int, branch: int) -> OnBranch:
+    return OnBranch(side, branch)
+
+
+def _whole_form(params: Any, side: int, branch: int) -> Whole:
+    return Whole(side)
+
+
 def _as_intervals(params_lo: Any, params_hi: Any, side: int) -> Any:
-    """Method of `on_side_box`: both corners together, once for a batch."""
+    """Put both corners together, once for a batch: method of `on_side_box`."""
     params = intervals_between(params_lo, params_hi)
     return params, params
 
 
-def _whole_box(params: Any, _: Any, lo: Any, hi: Any, side: int) -> Any:
-    """Method of `image_box` for a map whose `image` has no branches."""
-    slot, finite = _slot(Whole(side), on_side(params, side), _box(lo, hi), 0)
-    return 1 if finite else -1, slot, slot, NO_WITNESS
-
-
-def _smooth_box(params: Any, _: Any, lo: Any, hi: Any, side: int) -> Any:
-    """Method of `image_box` for a map of one branch, by `image_on`."""
-    slot, finite = _slot(OnBranch(side, 0), on_side(params, side), _box(lo, hi), 0)
+def _box_of_one(params: Any, _: Any, lo: Any, hi: Any, side: int) -> Any:
+    """Enclose the image under a map of one branch: method of `image_box`."""
+    here = on_side(params, side)
+    slot, finite = _slot(_form(here, side, 0), here, _box(lo, hi), 0)
     return 1 if finite else -1, slot, slot, NO_WITNESS
 
 
 def _box_of_two(params: Any, _: Any, lo: Any, hi: Any, side: int) -> Any:
-    """Method of `image_box` for a map of two branches, by `image_on` and `margin`."""
-    here, x, form = on_side(params, side), _box(lo, hi), Decision(side)
-    sign = _component(form, here, x, _columns(x, form, here, x), 0)
+    """Enclose the image under a map of two branches: method of `image_box`."""
+    here, x = on_side(params, side), _box(lo, hi)
+    sign = _sign(here, x, side)
     branch = 1 if sign.lo > 0.0 else 0
-    first, finite = _slot(OnBranch(side, branch), here, x, branch)
+    first, finite = _slot(_form(here, side, branch), here, x, branch)
     second = first
     count = 1 if finite & ((sign.lo > 0.0) | (sign.hi <= 0.0)) else -1
     if (sign.lo <= 0.0) & (sign.hi > 0.0):
-        second, also = _slot(OnBranch(side, 1), here, x, 1)
+        second, also = _slot(_form(here, side, 1), here, x, 1)
         count = 2 if finite & also else -1
     return count, first, second, NO_WITNESS
 
 
-def derive(cls: type, *, forced: bool, decided: bool, branches: int) -> bool:
-    """Give a class of parameters the methods of `image_box`, where its kernels suffice; whether they do."""
-    if forced and (branches == 1 or (branches == 2 and decided)):
-        method = _smooth_box if branches == 1 else _box_of_two
-    elif branches == 1:
-        method = _whole_box
-    else:
-        return False
+# ---------------------------------------------------------------- branch by branch, with slopes
+
+
+@generic(proof=True, default=_any_sign)
+def _sign(params: Any, x: Any, side: int) -> Any:
+    """Enclose `margin`; everything where a map has none."""
+
+
+@generic(proof=True, default=_on_branch_form)
+def _form(params: Any, side: int, branch: int) -> Any:
+    """Return the formula of one branch."""
+
+
+@proof_kernel(entry=True)
+def _enclose_branch(
+    lo_map: Any, hi_map: Any, side: int, branch: int, lo: Any, hi: Any, image: Any, slope: Any, state: Any
+) -> int:
+    """Fill images (2, n, d), slopes (2, n, d, d) and states of boxes on one branch; the side it leads to."""
+    params, to = on_side(intervals_between(lo_map, hi_map), side), side
+    for k in range(lo[0].size):
+        take_mark()
+        x = _box(pick(lo, k), pick(hi, k))
+        sign = _sign(params, x, side)
+        form = _form(params, side, branch)
+        columns = _columns(x, form, params, x)
+        found = _range(x, form, params, x, columns)
+        _, to = _formula(form, params, state_of(x))
+        for i in range(len(found)):
+            image[0, k, i], image[1, k, i] = found[i].lo, found[i].hi
+            for j in range(len(columns)):
+                slope[0, k, i, j], slope[1, k, i, j] = columns[j][i].slope.lo, columns[j][i].slope.hi
+        mine = (sign.lo > 0.0) if branch == 1 else (sign.hi <= 0.0)
+        never = (sign.hi <= 0.0) if branch == 1 else (sign.lo > 0.0)
+        state[k] = SURE if mine else (NEVER if never else MAYBE)
+        state[k] = UNKNOWN if take_mark() else state[k]
+    return int(to)
+
+
+@dataclass(frozen=True, eq=False)
+class BranchBoxes:
+    """Images and derivatives of boxes on one branch, for every parameter between two corners.
+
+    Attributes
+    ----------
+    lo, hi : ndarray, shape (n, d)
+        The images.
+    slope_lo, slope_hi : ndarray, shape (n, d, d)
+        Entry [k, i, j] holds every dx_i'/dx_j on box k.
+    state : ndarray of int8, shape (n,)
+        Whether the map takes this branch there: `SURE`, `NEVER`, `MAYBE`; `UNKNOWN` where nothing is proved.
+    side : int
+        The side it leads to.
+    """
+
+    lo: Floats
+    hi: Floats
+    slope_lo: Floats
+    slope_hi: Floats
+    state: NDArray[np.int8]
+    side: int
+
+
+def branch_boxes(lo_map: Any, hi_map: Any, side: int, branch: int, lo: Floats, hi: Floats) -> BranchBoxes:
+    """Enclose images and derivatives of boxes with corners of shape (n, d) on one branch of any map.
+
+    A map of one branch takes it; one of several without `margin` may take any of them anywhere.
+
+    Raises
+    ------
+    MapError
+        For a map whose kernels do more than boxes can follow; the line names the function.
+    """
+    n, d = lo.shape
+    image, slope, state = np.full((2, n, d), np.nan), np.full((2, n, d, d), np.nan), np.empty(n, np.int8)
+    corners = [tuple(np.ascontiguousarray(end[:, k]) for k in range(d)) for end in (lo, hi)]
+    to = _enclose_branch(lo_map, hi_map, side, branch, corners[0], corners[1], image, slope, state)
+    state[~(np.isfinite(image).all(axis=(0, 2)) & np.isfinite(slope).all(axis=(0, 2, 3)))] = UNKNOWN
+    return BranchBoxes(image[0], image[1], slope[0], slope[1], state, to)
+
+
+@kernel(entry=True)
+def _slope_at(params: Any, xs: Any) -> Any:
+    return image_on(params, pick(xs, 0), 0, 0)[2]
+
+
+def try_slope(params: Any, dimension: int) -> None:
+    """Compile the slope of the one branch of a map.
+
+    Raises
+    ------
+    MapError
+        For a map whose kernel `image` does more than derivatives can follow.
+    """
+    _slope_at(params, tuple(np.full(1, 0.5) for _ in range(dimension)))
+
+
+# ---------------------------------------------------------------- registration
+
+
+def derive(cls: type, *, forced: bool, decided: bool, branches: int, boxes: bool) -> bool:
+    """Give a class of parameters what follows from its kernels; whether it has `image_box` then.
+
+    Parameters
+    ----------
+    cls : type
+        The class.
+    forced, decided, boxes : bool
+        Whether it has `image_on`, `margin` and an `image_box` of its own.
+    branches : int
+        How many it has.
+    """
+    if not forced and branches == 1:
+        kernels.forced.on(cls, _by_image)
+        _form.on(cls, _whole_form)
+    if branches == 1:
+        _sign.on(cls, _one_branch)
+    elif decided:
+        _sign.on(cls, _margin)
+    enough = branches == 1 or (branches == 2 and decided and forced)
+    if boxes or not enough:
+        return boxes
     on_side_box.on(cls, _as_intervals)
-    image_box.on(cls, method)
+    kernels.image_box.on(cls, _box_of_one if branches == 1 else _box_of_two)
     return True

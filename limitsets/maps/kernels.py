@@ -23,6 +23,8 @@ __all__ = [
     "margin",
     "on_side",
     "on_side_box",
+    "pick",
+    "put",
     "scattered",
     "seeded",
     "state_of",
@@ -99,6 +101,48 @@ def scattered(params: Any, start: int, step: int) -> Any:
     """Return the parameters of one step of one start."""
 
 
+# ---------------------------------------------------------------- states in arrays
+
+
+@generic
+def pick(xs: Any, k: int) -> Any:
+    """State number k of a tuple of coordinate arrays: a number, or a tuple from two coordinates up."""
+
+
+@generic
+def put(xs: Any, k: int, x: Any) -> None:
+    """Store state number k."""
+
+
+def _pick1(xs: Any, k: int) -> Any:
+    return xs[0][k]
+
+
+def _pick2(xs: Any, k: int) -> Any:
+    return xs[0][k], xs[1][k]
+
+
+def _pick3(xs: Any, k: int) -> Any:
+    return xs[0][k], xs[1][k], xs[2][k]
+
+
+def _put1(xs: Any, k: int, x: Any) -> None:
+    xs[0][k] = x
+
+
+def _put2(xs: Any, k: int, x: Any) -> None:
+    xs[0][k], xs[1][k] = x
+
+
+def _put3(xs: Any, k: int, x: Any) -> None:
+    xs[0][k], xs[1][k], xs[2][k] = x
+
+
+for _n, _get, _set in ((1, _pick1, _put1), (2, _pick2, _put2), (3, _pick3, _put3)):
+    pick.on(_n, _get)
+    put.on(_n, _set)
+
+
 # ---------------------------------------------------------------- slopes of maps that do not give them
 
 
@@ -142,7 +186,7 @@ def _slope(y: Any, i: int) -> Any:
 
 @of_entries
 def _column(x: Any, j: int, params: Any, start: Any, side: int, branch: int) -> Any:
-    """Derivatives of the image by one coordinate."""
+    """Differentiate the image by one coordinate."""
     return _slope(entries_of(forced(params, state_of(seeded(start, j)), side, branch)[0]))
 
 
@@ -153,7 +197,7 @@ def _entry(column: Any, j: int, i: int) -> Any:
 
 @of_entries
 def _row(y: Any, i: int, columns: Any) -> Any:
-    """Derivatives of one coordinate of the image."""
+    """Return the derivatives of one coordinate of the image."""
     return state_of(_entry(columns, i))
 
 

@@ -10,7 +10,7 @@ from typing import Any
 
 from limitsets.interval import Interval
 from limitsets.jit import generic, proof_kernel
-from limitsets.maps.contract import fallback_box, image_box
+from limitsets.maps.kernels import fallback_box, image_box
 from limitsets.thrower.arrival_box import landed
 from limitsets.thrower.motion import FullThrow
 from limitsets.thrower.motion_box import NOTHING, FullSideBox, Ways, all_enclosed, gather_full_box, no_way

@@ -12,8 +12,7 @@ import limitsets as ls
 from limitsets import maps
 from limitsets.graph.images.hulls import Images
 from limitsets.jit import proof_kernel
-from limitsets.maps.contract import image_box
-from limitsets.maps.drivers import pick
+from limitsets.maps.kernels import image_box, pick
 from limitsets.maps.textbook.domains import DOMAINS
 from tests.interval.exact import arb
 
