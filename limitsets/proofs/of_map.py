@@ -237,11 +237,8 @@ def _ends(a: Matrix) -> tuple[Floats, Floats]:
 
 def _slope(steps: Sequence[BranchBoxes]) -> Matrix:
     """Enclose the derivative of the steps together."""
-    return reduce(
-        lambda total, step: _times(_matrix(step.slope_lo[0], step.slope_hi[0]), total),
-        steps,
-        _ONE[steps[0].lo.shape[1]],
-    )
+    each = [_matrix(step.slope_lo[0], step.slope_hi[0]) for step in steps]
+    return reduce(lambda total, step: _times(step, total), each)
 
 
 _ONE = {d: _matrix(np.eye(d), np.eye(d)) for d in (1, 2, 3)}
@@ -252,7 +249,7 @@ def _contracts(lo: Floats, hi: Floats, middle: Floats, at: BranchBoxes, slope: M
     d = middle.size
     with np.errstate(all="ignore"):  # a singular matrix gives nan, which fails below
         below, above = _ends(slope)
-        inverse = np.linalg.pinv(0.5 * (below + above) - np.eye(d))
+        inverse = np.asarray(np.linalg.pinv(0.5 * (below + above) - np.eye(d)), dtype=np.float64)
     c, one = _matrix(inverse, inverse), _ONE[d]
     off = [
         [Intervals.of(float(a), float(b)) - float(m)]
@@ -312,10 +309,10 @@ def _meet(one: tuple[Floats, Floats], two: tuple[Floats, Floats]) -> bool:
 
 
 def _within(cells: CellSet, lo: Floats, hi: Floats, side: int) -> bool:
-    """Whether a box smaller than a cell lies in the cells: then all its corners do."""
-    corners = np.array(list(product(*zip(lo, hi, strict=True))))
-    numbers = cells.grid.index(corners, side)
-    return bool((numbers >= 0).all() and cells.mask[numbers].all())
+    """Whether a box lies in the cells: one that is smaller than any cell, if all its corners do."""
+    least = np.array([np.diff(edges).min() for edges in cells.grid.edges[side]])
+    numbers = cells.grid.index(np.array(list(product(*zip(lo, hi, strict=True)))), side)
+    return bool((hi - lo < least).all() and (numbers >= 0).all() and cells.mask[numbers].all())
 
 
 def _cycles(proof: ProofOfMap) -> tuple[Claim, tuple[CycleOfMap, ...]]:
@@ -354,8 +351,12 @@ CLAIMS_OF_MAP = (*PROVERS, "cycles")
 
 
 def certify_map(
-    map: Any, grid: Grid, claims: Sequence[str] | None = None, *, upper: Any = None
-) -> ProofOfMap:  # the field's word
+    map: Any,  # noqa: A002  # the field's word
+    grid: Grid,
+    claims: Sequence[str] | None = None,
+    *,
+    upper: Any = None,
+) -> ProofOfMap:
     """Prove claims about the attracting cells of any map; called by `limitsets.certify`.
 
     Parameters
