@@ -39,7 +39,7 @@ def morse(graph: nx.DiGraph[int] | TransitionGraph, name: str = "") -> Figure:
     Examples
     --------
     >>> import limitsets as ls
-    >>> graph = ls.transitions(ls.maps.TwoState(1.0), ls.grid([(-2, 2), (-2, 2)], cells=32), method="centres")
+    >>> graph = ls.transitions(ls.maps.Cubic(1.5), ls.grid([(-1.2, 1.2)], cells=100), method="corners")
     >>> "2 attracting" in ls.plot.morse(graph).axes[0].get_title(loc="left")
     True
     """
