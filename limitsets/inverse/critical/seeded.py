@@ -15,7 +15,7 @@ from limitsets.geometry import rest_of
 from limitsets.inverse.critical.dual import Dual, sine, square_root
 from limitsets.scene import Scene
 from limitsets.scene.body import shape_of
-from limitsets.scene.quantities import STANDARD_GRAVITY, base_unit, value_of
+from limitsets.scene.quantities import STANDARD_GRAVITY, base_unit
 from limitsets.scene.units import convert, parse
 
 __all__ = ["Numbers", "numbers_of", "present", "with_present"]
@@ -47,7 +47,7 @@ def present(scene: Scene, name: str) -> float:
 
     A scene given by kappa without gravity has a speed all the same: only its unit is open, and shares of it are not.
     """
-    return 1.0 if _speed_is_open(scene, name) else value_of(scene, name)
+    return 1.0 if _speed_is_open(scene, name) else scene.value(name)
 
 
 def with_present(scene: Scene, values: Mapping[str, float]) -> Scene:
@@ -92,7 +92,7 @@ def numbers_of(scene: Scene, names: Sequence[str], before: int = 0) -> Numbers:
 class _Reader:
     def __init__(self, scene: Scene, names: Sequence[str], before: int) -> None:
         self.open_speed = SPEED in names and _speed_is_open(scene, SPEED)
-        shown = {name: value_of(scene, name) for name in names if not (self.open_speed and name == SPEED)}
+        shown = {name: scene.value(name) for name in names if not (self.open_speed and name == SPEED)}
         # a speed is written in place of kappa, a tilt in place of an acceleration: then it is what counts
         self.scene = scene.with_values(shown)
         self.tree: Any = self.scene.text
@@ -112,7 +112,7 @@ class _Reader:
         return self.constant(convert(parse(text, dimension), base_unit(dimension, self.scene.unit)))
 
     def number(self, name: str) -> Dual:
-        return self.seeded(value_of(self.scene, name), name)
+        return self.seeded(self.scene.value(name), name)
 
     def kappa(self) -> Dual:
         if "kappa" in self.tree["throw"]:

@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING, Any
 from limitsets.errors import AnswerError
 from limitsets.goals import Goal, Predicate
 from limitsets.proofs.asked import State
-from limitsets.proofs.certify import Claim, Proof, weakest_of
+from limitsets.proofs.certify import weakest_of
 from limitsets.proofs.confirm import DeniedError
+from limitsets.proofs.proof import Claim, Proof
 from limitsets.proofs.refutation import KINDS, write_refutation
 
 if TYPE_CHECKING:
