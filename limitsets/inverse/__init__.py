@@ -8,7 +8,8 @@ ends with (`robust_design`).  Nothing here is compiled or proved.
 from limitsets.inverse.critical.along import limit_sets_along
 from limitsets.inverse.critical.derivatives import CriticalJacobian, critical_jacobian
 from limitsets.inverse.critical.designing import Design, design
-from limitsets.inverse.margin.for_margin import RobustDesign, robust_design
+from limitsets.inverse.margin.answer import RobustDesign
+from limitsets.inverse.margin.for_margin import robust_design
 
 __all__ = [
     "CriticalJacobian",

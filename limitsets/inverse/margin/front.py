@@ -10,7 +10,7 @@ import numpy as np
 
 from limitsets.inverse.margin.feeding import ThrowsToFeed, throws_to_feed
 from limitsets.inverse.margin.search import Candidate, Search
-from limitsets.inverse.margin.sharp import on_all_corners
+from limitsets.robust.margins.estimate import on_all_corners
 
 __all__ = ["Option", "best_of", "front_of", "unbeaten"]
 
@@ -133,7 +133,9 @@ def _sure(
         tell("designs on all corners", number, MOST_SURE)
         options.remove(option)
         one, search = option.candidate, searches[option.candidate.order]
-        found = on_all_corners(search.scene.with_values(dict(one.values)), search.box, side, search.hard)
+        found = on_all_corners(
+            search.scene.with_values(dict(one.values)), search.tolerance, side, search.hard
+        )
         if found is not None and found.margin > 0.0:
             again = _option(replace(one, found=found), search, side, seed)
             sure += [] if again is None else [again]
