@@ -125,12 +125,9 @@ class Floats(Numbers):
 
     def _require_words_of_part(self) -> None:
         """Refuse two descriptions of shape or mass, half a one, or none."""
-        part: Mapping[str, Any] = self.tree["part"]
-        if ("sides" in part) == ("vertices" in part):
-            found = "both are given" if "sides" in part else "neither is given"
-            allowed = "sides = [three lengths] or vertices = [[x, y], ...]"
-            raise self.refusal("part", "the shape", found, allowed, "give one of them")
-        mass: Mapping[str, Any] = part["mass"]
+        shapes = "sides = [three lengths] or vertices = [[x, y], ...]"
+        self._require_one("part", "the shape", "sides", "vertices", shapes)
+        mass: Mapping[str, Any] = self.tree["part"]["mass"]
         measured = [name for name in ("center", "radius_of_gyration") if name in mass]
         made = [name for name in ("plate_density", "plate_thickness", "points") if name in mass]
         allowed = "center and radius_of_gyration, or plate_density and points"
@@ -154,16 +151,20 @@ class Floats(Numbers):
             remedy = f"{density} holds the thickness already: leave it out, or give the density in kg/m^3 or g/cm^3"
             raise self.refusal(keys, "the thickness", thickness, "one beside a mass per volume", remedy)
 
+    def _require_one(self, key: str, thing: str, one: str, other: str, allowed: str = "") -> None:
+        """Refuse a table with both of two words that exclude each other, or with neither."""
+        given = [word for word in (one, other) if word in self.tree[key]]
+        if len(given) != 1:
+            found = " and ".join(given) or f"neither {one} nor {other}"
+            remedy = "give one of them, not both" if given else "give one of them"
+            raise self.refusal(key, thing, found, allowed or f"{one} or {other}", remedy)
+
     @cached_property
     def gravity(self) -> float | None:
         """Gravity in the plane of the motion [unit/s^2]; None where it is not given."""
         if "gravity" not in self.tree:
             return None
-        given = self.tree["gravity"]
-        if len(given) != 1:
-            words, remedy = "acceleration and tilt", "give one of them, not both"
-            words, remedy = (words, remedy) if given else ("empty", "give one of them")
-            raise self.refusal("gravity", "gravity", words, "acceleration or tilt", remedy)
+        self._require_one("gravity", "gravity", "acceleration", "tilt")
         found: float = super().gravity
         return found
 
@@ -171,14 +172,11 @@ class Floats(Numbers):
     def kappa(self) -> float:
         """Gravity over the squared angular speed of the throw [unit]."""
         throw = self.tree["throw"]
-        if len(throw) != 1:
-            words = "kappa and speed" if throw else "neither kappa nor speed"
-            raise self.refusal("throw", "the throw", words, "kappa or speed", "give exactly one of them")
+        self._require_one("throw", "the throw", "kappa", "speed")
         if "speed" in throw and self.gravity is None:
             remedy = "a throw given by its speed needs it; add [gravity], or give throw.kappa"
-            raise self.refusal(
-                "throw.speed", "gravity", "missing", "acceleration or tilt in [gravity]", remedy
-            )
+            allowed = "acceleration or tilt in [gravity]"
+            raise self.refusal("throw.speed", "gravity", "missing", allowed, remedy)
         found: float = super().kappa
         if "speed" in throw and not LEAST <= found <= 1 / LEAST:
             allowed = f"gravity/speed^2 from {LEAST:g} to {1 / LEAST:g} {self.resolver.unit}"
