@@ -1,8 +1,8 @@
 """From the answer wanted to the scene: critical points with their derivatives, design, and design for a margin.
 
 `critical` differentiates critical points by the implicit function theorem, on dual numbers, and finds roots with that
-(`design`); `margin` looks for a large margin by the floats of `limitsets.robust`, counts throws to feed, and has what it
-ends with proved there (`robust_design`).  Nothing here is compiled or proved.
+(`design`); `margin` looks for a large margin by the floats of `limitsets.robust`, counts throws to feed, and has what
+it ends with proved there (`robust_design`).  Nothing here is compiled or proved.
 """
 
 from limitsets.inverse.critical.along import limit_sets_along
