@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from limitsets.errors import AnswerError
+from limitsets.files import as_table, picked
 
 if TYPE_CHECKING:
     from limitsets.graph import TransitionGraph
@@ -140,19 +141,14 @@ class Accuracy:
     def to_json(self) -> dict[str, Any]:
         """Give it as a table for JSON."""
         chosen = self.plan.chosen
-        return {
-            "asked": self.plan.asked,
-            "method": chosen.method,
-            "cells": chosen.cells,
-            "estimated_error": chosen.error if math.isfinite(chosen.error) else None,
-            "estimated_seconds": round(chosen.seconds, 6),
-            "seconds": round(self.seconds, 6),
-            "reached": self.reached if self.reached is None or math.isfinite(self.reached) else None,
-            "how": self.how,
-            "proved": self.proved,
-            "met": self.met,
-            "advice": self.advice,
-        }
+        return as_table(
+            asked=self.plan.asked,
+            **picked(chosen, "method", "cells"),
+            estimated_error=chosen.error,
+            estimated_seconds=round(chosen.seconds, 6),
+            seconds=round(self.seconds, 6),
+            **picked(self, "reached", "how", "proved", "met", "advice"),
+        )
 
 
 def require_error(error: float) -> float:

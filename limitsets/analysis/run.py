@@ -16,6 +16,7 @@ from limitsets.analysis.flags import other_vertex_first
 from limitsets.analysis.starts import Starts, against_starts
 from limitsets.analysis.verifying import verified
 from limitsets.errors import AnswerError
+from limitsets.files import as_table, picked
 
 if TYPE_CHECKING:
     import networkx as nx
@@ -121,10 +122,69 @@ class Analysis:
         return tuple(text for text in said if text is not None)
 
     def to_json(self) -> dict[str, Any]:
-        """Give it as plain tables for JSON (`limitsets.analysis.to_json`)."""
-        from limitsets.analysis.words import to_json
+        """Write it as tables, lists, text and finite numbers; None where a number is missing.
 
-        return to_json(self)
+        Returns
+        -------
+        dict
+            Sides are keys "0", "1", ...; lengths are in ``units["length"]``, angles in rad, times in seconds.
+            `limitsets.load` reads the scene back from ``["scene"]``.
+
+        Examples
+        --------
+        >>> import limitsets as ls
+        >>> found = ls.analyse("paper-designed")
+        >>> found.to_json()["attractors"][0]["flip_order"]
+        [0, 1, 2]
+        """
+        scene, goal, basins = self.scene, self.goal, self.basins
+        return as_table(
+            scene=scene.as_dict(),
+            units={"length": scene.unit, "angle": "rad", "time": "s", "lyapunov": "per throw"},
+            cells=self.grid.shape[:, 0],
+            critical_points={
+                side: [picked(point, "x", "kind") for point in points]
+                for side, points in sorted(self.critical_points.items())
+            },
+            attractors=[self._attractor(k) for k in range(len(self.attractors))],
+            basins={
+                **picked(basins, "attractors", "undecided_between"),
+                **{name.replace("-", "_"): share for name, share in basins.exits.items()},
+            },
+            starts=self.starts,
+            advice=self.advice,
+            cycles=[
+                picked(cycle, "period", "x")
+                | {"sides": cycle.side}
+                | picked(cycle, "multiplier", "admissible")
+                for cycle in self.cycles
+            ],
+            goal=None
+            if goal is None
+            else {"kind": goal.goal.kind, **picked(goal, "holds", "threshold", "how")},
+            goal_vacuous=None if goal is None else goal.vacuous,
+            effects=self.choice,
+            other_vertex_first=_ordered(self.other_vertex_first),
+            spurious=[{"cells": len(cells), "extents": cells.extents()} for cells in self.spurious],
+            accuracy=self.accuracy,
+            second_pass=self.second_pass,
+            timings={step: round(seconds, 6) for step, seconds in self.timings.items()},
+        )
+
+    def _attractor(self, k: int) -> dict[str, Any]:
+        found = self.attractors[k]
+        return {
+            "extents": _ordered(self.extents[k]),
+            "extents_from": self.extents_from[k],
+            "flip_order": found.flip_order,
+            "jogs_per_visit": _ordered(found.jogs_per_visit),
+            **picked(found, "flips_per_throw", "lyapunov", "throws", "in_cells", "stopped"),
+            "advice": self.limit_sets[k].advice,
+        }
+
+
+def _ordered(by_side: Mapping[int, Any]) -> dict[int, Any]:
+    return dict(sorted(by_side.items()))
 
 
 class _Found(NamedTuple):

@@ -19,6 +19,7 @@ from limitsets.auditing.assumptions import ASSUMPTIONS, Assumption
 from limitsets.auditing.judging import Row, all_kept, ask
 from limitsets.auditing.places import Places, Sample, places
 from limitsets.auditing.stretches import where
+from limitsets.files import as_table, picked
 
 if TYPE_CHECKING:
     from limitsets.proofs.parameters import ParameterBox
@@ -83,23 +84,15 @@ class Finding:
 
     def to_json(self) -> dict[str, Any]:
         """Give it as plain tables for JSON."""
-        return {
-            "effect": self.effect,
-            "assumption": self.about.what,
-            "where": self.place,
-            "called_for": "cannot tell" if self.called_for is None else self.called_for,
-            "how": self.how,
-            "side": self.side,
-            "x": self.x,
-            "worst": self.worst,
-            "threshold": self.threshold,
-            "missing": self.missing or None,
-            "ranges": {str(side): [list(pair) for pair in parts] for side, parts in self.ranges.items()},
-            "jogs": list(self.jogs),
-            "flips": list(self.flips),
-            "others": list(self.others),
-            "simulated": self.simulated,
-        }
+        return as_table(
+            effect=self.effect,
+            assumption=self.about.what,
+            where=self.place,
+            called_for="cannot tell" if self.called_for is None else self.called_for,
+            **picked(self, "how", "side", "x", "worst", "threshold"),
+            missing=self.missing or None,
+            **picked(self, "ranges", "jogs", "flips", "others", "simulated"),
+        )
 
 
 @dataclass(frozen=True, eq=False)

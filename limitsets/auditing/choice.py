@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from limitsets.auditing.audits import Finding, audit
+from limitsets.files import as_table, picked
 
 if TYPE_CHECKING:
     from limitsets.scene import Scene
@@ -37,11 +38,7 @@ class Choice:
 
     def to_json(self) -> dict[str, Any]:
         """Give it as plain tables for JSON."""
-        return {
-            "simulated": list(self.scene.effects.on()),
-            "switched_on": list(self.switched_on),
-            "left_out": dict(self.left_out),
-        }
+        return as_table(simulated=self.scene.effects.on(), **picked(self, "switched_on", "left_out"))
 
 
 def _hindrance(scene: Scene, finding: Finding, others: tuple[str, ...]) -> str:
@@ -70,13 +67,11 @@ def _hindrance(scene: Scene, finding: Finding, others: tuple[str, ...]) -> str:
 
 def _with(scene: Scene, effects: tuple[str, ...]) -> Scene:
     """Switch effects on, and `auto` off."""
-    from limitsets.scene.build import build
-
     tree = copy.deepcopy(dict(scene.text))
     table = {key: value for key, value in tree.get("effects", {}).items() if key != "auto"}
     table.update({effect: "bounded" if effect == "spread" else True for effect in effects})
     tree["effects"] = table
-    return build(tree, scene.file)
+    return scene.of(tree, scene.file)
 
 
 def choose(scene: Scene) -> Choice:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from limitsets.cli.arguments import HELP_NO_RECHECK, ends_of, number
-from limitsets.cli.output import Json, Scene, progress, saved, table
+from limitsets.cli.output import Json, Scene, progress, save_scene, show_scene, table
 from limitsets.errors import LimitsetsError
 from limitsets.files import as_json
 
@@ -16,9 +16,8 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from limitsets.inverse import Design
-    from limitsets.scene import Scene as SceneOf
 
-__all__ = ["design", "save_scene", "show_scene"]
+__all__ = ["design"]
 
 FREE = "free"
 
@@ -148,22 +147,6 @@ def _written(found: Design, out: Path, tell: Callable[[str, int, int], None]) ->
         (folder / names[1]).write_text(as_json(found.to_json()), encoding="utf-8", newline="\n")
         drawn.savefig(folder / names[2], dpi=DPI)
     return [out / name for name in names]
-
-
-def save_scene(scene: SceneOf, file: Path) -> list[Path]:
-    """Write the scene alone."""
-    from limitsets.scene import dump
-
-    with saved(file) as draft:
-        draft.write_text(dump(scene), encoding="utf-8", newline="\n")
-    return [file]
-
-
-def show_scene(scene: SceneOf, files: list[Path]) -> None:
-    """Say where the scene is, or print it where it is in no file."""
-    from limitsets.scene import dump
-
-    typer.echo(f"scene: {files[0]}" if files else "\n" + dump(scene).rstrip("\n"))
 
 
 def _text(found: Design, files: list[Path]) -> None:

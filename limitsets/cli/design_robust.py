@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from limitsets.cli.design import save_scene, show_scene
-from limitsets.cli.output import progress, table
+from limitsets.cli.output import progress, save_scene, show_scene, table
 from limitsets.errors import LimitsetsError
 from limitsets.files import as_json
 
@@ -76,7 +75,7 @@ def _ends(scene: Scene, name: str, ends: Ends) -> tuple[float, float]:
     lo, hi = ends
     if lo is None or hi is None:
         raise LimitsetsError("the bounds", name, "a lower and an upper one", "give both", key="--bounds")
-    return in_units(scene, name, lo, key="--bounds"), in_units(scene, name, hi, key="--bounds")
+    return in_units(scene.unit, name, lo, key="--bounds"), in_units(scene.unit, name, hi, key="--bounds")
 
 
 def _written(found: RobustDesign, out: Path, *, recheck: bool) -> tuple[RobustDesign, list[Path]]:

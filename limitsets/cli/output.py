@@ -9,14 +9,17 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from limitsets.errors import LimitsetsError
 from limitsets.files import as_json, replaced
 
-__all__ = ["Json", "Out", "Scene", "answer", "progress", "saved", "table"]
+if TYPE_CHECKING:
+    from limitsets.scene import Scene as SceneOf
+
+__all__ = ["Json", "Out", "Scene", "answer", "progress", "save_scene", "saved", "show_scene", "table"]
 
 Scene = Annotated[
     str, typer.Argument(metavar="SCENE", help="A built-in name (see: limitsets scenes) or a TOML file.")
@@ -72,6 +75,22 @@ def answer(record: Any, json: bool, out: Path | None, text: Callable[[], None]) 
         print(words, end="")
     else:
         text()
+
+
+def save_scene(scene: SceneOf, file: Path) -> list[Path]:
+    """Write the scene alone."""
+    from limitsets.scene import dump
+
+    with saved(file) as draft:
+        draft.write_text(dump(scene), encoding="utf-8", newline="\n")
+    return [file]
+
+
+def show_scene(scene: SceneOf, files: list[Path]) -> None:
+    """Say where the scene is, or print it where it is in no file."""
+    from limitsets.scene import dump
+
+    typer.echo(f"scene: {files[0]}" if files else "\n" + dump(scene).rstrip("\n"))
 
 
 class _Lines:

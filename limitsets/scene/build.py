@@ -1,26 +1,25 @@
-"""From a TOML structure to a `Scene`: units, and what contradicts what."""
+"""From a TOML structure to the fields of a `Scene`: units, and what contradicts what."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from limitsets.scene.facts import Deviation
 from limitsets.scene.floats import Floats
 from limitsets.scene.purpose import resolve_effects, resolve_goal, resolve_world
 from limitsets.scene.quantities import deviation, require
 from limitsets.scene.resolve import Resolver
-from limitsets.scene.scene import Scene
 from limitsets.scene.units import parse
 from limitsets.scene.validation import Tree, plain, validate
 
 if TYPE_CHECKING:
     from limitsets.scene.schema import SceneTable
 
-__all__ = ["build"]
+__all__ = ["resolved"]
 
 
-def build(structure: object, file: str | None) -> Scene:
-    """Check a structure and resolve it.
+def resolved(structure: object, file: str | None) -> dict[str, Any]:
+    """Check a structure and resolve it: the fields of its `Scene`, by name.
 
     Parameters
     ----------
@@ -28,10 +27,6 @@ def build(structure: object, file: str | None) -> Scene:
         What TOML held; anything is accepted here and refused with reasons.
     file : str or None
         Where it was read from.
-
-    Returns
-    -------
-    Scene
 
     Raises
     ------
@@ -50,26 +45,23 @@ def build(structure: object, file: str | None) -> Scene:
     goal = None
     if table.goal is not None:
         goal = resolve_goal(table.goal, len(body.sides), arm_length, resolver)
-    return Scene(
-        name=table.name,
-        unit=unit,
-        vertices=body.vertices,
-        centre=body.centre,
-        radius_of_gyration=body.radius_of_gyration,
-        sides=body.sides,
-        surface_height=numbers.number("arm.surface_height"),
-        arm_length=arm_length,
-        kappa=numbers.kappa,
-        gravity=gravity,
-        flight=table.model.flight,
-        flip=table.model.flip,
-        goal=goal,
-        world=world,
-        effects=resolve_effects(table.effects, world, table.model.flight, resolver),
-        tolerance=_tolerance(tree, table, resolver),
-        file=file,
-        text=tree,
-    )
+    return {
+        "name": table.name,
+        "unit": unit,
+        **body._asdict(),
+        "surface_height": numbers.number("arm.surface_height"),
+        "arm_length": arm_length,
+        "kappa": numbers.kappa,
+        "gravity": gravity,
+        "flight": table.model.flight,
+        "flip": table.model.flip,
+        "goal": goal,
+        "world": world,
+        "effects": resolve_effects(table.effects, world, table.model.flight, resolver),
+        "tolerance": _tolerance(tree, table, resolver),
+        "file": file,
+        "text": tree,
+    }
 
 
 def _require_reach(feet: list[float], arm_length: float, table: SceneTable, resolver: Resolver) -> None:

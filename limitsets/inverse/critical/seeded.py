@@ -13,7 +13,7 @@ import numpy as np
 from limitsets.inverse.critical.dual import Dual, sine, square_root
 from limitsets.scene import Scene
 from limitsets.scene.numbers import Numbers
-from limitsets.scene.quantities import base_unit, value_of
+from limitsets.scene.quantities import base_unit
 from limitsets.scene.units import convert, parse
 
 __all__ = ["Seeded", "numbers_of", "present", "with_present"]
@@ -45,7 +45,7 @@ def present(scene: Scene, name: str) -> float:
 
     A scene given by kappa without gravity has a speed all the same: only its unit is open, and shares of it are not.
     """
-    return 1.0 if _speed_is_open(scene, name) else value_of(scene, name)
+    return 1.0 if _speed_is_open(scene, name) else scene.value(name)
 
 
 def with_present(scene: Scene, values: Mapping[str, float]) -> Scene:
@@ -94,7 +94,7 @@ class _Duals(Numbers):
 
     def __init__(self, scene: Scene, names: Sequence[str], before: int) -> None:
         self.open_speed = SPEED in names and _speed_is_open(scene, SPEED)
-        shown = {name: value_of(scene, name) for name in names if not (self.open_speed and name == SPEED)}
+        shown = {name: scene.value(name) for name in names if not (self.open_speed and name == SPEED)}
         # a speed is written in place of kappa, a tilt in place of an acceleration: then it is what counts
         self.scene = scene.with_values(shown)
         super().__init__(self.scene.text, square_root, sine)
@@ -113,7 +113,7 @@ class _Duals(Numbers):
 
     def number(self, name: str) -> Dual:
         """Return a quantity by its name; kappa by a share of the speed, where nothing else is known of the speed."""
-        found = self.seeded(value_of(self.scene, name), name)
+        found = self.seeded(self.scene.value(name), name)
         if name == KAPPA and self.open_speed:
             speed = self.seeded(1.0, SPEED)
             return found / (speed * speed)

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from limitsets.files import as_json
+from limitsets.files import as_json, as_table, picked
 from limitsets.goals import Goal
 from limitsets.inverse.margin.feeding import ThrowsToFeed
 from limitsets.inverse.margin.front import Option
@@ -92,27 +92,22 @@ class RobustDesign:
         sides = tuple(
             f"part.sides[{k}]" for k in range(len(self.scene.sides)) if "sides" in self.scene.text["part"]
         )
-        names = (*sides, *self.varied)
-        lead = self.lead
-        return {
-            "scene": self.scene.as_dict(),
-            "x": self.x,
-            "side": self.side,
-            "tolerance": self.tolerance,
-            "values": _quantities(self.scene, names),
-            "before": _quantities(self.before, names),
-            "sampled": _sampled(self.sampled),
-            "margins": [one.to_json() for one in self.margins],
-            "before_sampled": _sampled(self.before_sampled),
-            "before_margins": [one.to_json() for one in self.before_margins],
-            "ratio": self.ratio,
-            "lead": {"share": lead.share, "x": lead.x, "y": lead.y, "inside": lead.inside},
-            "throws": self.feeding.to_json(),
-            "before_throws": None if self.before_feeding is None else self.before_feeding.to_json(),
-            "front": [option.to_json() for option in self.front],
-            "evaluations": self.evaluations,
-            "timings": {"search": self.seconds},
-        }
+        values, before = (
+            {name: scene.value(name) for name in (*sides, *self.varied)}
+            for scene in (self.scene, self.before)
+        )
+        return as_table(
+            scene=self.scene.as_dict(),
+            **picked(self, "x", "side", "tolerance"),
+            values=values,
+            before=before,
+            **picked(self, "sampled", "margins", "before_sampled", "before_margins", "ratio"),
+            lead=self.lead._asdict(),
+            throws=self.feeding,
+            before_throws=self.before_feeding,
+            **picked(self, "front", "evaluations"),
+            timings={"search": self.seconds},
+        )
 
     def save(self, folder: str | Path) -> tuple[Path, ...]:
         """Write the scene, the answer as JSON, and what `limitsets.recheck` checks of the margin; checked before."""
@@ -123,22 +118,6 @@ def both(margins: Sequence[Margin]) -> tuple[float | None, float | None]:
     """Give the factor to which all goals are proved, and that at which one is refuted; None where not known."""
     refuted = [one.refuted for one in margins if one.refuted is not None]
     return min((one.proved for one in margins), default=None), min(refuted, default=None)
-
-
-def _sampled(found: Estimate | None) -> dict[str, Any] | None:
-    if found is None:
-        return None
-    return {
-        "margin": found.margin,
-        "x": None if found.x != found.x else found.x,
-        "threshold": found.threshold,
-        "reach": found.reach,
-        "effects": {name: list(pair) for name, pair in found.effects.items()},
-    }
-
-
-def _quantities(scene: Scene, names: tuple[str, ...]) -> dict[str, float]:
-    return {name: scene.value(name) for name in names}
 
 
 def save(found: RobustDesign, folder: Path, *, recheck: bool = True) -> tuple[RobustDesign, tuple[Path, ...]]:

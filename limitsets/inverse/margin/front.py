@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from limitsets.files import as_table, picked
 from limitsets.inverse.margin.feeding import ThrowsToFeed, throws_to_feed
 from limitsets.inverse.margin.search import Candidate, Search
 from limitsets.robust.margins.estimate import on_all_corners
@@ -37,14 +38,10 @@ class Option:
 
     def to_json(self) -> dict[str, Any]:
         """Give it as a plain table for JSON."""
-        found = self.candidate.found
-        return {
-            "values": self.candidate.values,
-            "order": self.candidate.order,
-            "margin": found.margin,
-            "x": found.x,
-            "throws": self.feeding.to_json(),
-        }
+        one = self.candidate
+        return as_table(
+            **picked(one, "values", "order"), **picked(one.found, "margin", "x"), throws=self.feeding
+        )
 
 
 def unbeaten(margin: Sequence[float], throws: Sequence[float]) -> list[int]:

@@ -8,10 +8,12 @@ from pathlib import Path
 from typing import Any
 
 from limitsets.errors import AnswerError
+from limitsets.files import as_table, picked
 from limitsets.goals import Goal, Predicate
 from limitsets.proofs.asked import State
-from limitsets.proofs.certify import Claim, Proof, weakest_of
+from limitsets.proofs.certify import weakest_of
 from limitsets.proofs.confirm import DeniedError
+from limitsets.proofs.proof import Claim, Proof
 from limitsets.proofs.query import Outcome
 from limitsets.proofs.refutation import KINDS, write_refutation
 from limitsets.scene import Scene
@@ -82,21 +84,18 @@ class Margin:
     def to_json(self) -> dict[str, Any]:
         """Give it as a plain table for JSON; every number is finite or null."""
         goals = [goal_table(goal, self.scene.unit) for goal in self.goals]
-        return {
-            "quantity": self.quantity,
-            "reading": self.reading,
-            "goal": goals[0] if len(goals) == 1 else goals,
-            "proved": self.proved,
-            "refuted": self.refuted,
-            "unit": self.unit or None,
-            "nominal": self.nominal,
-            "closed": self.closed,
-            "reason": self.reason or None,
-            "counterexample": self._states() or None,
-            "certificate": None,
-            "pieces": len(self.pieces),
-            "timings": {"margin": self.seconds},
-        }
+        return as_table(
+            **picked(self, "quantity", "reading"),
+            goal=goals[0] if len(goals) == 1 else goals,
+            **picked(self, "proved", "refuted"),
+            unit=self.unit or None,
+            **picked(self, "nominal", "closed"),
+            reason=self.reason or None,
+            counterexample=self._states() or None,
+            certificate=None,
+            pieces=len(self.pieces),
+            timings={"margin": self.seconds},
+        )
 
     def _states(self) -> list[dict[str, Any]]:
         against = self.against

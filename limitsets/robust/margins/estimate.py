@@ -12,10 +12,12 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from limitsets.files import as_table, picked
 from limitsets.robust.margins.trap import Trap, trap
 from limitsets.robust.margins.vector import Signs, Tolerance, corners, worst_corner
 from limitsets.scene import Scene
@@ -56,6 +58,10 @@ class Estimate:
     reach: float
     kept: Trap
     effects: dict[str, tuple[float, float]]
+
+    def to_json(self) -> dict[str, Any]:
+        """Give it as a plain table for JSON, without where the part is kept."""
+        return as_table(**picked(self, "margin", "x", "threshold", "reach", "effects"))
 
 
 def _kept(scene: Scene | None, start: tuple[float, int], landing: float) -> Trap | None:
