@@ -6,7 +6,7 @@ from pathlib import Path
 
 import limitsets as ls
 from limitsets.scene.quantities import NAMES
-from limitsets.scene.schema import SceneTable
+from limitsets.scene.schema import scene_table
 
 PAGE = (Path(__file__).resolve().parents[2] / "docs" / "scene.md").read_text(encoding="utf-8")
 
@@ -42,7 +42,7 @@ def documented():
 
 
 def test_the_table_has_the_keys_that_there_are():
-    assert sorted(documented()) == sorted(keys(SceneTable))
+    assert sorted(documented()) == sorted(keys(scene_table(with_effects=True)))
 
 
 def test_every_quantity_is_named():

@@ -73,9 +73,7 @@ def section_of(goal: OrientedBeyond, scene: Scene) -> dict[str, Any]:
 
 
 def _refute(found: Attraction, scene: Scene, goal: OrientedBeyond) -> Answer:
-    def wrong(x: Any, side: Any) -> Any:
-        return (x > goal.x) & (side != goal.side)
-
+    wrong = goal.wrong()
     if not goal.from_anywhere:
         refutation = recurrent_violation(found, scene, wrong)
         again = _again(found, goal) if refutation.of == "every" else {}

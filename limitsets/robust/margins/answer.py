@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import re
-from dataclasses import asdict, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from limitsets.errors import AnswerError
-from limitsets.goals import Goal, Predicate
+from limitsets.goals import Goal, Predicate, as_written
 from limitsets.proofs.asked import State
 from limitsets.proofs.certify import Claim, Proof, weakest_of
 from limitsets.proofs.confirm import DeniedError
@@ -24,12 +24,7 @@ def goal_table(goal: Goal, unit: str) -> dict[str, Any]:
     """Give a goal as a scene would name it; a function by its name."""
     if isinstance(goal, Predicate):
         return {"predicate": goal.name, "from_anywhere": goal.from_anywhere}
-    table: dict[str, Any] = asdict(goal)
-    anywhere = table.pop("from_anywhere")
-    if "x" in table:
-        table["x"] = f"{table['x']!r} {unit}"
-    words = list(table["order"]) if "order" in table else table or True
-    return {goal.kind: words, "from_anywhere": anywhere}
+    return as_written(goal, unit)
 
 
 def to_json(margin: Margin) -> dict[str, Any]:
