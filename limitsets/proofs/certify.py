@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from limitsets.errors import AnswerError
-from limitsets.proofs.asked import State, ask, borders, prove
+from limitsets.proofs.asked import State, ask, borders, prove, rechecked
 from limitsets.proofs.asked.starts import leaving
 from limitsets.proofs.attraction import Attraction, attraction, near_section
 from limitsets.proofs.certificate import write
@@ -166,6 +166,14 @@ class Proof:
                 f"with the effects {', '.join(self.effects)}",
                 "the minimal model, and noise",
                 "nothing rechecks other maps; the proof stands in .claims and .to_json()",
+            )
+        goal = self.scene.goal
+        if goal is not None and not rechecked(goal) and any(claim.claim == "goal" for claim in self.claims):
+            raise AnswerError(
+                "the certificate",
+                f"of the goal {goal.kind}",
+                "goals that the checker knows",
+                "nothing rechecks others; the proof stands in .claims and .to_json()",
             )
         good = [
             {"claim": claim.claim, "section": claim.section, "verdict": claim.verdict}

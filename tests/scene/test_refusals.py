@@ -198,7 +198,7 @@ def test_an_effect_that_is_not_declared_is_an_unknown_key(
     assert load(whole).effects.on() == ("roll",)
     monkeypatch.delitem(EFFECTS, "roll")
     with pytest.raises(
-        SceneError, match="auto, bounce, contact, drive, landing, pivot, slip, spread.*known"
+        SceneError, match=r"auto, bounce, contact, drive, landing, pivot, slip, spread.*known"
     ) as caught:
         load(whole)
     assert caught.value.key == "effects.roll"

@@ -19,7 +19,7 @@ from limitsets.proofs.asked.search import State
 from limitsets.proofs.attraction import Attraction, near_section
 from limitsets.scene import Scene
 
-__all__ = ["KINDS", "Answer", "Kind", "State", "ask", "borders", "prove", "sentence"]
+__all__ = ["KINDS", "Answer", "Kind", "State", "ask", "borders", "prove", "rechecked", "sentence"]
 
 # A goal of whose starts so small a share is open, while others leave, is not asked again with finer cells.
 LITTLE = 1e-3
@@ -47,6 +47,11 @@ NONE = Kind(_nothing, _nothing, lambda _: "", lambda _: ())
 
 def _kind(goal: Goal) -> Kind:
     return KINDS.get(goal.kind, NONE)
+
+
+def rechecked(goal: Goal) -> bool:
+    """Whether the checker knows a goal, so that a certificate of it can be written."""
+    return _kind(goal).rechecked
 
 
 def prove(found: Attraction, scene: Scene, goal: Goal) -> Answer:

@@ -123,4 +123,4 @@ def _sentence(section: Mapping[str, Any]) -> str:
     return f"In the attracting cells, every part {beyond}"
 
 
-KIND = Kind(_prove, _refute, _sentence, lambda goal: [below(goal.x)])
+KIND = Kind(_prove, _refute, _sentence, lambda goal: [below(goal.x)], rechecked=True)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from limitsets.errors import AnswerError
 from limitsets.goals import Goal, Predicate, as_written
-from limitsets.proofs.asked import State
+from limitsets.proofs.asked import State, rechecked
 from limitsets.proofs.certify import Claim, Proof, weakest_of
 from limitsets.proofs.confirm import DeniedError
 from limitsets.proofs.refutation import KINDS, write_refutation
@@ -85,12 +85,12 @@ def _require_checkable(margin: Margin) -> None:
             "nothing rechecks other maps; the margin stands",
         )
     for goal in margin.goals:
-        if isinstance(goal, Predicate):
+        if not rechecked(goal):
             raise AnswerError(
                 "the certificate",
-                goal.name,
-                "goals that a scene can name",
-                "nothing rechecks the caller's code; the margin stands",
+                f"of the goal {goal.kind}",
+                "goals that the checker knows",
+                "nothing rechecks others; the margin stands",
             )
 
 
