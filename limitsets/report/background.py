@@ -112,18 +112,13 @@ def _effects(analysis: Analysis) -> list[str]:
 
 def _assumed(scene: Scene) -> str:
     """Say what is still assumed with the effects that are on."""
-    effects = scene.effects
-    kept = [
-        (effects.drive, "the throw is impulsive"),
-        (False, "it does not tip the part"),
-        (effects.landing, "the left bottom vertex lands first"),
-        (effects.slip, "the vertex that lands sticks without slipping"),
-        (effects.bounce, "it does not bounce"),
-        (effects.pivot, "it acts as a hinge until a side lies flat"),
-        (effects.roll, "the part then stays where it is until the next throw"),
-        (bool(effects.spread), "every throw is like the other"),
-    ]
-    words = "; ".join(text for lifted, text in kept if not lifted)
+    from limitsets.thrower.effects import EFFECTS
+
+    kept = [each.lifts for name, each in EFFECTS.items() if name not in scene.effects.words]
+    kept.insert(
+        0 if scene.effects.drive else 1, "it does not tip the part"
+    )  # of the throw; no effect lifts this
+    words = "; ".join(kept)
     return f"**Assumed:** {words}. `limitsets audit` says which of this the scene breaks."
 
 

@@ -6,9 +6,9 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 from limitsets.analysis import overlap
-from limitsets.goals import OrientedBeyond, Reaches
+from limitsets.goals import order_of
 from limitsets.report.background import everything, figure_line, scene_of, steps, trust
-from limitsets.report.questions import order_of, question_of, verdict_of, void_of
+from limitsets.report.questions import question_of, verdict_of, void_of
 from limitsets.report.tables import bands, intervals, percent, table
 from limitsets.report.tables import count as count_of
 
@@ -146,13 +146,11 @@ def _goal(analysis: Analysis) -> str:
     goal = asked.goal
     verdict = "This analysis cannot tell" if asked.holds is None else f"It {verdict_of(asked)}"
     lines = ["## The goal", f"Asked: {question_of(goal, unit)}. **{verdict}** ({asked.how}: no proof)."]
-    if isinstance(goal, OrientedBeyond) and asked.threshold is not None:
-        lines.append(f"The sentence is true from x = {asked.threshold:.3f} {unit} on.")
+    if asked.threshold is not None and (explained := goal.explained(asked.threshold, unit)):
+        lines.append(explained)
     void = void_of(asked, unit)
     if void:
         lines.append(f"But {void}.")
-    if isinstance(goal, Reaches) and asked.threshold is not None:
-        lines.append(f"The farthest x reached on side {goal.side} is {asked.threshold:.3f} {unit}.")
     return "\n\n".join([lines[0], " ".join(lines[1:])])
 
 
