@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from limitsets.files import as_table, picked
 from limitsets.robust.margins.beyond import MarginsBeyond, margins_beyond, places_beyond
 from limitsets.scene import Scene
 
@@ -20,14 +21,11 @@ PLACES, COARSE, EACH, SECONDS = 7, 0.1, 15.0, 150.0
 
 def curve_table(found: MarginsBeyond) -> dict[str, Any]:
     """Give margins against X as a plain table; null where nothing is refuted."""
-    return {
-        "side": found.side,
-        "x": found.x.tolist(),
-        "quantities": list(found.names),
-        "units": list(found.units),
-        "proved": found.proved.tolist(),
-        "refuted": [[x if math.isfinite(x) else None for x in row] for row in found.refuted.tolist()],
-    }
+    return as_table(
+        **picked(found, "side", "x"),
+        quantities=found.names,
+        **picked(found, "units", "proved", "refuted"),
+    )
 
 
 def curve_read(table: Mapping[str, Any], scene: Scene) -> MarginsBeyond:
