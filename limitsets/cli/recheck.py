@@ -36,5 +36,5 @@ def recheck(
     def text() -> None:
         show(report, str(file))
 
-    answer(asdict(report), json, out, text)
+    answer(asdict(report), json, text, out)
     raise typer.Exit(EXITS[report.verdict])

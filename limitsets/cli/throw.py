@@ -42,7 +42,7 @@ def throw(
         unit = chosen.unit
         table(["throw", f"x [{unit}]", "side", "status", "turned by", f"displacement [{unit}]", "flag"], rows)
 
-    answer(records, json, out, text)
+    answer(records, json, text, out)
     if chosen.effects.auto:
         typer.echo(
             "limitsets: auto in [effects] is resolved by limitsets analyse; thrown with: "

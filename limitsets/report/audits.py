@@ -10,7 +10,7 @@ from limitsets import plot
 from limitsets.files import as_json
 from limitsets.report.pages import words
 from limitsets.report.tables import percent
-from limitsets.report.writing import DPI, filled
+from limitsets.report.writing import laid
 
 if TYPE_CHECKING:
     from limitsets.auditing import Audit, Finding
@@ -132,9 +132,8 @@ def write_audit(found: Audit, folder: str | Path) -> list[Path]:
     LimitsetsError
         The folder cannot be written.
     """
-    names = ["audit.md", "audit.json", "audit.png"]
-    with filled(folder) as draft:
-        plot.audit(found).savefig(draft / names[2], dpi=DPI)
-        (draft / names[1]).write_text(as_json(found.to_json()), encoding="utf-8", newline="\n")
-        (draft / names[0]).write_text(audit_page(found, names[2]), encoding="utf-8", newline="\n")
-    return [Path(folder) / name for name in names]
+    return laid(
+        folder,
+        [("audit", plot.audit(found))],
+        lambda figures: {"audit.md": audit_page(found, figures["audit"]), "audit.json": as_json(found)},
+    )
