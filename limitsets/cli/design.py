@@ -49,25 +49,9 @@ def design(
         float,
         typer.Option("--seconds", min=0.0, metavar="S", help="With --robust: for the proof of each margin."),
     ] = 240.0,
-    starts: Annotated[
-        int,
-        typer.Option(
-            "--starts",
-            min=0,
-            max=10_000,
-            metavar="N",
-            help=HELP_STARTS,
-        ),
-    ] = 8,
+    starts: Annotated[int, typer.Option("--starts", min=0, max=10_000, metavar="N", help=HELP_STARTS)] = 8,
     stages: Annotated[
-        int | None,
-        typer.Option(
-            "--stages",
-            min=1,
-            max=1000,
-            metavar="N",
-            help=HELP_STAGES,
-        ),
+        int | None, typer.Option("--stages", min=1, max=1000, metavar="N", help=HELP_STAGES)
     ] = None,
     out: Annotated[
         Path | None,
