@@ -13,7 +13,8 @@ from functools import cache
 from typing import TYPE_CHECKING, Any
 
 from limitsets.analysis import overlap
-from limitsets.report.questions import order_of, question_of, verdict_of, void_of
+from limitsets.goals import order_of
+from limitsets.report.questions import question_of, verdict_of, void_of
 from limitsets.report.tables import bands, count, intervals, percent, table
 
 if TYPE_CHECKING:
@@ -101,9 +102,15 @@ def page(analysis: Analysis, figures: Mapping[str, str]) -> str:
     >>> page(ls.analyse("paper-designed"), {}).splitlines()[0]
     '# paper-designed: where the throws lead'
     """
+    from limitsets.thrower.effects import EFFECTS  # lazily: it loads numba
+
+    effects = analysis.scene.effects
+    assumed = [each.lifts for name, each in EFFECTS.items() if name not in effects.words]
+    # of the throw; no effect lifts this
+    assumed.insert(0 if effects.drive else 1, "it does not tip the part")
     everything: dict[int, list[tuple[float, float]]] = {}
     for extents in analysis.extents:
         for side, parts in extents.items():
             everything.setdefault(side, []).extend(parts)
     broken = overlap(analysis.other_vertex_first, everything)
-    return words("report", figures, analysis=analysis, broken=broken) + "\n"
+    return words("report", figures, analysis=analysis, broken=broken, assumed=assumed) + "\n"
