@@ -48,8 +48,10 @@ from numba.core.registry import cpu_target
 from limitsets.errors import LimitsetsError, MapError
 
 __all__ = [
+    "chained",
     "cover_foreign_class",
     "entries_of",
+    "entry_of",
     "formula",
     "generic",
     "kernel",
@@ -59,6 +61,7 @@ __all__ = [
     "operation",
     "proof_kernel",
     "take_mark",
+    "with_entry",
 ]
 
 F = TypeVar("F", bound=Callable[..., Any])
@@ -748,6 +751,81 @@ class Generic(Protocol[P, R]):
         """Add the method of a class, or of plain tuples of a length: a module-level function."""
 
 
+def entry_of(entries: Any, cls: type) -> Any:
+    """Return the entry of a class in a tuple of several classes, None where there is none; chosen at compile time."""
+    return next((entry for entry in entries if type(entry) is cls), None)
+
+
+def with_entry(entries: Any, entry: Any) -> Any:
+    """Return a tuple with its entry of the same class replaced."""
+    return tuple(entry if type(each) is type(entry) else each for each in entries)
+
+
+def _place_of(entries: Any, cls: type | None) -> int | None:
+    """Where a tuple has its entry of a class, as numba sees it."""
+    return next((k for k, each in enumerate(entries) if named_tuple_class(each) is cls), None)
+
+
+def _choose_entry(entries: Any, cls: Any) -> Callable[..., Any]:
+    at = _place_of(entries, cls.instance_class)
+    return (lambda entries, cls: None) if at is None else (lambda entries, cls: entries[at])
+
+
+def _choose_with(entries: Any, entry: Any) -> Callable[..., Any] | None:
+    at = _place_of(entries, named_tuple_class(entry))
+    if at is None:
+        return None
+    after = at + 1
+    return lambda entries, entry: entries[:at] + (entry,) + entries[after:]  # noqa: RUF005 - numba has no unpacking
+
+
+for _stub, _choose in ((entry_of, _choose_entry), (with_entry, _choose_with)):
+    extending.overload(_stub, jit_options={"forceinline": True}, strict=False)(_choose)
+
+
+@overload
+def chained(stub: Callable[P, R]) -> Generic[P, R]: ...
+@overload
+def chained(*, proof: bool) -> Callable[[Callable[P, R]], Generic[P, R]]: ...
+def chained(stub: Any = None, *, proof: bool = False) -> Any:
+    """Make a function of a tuple of several classes and a value that each entry hands on to the next.
+
+    Parameters
+    ----------
+    stub : callable
+        A module-level function of (entry, value, ...); its body is never compiled.
+    proof : bool
+        Compile the methods without contraction.
+
+    Returns
+    -------
+    callable
+        A `Generic`: ``stub.on(Class, method)``.  Called with a tuple it runs the methods of its entries in their order;
+        an entry without one hands the value on as it is, and is not in the machine code.
+    """
+    if stub is None:
+        return lambda f: _chained(f, proof)
+    return _chained(stub, proof)
+
+
+def _chained(stub: Any, proof: bool) -> Any:
+    """Make the table of methods, and the method of a tuple."""
+
+    def one_after_another(entries: Any, value: Any, *rest: Any) -> Any:
+        return made(entries[1:], made(entries[0], value, *rest), *rest)
+
+    def of_tuple(first: Any) -> Callable[..., Any] | None:
+        plain = type(first) is tuple or (isinstance(first, types.BaseTuple) and not named_tuple_class(first))
+        return None if not plain else one_after_another if len(first) else _handed_on
+
+    made = _generic(stub, proof, True, _handed_on, of_tuple)
+    return made
+
+
+def _handed_on(entry: Any, value: Any, *rest: Any) -> Any:
+    return value
+
+
 @overload
 def generic(stub: Callable[P, R]) -> Generic[P, R]: ...
 @overload
@@ -790,13 +868,21 @@ def generic(
     return _generic(stub, proof, inlined, default)
 
 
-def _generic(stub: Any, proof: bool, inlined: bool, default: Callable[..., Any] | None) -> Any:
-    """Make the table of methods and the overload that reads it."""
+def _generic(
+    stub: Any,
+    proof: bool,
+    inlined: bool,
+    default: Callable[..., Any] | None,
+    of_tuple: Callable[[Any], Callable[..., Any] | None] = lambda first: None,
+) -> Any:
+    """Make the table of methods and the overload that reads it; `of_tuple` gives the method of a plain tuple."""
     methods: dict[Any, Callable[..., Any]] = {}
     given = _PROOF if proof else _ESTIMATE
     options = {**{key: given[key] for key in _OVERLOAD}, "forceinline": inlined}
 
     def choose(first: Any, *rest: Any) -> Callable[..., Any] | None:
+        if (method := of_tuple(first)) is not None:
+            return method
         key: Any = type(None) if isinstance(first, types.NoneType) else named_tuple_class(first)
         if key is None and isinstance(first, types.UniTuple):
             key = first.count
@@ -805,7 +891,7 @@ def _generic(stub: Any, proof: bool, inlined: bool, default: Callable[..., Any] 
     @functools.wraps(stub)
     def chosen(first: Any, *rest: Any) -> Any:
         """Run the method in Python, on the numbers of Python: a method made of formulas alone knows no others."""
-        method = methods.get(type(first), default)
+        method = of_tuple(first) or methods.get(type(first), default)
         if method is None:
             raise MapError("the argument", type(first).__name__, "a class with a method", "add one")
         return method(first, *rest)

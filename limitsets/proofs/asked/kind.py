@@ -71,6 +71,8 @@ class Kind(NamedTuple):
         From the goal to the borders of cells that it needs.
     almost : callable
         From the goal to whether it speaks of almost every orbit only.
+    rechecked : bool
+        Whether the checker knows the goal, so that a certificate of it can be written.
     """
 
     prove: Callable[[Attraction, Scene, Any], Answer]
@@ -78,6 +80,7 @@ class Kind(NamedTuple):
     sentence: Callable[[Mapping[str, Any]], str]
     borders: Callable[[Any], Sequence[float]]
     almost: Callable[[Any], bool] = lambda _: False
+    rechecked: bool = False
 
 
 def undecided(reason: str, *, final: bool = False) -> Answer:

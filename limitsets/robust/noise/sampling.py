@@ -69,8 +69,8 @@ def scattering_map(scene: Scene, scatter: Scattering, seed: int = 0) -> Any:
     AnswerError
         For laws that counted throws do not know: they are Gaussian or Uniform, both alike, of speed and landing place.
     """
-    from limitsets.thrower.effects import with_effects
     from limitsets.thrower.effects.spread import Even, Normal, Spread
+    from limitsets.thrower.full import with_effects
 
     laws = [getattr(scatter, name) for name in scatter.given()]
     alike = {type(law) for law in laws}
@@ -84,7 +84,7 @@ def scattering_map(scene: Scene, scatter: Scattering, seed: int = 0) -> Any:
     full = plain if hasattr(plain, "bare") else with_effects(plain, {}, None)
     law = Even() if alike == {Uniform} else Normal()
     spread = Spread(law, scale["speed"], scale["landing"], float(seed))
-    return full._replace(effects=full.effects._replace(spread=spread))
+    return full._replace(effects=(*full.effects, spread))
 
 
 def _scale(law: Any) -> float:

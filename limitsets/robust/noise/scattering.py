@@ -137,10 +137,10 @@ def still_map(scene: Scene) -> Any:
     """Return the scene's map without its scatter: the minimal one where no other effect is on."""
     if scene.effects.spread is None:
         return scene.map
-    full: Any = scene.map
-    plain = full._replace(effects=full.effects._replace(spread=None))
-    effects = replace(scene.effects, spread=None)
-    return plain if effects.on() else scene.bare_map
+    from limitsets.thrower.effects.spread import Spread
+    from limitsets.thrower.motion import without
+
+    return without(scene.map, Spread)
 
 
 def thrown(params: Any) -> Callable[[float], Any]:

@@ -41,7 +41,7 @@ def _joined(one: MarginsBeyond | None, other: MarginsBeyond) -> MarginsBeyond:
     if one is None:
         return other
     order = np.argsort(np.concatenate([one.x, other.x]))
-    columns = {
+    columns: dict[str, Any] = {
         name: np.concatenate([getattr(one, name), getattr(other, name)])[order]
         for name in ("x", "proved", "refuted")
     }

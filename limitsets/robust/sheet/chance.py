@@ -33,7 +33,7 @@ def noise_of(scene: Scene, given: Scattering | None) -> tuple[Scattering | None,
         return None, ""
     if scene.effects.spread is not None:
         return scattering_of(scene), "the scene's, [world] scatter with [effects] spread"
-    normal = replace(scene, effects=replace(scene.effects, spread="gaussian"))
+    normal = replace(scene, effects=scene.effects.also(spread="gaussian"))
     words = "the scene's, [world] scatter, taken as standard deviations of normal laws; "
     return scattering_of(normal), words + 'spread = "bounded" in [effects] would make them bounds'
 
