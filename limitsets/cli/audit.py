@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from limitsets.cli.output import Json, Scene, progress, table
-from limitsets.files import as_json
+from limitsets.cli.output import Json, Scene, answer, progress, table
+
+if TYPE_CHECKING:
+    from limitsets.auditing import Audit
 
 __all__ = ["audit"]
 
@@ -40,9 +42,10 @@ def audit(
 
             tell("files", 1, 2)
             files = write_audit(found, out)
-    if json:
-        print(as_json(found.to_json()), end="")
-        return
+    answer(found, json, lambda: _text(found, files))
+
+
+def _text(found: Audit, files: list[Path]) -> None:
     from limitsets.report.audits import HEADS, lines_of, summary
 
     table(HEADS, lines_of(found))

@@ -7,9 +7,8 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from limitsets.cli.output import progress, save_scene, show_scene, table
+from limitsets.cli.output import answer, progress, save_scene, show_scene, table
 from limitsets.errors import LimitsetsError
-from limitsets.files import as_json
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -49,10 +48,7 @@ def run_robust(
             progress=tell,
         )
         found, files = (found, []) if out is None else _written(found, out, recheck=recheck)
-    if json:
-        print(as_json(found.to_json()), end="")
-    else:
-        _text(found, files)
+    answer(found, json, lambda: _text(found, files))
     return 0 if seconds == 0.0 or all(one.proved > 0.0 for one in found.margins) else 1
 
 

@@ -65,7 +65,7 @@ def saved(file: Path) -> Iterator[Path]:
         ) from None
 
 
-def answer(record: Any, json: bool, out: Path | None, text: Callable[[], None]) -> None:
+def answer(record: Any, json: bool, text: Callable[[], None], out: Path | None = None) -> None:
     """Give an answer as JSON or as text, and write it to a file where one is named."""
     words = as_json(record)
     if out is not None:

@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from limitsets.cli.arguments import HELP_NO_RECHECK, deviations
-from limitsets.cli.output import Json, Scene, progress, table
-from limitsets.files import as_json
+from limitsets.cli.output import Json, Scene, answer, progress, table
 
 if TYPE_CHECKING:
     from limitsets.robust.sheet.summary import Robustness
@@ -91,17 +90,15 @@ def robustness(
 
         tell("files", len(found.entries), len(found.entries) + 1)
         files = write_robustness(found, folder)
-    if json:
-        print(as_json(found.to_json()), end="")
-    else:
-        _text(found, files)
+    answer(found, json, lambda: _text(found, files))
     raise typer.Exit(0 if found.verdict == "proved" else 1)
 
 
 def _text(found: Robustness, files: list[Any]) -> None:
-    from limitsets.report.robust_pages import HEADS, answer, lines_of
+    from limitsets.report.robust_pages import HEADS, lines_of
+    from limitsets.report.robust_pages import answer as said
 
-    typer.echo(answer(found).replace("**", ""))
+    typer.echo(said(found).replace("**", ""))
     if found.singles:
         table(HEADS, lines_of(found))
     for part in ("joint", "curve", "noise"):

@@ -4,6 +4,7 @@ from collections.abc import Iterator
 
 import numpy as np
 import pytest
+from limitsets.report.background import trust
 from typer.testing import CliRunner
 
 import limitsets as ls
@@ -17,7 +18,6 @@ from limitsets.graph.images.sampled import sampled
 from limitsets.maps import contract, images
 from limitsets.proofs.asked import KINDS, sentence
 from limitsets.report.audits import summary
-from limitsets.report.background import trust
 from limitsets.report.pages import page
 from limitsets.report.questions import question_of, verdict_of
 from limitsets.robust.margins.finding import asked_of
