@@ -309,10 +309,10 @@ def left_to_cells() -> LimitSet:
 
 def limit_of(graph: TransitionGraph, attractor: Attractor) -> LimitSet:
     """Its end points; the cells where the map's branches cannot be followed one by one."""
-    from limitsets.maps import kind_of
+    from limitsets.maps import has_slope
     from limitsets.sets import LimitSet, limit_set
 
-    if kind_of(graph.map).has_image_on:
+    if has_slope(graph.map):
         return limit_set(graph, attractor)
     advice = "with effects on a throw has more branches than this version follows"
     return LimitSet(attractor.extents, (), 0, False, False, advice)

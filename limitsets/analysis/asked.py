@@ -63,9 +63,9 @@ def _may_leave(graph: TransitionGraph) -> float:
 
 def _after_any_throw(graph: TransitionGraph) -> Extents:
     """Where a part can rest after one throw or more: the image of the whole domain holds all later images."""
-    from limitsets.maps import along, kind_of, monotone_pieces
+    from limitsets.maps import along, has_slope, monotone_pieces
 
-    if not kind_of(graph.map).has_image_on:
+    if not has_slope(graph.map):
         return _seen_after_a_throw(graph)
     domain = graph.grid.domain
     found: dict[int, list[tuple[float, float]]] = {}

@@ -71,7 +71,7 @@ class Assumption:
     below : bool
         Whether it holds below the limit, or above it.
     terms : callable
-        From the scene and its box of parameters to `Terms`.
+        From the scene and its box of parameters to `Terms`; without a box, as floats have it.
     """
 
     effect: str
@@ -82,33 +82,35 @@ class Assumption:
     dimension: str
     column: Assumed
     below: bool
-    terms: Callable[[Scene, ParameterBox], Terms]
+    terms: Callable[[Scene, ParameterBox | None], Terms]
 
 
 def _everywhere(scene: Scene, limit: float) -> NDArray[np.float64]:
     return np.full(len(scene.sides), limit)
 
 
-def _positive(scene: Scene, _: ParameterBox) -> Terms:
+def _positive(scene: Scene, _: ParameterBox | None) -> Terms:
     return Terms(_everywhere(scene, 0.0))
 
 
-def _enough(scene: Scene, _: ParameterBox) -> Terms:
+def _enough(scene: Scene, _: ParameterBox | None) -> Terms:
     return Terms(_everywhere(scene, 1.0))
 
 
-def _corner(scene: Scene, box: ParameterBox) -> Terms:
+def _corner(scene: Scene, box: ParameterBox | None) -> Terms:
     corners = scene.sides.corner
+    if box is None:
+        return Terms(corners)
     known = [corner_bounds(*box.bare, side, float(corner)) for side, corner in enumerate(corners)]
     return Terms(np.array([below for below, _ in known]))
 
 
-def _friction(scene: Scene, _: ParameterBox) -> Terms:
+def _friction(scene: Scene, _: ParameterBox | None) -> Terms:
     friction = scene.world.friction
     return Terms(None, missing="friction") if friction is None else Terms(_everywhere(scene, friction))
 
 
-def _bounce(scene: Scene, _: ParameterBox) -> Terms:
+def _bounce(scene: Scene, _: ParameterBox | None) -> Terms:
     """Compare the height of the bounce, e^2 times that of the fall, with the threshold."""
     e, threshold = scene.world.restitution, scene.world.bounce_threshold
     if e == 0.0:
@@ -127,7 +129,7 @@ def _bounce(scene: Scene, _: ParameterBox) -> Terms:
     return Terms(_everywhere(scene, threshold), scale=e * e)
 
 
-def _drive(scene: Scene, _: ParameterBox) -> Terms:
+def _drive(scene: Scene, _: ParameterBox | None) -> Terms:
     """To first order in the stroke the landing moves by (kappa/2) sin(stroke) phi^2."""
     notable, stroke = NOTABLE * scene.arm_length, scene.world.stroke
     if stroke is None:
@@ -139,7 +141,7 @@ def _drive(scene: Scene, _: ParameterBox) -> Terms:
     return Terms(_everywhere(scene, notable), scale=math.sin(stroke))
 
 
-def _spread(scene: Scene, _: ParameterBox) -> Terms:
+def _spread(scene: Scene, _: ParameterBox | None) -> Terms:
     notable, scatter = NOTABLE * scene.arm_length, scene.world.scatter
     if scatter is None:
         return Terms(None, missing="scatter", matters=lambda shift: notable / shift if shift > 0 else None)

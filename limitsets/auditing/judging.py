@@ -62,6 +62,11 @@ class Row:
         values = self.values(found)
         return values[:, 1] <= self.limit(side) if self.about.below else values[:, 0] >= self.limit(side)
 
+    def spare(self, found: Array, side: int) -> Array:
+        """Give how far within the limit it is, to the width of the enclosures; below 0 beyond it."""
+        inside: Array = (self.limit(side) - self.values(found).mean(axis=1)) * (1 if self.about.below else -1)
+        return inside
+
 
 def ask(box: ParameterBox, side: int, x: Array) -> Array:
     """Enclose everything at single throws."""

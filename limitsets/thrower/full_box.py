@@ -10,7 +10,7 @@ from typing import Any
 
 from limitsets.interval import Interval
 from limitsets.jit import entry_of, generic, proof_kernel
-from limitsets.maps.contract import fallback_box, image_box
+from limitsets.maps.kernels import fallback_box, image_box
 from limitsets.thrower.arrival_box import landed
 from limitsets.thrower.effects.landing import Landing
 from limitsets.thrower.effects.roll import Roll

@@ -88,8 +88,8 @@ TABLE: list[tuple[dict[str, Any], str, str]] = [
     ({"part/sides/1": "-3.6 in"}, "part.sides[1]", "above 0"),
     ({"part/sides/1": "36 in"}, "part.sides", "triangle inequality"),
     ({"part/sides/1": "0.999999 in"}, "part.sides", "triangle inequality"),
-    ({"part/sides": GONE}, "part", "neither is given"),
-    ({"part": BOTH | {"mass": {"plate_density": "1 kg/m^2"}}}, "part", "both are given"),
+    ({"part/sides": GONE}, "part", "neither sides nor vertices"),
+    ({"part": BOTH | {"mass": {"plate_density": "1 kg/m^2"}}}, "part", "sides and vertices"),
     # mass
     ({"part/mass": {}}, "part.mass", "empty"),
     ({"part/mass/center": GONE}, "part.mass", "only radius_of_gyration"),

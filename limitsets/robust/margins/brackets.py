@@ -12,16 +12,17 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 
-from limitsets.robust.margins.asking import Asked, Question
+from limitsets.proofs.query import Outcome, Query
 from limitsets.robust.margins.deviations import Measure, short
+from limitsets.robust.margins.halving import a_little_beyond, halved
 
 __all__ = ["Bracket", "Tell", "bracket_fixed", "bracket_per_throw"]
 
 Tell = Callable[[float], None]
 """Called with the share of the bracket that is closed."""
 
-# Steps outward at most, each `FACTOR` times as far; halvings of a bracket; trials of pieces in one direction.
-STEPS, FACTOR, HALVINGS, TRIALS = 24, 3, 40, 200
+# Steps outward at most, each `FACTOR` times as far; trials of pieces in one direction.
+STEPS, FACTOR, TRIALS = 24, 3, 200
 
 # What to do about a bracket that does not close.
 NARROWER = "; it would need finer cells than are tried here: ask for a wider bracket, or another x"
@@ -43,9 +44,9 @@ class Bracket:
         Largest size proved, 0 if the scene as it is or nothing is.
     refuted : Fraction or None
         Smallest size refuted.
-    pieces : list of Asked
+    pieces : list of Outcome
         What proves it.
-    against : Asked or None
+    against : Outcome or None
         What refutes it.
     reason : str
         Why the bracket is not closed, or does not end.
@@ -55,8 +56,8 @@ class Bracket:
 
     proved: Fraction = Fraction(0)
     refuted: Fraction | None = None
-    pieces: list[Asked] = field(default_factory=list)
-    against: Asked | None = None
+    pieces: list[Outcome] = field(default_factory=list)
+    against: Outcome | None = None
     reason: str = ""
     sign: int = 1
 
@@ -69,80 +70,72 @@ class Bracket:
 class _Reach:
     """How far in one direction single scenes are good, bad, or cannot be."""
 
+    query: Query
+    measure: Measure
+    sign: int
     good: Fraction = Fraction(0)
     bad: Fraction | None = None
-    against: Asked | None = None
+    against: Outcome | None = None
     end: Fraction | None = None
     reason: str = ""
 
+    def ask(self, size: Fraction) -> str:
+        """Ask a single scene, and remember what it says; the verdict."""
+        found = _point(self.query, self.measure, self.sign * size)
+        if found.verdict == "proved":
+            self.good = max(self.good, size)
+        elif found.verdict == "refuted":
+            self.bad, self.against = size, found
+        else:
+            self.end, self.reason = size, found.reason
+        return found.verdict
 
-def _point(question: Question, measure: Measure, size: Fraction, finest: int = 3) -> Asked:
+    @property
+    def gap(self) -> bool:
+        """Whether nothing is known of some scene before those that are bad."""
+        return self.bad is not None and self.end is not None and self.end < self.bad
+
+
+def _point(query: Query, measure: Measure, size: Fraction) -> Outcome:
     """Ask a single scene."""
     piece = measure.piece(measure.at(size))
-    found = question.prove(piece, finest=0)
+    found = query.prove(piece, finest=0)
     if found.verdict in ("proved", "impossible"):
         return found
-    against = question.refute(piece)
+    against = query.refute(piece)
     if against.verdict == "refuted":
         return replace(against, within={measure.quantity: measure.text(abs(size))})
-    return question.prove(piece, finest=finest)
+    return query.prove(piece)
 
 
-def _reach(
-    question: Question, measure: Measure, sign: int, width: Fraction, known: Fraction | None
-) -> _Reach:
+def _reach(query: Query, measure: Measure, sign: int, width: Fraction, known: Fraction | None) -> _Reach:
     """Go outward from the scene as it is until single scenes are refuted or cannot be, then halve."""
-    reach, step = _Reach(), measure.least
-
-    def ask(size: Fraction) -> None:
-        found = _point(question, measure, sign * size)
-        if found.verdict == "proved":
-            reach.good = max(reach.good, size)
-        elif found.verdict == "refuted":
-            reach.bad, reach.against = size, found
-        else:
-            reach.end, reach.reason = size, found.reason
-
+    reach, step = _Reach(query, measure, sign), measure.least
     for _ in range(STEPS):
         size = step if measure.most is None else min(step, (step / FACTOR + measure.most) / 2)
         if known is not None and reach.good >= known:
             return reach
-        ask(size)
-        if reach.bad is not None or reach.end is not None:
+        if reach.ask(size) != "proved":
             break
         step *= FACTOR
-    for _ in range(HALVINGS):
-        top = min(each for each in (reach.bad, reach.end, Fraction(10**9)) if each is not None)
-        if top == 10**9 or top - reach.good <= width * top or top < NONE * measure.least:
-            break
-        ask(short((reach.good + top) / 2))
-        if reach.bad is not None and reach.end is not None and reach.end < reach.bad:
-            break  # nothing is known of a scene between: what is refuted is nearly as near as can be
+    else:
+        return reach
+    top = next(each for each in (reach.bad, reach.end) if each is not None)
+    # beyond a gap what is refuted is nearly as near as can be
+    least, near = NONE * measure.least, reach.good
+    halved(near, top, lambda size: reach.ask(size) == "proved", width, least, stop=lambda: reach.gap)
     if reach.bad is not None and reach.end is not None:
-        _approach(question, measure, sign, width, reach)
+        # lower what is refuted towards what is undecided, and raise what is proved
+        halved(reach.end, reach.bad, lambda size: reach.ask(size) != "refuted", width)
+        reach.end = None
     return reach
 
 
-def _approach(question: Question, measure: Measure, sign: int, width: Fraction, reach: _Reach) -> None:
-    """Lower what is refuted towards what is undecided, and raise what is proved."""
-    low = reach.end or Fraction(0)
-    while reach.bad is not None and reach.bad - low > width * reach.bad:
-        size = short((low + reach.bad) / 2)
-        found = _point(question, measure, sign * size)
-        if found.verdict == "refuted":
-            reach.bad, reach.against = size, found
-        elif found.verdict == "proved":
-            low = reach.good = max(reach.good, size)
-        else:
-            low = size
-    reach.end = None
-
-
 def _grow(
-    question: Question, measure: Measure, sign: int, target: Fraction, wall: Fraction, tell: Tell
-) -> tuple[Fraction, list[Asked], str]:
+    query: Query, measure: Measure, sign: int, target: Fraction, wall: Fraction, tell: Tell
+) -> tuple[Fraction, list[Outcome], str]:
     """Prove from the scene as it is outward, in pieces; how far, the pieces, and what stops it."""
-    low, pieces, reason = Fraction(0), list[Asked](), ""
+    low, pieces, reason = Fraction(0), list[Outcome](), ""
     share = Fraction(2, 5)
     step = share * wall
     for _ in range(TRIALS):
@@ -152,7 +145,7 @@ def _grow(
         high = min(target, short(low + step, up=True))
         # far from the wall narrower pieces do as well as finer cells, and to fail with these is what takes time
         finest = 3 if low > NEAR * wall else 1
-        found = question.prove(measure.piece(measure.between(sign * low, sign * high)), finest=finest)
+        found = query.prove(measure.piece(measure.between(sign * low, sign * high)), finest=finest)
         if found.verdict == "proved":
             pieces.append(found)
             low, share = high, min(share * Fraction(9, 8), Fraction(3))
@@ -166,12 +159,12 @@ def _grow(
     return low, pieces, reason
 
 
-def bracket_fixed(question: Question, measure: Measure, width: Fraction, tell: Tell) -> Bracket:
+def bracket_fixed(query: Query, measure: Measure, width: Fraction, tell: Tell) -> Bracket:
     """Bracket the margin of a quantity that is fixed but unknown."""
     ways: dict[int, _Reach] = {}
     for sign in (-1, 1):
         known = min((way.bad for way in ways.values() if way.bad is not None), default=None)
-        ways[sign] = _reach(question, measure, sign, width / 4, known)
+        ways[sign] = _reach(query, measure, sign, width / 4, known)
     found = Bracket()
     bad = [way for way in ways.values() if way.bad is not None]
     if bad:
@@ -187,41 +180,41 @@ def bracket_fixed(question: Question, measure: Measure, width: Fraction, tell: T
     first = next((way for way in ends if way.good == goal and way.end is not None), None)
     if first is not None and first.end is not None:
         found.reason = f"from {measure.text(first.end)} on: {first.reason}"
-    found = _fixed_proof(question, measure, found, short(goal), tell)
+    found = _fixed_proof(query, measure, found, short(goal), tell)
     found.reason = "" if found.closed(width) else found.reason
     return found
 
 
-def _fixed_proof(question: Question, measure: Measure, found: Bracket, goal: Fraction, tell: Tell) -> Bracket:
+def _fixed_proof(query: Query, measure: Measure, found: Bracket, goal: Fraction, tell: Tell) -> Bracket:
     """Prove it all at once, or grow the proof in both directions."""
     if goal <= NONE * measure.least:
         return found
     # all at once first: two throws with the same parameters may settle it
-    whole = question.prove(measure.piece(measure.between(-goal, goal)), finest=1)
+    whole = query.prove(measure.piece(measure.between(-goal, goal)), finest=1)
     if whole.verdict == "proved":
         found.pieces, found.proved = [whole], goal
         return found
     wall = found.refuted or goal * Fraction(101, 100)
     for sign in (-1, 1):
         near = found.against is not None and sign == found.sign
-        far, pieces, reason = _grow(question, measure, sign, goal, wall if near else 3 * wall, tell)
+        far, pieces, reason = _grow(query, measure, sign, goal, wall if near else 3 * wall, tell)
         found.pieces += pieces
         if far < goal:
             goal, found.reason = far, reason + NARROWER
-            _fails_beyond(question, measure, sign, far, found)
+            _fails_beyond(query, measure, sign, far, found)
             if not far:
                 break
     found.proved = goal
     return found
 
 
-def _fails_beyond(question: Question, measure: Measure, sign: int, far: Fraction, found: Bracket) -> None:
+def _fails_beyond(query: Query, measure: Measure, sign: int, far: Fraction, found: Bracket) -> None:
     """Where a proof stops growing, look for a scene that fails: a goal may fail at a size and hold at larger ones."""
-    for k in range(10):
-        size = short(far * (1 + Fraction(2**k - 1, 400)), up=True)
+    for beyond in a_little_beyond(far, Fraction(1, 400), 10):
+        size = short(beyond, up=True)
         if found.refuted is not None and size >= found.refuted:
             return
-        against = question.refute(measure.piece(measure.at(sign * size)))
+        against = query.refute(measure.piece(measure.at(sign * size)))
         if against.verdict == "refuted":
             found.refuted, found.sign = size, sign
             found.against = replace(against, within={measure.quantity: measure.text(size)})
@@ -231,11 +224,11 @@ def _fails_beyond(question: Question, measure: Measure, sign: int, far: Fraction
 class _Sizes:
     """Sizes of a quantity that is another one at every throw, proved and refuted."""
 
-    def __init__(self, question: Question, measure: Measure) -> None:
-        self.question, self.measure, self.found = question, measure, Bracket()
+    def __init__(self, query: Query, measure: Measure) -> None:
+        self.query, self.measure, self.found = query, measure, Bracket()
 
     def proves(self, size: Fraction, finest: int) -> bool:
-        one = self.question.prove(None, {self.measure.quantity: self.measure.text(size)}, finest)
+        one = self.query.prove(None, {self.measure.quantity: self.measure.text(size)}, finest)
         if one.verdict == "proved":
             if size > self.found.proved:
                 self.found.proved, self.found.pieces = size, [one]
@@ -244,7 +237,7 @@ class _Sizes:
         return one.verdict == "proved"
 
     def refutes(self, size: Fraction) -> bool:
-        one = self.question.refute(None, {self.measure.quantity: self.measure.text(size)})
+        one = self.query.refute(None, {self.measure.quantity: self.measure.text(size)})
         if one.verdict == "refuted":
             self.found.refuted, self.found.against = size, one
         return one.verdict == "refuted"
@@ -257,22 +250,23 @@ class _Sizes:
                 break
             nearer = FACTOR * size
             size = nearer if most is None or nearer < most else (size + most) / 2
-        while size - self.found.proved > size / 40 and size > NONE * self.measure.least:
-            middle = short((size + self.found.proved) / 2)
-            size = size if self.proves(middle, 1) else middle
+        least = NONE * self.measure.least
+        _, size = halved(
+            self.found.proved, size, lambda middle: self.proves(middle, 1), Fraction(1, 40), least
+        )
         return size
 
     def against(self, size: Fraction) -> None:
         """Find a size that is refuted, from one on that is not proved."""
-        for k in range(8):
-            beyond = short(size * (1 + Fraction(2**k - 1, 100)))
-            if (self.measure.most is None or beyond < self.measure.most) and self.refutes(beyond):
+        most = self.measure.most
+        for beyond in a_little_beyond(size, Fraction(1, 100), 8):
+            if (most is None or short(beyond) < most) and self.refutes(short(beyond)):
                 return
 
 
-def bracket_per_throw(question: Question, measure: Measure, width: Fraction, tell: Tell) -> Bracket:
+def bracket_per_throw(query: Query, measure: Measure, width: Fraction, tell: Tell) -> Bracket:
     """Bracket the margin of a quantity that is another one at every throw."""
-    sizes = _Sizes(question, measure)
+    sizes = _Sizes(query, measure)
     found = sizes.found
     top = sizes.first()
     tell(0.3)

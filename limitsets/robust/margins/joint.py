@@ -1,22 +1,23 @@
 """The joint margin: the factor on a whole vector of tolerances, up to which goals are proved.
 
-Every quantity is fixed but unknown, but for the landing place, which differs at every throw.  The worst corners bracket
-the factor from above, the proof of the whole box from below.
+Every quantity is fixed but unknown, but for the landing place, which differs at every throw.  The worst corners, each
+a single scene, bracket the factor from above, the proof of the whole box from below.
 """
 
 from __future__ import annotations
 
 import time
 from collections.abc import Mapping
+from dataclasses import replace
 from fractions import Fraction
 
 from limitsets.goals import Goal
-from limitsets.robust.margins.asking import Asked
-from limitsets.robust.margins.corners import at_corners, rounded
+from limitsets.proofs.query import Outcome, Query
+from limitsets.robust.margins.answer import Margin
 from limitsets.robust.margins.cutting import Cutting, Tell
-from limitsets.robust.margins.effect import Effects, effects_of
-from limitsets.robust.margins.finding import Margin, asked_of
-from limitsets.robust.margins.vector import Tolerance
+from limitsets.robust.margins.halving import a_little_beyond, halved
+from limitsets.robust.margins.sensitivity import Sensitivity, sensitivity_of
+from limitsets.robust.margins.vector import Signs, Tolerance
 from limitsets.scene import Scene
 
 __all__ = ["joint_margin"]
@@ -26,6 +27,9 @@ SECONDS = 150.0
 
 # Parts of the bracket's lower end that are proved in turn.
 STAGES = tuple(Fraction(n, 32) for n in (1, 2, 4, 8, 16, 24, 32))
+
+# Corners whose factor is bracketed, the worst first; factors between which it is sought.
+CORNERS, SMALL, LEAST, MOST = 4, Fraction(1, 16), Fraction(1, 10**6), Fraction(10**6)
 
 
 def joint_margin(
@@ -61,19 +65,18 @@ def joint_margin(
         Its `quantity` is "joint", `proved` and `refuted` are factors.
     """
     begin = time.perf_counter()
-    question = asked_of(scene, goals)
+    query = Query.of(scene, goals)
     texts = dict(scene.text.get("tolerance", {}) if tolerance is None else tolerance)
-    vector = Tolerance.of(question.scene, texts)
-    share = Fraction(repr(width))
-    effects = effects_of(question, vector.measures, _sizes(vector)) if vector.measures else Effects.none(0)
-    good, bad, against, reason = at_corners(question, vector, effects, share / 8)
+    vector, share = Tolerance.of(query.scene, texts), Fraction(repr(width))
+    sensitivity = sensitivity_of(query, vector)
+    good, bad, against, reason = _at_corners(query, vector, sensitivity, share / 8)
     target = rounded(min(good, bad * (1 - share * Fraction(9, 10))) if bad is not None else good)
     tell(0.05)
-    proved, pieces, noise = Fraction(0), list[Asked](), dict[str, str]()
+    proved, pieces, noise = Fraction(0), list[Outcome](), dict[str, str]()
     end = time.perf_counter() + seconds
     for stage in STAGES if target > 0 else ():
         # the smaller box first: what is proved of it stands, whatever becomes of the larger one
-        cutting = Cutting(question, vector, rounded(target * stage), effects)
+        cutting = Cutting(query, vector, rounded(target * stage), sensitivity)
         left = end - time.perf_counter()
         part, why = cutting.run(left if stage == STAGES[-1] else left / 2, tell)
         reason = why or reason
@@ -96,7 +99,7 @@ def joint_margin(
         "" if closed else reason,
         closed,
         time.perf_counter() - begin,
-        question.scene,
+        query.scene,
         dict(texts),
         vector.texts(proved) if proved else {},
         noise if proved else {},
@@ -105,5 +108,51 @@ def joint_margin(
     )
 
 
-def _sizes(vector: Tolerance) -> dict[str, Fraction]:
-    return {one.quantity: size for one, size in zip(vector.measures, vector.sizes, strict=True)}
+def _at_corners(
+    query: Query, tolerance: Tolerance, sensitivity: Sensitivity, width: Fraction
+) -> tuple[Fraction, Fraction | None, Outcome | None, str]:
+    """Bracket the factor at the worst corners, as single scenes: proved, refuted, by what, why not."""
+    count = len(tolerance.measures)
+    goods, bad, against, reason = list[Fraction](), None, None, ""
+    for signs in (sensitivity.corners() or [(1,) * count, (-1,) * count])[:CORNERS]:
+        good, own, by, why = _at_one(query, tolerance, signs, width, bad)
+        goods.append(good)
+        if own is not None and (bad is None or own < bad):
+            bad, against = own, by
+        reason = reason or why
+    return min(goods), bad, against, reason
+
+
+def _at_one(
+    query: Query, tolerance: Tolerance, signs: Signs, width: Fraction, known: Fraction | None
+) -> tuple[Fraction, Fraction | None, Outcome | None, str]:
+    good, bad, against, reason = Fraction(0), None, None, ""
+
+    def proves(factor: Fraction) -> bool:
+        nonlocal good, reason
+        found = query.prove(tolerance.corner(factor, signs), tolerance.noise(factor))
+        good, reason = (max(good, factor), reason) if found.verdict == "proved" else (good, found.reason)
+        return found.verdict == "proved"
+
+    def refutes(factor: Fraction) -> bool:
+        nonlocal bad, against
+        found = query.refute(tolerance.corner(factor, signs), tolerance.noise(factor))
+        if found.verdict == "refuted":
+            bad, against = factor, replace(found, within=tolerance.texts(factor))
+        return found.verdict == "refuted"
+
+    factor = known or SMALL
+    while proves(factor):
+        if known is not None or factor > MOST:
+            return good, None, None, ""
+        factor *= 2
+    _, top = halved(good, factor, proves, width, LEAST, rounded)
+    if any(refutes(rounded(beyond)) for beyond in a_little_beyond(top, Fraction(1, 400), 10)):
+        # what is not proved need not fail: it may hold for fewer starts than all
+        halved(top, bad or top, lambda middle: not refutes(middle), width, rounded=rounded)
+    return good, bad, against, reason
+
+
+def rounded(value: Fraction) -> Fraction:
+    """Five digits: a factor that people can read, and whose multiples are short decimals."""
+    return Fraction(f"{float(value):.5g}")

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from limitsets.cells import Grid
-from limitsets.maps import along, images, kind_of
+from limitsets.maps import along, has_slope, images, kind_of
 from limitsets.robust.noise.cutting import Pieces
 from limitsets.robust.noise.sheets import Boxes
 
@@ -135,4 +135,4 @@ def _spread_of_points(
 def uses_pieces(params: Any) -> bool:
     """Whether cells of a map can be cut into monotone pieces."""
     kind = kind_of(params)
-    return kind.dimension == 1 and kind.has_image_on
+    return kind.dimension == 1 and has_slope(params)

@@ -10,9 +10,10 @@ from typing import TYPE_CHECKING
 
 from limitsets.errors import AnswerError
 from limitsets.goals import Goal, OrientedBeyond, Reaches
+from limitsets.proofs.query import Query
 from limitsets.robust.margins.beyond import MarginsBeyond
 from limitsets.robust.margins.deviations import Measure, measure, measures
-from limitsets.robust.margins.finding import GoalLike, Margin, asked_of, goals_of, margin
+from limitsets.robust.margins.finding import GoalLike, Margin, goals_of, margin
 from limitsets.robust.margins.joint import joint_margin
 from limitsets.robust.margins.vector import Tolerance
 from limitsets.robust.margins.words import reach_of
@@ -259,7 +260,7 @@ def robustness(
             raise AnswerError("what to leave out", part, ", ".join(PARTS), "correct the word")
     given = scene if isinstance(scene, Scene) else load(scene)
     goals, asked = _goals(given, goal), still(given)
-    question = asked_of(asked, goals)
+    question = Query.of(asked, goals)
     question.box(None, {})  # refuses a scene of which nothing can be proved
     todo = _todo(question.scene, quantities, reading)
     vector = dict(tolerance if tolerance is not None else given.text.get("tolerance", {}))
@@ -296,7 +297,7 @@ def _filled(
         "noise" not in missing
     )
     sheet.tell("the goal in the scene as it is")
-    question = asked_of(scene, goals)
+    question = Query.of(scene, goals)
     nominal = question.prove()
     verdict = nominal.verdict if nominal.verdict == "proved" else question.refute().verdict
     sheet.done += 1

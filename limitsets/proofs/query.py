@@ -1,4 +1,4 @@
-"""One question: whether goals hold for all of a box of scenes, and every sequence of throws with some noise.
+"""One query: whether goals hold for all of a box of scenes, and every sequence of throws with some noise.
 
 Cells are made fine where it pays: first some hundreds of them a side, then borders spread evenly over what attracts.
 """
@@ -19,11 +19,12 @@ from limitsets.proofs.asked.kind import against
 from limitsets.proofs.attraction import Attraction, attraction
 from limitsets.proofs.cover import cover
 from limitsets.proofs.parameters import ParameterBox, parameter_box
+from limitsets.proofs.simulated import scattered
 from limitsets.proofs.tolerance import Piece
-from limitsets.robust.margins.worst import worst_orbit
-from limitsets.scene import Scene
+from limitsets.proofs.worst import worst_orbit
+from limitsets.scene import Scene, load
 
-__all__ = ["Asked", "Question"]
+__all__ = ["Outcome", "Query"]
 
 # Cells per side to begin with, then borders over all that attracts, and pieces of a parameter where a cell is open to
 # both decisions; more cells to begin with where nothing attracts.
@@ -35,7 +36,7 @@ LADDER = (512, 2048, 8192, 32_768)
 
 
 @dataclass(frozen=True, eq=False)
-class Asked:
+class Outcome:
     """What became of the goals on one box.
 
     Attributes
@@ -72,7 +73,7 @@ class Asked:
 
 
 @dataclass(frozen=True, eq=False)
-class Question:
+class Query:
     """Some goals of a scene: all have to hold.
 
     Attributes
@@ -85,6 +86,26 @@ class Question:
 
     scene: Scene
     goals: tuple[Goal, ...]
+
+    @classmethod
+    def of(cls, scene: Scene, goals: tuple[Goal, ...]) -> Query:
+        """Put goals to a scene; its own goal is left out, so that a certificate says what was asked.
+
+        Raises
+        ------
+        AnswerError
+            The scene scatters its throws: a margin is that of the quantities asked about, and of nothing else.
+        """
+        if scattered(scene):
+            raise AnswerError(
+                "the scene's effect spread",
+                "bounded",
+                "a scene whose throws are all alike",
+                "leave spread out of [effects]; reading per-throw asks about noise",
+            )
+        tree = scene.as_dict()
+        tree.pop("goal", None)
+        return cls(load(tree), goals)
 
     @property
     def anywhere(self) -> bool:
@@ -101,7 +122,7 @@ class Question:
         noise: Mapping[str, str] | None = None,
         finest: int = 3,
         bases: int = len(BASES),
-    ) -> Asked:
+    ) -> Outcome:
         """Prove the goals, with finer and finer cells; or say what is missing.
 
         Parameters
@@ -125,11 +146,11 @@ class Question:
                 answers = self._each(found)
                 missing = answers[-1]
                 if missing.verdict == "proved":
-                    return Asked("proved", "", found, answers, piece=piece, noise=noise)
+                    return Outcome("proved", "", found, answers, piece=piece, noise=noise)
                 if missing.final or not (found.component >= 0).any():
                     break
         except AnswerError as error:
-            return Asked("impossible", _said(error), piece=piece, noise=noise)
+            return Outcome("impossible", _said(error), piece=piece, noise=noise)
         reason = missing.reason
         if missing.verdict == "proved-on-cells":
             share = 100.0 * missing.shares["share"]
@@ -138,7 +159,7 @@ class Question:
             )
         if not (found.component >= 0).any():
             reason = f"{reason}: from some of them, parts may leave the arm"
-        return Asked("undecided", reason, found, piece=piece, noise=noise)
+        return Outcome("undecided", reason, found, piece=piece, noise=noise)
 
     def _each(self, found: Attraction) -> tuple[Answer, ...]:
         """Prove one goal after the other, up to the first that is not: it comes last then."""
@@ -178,7 +199,7 @@ class Question:
                 cuts[side] = [*cuts[side], *np.linspace(lo, hi, count).tolist()]
         return attraction(cover(box, BASE, cuts, PIECES[step]))
 
-    def refute(self, piece: Piece | None = None, noise: Mapping[str, str] | None = None) -> Asked:
+    def refute(self, piece: Piece | None = None, noise: Mapping[str, str] | None = None) -> Outcome:
         """Search for an orbit of one scene that violates one of the goals.
 
         Parameters
@@ -194,15 +215,15 @@ class Question:
             box = self.box(piece, noise)
             found = self._coarse(box)
         except AnswerError as error:
-            return Asked("impossible", _said(error), piece=piece, noise=noise)
+            return Outcome("impossible", _said(error), piece=piece, noise=noise)
         for goal in self.goals:
             answer = self._against(found, goal)
             if answer.verdict == "refuted":
-                return Asked(
+                return Outcome(
                     "refuted", answer.reason, found, (answer,), goal, answer.counterexample, piece, noise
                 )
             reason = answer.reason or reason
-        return Asked("undecided", reason, found, piece=piece, noise=noise)
+        return Outcome("undecided", reason, found, piece=piece, noise=noise)
 
     def _against(self, found: Attraction, goal: Goal) -> Answer:
         """Search for what refutes one goal: where throws differ, for the worst that they can do."""
