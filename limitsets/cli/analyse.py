@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from limitsets.cli.output import Json, Scene, answer, progress, table
+from limitsets.cli.output import Json, Scene, answer, opened, progress, table
 
 if TYPE_CHECKING:
     from limitsets.analysis import Analysis, Plan
@@ -41,14 +41,9 @@ def analyse(
 ) -> None:
     """Find limit sets, basins and critical points, and write report.md, analysis.json and figures."""
     with progress() as tell:
-        from limitsets.scene import load
-
-        chosen = load(scene)
-        folder = out if out is not None else Path(f"{chosen.name}-analysis")
-        from limitsets.report.writing import require_place, write
-
-        require_place(folder)
+        chosen, folder = opened(scene, out, "analysis")
         from limitsets.analysis import analyse as run
+        from limitsets.report import write
 
         analysis = run(chosen, cells, error=error, progress=tell, announce=_announce)
         files = write(analysis, folder, progress=tell)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from limitsets.cli.output import Json, Scene, answer, progress, table
+from limitsets.cli.output import Json, Scene, answer, opened, progress, table
 
 if TYPE_CHECKING:
     from limitsets.auditing import Audit
@@ -25,13 +25,7 @@ def audit(
 ) -> None:
     """Ask which assumptions of the model a scene breaks: on its limit set, and on the whole arm."""
     with progress() as tell:
-        from limitsets.scene import load
-
-        chosen = load(scene)
-        if out is not None:
-            from limitsets.report.writing import require_place
-
-            require_place(out)
+        chosen, _ = opened(scene, out)
         tell("assumptions", 0, 1 + (out is not None))
         from limitsets.auditing import audit as run
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from limitsets.cli.arguments import HELP_NO_RECHECK, ends_of, number
-from limitsets.cli.output import Json, Scene, answer, progress, save_scene, show_scene, table
+from limitsets.cli.output import Json, Scene, answer, opened, progress, save_scene, show_scene, table
 from limitsets.errors import LimitsetsError
 from limitsets.files import as_json
 
@@ -86,13 +86,8 @@ def design(
         raise typer.Exit(run_robust(scene, names, ends_of(bounds), evaluations, seconds, out, **told))
     with progress() as tell:
         from limitsets.inverse import design as run
-        from limitsets.scene import load
 
-        chosen = load(scene)
-        if out is not None and out.suffix != ".toml":
-            from limitsets.report.writing import require_place
-
-            require_place(out)
+        chosen, _ = opened(scene, None if out and out.suffix == ".toml" else out)
         found = run(
             chosen,
             critical_points=_points(critical_points),

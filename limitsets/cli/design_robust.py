@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from limitsets.cli.output import answer, progress, save_scene, show_scene, table
+from limitsets.cli.output import answer, opened, progress, save_scene, show_scene, table
 from limitsets.errors import LimitsetsError
 
 if TYPE_CHECKING:
@@ -34,12 +34,8 @@ def run_robust(
     """Search, prove, write and print; the exit code."""
     with progress() as tell:
         from limitsets.inverse import robust_design
-        from limitsets.report.writing import require_place
-        from limitsets.scene import load
 
-        scene = load(name)
-        if out is not None and out.suffix != ".toml":
-            require_place(out)
+        scene, _ = opened(name, None if out and out.suffix == ".toml" else out)
         found = robust_design(
             scene,
             vary=_varied(scene, vary, bounds),

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from limitsets.cli.arguments import HELP_NO_RECHECK, place
-from limitsets.cli.output import Json, Scene, answer, progress, table
+from limitsets.cli.output import Json, Scene, answer, opened, progress, table
 from limitsets.errors import LimitsetsError
 from limitsets.files import as_json
 
@@ -50,14 +50,9 @@ def margin(
     """
     with progress() as tell:
         from limitsets.robust.margins.finding import margin as run
-        from limitsets.scene import load
 
-        chosen = load(scene)
+        chosen, _ = opened(scene, out)
         goal = None if x is None else _goal_at(chosen, x)
-        if out is not None:
-            from limitsets.report.writing import require_place
-
-            require_place(out)
         found = run(chosen, *(quantity or ()), reading=reading, goal=goal, width=width, progress=tell)
         records = [each.to_json() for each in found]
         if out is not None:
