@@ -147,7 +147,7 @@ def test_a_small_search_finds_scenes_that_hold_throughout_their_box(small):
     box = Tolerance.of(scene, small.tolerance)
     factor = 0.9 * small.sampled.margin
     for _ in range(12):
-        corner = box.scene_at(scene, factor, rng.choice((-1.0, 1.0), len(box.names)))
+        corner = box.scene_at(scene, factor, rng.choice((-1.0, 1.0), len(box.deviations)))
         x = np.full(200, small.x - 1e-3)
         side = np.full(200, small.side)
         arrived = np.zeros(200, dtype=bool)
