@@ -160,21 +160,13 @@ class Proof:
         DeniedError
             The checker does not confirm it: it is kept as NAME.denied.zip, and what it denies is undecided.
         """
+        left, goal = "the proof stands in .claims and .to_json()", self.scene.goal
         if self.effects:
-            raise AnswerError(
-                "the certificate",
-                f"with the effects {', '.join(self.effects)}",
-                "the minimal model, and noise",
-                "nothing rechecks other maps; the proof stands in .claims and .to_json()",
-            )
-        goal = self.scene.goal
+            given, allowed = f"with the effects {', '.join(self.effects)}", "the minimal model, and noise"
+            raise AnswerError("the certificate", given, allowed, f"nothing rechecks other maps; {left}")
         if goal is not None and not rechecked(goal) and any(claim.claim == "goal" for claim in self.claims):
-            raise AnswerError(
-                "the certificate",
-                f"of the goal {goal.kind}",
-                "goals that the checker knows",
-                "nothing rechecks others; the proof stands in .claims and .to_json()",
-            )
+            given, allowed = f"of the goal {goal.kind}", "goals that the checker knows"
+            raise AnswerError("the certificate", given, allowed, f"nothing rechecks others; {left}")
         good = [
             {"claim": claim.claim, "section": claim.section, "verdict": claim.verdict}
             for claim in self.claims
