@@ -165,9 +165,10 @@ def noise_statistics(
 
     Examples
     --------
-    >>> from limitsets.robust import Gaussian, Scattering, noise_statistics
+    >>> import limitsets as ls
+    >>> from limitsets.robust import Gaussian, Scattering
     >>> noise = Scattering(speed=Gaussian(0.01), landing=Gaussian(0.05))
-    >>> found = noise_statistics("paper-designed", noise, goal=(20.5, 2), cells=512, sensitivity=False)
+    >>> found = ls.noise_statistics("paper-designed", noise, goal=(20.5, 2), cells=512, sensitivity=False)
     >>> round(found.numbers["mean throws"], 1), round(float(found.feeding.survivors[40]), 2)
     (23.2, 0.2)
     """
