@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from limitsets.cells import CellSet
 from limitsets.graph.components import Components, strong_components
-from limitsets.graph.ranges import Ranges
+from limitsets.graph.ranges import Ranges, one_run
 from limitsets.maps import kind_of
 from limitsets.robust.noise.sheets import Array, Sheets
 from limitsets.robust.noise.ulam import Transfer
@@ -114,15 +114,11 @@ def _cells_hit(chain: Transfer, sheet: Any, stage: Sheets) -> tuple[Cells, Cells
 
 def _ranges(chain: Transfer, source: Cells, start: Cells, run: Cells) -> Ranges:
     counts = np.bincount(source, minlength=chain.n_cells)
-    one = np.ones(start.size, dtype=np.int32)
     bits = (chain.sinks > 0.0) @ (1 << np.arange(chain.sinks.shape[1]))
     return Ranges(
         np.concatenate([[0], np.cumsum(counts)]).astype(np.int64),
-        start.astype(np.int32),
-        run.astype(np.int32),
-        one,
-        one.copy(),
-        chain.grid.side_of(start).astype(np.int32),
+        one_run(chain.grid.side_of(start), start, run),
+        False,
         np.ones(chain.grid.sides, dtype=np.int64),
         np.ones(chain.grid.sides, dtype=np.int64),
         bits.astype(np.uint8),
@@ -142,14 +138,7 @@ def _without(r: Ranges, cells: NDArray[np.bool_]) -> Ranges:
     counts = np.where(cells, 0, np.diff(r.first))
     kept = np.repeat(~cells, np.diff(r.first))
     first = np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
-    return r._replace(
-        first=first,
-        start=r.start[kept],
-        run=r.run[kept],
-        rows=r.rows[kept],
-        planes=r.planes[kept],
-        side=r.side[kept],
-    )
+    return r._replace(first=first, box=r.box[kept], single=False)
 
 
 def _first(cells: Cells) -> int:
