@@ -22,10 +22,11 @@ written once, here and in the rooms above, and know maps only through these func
 ======================================  =============================================================================
 
 Without an `image_box` boxes are derived (`limitsets.maps.derived`): of a map of one branch from `image_on` or `image`,
-of a map of two from `image_on` and `margin`.  `image_on` may leave the slope out, which is derived then.  A box by hand,
-written with `limitsets.interval`, pays where a tighter one is known, or where an image ends on the border of the domain,
-which no rounding may pass.  A cell counts as one of which nothing is proved where its image is nan or unbounded, and
-where a function was asked beyond where it is defined (the contract of that room), whatever count the kernel gives.
+of a map of two from `image_on` and `margin`.  `image_on` may leave the slope out, which is derived then.  A box by
+hand, written with `limitsets.interval`, pays where a tighter one is known, or where an image ends on the border of the
+domain, which no rounding may pass.  A cell counts as one of which nothing is proved where its image is nan or
+unbounded, and where a function was asked beyond where it is defined (the contract of that room), whatever count the
+kernel gives.
 
 In two and three dimensions x is a tuple and the slope a tuple of rows.
 """
