@@ -1,20 +1,60 @@
-"""Files that are replaced whole: a crash or Ctrl-C leaves the old ones as they were.  And the one form of our JSON."""
+"""Files that are replaced whole: a crash or Ctrl-C leaves the old ones as they were.  And the one form of our JSON.
+
+Answers are written by this file alone, not by msgspec or cattrs: both leave nan as it is and know no numpy, so that the
+same walk would follow theirs, and msgspec writes some floats differently from Python.
+"""
 
 from __future__ import annotations
 
 import errno
 import json
+import math
 import shutil
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import fields, is_dataclass
 from pathlib import Path
 from typing import Any
 
-__all__ = ["as_json", "replaced"]
+__all__ = ["as_json", "as_plain", "as_table", "picked", "replaced"]
 
 
-def as_json(record: Any) -> str:
+def as_plain(answer: Any) -> Any:
+    """Give an answer as JSON has it: tables with keys of text, lists, text, numbers that are finite; null for others.
+
+    An object gives its own tables (`to_json`), or else all of its fields.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> as_plain({0: (np.float64(1.5), np.array([2.0, np.nan]))})
+    {'0': [1.5, [2.0, None]]}
+    """
+    if hasattr(answer, "to_json"):
+        return answer.to_json()
+    if isinstance(answer, Mapping):
+        return {str(key): as_plain(value) for key, value in answer.items()}
+    if hasattr(answer, "tolist"):  # of numpy, which the commands' help does without
+        return as_plain(answer.tolist())
+    if is_dataclass(answer):
+        return as_plain(picked(answer, *(field.name for field in fields(answer))))
+    if isinstance(answer, Iterable) and not isinstance(answer, str):
+        return [as_plain(value) for value in answer]
+    return None if isinstance(answer, float) and not math.isfinite(answer) else answer
+
+
+def as_table(**values: Any) -> dict[str, Any]:
+    """Give a plain table of an answer's values by name, in this order."""
+    return {name: as_plain(value) for name, value in values.items()}
+
+
+def picked(answer: Any, *names: str) -> dict[str, Any]:
+    """Give some fields of an answer by their names."""
+    return {name: getattr(answer, name) for name in names}
+
+
+def as_json(answer: Any) -> str:
     r"""Write an answer as JSON, as all of them are: indented, its numbers finite, with a line break at the end.
 
     Examples
@@ -22,7 +62,7 @@ def as_json(record: Any) -> str:
     >>> as_json([])
     '[]\n'
     """
-    return json.dumps(record, indent=2, allow_nan=False) + "\n"
+    return json.dumps(as_plain(answer), indent=2, allow_nan=False) + "\n"
 
 
 @contextmanager

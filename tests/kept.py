@@ -4,7 +4,7 @@ import hashlib
 from pathlib import Path
 from typing import Any
 
-from limitsets import jit
+from limitsets.jit import cache
 
 
 def kept(loop: Any) -> Any:
@@ -12,9 +12,9 @@ def kept(loop: Any) -> Any:
 
     For loops that call kernels of these two only, with the package's classes.
     """
-    if jit._folder is not None:
+    if cache._folder is not None:
         file = Path(loop.py_func.__code__.co_filename)
-        cache = jit._source_cache(jit._folder / hashlib.sha256(file.read_bytes()).hexdigest()[:24])
-        if cache is not None:
-            loop._cache = cache(loop.py_func)
+        made = cache._source_cache(cache._folder / hashlib.sha256(file.read_bytes()).hexdigest()[:24])
+        if made is not None:
+            loop._cache = made(loop.py_func)
     return loop

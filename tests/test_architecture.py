@@ -15,7 +15,8 @@ import limitsets
 ROOT = Path(__file__).resolve().parents[1]
 PACKAGE = ROOT / "limitsets"
 SOURCES = sorted(PACKAGE.rglob("*.py"))
-LATE = ["numba", "scipy", "networkx", "matplotlib", "pint", "pydantic", "typer", "rich", "pymunk"]
+LATE = ["numba", "scipy", "networkx", "matplotlib", "pint", "pydantic", "typer", "rich", "jinja2", "tomlkit"]
+LATE += ["pymunk"]
 
 
 def run_python(code: str, cwd: Path = ROOT) -> str:
@@ -49,7 +50,7 @@ def imported_names(source: Path) -> set[str]:
 @pytest.mark.parametrize("source", SOURCES, ids=lambda path: str(path.relative_to(PACKAGE)))
 def test_only_jit_imports_numba(source):
     numba = {"numba", "llvmlite"} & imported_names(source)
-    assert not numba or source == PACKAGE / "jit.py"
+    assert not numba or source.parent == PACKAGE / "jit"
 
 
 def test_the_checker_imports_nothing_of_ours():

@@ -9,7 +9,6 @@ from limitsets.analysis.asked import Answered
 from limitsets.analysis.flags import other_vertex_first, overlap
 from limitsets.analysis.run import Analysis, analyse
 from limitsets.analysis.starts import Starts
-from limitsets.analysis.words import scene_of, to_json
 
 __all__ = [
     "Accuracy",
@@ -21,6 +20,4 @@ __all__ = [
     "other_vertex_first",
     "overlap",
     "plan_for",
-    "scene_of",
-    "to_json",
 ]

@@ -10,12 +10,21 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from limitsets.analysis.accuracy import CELLS as BY_CELLS
-from limitsets.analysis.accuracy import Accuracy, Plan, left_to_cells, limit_of, plan_for, require_error
+from limitsets.analysis.accuracy import (
+    Accuracy,
+    Plan,
+    best_extents,
+    left_to_cells,
+    limit_of,
+    plan_for,
+    require_error,
+)
 from limitsets.analysis.asked import Answered, answer
 from limitsets.analysis.flags import other_vertex_first
 from limitsets.analysis.starts import Starts, against_starts
 from limitsets.analysis.verifying import verified
 from limitsets.errors import AnswerError
+from limitsets.files import as_table, picked
 
 if TYPE_CHECKING:
     import networkx as nx
@@ -104,10 +113,7 @@ class Analysis:
     @property
     def extents(self) -> tuple[Extents, ...]:
         """Per attractor its intervals: of the limit set where its end points are known, else of the cells."""
-        return tuple(
-            limit.extents if limit.converged else attractor.extents
-            for limit, attractor in zip(self.limit_sets, self.attractors, strict=True)
-        )
+        return best_extents(self.attractors, self.limit_sets)
 
     @property
     def extents_from(self) -> tuple[str, ...]:
@@ -121,10 +127,69 @@ class Analysis:
         return tuple(text for text in said if text is not None)
 
     def to_json(self) -> dict[str, Any]:
-        """Give it as plain tables for JSON (`limitsets.analysis.to_json`)."""
-        from limitsets.analysis.words import to_json
+        """Write it as tables, lists, text and finite numbers; None where a number is missing.
 
-        return to_json(self)
+        Returns
+        -------
+        dict
+            Sides are keys "0", "1", ...; lengths are in ``units["length"]``, angles in rad, times in seconds.
+            `limitsets.load` reads the scene back from ``["scene"]``.
+
+        Examples
+        --------
+        >>> import limitsets as ls
+        >>> found = ls.analyse("paper-designed")
+        >>> found.to_json()["attractors"][0]["flip_order"]
+        [0, 1, 2]
+        """
+        scene, goal, basins = self.scene, self.goal, self.basins
+        return as_table(
+            scene=scene.as_dict(),
+            units={"length": scene.unit, "angle": "rad", "time": "s", "lyapunov": "per throw"},
+            cells=self.grid.shape[:, 0],
+            critical_points={
+                side: [picked(point, "x", "kind") for point in points]
+                for side, points in sorted(self.critical_points.items())
+            },
+            attractors=[self._attractor(k) for k in range(len(self.attractors))],
+            basins={
+                **picked(basins, "attractors", "undecided_between"),
+                **{name.replace("-", "_"): share for name, share in basins.exits.items()},
+            },
+            starts=self.starts,
+            advice=self.advice,
+            cycles=[
+                picked(cycle, "period", "x")
+                | {"sides": cycle.side}
+                | picked(cycle, "multiplier", "admissible")
+                for cycle in self.cycles
+            ],
+            goal=None
+            if goal is None
+            else {"kind": goal.goal.kind, **picked(goal, "holds", "threshold", "how")},
+            goal_vacuous=None if goal is None else goal.vacuous,
+            effects=self.choice,
+            other_vertex_first=_ordered(self.other_vertex_first),
+            spurious=[{"cells": len(cells), "extents": cells.extents()} for cells in self.spurious],
+            accuracy=self.accuracy,
+            second_pass=self.second_pass,
+            timings={step: round(seconds, 6) for step, seconds in self.timings.items()},
+        )
+
+    def _attractor(self, k: int) -> dict[str, Any]:
+        found = self.attractors[k]
+        return {
+            "extents": _ordered(self.extents[k]),
+            "extents_from": self.extents_from[k],
+            "flip_order": found.flip_order,
+            "jogs_per_visit": _ordered(found.jogs_per_visit),
+            **picked(found, "flips_per_throw", "lyapunov", "throws", "in_cells", "stopped"),
+            "advice": self.limit_sets[k].advice,
+        }
+
+
+def _ordered(by_side: Mapping[int, Any]) -> dict[int, Any]:
+    return dict(sorted(by_side.items()))
 
 
 class _Found(NamedTuple):
@@ -268,10 +333,7 @@ def analyse(
         morse = morse_graph(graph)
         false_sets = spurious(graph)
     with steps.step("goal"):
-        extents = [
-            limit.extents if limit.converged else each.extents
-            for limit, each in zip(limits, found, strict=True)
-        ]
+        extents = best_extents(found, limits)
         asked = None if chosen.goal is None else answer(chosen.goal, graph, found, shares, extents)
         if asked is not None and asked.holds and starts is not None and starts.elsewhere:
             asked = replace(asked, holds=None)  # some starts stay where nothing is known

@@ -61,15 +61,6 @@ class Starts:
             )
         return "; ".join(parts) + "; ask for more cells" if parts else None
 
-    def to_json(self) -> dict[str, Any]:
-        """Give it as a table for JSON."""
-        return {
-            "count": self.count,
-            "throws": self.throws,
-            "elsewhere": self.elsewhere,
-            "contradicted": self.contradicted,
-        }
-
 
 def against_starts(graph: TransitionGraph, attractors: Sequence[Attractor], basins: Basins) -> Starts:
     """Throw a thousand random starts, the same ones each time, and compare.

@@ -19,6 +19,7 @@ from limitsets.auditing.assumptions import ASSUMPTIONS, Assumption
 from limitsets.auditing.judging import Row, all_kept, ask
 from limitsets.auditing.places import Places, Sample, places
 from limitsets.auditing.stretches import where
+from limitsets.files import as_table, picked
 
 if TYPE_CHECKING:
     from limitsets.proofs.parameters import ParameterBox
@@ -83,23 +84,15 @@ class Finding:
 
     def to_json(self) -> dict[str, Any]:
         """Give it as plain tables for JSON."""
-        return {
-            "effect": self.effect,
-            "assumption": self.about.what,
-            "where": self.place,
-            "called_for": "cannot tell" if self.called_for is None else self.called_for,
-            "how": self.how,
-            "side": self.side,
-            "x": self.x,
-            "worst": self.worst,
-            "threshold": self.threshold,
-            "missing": self.missing or None,
-            "ranges": {str(side): [list(pair) for pair in parts] for side, parts in self.ranges.items()},
-            "jogs": list(self.jogs),
-            "flips": list(self.flips),
-            "others": list(self.others),
-            "simulated": self.simulated,
-        }
+        return as_table(
+            effect=self.effect,
+            assumption=self.about.what,
+            where=self.place,
+            called_for="cannot tell" if self.called_for is None else self.called_for,
+            **picked(self, "how", "side", "x", "worst", "threshold"),
+            missing=self.missing or None,
+            **picked(self, "ranges", "jogs", "flips", "others", "simulated"),
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,20 +137,17 @@ def _worst(row: Row, found: Mapping[int, Array], samples: Mapping[int, Sample]) 
         excess = np.where(known, reached - limit if row.about.below else limit - reached, -np.inf)
         k = int(excess.argmax())
         if not best[1] or excess[k] > best[0]:
-            value, threshold = float(reached[k]), row.limit(side)
-            if row.terms.limit is None:
-                matters = row.terms.matters(value) if math.isfinite(value) else None
-                threshold = math.nan if matters is None else matters
-            best = (
-                excess[k],
-                {
-                    "side": side,
-                    "x": float(samples[side].x[k]),
-                    "worst": value if math.isfinite(value) else None,
-                    "threshold": threshold if math.isfinite(threshold) else None,
-                },
-            )
+            value: float | None = _finite(float(reached[k]))
+            threshold: float | None = row.limit(side)
+            if row.terms.limit is None and value is not None:
+                threshold = row.terms.matters(value)
+            x = float(samples[side].x[k])
+            best = excess[k], {"side": side, "x": x, "worst": value, "threshold": _finite(threshold)}
     return best[1]
+
+
+def _finite(value: float | None) -> float | None:
+    return None if value is None or not math.isfinite(value) else value
 
 
 def _shares(broken: Mapping[int, Flags], samples: Mapping[int, Sample]) -> dict[str, Any]:
@@ -178,10 +168,8 @@ def _ranges(box: ParameterBox, row: Row, found: Mapping[int, Array], domain: Map
         def broken(x: Array, side: int = side) -> Flags:
             return row.broken(ask(box, side, x), side)
 
-        parts = where(broken, sample.x, row.broken(found[side], side))
-        if parts:
-            ranges[side] = parts
-    return ranges
+        ranges[side] = where(broken, sample.x, row.broken(found[side], side))
+    return {side: parts for side, parts in ranges.items() if parts}
 
 
 def _findings(
@@ -254,7 +242,5 @@ def audit(scene: str | Path | Mapping[str, Any] | Scene) -> Audit:
     box = parameter_box(load({**chosen.as_dict(), "effects": {}}))
     rows = [Row(about, about.terms(chosen, box)) for about in ASSUMPTIONS]
     asked = places(chosen, box)
-    findings = [
-        finding for place in ("limit-set", "domain") for finding in _findings(place, chosen, box, rows, asked)
-    ]
-    return Audit(chosen, tuple(findings), asked.extents, asked.enclosed)
+    two = (_findings(place, chosen, box, rows, asked) for place in ("limit-set", "domain"))
+    return Audit(chosen, sum(two, ()), asked.extents, asked.enclosed)

@@ -32,7 +32,8 @@ class Row:
 
     def limit(self, side: int) -> float:
         """Give the limit on a side, nan where a fact is missing."""
-        return math.nan if self.terms.limit is None else float(self.terms.limit[side])
+        limit = self.terms.limit
+        return math.nan if limit is None else float(limit[side] if isinstance(limit, np.ndarray) else limit)
 
     def values(self, found: Array) -> Array:
         """Both ends of the number, widened by the rounding of scale and offset."""
@@ -61,6 +62,11 @@ class Row:
         """Whether it is proved to hold."""
         values = self.values(found)
         return values[:, 1] <= self.limit(side) if self.about.below else values[:, 0] >= self.limit(side)
+
+    def spare(self, found: Array, side: int) -> Array:
+        """Give how far within the limit it is, to the width of the enclosures; below 0 beyond it."""
+        inside: Array = (self.limit(side) - self.values(found).mean(axis=1)) * (1 if self.about.below else -1)
+        return inside
 
 
 def ask(box: ParameterBox, side: int, x: Array) -> Array:

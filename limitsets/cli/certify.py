@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from limitsets.cli.arguments import HELP_NO_RECHECK, deviations
-from limitsets.cli.output import Json, Scene, progress, saved, table
-from limitsets.files import as_json
+from limitsets.cli.output import Json, Scene, answer, progress, saved, table
 
 if TYPE_CHECKING:
     from limitsets.proofs import Claim, Proof
@@ -75,13 +74,8 @@ def certify(
                 except DeniedError as error:
                     proof, kept = proof.denied(error.claims), str(file.with_name(Path(error.file or "").name))
             seconds = None if no_recheck or not written else time.perf_counter() - begin
-    if json:
-        print(
-            as_json([each | {"timings": each["timings"] | {"recheck": seconds}} for each in proof.to_json()]),
-            end="",
-        )
-    else:
-        _text(proof, file if written else None, kept, seconds)
+    records = [each | {"timings": each["timings"] | {"recheck": seconds}} for each in proof.to_json()]
+    answer(records, json, lambda: _text(proof, file if written else None, kept, seconds))
     raise typer.Exit(0 if proof.proved else 1)
 
 
@@ -195,12 +189,10 @@ def _percent(share: float) -> str:
 
 
 def _attraction(proof: Proof, claim: Claim) -> list[str]:
-    from limitsets.proofs.answer import jog_fixed_points, max_throws, outer_extents
-
-    unit, bound, points = proof.scene.unit, max_throws(proof), jog_fixed_points(claim)
+    unit, bound, points = proof.scene.unit, proof.max_throws(), claim.jog_fixed_points
     extents = {
         side: ", ".join(f"{_down(lo, 3)} to {_up(hi, 3)}" for lo, hi in parts)
-        for side, parts in outer_extents(proof).items()
+        for side, parts in proof.outer_extents().items()
     }
     growth = _down(bound["near_joint"], 6)
     starts = ", ".join(f"{_up(x, 6)} {unit} on side {side}" for side, x in bound["beyond"].items())
@@ -279,9 +271,7 @@ def _heads(proof: Proof) -> list[str]:
 
 def _thrown(proof: Proof, state: State) -> list[str]:
     """Say what a throw was like, one word for each of `_heads`."""
-    from limitsets.proofs.answer import thrown
-
-    said, noise, row = thrown(proof, state), proof.noise, []
+    said, noise, row = proof.thrown(state), proof.noise, []
     if "throw.speed" in noise and "gravity.tilt" in noise:
         row.append(f"{state.kappa:.6f}")
     elif "throw.speed" in noise and state.kappa is not None:

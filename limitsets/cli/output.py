@@ -9,14 +9,28 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from limitsets.errors import LimitsetsError
 from limitsets.files import as_json, replaced
 
-__all__ = ["Json", "Out", "Scene", "answer", "progress", "saved", "table"]
+if TYPE_CHECKING:
+    from limitsets.scene import Scene as SceneOf
+
+__all__ = [
+    "Json",
+    "Out",
+    "Scene",
+    "answer",
+    "opened",
+    "progress",
+    "save_scene",
+    "saved",
+    "show_scene",
+    "table",
+]
 
 Scene = Annotated[
     str, typer.Argument(metavar="SCENE", help="A built-in name (see: limitsets scenes) or a TOML file.")
@@ -45,6 +59,19 @@ def table(heads: Sequence[str], rows: Sequence[Sequence[object]]) -> None:
     Console(width=None if sys.stdout.isatty() else 200).print(grid)
 
 
+def opened(scene: str, out: Path | None, word: str = "") -> tuple[SceneOf, Path]:
+    """Load a scene; a folder, by default NAME-WORD, that cannot be written is refused before anything is computed."""
+    from limitsets.scene import load
+
+    chosen = load(scene)
+    folder = out or Path(f"{chosen.name}-{word}")
+    if out or word:
+        from limitsets.report.writing import require_place
+
+        require_place(folder)
+    return chosen, folder
+
+
 @contextmanager
 def saved(file: Path) -> Iterator[Path]:
     """Write one file whole: a draft to write to, which takes its place at the end."""
@@ -62,7 +89,7 @@ def saved(file: Path) -> Iterator[Path]:
         ) from None
 
 
-def answer(record: Any, json: bool, out: Path | None, text: Callable[[], None]) -> None:
+def answer(record: Any, json: bool, text: Callable[[], None], out: Path | None = None) -> None:
     """Give an answer as JSON or as text, and write it to a file where one is named."""
     words = as_json(record)
     if out is not None:
@@ -72,6 +99,22 @@ def answer(record: Any, json: bool, out: Path | None, text: Callable[[], None]) 
         print(words, end="")
     else:
         text()
+
+
+def save_scene(scene: SceneOf, file: Path) -> list[Path]:
+    """Write the scene alone."""
+    from limitsets.scene import dump
+
+    with saved(file) as draft:
+        draft.write_text(dump(scene), encoding="utf-8", newline="\n")
+    return [file]
+
+
+def show_scene(scene: SceneOf, files: list[Path]) -> None:
+    """Say where the scene is, or print it where it is in no file."""
+    from limitsets.scene import dump
+
+    typer.echo(f"scene: {files[0]}" if files else "\n" + dump(scene).rstrip("\n"))
 
 
 class _Lines:

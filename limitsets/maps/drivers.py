@@ -13,19 +13,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from limitsets.errors import MapError
-from limitsets.jit import generic, kernel
+from limitsets.jit import kernel
 from limitsets.maps import codes
-from limitsets.maps.contract import (
-    displacement,
-    fallback,
-    image,
-    image_on,
-    kind_of,
-    on_side,
-    require_codes,
-    require_sides,
-    scattered,
-)
+from limitsets.maps.contract import kind_of, require_codes, require_sides
+from limitsets.maps.kernels import displacement, fallback, image, image_on, on_side, pick, put, scattered
 
 __all__ = [
     "Images",
@@ -39,45 +30,6 @@ __all__ = [
     "rows",
     "step",
 ]
-
-
-@generic
-def pick(xs: Any, k: int) -> Any:
-    """State number k of a tuple of coordinate arrays: a number, or a tuple from two coordinates up."""
-
-
-@generic
-def put(xs: Any, k: int, x: Any) -> None:
-    """Store state number k."""
-
-
-def _pick1(xs: Any, k: int) -> Any:
-    return xs[0][k]
-
-
-def _pick2(xs: Any, k: int) -> Any:
-    return xs[0][k], xs[1][k]
-
-
-def _pick3(xs: Any, k: int) -> Any:
-    return xs[0][k], xs[1][k], xs[2][k]
-
-
-def _put1(xs: Any, k: int, x: Any) -> None:
-    xs[0][k] = x
-
-
-def _put2(xs: Any, k: int, x: Any) -> None:
-    xs[0][k], xs[1][k] = x
-
-
-def _put3(xs: Any, k: int, x: Any) -> None:
-    xs[0][k], xs[1][k], xs[2][k] = x
-
-
-for _n, _get, _set in ((1, _pick1, _put1), (2, _pick2, _put2), (3, _pick3, _put3)):
-    pick.on(_n, _get)
-    put.on(_n, _set)
 
 
 @kernel
@@ -316,13 +268,23 @@ def orbit(params: Any, x: Any, side: int, count: int) -> Orbit:
     start = start_of(params, x, side)
     if count < 0:
         raise MapError("the number of steps", count, "an integer from 0", "pass count=100")
-    kind = kind_of(params)
+    xs, sides, code = empty_orbit(start, side, count)
+    return as_orbit(params, xs, sides, code, _orbit(params, 0, xs, sides, code))
+
+
+def empty_orbit(start: tuple[float, ...], side: int, count: int) -> tuple[Any, Any, Any]:
+    """Arrays for an orbit of `count` steps, the first state in its place: states, sides, codes."""
     xs = tuple(np.empty(count + 1) for _ in start)
     for values, value in zip(xs, start, strict=True):
         values[0] = value
-    sides, code = np.empty(count + 1, np.int64), np.empty(count, np.int64)
+    sides = np.empty(count + 1, np.int64)
     sides[0] = side
-    made = _orbit(params, 0, xs, sides, code)
+    return xs, sides, np.empty(count, np.int64)
+
+
+def as_orbit(params: Any, xs: Any, sides: Any, code: Any, made: int) -> Orbit:
+    """Cut an orbit off where it left or stalled, and say why."""
+    kind = kind_of(params)
     require_codes(params, code[:made])
     stopped = None
     if made and code[made - 1] < 0:

@@ -5,22 +5,23 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from fractions import Fraction
-from importlib.metadata import PackageNotFoundError, version
+from functools import singledispatch
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 from limitsets.errors import AnswerError
-from limitsets.proofs.asked import State, ask, borders, prove
+from limitsets.proofs.asked import ask, borders, prove
 from limitsets.proofs.asked.starts import leaving
 from limitsets.proofs.attraction import Attraction, attraction, near_section
-from limitsets.proofs.certificate import write
 from limitsets.proofs.cover import cover
 from limitsets.proofs.end_points import proved_ends
 from limitsets.proofs.expansion import least_slope
+from limitsets.proofs.of_map import certify_map
 from limitsets.proofs.orbits import proved_cycles
 from limitsets.proofs.parameters import ParameterBox, parameter_box
+from limitsets.proofs.proof import Claim, Proof
 from limitsets.proofs.simulated import joined, scattered
 from limitsets.proofs.tolerance import Piece, whole
 from limitsets.proofs.trapping import trapping
@@ -28,7 +29,7 @@ from limitsets.scene import Scene, load
 from limitsets.scene.quantities import deviation, find
 from limitsets.scene.units import parse
 
-__all__ = ["CLAIMS", "Claim", "Proof", "certify", "weakest_of"]
+__all__ = ["CLAIMS", "certify", "weakest_of"]
 
 # Cells per side, tried in turn until everything asked for is proved or refuted.
 LADDER = (2048, 8192, 32768, 131072)
@@ -43,171 +44,6 @@ MOST_SEARCHED = 8
 STARTS = ("every", "almost-every", "from", "cells")
 
 Progress = Callable[[str, int, int], None]
-
-
-@dataclass(frozen=True)
-class Claim:
-    """One claim and what became of it.
-
-    Attributes
-    ----------
-    claim : str
-        A word of `CLAIMS`.
-    verdict : str
-        "proved", "refuted" or "undecided"; of a goal also "proved-on-cells", for the starts in some cells only.
-    reason : str
-        Why it is not proved: what is missing and where; empty if it is.
-    section : dict
-        What a recheck needs, empty if nothing is proved.
-    counterexample : tuple of State
-        An orbit that refutes it, empty if none was found.
-    fixed : dict of str to list of str
-        The counterexample's values of what is fixed but unknown, as pairs of texts.
-    final : bool
-        Whether finer cells cannot change the verdict.
-    starts : str, dict or None
-        Of a goal that is proved, for which starts: "every", "almost-every", ``{"from": {"0": x}}`` or "cells"; of one
-        that is refuted, of which starts it is not true.  None for other claims.
-    shares : dict of str to float
-        Of a goal that is proved: shares of the arm for whose starts it is (`share`), whose starts are proved to leave
-        (`leaves`) or to creep to the joint (`creeps`), and of whose starts nothing is proved (`open`).
-    note : str
-        What a reader of a proved goal should know, empty if nothing.
-    recurs : dict
-        Why the orbit that refutes comes back, or that it need not: as in `limitsets.proofs.asked.recurring.Refutation`.
-    """
-
-    claim: str
-    verdict: str
-    reason: str
-    section: dict[str, Any]
-    counterexample: tuple[State, ...] = ()
-    fixed: dict[str, list[str]] = field(default_factory=dict)
-    final: bool = False
-    starts: Any = None
-    shares: dict[str, float] = field(default_factory=dict)
-    note: str = ""
-    recurs: dict[str, Any] = field(default_factory=dict)
-
-    @property
-    def written(self) -> bool:
-        """Whether a certificate may hold it."""
-        return self.verdict in ("proved", "proved-on-cells")
-
-
-@dataclass(frozen=True, eq=False)
-class Proof:
-    """What was proved of a scene.
-
-    Attributes
-    ----------
-    scene : Scene
-        The scene.
-    noise, tolerance : dict of str to str
-        What may differ at every throw, and what is fixed but unknown, and by how much.
-    attractions : tuple of Attraction
-        Cells, images, ranks; one for each box into which a tolerance was cut.
-    claims : tuple of Claim
-        One per claim asked for.
-    seconds : float
-        Time it took.
-    """
-
-    scene: Scene
-    noise: dict[str, str]
-    tolerance: dict[str, str]
-    attractions: tuple[Attraction, ...]
-    claims: tuple[Claim, ...]
-    seconds: float
-
-    @property
-    def proved(self) -> bool:
-        """Whether every claim is proved."""
-        return all(claim.verdict == "proved" for claim in self.claims)
-
-    @property
-    def spans(self) -> dict[str, list[str]]:
-        """Both ends of each quantity that is fixed but unknown, as text."""
-        return whole(self.scene, self.tolerance).texts() if self.tolerance else {}
-
-    @property
-    def effects(self) -> tuple[str, ...]:
-        """The effects of the scene that the proof is about, but for a spread, which is noise."""
-        return tuple(name for name in self.scene.effects.on() if name != "spread")
-
-    def to_json(self) -> list[dict[str, Any]]:
-        """Give it as plain tables for JSON, one per claim (`limitsets.proofs.answer`)."""
-        from limitsets.proofs.answer import to_json
-
-        return to_json(self)
-
-    def save(self, path: str | Path, *, recheck: bool = True, workers: int | None = 1) -> Path:
-        """Write the certificate of the claims that are proved; it gets its name once `recheck` has confirmed it.
-
-        Parameters
-        ----------
-        path : str or Path
-            The file, replaced whole.
-        recheck : bool
-            Whether to have it checked first.
-        workers : int, optional
-            Processes that check it, as in `limitsets.recheck`.
-
-        Raises
-        ------
-        AnswerError
-            Nothing is proved, or it is proved of a map that no recheck knows.
-        DeniedError
-            The checker does not confirm it: it is kept as NAME.denied.zip, and what it denies is undecided.
-        """
-        if self.effects:
-            raise AnswerError(
-                "the certificate",
-                f"with the effects {', '.join(self.effects)}",
-                "the minimal model, and noise",
-                "nothing rechecks other maps; the proof stands in .claims and .to_json()",
-            )
-        good = [
-            {"claim": claim.claim, "section": claim.section, "verdict": claim.verdict}
-            for claim in self.claims
-            if claim.written
-        ]
-        if not good:
-            raise AnswerError(
-                "the certificate", "without a proved claim", "at least one", "see the reasons in .claims"
-            )
-        try:
-            producer = {"limitsets": version("limitsets")}
-        except PackageNotFoundError:  # sources that are not installed
-            producer = {}
-        write(
-            path,
-            self.attractions,
-            good,
-            noise=self.noise,
-            tolerance=self.tolerance,
-            unit=self.scene.unit,
-            producer=producer,
-            recheck=recheck,
-            workers=workers,
-        )
-        return Path(path)
-
-    def denied(self, claims: Mapping[str, str]) -> Proof:
-        """Return what is left of it where the checker denies some claims: these are undecided."""
-        left = tuple(
-            replace(
-                each,
-                verdict="undecided",
-                reason=f"the checker denies it: {claims[each.claim]}",
-                section={},
-                starts=None,
-            )
-            if each.claim in claims
-            else each
-            for each in self.claims
-        )
-        return replace(self, claims=left)
 
 
 def _attracts_all(found: Attraction, scene: Scene) -> Claim:
@@ -361,6 +197,7 @@ def _deviations(scene: Scene, given: Mapping[str, str] | None) -> dict[str, str]
     return found
 
 
+@singledispatch
 def certify(
     scene: Scene | str | Path,
     claims: Sequence[str] | None = None,
@@ -369,7 +206,9 @@ def certify(
     tolerance: Mapping[str, str] | None = None,
     progress: Progress | None = None,
 ) -> Proof:
-    """Prove claims about the limit set of a scene.
+    """Prove claims about the limit set of a scene; or of any map: ``certify(map, grid, claims)``.
+
+    Of a map see `limitsets.proofs.of_map.certify_map`; the following is about a scene.
 
     Parameters
     ----------
@@ -406,6 +245,9 @@ def certify(
     >>> proof = ls.certify("paper-designed")
     >>> [(claim.claim, claim.verdict, claim.starts) for claim in proof.claims]
     [('attracts-all', 'proved', None), ('goal', 'proved', 'every')]
+    >>> proof = ls.certify(ls.maps.Logistic(3.2), ls.grid([(0.1, 0.9)], cells=512), ["attracts-all"])
+    >>> proof.claims[0].verdict
+    'proved'
     """
     asked = scene if isinstance(scene, Scene) else load(scene)
     wanted = _chosen(asked, claims)
@@ -419,6 +261,9 @@ def certify(
         found = (one,)
     seconds = time.perf_counter() - begin
     return Proof(asked, noise, tolerance, found, answers, seconds)
+
+
+certify.register(tuple, cast(Any, certify_map))  # a map is a NamedTuple; its answer is another class
 
 
 def _attempt(

@@ -15,14 +15,14 @@ from typing import Any
 import numpy as np
 
 from limitsets.errors import AnswerError
-from limitsets.geometry import rest_of, side_ends
+from limitsets.geometry import side_ends
 from limitsets.geometry.polygon import above_side
 from limitsets.proofs.mean_value import Slope, about, middle, root
 from limitsets.proofs.rational import Span, angle, pi, sine, square_root
 from limitsets.proofs.simulated import simulated
 from limitsets.scene import Scene
-from limitsets.scene.body import Shape, shape_of
-from limitsets.scene.quantities import STANDARD_GRAVITY, base_unit, find, text_at, texts
+from limitsets.scene.numbers import Numbers
+from limitsets.scene.quantities import base_unit, find, text_at, texts
 from limitsets.scene.units import exact_factor, parse, share_of_pi
 from limitsets.thrower import Throw
 from limitsets.thrower.motion import FullThrow, Outline
@@ -84,16 +84,60 @@ class ParameterBox:
         return self.lo._replace(bare=bare) if isinstance(self.lo, FullThrow) else bare
 
 
-class _Reader:
-    """Spans of the quantities of one scene, in its unit of length."""
+class _Spans(Numbers):
+    """Spans of the quantities of one scene, in its unit of length, with the noise of its throws.
+
+    Parameters
+    ----------
+    unit : str
+        The scene's unit of length.
+    tree : mapping
+        Its text, quantities with a tolerance as pairs of texts.
+    noise : mapping of str to str, optional
+        What differs at every throw.
+    instead : mapping of str to Span or Slope, optional
+        What stands in for quantities.
+    """
 
     def __init__(
-        self, scene: Scene, tree: Mapping[str, Any], instead: Mapping[str, Span | Slope] | None = None
+        self,
+        unit: str,
+        tree: Mapping[str, Any],
+        noise: Mapping[str, str] | None = None,
+        instead: Mapping[str, Span | Slope] | None = None,
     ) -> None:
-        self.scene, self.tree, self.unit, self.instead = scene, tree, scene.unit, instead or {}
+        super().__init__(tree, root, sine)
+        self.unit, self.noise, self.instead = unit, noise or {}, instead or {}
 
-    def has(self, table: str, key: str) -> bool:
-        return key in self.tree.get(table, {})
+    def number(self, name: str) -> Any:
+        """Return a quantity, as throws have it."""
+        found = self.span(name)
+        if name == "throw.kappa":
+            share, more = self.deviation("throw.speed")
+            if more.hi > 0:
+                raise AnswerError(
+                    "the noise", self.noise, "percent, for a scene given by kappa", "give it in percent"
+                )
+            speed = Span(1 - share.hi, 1 + share.hi)
+            return found * self.share_of_gravity() / (speed * speed)
+        if name == "gravity.acceleration":
+            found = found * self.share_of_gravity()
+        elif name in VARYING:
+            share, more = self.deviation(name)
+            found = Span((found * (1 - share) - more).lo, (found * (1 + share) + more).hi)
+        return self._possible(name, found)
+
+    def _possible(self, name: str, found: Any) -> Any:
+        """Refuse a speed or a gravity that may be 0, and a tilt that may lie level or overhang."""
+        if name == "gravity.tilt":
+            most = (pi() / 2).lo if name in self.noise else (pi() / 2).hi
+            if not (found.lo > 0 and found.hi <= most):
+                shown = self.tree["gravity"]["tilt"]
+                text = f"{shown} +- {self.noise[name]}" if name in self.noise else shown
+                raise AnswerError(name, text, "from 0 to 90 degrees", NARROWER)
+        elif name in ("throw.speed", "gravity.acceleration") and not found.lo > 0:
+            raise AnswerError("the speed or gravity", self.tree["throw"], "above 0 throughout", NARROWER)
+        return found
 
     def span(self, name: str) -> Any:
         """Return a quantity, or the span between the two texts of a tolerance, or what stands in for it."""
@@ -101,10 +145,11 @@ class _Reader:
             return self.instead[name]
         found = text_at(self.tree, name)
         pair = found if isinstance(found, list) else [found, found]
-        lo, hi = (self.one(text, find(name).dimension) for text in pair)
+        lo, hi = (self.constant(text, find(name).dimension) for text in pair)
         return Span(lo.lo, hi.hi)
 
-    def one(self, text: str, dimension: str) -> Span:
+    def constant(self, text: str, dimension: str, key: str = "") -> Span:
+        """Return a text of a dimension."""
         quantity = parse(text, dimension)
         number = Fraction(quantity.number)
         share = share_of_pi(quantity.unit)
@@ -112,80 +157,40 @@ class _Reader:
             return pi() * Span.of(share * number)
         return Span.of(number * exact_factor(quantity.unit, base_unit(dimension, self.unit)))
 
-    def deviation(self, name: str, noise: Mapping[str, str]) -> tuple[Span, Span]:
+    def deviation(self, name: str) -> tuple[Span, Span]:
         """Return the noise of a quantity as a share of it, and in its own dimension; one of the two is 0."""
-        text = noise.get(name)
+        text = self.noise.get(name)
         if text is None:
             return Span.of(0), Span.of(0)
         if text.rstrip().endswith("%"):
             return Span.of(Fraction(parse(text, "share").number) / 100), Span.of(0)
-        return Span.of(0), self.one(text, find(name).dimension)
+        return Span.of(0), self.constant(text, find(name).dimension)
 
-    def kappa(self, noise: Mapping[str, str]) -> Span:
-        """Return kappa = g / w^2, with the noise of the speed w and of the tilt."""
-        share, more = self.deviation("throw.speed", noise)
-        slow, fast = 1 - share, 1 + share
-        if self.has("throw", "kappa"):
-            if more.hi > 0:
-                raise AnswerError(
-                    "the noise", noise, "percent, for a scene given by kappa", "give it in percent"
-                )
-            kappa = self.span("throw.kappa") * self.share_of_gravity(noise)
-            return Span((kappa / (fast * fast)).lo, (kappa / (slow * slow)).hi)
-        if self.has("gravity", "acceleration"):
-            gravity = self.span("gravity.acceleration") * self.share_of_gravity(noise)
-        else:
-            tilt = self.tilt(noise)
-            gravity = self.one(STANDARD_GRAVITY, "acceleration") * sine(tilt)
-        speed = self.span("throw.speed")
-        slow, fast = speed * slow - more, speed * fast + more
-        if not (gravity.lo > 0 and slow.lo > 0):
-            raise AnswerError("the speed or gravity", self.tree["throw"], "above 0 throughout", NARROWER)
-        return Span((gravity / (fast * fast)).lo, (gravity / (slow * slow)).hi)
-
-    def tilt(self, noise: Mapping[str, str]) -> Span:
-        """Return the tilt with its noise: all of it between level and upright."""
-        share, more = self.deviation("gravity.tilt", noise)
-        nominal = self.span("gravity.tilt")
-        tilt = Span((nominal * (1 - share) - more).lo, (nominal * (1 + share) + more).hi)
-        most = (pi() / 2).lo if "gravity.tilt" in noise else (pi() / 2).hi
-        if not (tilt.lo > 0 and tilt.hi <= most):
-            shown = self.tree["gravity"]["tilt"]
-            text = f"{shown} +- {noise['gravity.tilt']}" if "gravity.tilt" in noise else shown
-            raise AnswerError("gravity.tilt", text, "from 0 to 90 degrees", NARROWER)
-        return tilt
-
-    def share_of_gravity(self, noise: Mapping[str, str]) -> Span:
+    def share_of_gravity(self) -> Span:
         """Return what the noise of the tilt multiplies g by: sin(tilt +- dev) / sin(tilt).
 
         Both ends are farthest from 1 at the smallest tilt: (1 +- p) cot((1 +- p) t) against cot(t), and cot(t) alone.
         """
-        if "gravity.tilt" not in noise:
+        if "gravity.tilt" not in self.noise:
             return Span.of(1)
-        if not self.has("gravity", "tilt"):
+        if "tilt" not in self.tree.get("gravity", {}):
             raise AnswerError(
                 "the noise of gravity.tilt",
-                noise["gravity.tilt"],
+                self.noise["gravity.tilt"],
                 "noise of a quantity that the scene gives",
                 "give the scene [gravity] tilt, or leave this noise out",
             )
-        self.tilt(noise)
-        share, more = self.deviation("gravity.tilt", noise)
+        self.number("gravity.tilt")
+        share, more = self.deviation("gravity.tilt")
         found = text_at(self.tree, "gravity.tilt")
-        least = self.one(found[0] if isinstance(found, list) else found, "angle")
+        least = self.constant(found[0] if isinstance(found, list) else found, "angle")
         flat, steep = sine(least * (1 - share) - more), sine(least * (1 + share) + more)
         return Span((flat / sine(least)).lo, (steep / sine(least)).hi)
 
-    def shape(self) -> Shape:
-        """Return the part as `shape_of` gives it, in spans or in slopes over them."""
-        return shape_of(self.tree["part"], self.span, self.one, root)
-
-    def body(self) -> tuple[list[tuple[Any, ...]], Span]:
+    def body(self) -> tuple[list[tuple[Any, ...]], Any]:
         """Return (a, d, length) of every side, and the radius of gyration."""
-        vertices, centre, lengths, radius = self.shape()
         corner = Span.of(0, 4)  # of no use to a proof about the minimal map
-        sides = rest_of(vertices, centre, lengths, root, lambda _y, _x: corner)
-        return [side[:3] for side in sides], radius
+        return [side[:3] for side in self.sides(lambda _y, _x: corner)], self.shape.radius_of_gyration
 
     def narrow_body(self) -> tuple[list[tuple[Any, ...]], Span]:
         """As `body`, but narrower where several of its numbers are known to a tolerance only."""
@@ -198,8 +203,10 @@ class _Reader:
         middles = [middle(span) for span in box]
         unit = [[Span.of(int(j == k)) for j in range(len(names))] for k in range(len(names))]
         rising = [Slope(span, tuple(row)) for span, row in zip(box, unit, strict=True)]
-        centre = _Reader(self.scene, self.tree, dict(zip(names, middles, strict=True))).body()
-        steep = _Reader(self.scene, self.tree, dict(zip(names, rising, strict=True))).body()
+        centre, steep = (
+            _Spans(self.unit, self.tree, instead=dict(zip(names, values, strict=True))).body()
+            for values in (middles, rising)
+        )
         offsets = [span - mid for span, mid in zip(box, middles, strict=True)]
         sides = [
             tuple(about(mid, rise, offsets, known) for mid, rise, known in zip(*rows, strict=True))
@@ -209,8 +216,7 @@ class _Reader:
 
     def outline(self) -> tuple[list[Span], list[list[Span]], list[list[Span]]]:
         """Return the exterior angles, and where the vertices are: p and q of `thrower.motion.Outline`."""
-        vertices, centre, lengths, _ = self.shape()
-        sides = rest_of(vertices, centre, lengths, square_root, angle)
+        vertices, sides = self.shape.vertices, self.sides(angle)
         ends = [side_ends(len(vertices), side) for side in range(len(vertices))]
         p, q = [], []
         for (left, right), side in zip(ends, sides, strict=True):
@@ -222,7 +228,7 @@ class _Reader:
 
 def lengths_of(scene: Scene, tree: Mapping[str, Any]) -> dict[str, Span]:
     """Name the lengths of the part, and say what is known of each, in the scene's unit."""
-    reader = _Reader(scene, tree)
+    reader = _Spans(scene.unit, tree)
     names = [name for name, _ in texts(tree["part"], "part") if find(name).dimension == "length"]
     return {name: reader.span(name) for name in names}
 
@@ -231,7 +237,7 @@ def body_at(
     scene: Scene, tree: Mapping[str, Any], lengths: Mapping[str, Any]
 ) -> tuple[list[tuple[Any, ...]], Any]:
     """Return (a, d, length) of every side and the radius of gyration, in whatever arithmetic the lengths are given."""
-    return _Reader(scene, tree, lengths).body()
+    return _Spans(scene.unit, tree, instead=lengths).body()
 
 
 def _require_rest(sides: Sequence[tuple[Any, ...]], kappa: Span, radius: Span) -> None:
@@ -285,14 +291,14 @@ def parameter_box(
     True
     """
     text: Any = copy.deepcopy(dict(scene.text if tree is None else tree))
-    reader = _Reader(scene, text)
+    reader = _Spans(scene.unit, text, noise)
     for name in noise or {}:
         if name not in VARYING:
             raise AnswerError(
                 "the noise", name, ", ".join(VARYING), "what is fixed but unknown is a tolerance"
             )
-    kappa = reader.kappa(noise or {})
-    scatter = reader.deviation("landing.x", noise or {})[1]
+    kappa = reader.kappa
+    scatter = reader.deviation("landing.x")[1]
     landing = scatter.outward()[1] if scatter.hi > 0 else 0.0
     try:
         sides, radius = reader.narrow_body()
@@ -301,7 +307,7 @@ def parameter_box(
             "the part", "such sides", "one that can be, throughout the tolerance", NARROWER
         ) from None
     _require_rest(sides, kappa, radius)
-    scalars = [kappa, reader.span("arm.surface_height"), reader.span("arm.length"), radius]
+    scalars = [kappa, reader.number("arm.surface_height"), reader.number("arm.length"), radius]
     ends = [span.outward() for span in scalars]
     columns = [np.array([side[k].outward() for side in sides]) for k in range(3)]
     full = simulated(scene)

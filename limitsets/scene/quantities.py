@@ -4,22 +4,19 @@ from __future__ import annotations
 
 import copy
 import difflib
-import math
 import numbers
 import re
 from collections.abc import Iterator, Mapping
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 from limitsets.errors import SceneError
 from limitsets.scene.facts import Deviation
 from limitsets.scene.units import Quantity, convert, parse, shown, written
 from limitsets.scene.validation import Tree
 
-if TYPE_CHECKING:
-    from limitsets.scene.scene import Scene
-
 __all__ = [
     "NAMES",
+    "NOISE_ONLY",
     "STANDARD_GRAVITY",
     "Place",
     "base_unit",
@@ -31,7 +28,6 @@ __all__ = [
     "require",
     "text_at",
     "texts",
-    "value_of",
 ]
 
 NAMES: dict[str, str] = {
@@ -63,7 +59,7 @@ _RIVALS = {
     "gravity.acceleration": "gravity.tilt",
     "gravity.tilt": "gravity.acceleration",
 }
-_NOISE_ONLY = "landing.x"
+NOISE_ONLY = "landing.x"
 
 
 class Place(NamedTuple):
@@ -169,67 +165,42 @@ def require(tree: Tree, name: str, key: str, file: str | None) -> None:
         )
 
 
-def in_units(scene: Scene, name: str, value: float | str, *, key: str | None = None) -> float:
-    """Give what was said of a quantity, a number in the scene's units or text with a unit, in the scene's units."""
+def in_units(unit: str, name: str, value: float | str, *, key: str | None = None) -> float:
+    """Give a quantity, a number or text with a unit, in the units of a scene of this unit of length."""
     if not isinstance(value, str):
         return float(value)
     dimension = find(name).dimension
-    return convert(parse(value, dimension, key=key), base_unit(dimension, scene.unit))
+    return convert(parse(value, dimension, key=key), base_unit(dimension, unit))
 
 
-def value_of(scene: Scene, name: str) -> float:
-    """Give the value of a quantity in the scene's units (`Scene.value`)."""
-    find(name, file=scene.file)  # an error names the file
-    text = text_at(scene.text, name)
-    if text is not None:
-        return in_units(scene, name, text)
-    derived = {
-        "throw.kappa": scene.kappa,
-        "throw.speed": None if scene.gravity is None else math.sqrt(scene.gravity / scene.kappa),
-        "gravity.acceleration": scene.gravity,
-        "part.mass.radius_of_gyration": scene.radius_of_gyration,
-    }
-    found = derived.get(name)
-    if found is None:
-        remedy = "add [gravity]" if name == "throw.speed" else "it is given in other words here"
-        if name == _NOISE_ONLY:
-            remedy = "it names the noise of landings only"
-        raise SceneError(
-            "the quantity", name, "a quantity that the scene gives", remedy, key=name, file=scene.file
-        )
-    return found
-
-
-def replaced(scene: Scene, values: Mapping[str, float | str]) -> Tree:
+def replaced(text: Mapping[str, Any], unit: str, file: str | None, values: Mapping[str, float | str]) -> Tree:
     """Write new values into a copy of a scene's text (`Scene.with_values`)."""
-    tree = copy.deepcopy(dict(scene.text))
+    tree = copy.deepcopy(dict(text))
     for name, value in values.items():
-        place = find(name, file=scene.file)
+        place = find(name, file=file)
         rival = _RIVALS.get(name)
-        if name == _NOISE_ONLY or rival in values:
+        if name == NOISE_ONLY or rival in values:
             remedy = (
                 "it names the noise of landings only"
                 if rival is None
                 else f"leave out one of {name}, {rival}"
             )
-            raise SceneError(
-                "the quantity", name, "quantities that can be set", remedy, key=name, file=scene.file
-            )
-        require(tree, name, name, scene.file)
+            raise SceneError("the quantity", name, "quantities that can be set", remedy, key=name, file=file)
+        require(tree, name, name, file)
         if rival is not None:
             section, other = rival.split(".")
             tree.get(section, {}).pop(other, None)
         node: Any = tree
         for word in place.path[:-1]:
             node = node.setdefault(word, {}) if isinstance(node, dict) else node[word]
-        node[place.path[-1]] = _as_text(value, place, scene)
+        node[place.path[-1]] = _as_text(value, place, unit, file)
     return tree
 
 
-def _as_text(value: object, place: Place, scene: Scene) -> str:
-    unit = base_unit(place.dimension, scene.unit)
+def _as_text(value: object, place: Place, length: str, file: str | None) -> str:
+    unit = base_unit(place.dimension, length)
     if isinstance(value, str):
-        quantity = parse(value, place.dimension, key=place.name, file=scene.file)
+        quantity = parse(value, place.dimension, key=place.name, file=file)
         # the scene keeps its unit, which is that of the arm's length
         changes_unit = place.name == "arm.length" and quantity.unit != unit
         return written(convert(quantity, unit), unit) if changes_unit else value
@@ -244,7 +215,7 @@ def _as_text(value: object, place: Place, scene: Scene) -> str:
         f'a number [{unit}] or text "<decimal number> <unit>"',
         "give one of these",
         key=place.name,
-        file=scene.file,
+        file=file,
     )
 
 
@@ -258,7 +229,7 @@ def parsed_deviation(text: object, name: str, *, key: str | None = None, file: s
     """
     place = find(name, key=key, file=file)
     # where a landing is measured from is a convention: a share of it means nothing
-    relative = isinstance(text, str) and text.rstrip().endswith("%") and name != _NOISE_ONLY
+    relative = isinstance(text, str) and text.rstrip().endswith("%") and name != NOISE_ONLY
     return parse(text, "share" if relative else place.dimension, key=key, file=file)
 
 

@@ -67,12 +67,10 @@ def load(source: str | Path | Mapping[str, Any]) -> Scene:
     >>> scene.kappa, scene.unit
     (25.3778518, 'in')
     """
-    from limitsets.scene.build import build
-
     if isinstance(source, Mapping):
-        return build({"name": "scene", **source}, None)
+        return Scene.of({"name": "scene", **source}, None)
     if isinstance(source, str) and "\n" in source:
-        return build({"name": "scene", **_parsed(source, None)}, None)
+        return Scene.of({"name": "scene", **_parsed(source, None)}, None)
     if not isinstance(source, str | Path):
         allowed = "a built-in name, a path, TOML text or a structure"
         raise SceneError("the source of a scene", shown(source), allowed, "give one of these")
@@ -81,7 +79,7 @@ def load(source: str | Path | Mapping[str, Any]) -> Scene:
     builtin = isinstance(source, str) and file in scenes()
     text = _builtin(file) if builtin else _decoded(_read(Path(source), file), file)
     stem = Path(file).stem
-    return build({"name": stem if _can_name(stem) else "scene", **_parsed(text, file)}, file)
+    return Scene.of({"name": stem if _can_name(stem) else "scene", **_parsed(text, file)}, file)
 
 
 def _can_name(stem: str) -> bool:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -11,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from limitsets.errors import SceneError
 from limitsets.geometry import RestingSides
 from limitsets.goals import Goal
 from limitsets.scene.facts import Deviation, Effects, World
@@ -87,6 +89,19 @@ class Scene:
     file: str | None
     text: Mapping[str, Any] = field(repr=False)
 
+    @classmethod
+    def of(cls, structure: object, file: str | None) -> Scene:
+        """Check and resolve what TOML held; `limitsets.load` also reads names, files and text.
+
+        Raises
+        ------
+        SceneError
+            For the first thing wrong, with file, key, value, what is allowed and what to do.
+        """
+        from limitsets.scene.build import resolved  # lazily: it loads pydantic
+
+        return cls(**resolved(structure, file))
+
     def __eq__(self, other: object) -> bool:
         """Two scenes are equal that are written in the same words, wherever they were read."""
         return self.text == other.text if isinstance(other, Scene) else NotImplemented
@@ -97,12 +112,11 @@ class Scene:
     @cached_property
     def map(self) -> Throw | FullThrow:
         """The throw map of the scene, as kernels take it, with the effects it switches on."""
-        on = self.effects.on()
-        if not on:
+        if not self.effects.words:
             return self.bare_map
-        from limitsets.thrower.effects import with_effects  # lazily: it loads numba
+        from limitsets.thrower.full import with_effects  # lazily: it loads numba
 
-        return with_effects(self.bare_map, {name: getattr(self.effects, name) for name in on}, self._facts())
+        return with_effects(self.bare_map, self.effects.words, self._facts())
 
     def _facts(self) -> World:
         """Return the world with its scatter of the speed as a share, where the scene knows the speed."""
@@ -164,9 +178,27 @@ class Scene:
         >>> load("paper-designed").value("arm.length")
         28.0
         """
-        from limitsets.scene.quantities import value_of
+        from limitsets.scene.quantities import NOISE_ONLY, find, in_units, text_at
 
-        return value_of(self, name)
+        find(name, file=self.file)  # an error names the file
+        text = text_at(self.text, name)
+        if text is not None:
+            return in_units(self.unit, name, text)
+        derived = {
+            "throw.kappa": self.kappa,
+            "throw.speed": None if self.gravity is None else math.sqrt(self.gravity / self.kappa),
+            "gravity.acceleration": self.gravity,
+            "part.mass.radius_of_gyration": self.radius_of_gyration,
+        }
+        found = derived.get(name)
+        if found is None:
+            remedy = "add [gravity]" if name == "throw.speed" else "it is given in other words here"
+            if name == NOISE_ONLY:
+                remedy = "it names the noise of landings only"
+            raise SceneError(
+                "the quantity", name, "a quantity that the scene gives", remedy, key=name, file=self.file
+            )
+        return found
 
     def with_values(self, values: Mapping[str, float | str]) -> Scene:
         """Give the scene with other values; everything that follows from them is computed anew.
@@ -194,10 +226,9 @@ class Scene:
         >>> load("paper-designed").with_values({"arm.length": 30, "throw.kappa": "2 ft"}).kappa
         24.0
         """
-        from limitsets.scene.build import build
         from limitsets.scene.quantities import replaced
 
-        return build(replaced(self, values), self.file)
+        return Scene.of(replaced(self.text, self.unit, self.file, values), self.file)
 
     def as_dict(self) -> dict[str, Any]:
         """Give the scene as it was written, as plain tables and lists that `limitsets.load` reads again."""

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import limitsets as ls
-from limitsets.analysis import other_vertex_first, overlap, scene_of
+from limitsets.analysis import other_vertex_first, overlap
 from limitsets.errors import AnswerError, GridError, SceneError
 from limitsets.thrower import impact_angles
 from tests.scene.four_gon import FOUR_GON
@@ -195,7 +195,7 @@ def test_json(source):
     found = analysed(source)
     record = json.loads(json.dumps(found.to_json(), allow_nan=False))
     assert set(record) == WORDS
-    assert scene_of(record) == found.scene
+    assert ls.load(record["scene"]) == found.scene
     sides = {str(side) for side in range(len(found.scene.sides))}
     assert set(record["critical_points"]) == set(record["other_vertex_first"]) == sides
     for points in record["critical_points"].values():

@@ -13,9 +13,10 @@ from limitsets.inverse.margin.front import unbeaten
 from limitsets.inverse.margin.lead import lead_of, lead_weight
 from limitsets.inverse.margin.polishing import polished
 from limitsets.inverse.margin.search import Search, bounds_of
-from limitsets.inverse.margin.sharp import Box, failing, sharp
-from limitsets.inverse.margin.trap import trap
 from limitsets.maps import advance
+from limitsets.robust.margins.estimate import estimated, failing
+from limitsets.robust.margins.trap import trap
+from limitsets.robust.margins.vector import Tolerance
 from tests.studies.test_studies import load_study
 
 SPEED = {"throw.speed": "1 %"}
@@ -61,24 +62,24 @@ def test_landings_off_by_e_are_never_thrown_out_of_what_keeps_the_part():
 def test_the_margin_of_the_speed_is_that_of_the_table():
     """At X = 20 in: 0.733 %, where the threshold of a slower throw passes 20."""
     scene = ls.load("paper-designed")
-    box = Box.of(scene, SPEED)
+    box = Tolerance.of(scene, SPEED)
     for factor, beyond in ((0.732, False), (0.734, True)):
-        corner = box.at(scene, factor, (-1,))
+        corner = box.scene_at(scene, factor, (-1,))
         assert (trap(corner.map, 12.0, 2).threshold(2) > 20.0) == beyond
 
 
 def test_the_best_margin_of_the_speed_is_where_both_ends_meet():
     scene = ls.load("paper-designed")
-    box = Box.of(scene, SPEED)
-    found = sharp(scene, box, 2, steps=16)
+    box = Tolerance.of(scene, SPEED)
+    found = estimated(scene, box, 2, steps=16)
     ends = []
     for sign in (-1, 1):
-        kept = trap(box.at(scene, found.margin, (sign,)).map, 12.0, 2)
+        kept = trap(box.scene_at(scene, found.margin, (sign,)).map, 12.0, 2)
         ends.append((kept.threshold(2), float(kept.hi[2])))
     assert max(end[0] for end in ends) <= found.x <= min(end[1] for end in ends)
     ends = []
     for sign in (-1, 1):
-        kept = trap(box.at(scene, 1.03 * found.margin, (sign,)).map, 12.0, 2)
+        kept = trap(box.scene_at(scene, 1.03 * found.margin, (sign,)).map, 12.0, 2)
         ends.append((kept.threshold(2), float(kept.hi[2])))
     assert max(end[0] for end in ends) > min(end[1] for end in ends)
 
@@ -125,7 +126,7 @@ def test_what_is_unbeaten_is_beaten_by_none():
 def test_no_part_rests_in_a_box_larger_than_plane_geometry_allows():
     """The study's bound, by formulas of its own, against the package's refusal of parts that tip over."""
     study, scene = load_study("07_robust_design"), ls.load("paper-designed")
-    box = Box.of(
+    box = Tolerance.of(
         scene,
         {f"part.sides[{k}]": "1 %" for k in range(3)}
         | {f"part.mass.center.{word}": "0.01 in" for word in ("along", "above")},
@@ -133,7 +134,7 @@ def test_no_part_rests_in_a_box_larger_than_plane_geometry_allows():
     largest = study.largest_at_rest((5.75, 3.6, 6.75), 4.2255778, 0.7082490)
     signs = list(np.ndindex(2, 2, 2, 2, 2))
     rests = [
-        all(box.at(scene, share * largest, [2 * s - 1 for s in corner]) is not None for corner in signs)
+        all(box.scene_at(scene, share * largest, [2 * s - 1 for s in corner]) is not None for corner in signs)
         for share in (0.999, 1.001)
     ]
     assert rests == [True, False]
@@ -144,17 +145,17 @@ def test_a_small_search_finds_scenes_that_hold_throughout_their_box(small):
     """Thrown: scenes drawn from 0.9 of the box, landings off at random; nothing rests wrongly, and all get there."""
     rng, scene = np.random.default_rng(1), small.scene
     assert small.sampled.margin > 0
-    box = Box.of(scene, small.tolerance)
+    box = Tolerance.of(scene, small.tolerance)
     factor = 0.9 * small.sampled.margin
     for _ in range(12):
-        corner = box.at(scene, factor, rng.choice((-1.0, 1.0), len(box.sizes)))
+        corner = box.scene_at(scene, factor, rng.choice((-1.0, 1.0), len(box.deviations)))
         x = np.full(200, small.x - 1e-3)
         side = np.full(200, small.side)
         arrived = np.zeros(200, dtype=bool)
         for throw in range(3000):
             x, side, code, _ = advance(corner.map, x, side, 1)
             assert (code >= 0).all()
-            x = x + factor * box.landing * rng.uniform(-1, 1, x.size)
+            x = x + factor * box.scatter * rng.uniform(-1, 1, x.size)
             if throw > 500:
                 assert not ((x > small.x) & (side != small.side)).any()
                 arrived |= (x >= small.x) & (side == small.side)
@@ -164,7 +165,7 @@ def test_a_small_search_finds_scenes_that_hold_throughout_their_box(small):
 @pytest.mark.sweep
 def test_the_margin_of_the_design_is_that_of_its_worst_corner(small):
     """By `failing`, which tries corner after corner at one factor: none at the margin, one a little beyond."""
-    box = Box.of(small.scene, small.tolerance)
+    box = Tolerance.of(small.scene, small.tolerance)
     fails = [
         failing(small.scene, box, 2, small.sampled, share * small.sampled.margin) for share in (1.0, 1.001)
     ]
@@ -174,7 +175,7 @@ def test_the_margin_of_the_design_is_that_of_its_worst_corner(small):
 
 @pytest.mark.sweep
 def test_what_stands_on_the_front_holds_on_all_corners(small):
-    box = Box.of(small.scene, small.tolerance)
+    box = Tolerance.of(small.scene, small.tolerance)
     for option in small.front[:3]:
         scene, found = small.before.with_values(option.candidate.values), option.candidate.found
         assert failing(scene, box, 2, found, found.margin) == []
@@ -183,10 +184,10 @@ def test_what_stands_on_the_front_holds_on_all_corners(small):
 def test_polishing_never_ends_below_its_start():
     """The scene itself as the start, its margin from a search for the worst corner that knows nothing of polishing."""
     scene = ls.load("paper-designed")
-    box = Box.of(scene, SPEED)
+    box = Tolerance.of(scene, SPEED)
     search = Search(scene, box, 2, bounds_of(scene, {"throw.kappa": (20.0, 30.0)}))
     start = math.log(scene.kappa / 20.0) / math.log(1.5)
-    before = sharp(scene, box, 2, steps=20).margin
+    before = estimated(scene, box, 2, steps=20).margin
     made, found = polished(search, [[start]], lambda each: each, 12, lambda *_: None)
     assert found.margin > 1.01 * before
     assert failing(made, box, 2, found, found.margin) == []
@@ -216,7 +217,7 @@ def test_the_same_seed_gives_the_same_designs():
     scene = ls.load("paper-designed")
     found = []
     for _ in range(2):
-        search = Search(scene, Box.of(scene, SPEED), 2, bounds_of(scene, None))
+        search = Search(scene, Tolerance.of(scene, SPEED), 2, bounds_of(scene, None))
         drawn, _ = search.drawn(np.random.default_rng(8), 5)
         found.append(search.improved(drawn, 1, 3, lambda *_: None)[0])
     assert (found[0] == found[1]).all()

@@ -15,9 +15,10 @@ from limitsets.graph.images.enclosed import enclosures
 from limitsets.proofs import asked
 from limitsets.proofs import cover as covers
 from limitsets.proofs.attraction import attraction
-from limitsets.proofs.certify import Claim, weakest_of
+from limitsets.proofs.certify import weakest_of
 from limitsets.proofs.cover import Cover, cover
 from limitsets.proofs.parameters import parameter_box
+from limitsets.proofs.proof import Claim
 from limitsets.proofs.thinning import thinned
 from tests.scene.four_gon import FOUR_GON
 

@@ -6,7 +6,8 @@ import math
 import pytest
 
 import limitsets as ls
-from limitsets.inverse.margin.sharp import Box, failing, sharp
+from limitsets.robust.margins.estimate import estimated, failing
+from limitsets.robust.margins.vector import Tolerance
 from tests.studies.test_studies import STUDIES, load_study
 
 
@@ -40,8 +41,8 @@ def test_five_times_the_margin_is_out_of_reach(recorded):
 
 def test_the_design_holds_on_every_corner_of_its_box(recorded):
     scene = design_of(recorded)
-    box = Box.of(scene, load_study("07_robust_design").TOLERANCE)
-    found = sharp(scene, box, 2)
+    box = Tolerance.of(scene, load_study("07_robust_design").TOLERANCE)
+    found = estimated(scene, box, 2)
     kept = recorded["sampled"]
     assert found.threshold == pytest.approx(kept["threshold"], abs=1e-9)
     at = type(found)(kept["margin"], recorded["x"], found.threshold, found.reach, found.kept, found.effects)

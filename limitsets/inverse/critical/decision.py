@@ -23,7 +23,7 @@ SMALL = 0.5
 
 
 class Part(NamedTuple):
-    """One side of a part, as `limitsets.inverse.critical.seeded.Numbers` holds it; names are those of `params.Side`."""
+    """One side of a part, as `limitsets.inverse.critical.seeded.Seeded` holds it; names are those of `params.Side`."""
 
     a: Dual
     d: Dual

@@ -18,7 +18,7 @@ from limitsets.errors import AnswerError
 from limitsets.inverse.critical.decision import Decision, Part, decided
 from limitsets.inverse.critical.dual import Dual
 from limitsets.inverse.critical.first import first_points, nearest_miss
-from limitsets.inverse.critical.seeded import Numbers, numbers_of, present
+from limitsets.inverse.critical.seeded import Seeded, numbers_of, present
 from limitsets.maps.critical import CriticalPoint
 from limitsets.scene import Scene, load
 from limitsets.thrower import impact_angles
@@ -177,7 +177,7 @@ def critical_jacobian(scene: Scene | str, *names: str) -> CriticalJacobian:
     )
 
 
-def _slacks(numbers: Numbers) -> tuple[Sequence[Dual], ...]:
+def _slacks(numbers: Seeded) -> tuple[Sequence[Dual], ...]:
     right = [length - a for length, a in zip(numbers.length, numbers.a, strict=True)]
     return numbers.a, right, numbers.d
 
@@ -185,7 +185,7 @@ def _slacks(numbers: Numbers) -> tuple[Sequence[Dual], ...]:
 class _Row:
     """One side: its first critical point, derivatives, or why there are none."""
 
-    def __init__(self, scene: Scene, numbers: Numbers, side: int, point: CriticalPoint | None) -> None:
+    def __init__(self, scene: Scene, numbers: Seeded, side: int, point: CriticalPoint | None) -> None:
         self.scene, self.side = scene, side
         self.part = Part(numbers.a[side], numbers.d[side], numbers.rho, numbers.kappa, numbers.h)
         self.slope = np.full(numbers.h.slope.size - 1, np.nan)

@@ -1,29 +1,27 @@
 """The numbers of a scene as dual numbers: what the throw needs, with derivatives by the scene's own quantities.
 
-From the text of the scene through the same formulas of `geometry` that floats and spans of rational numbers go through
-(`limitsets.proofs.parameters` is the other reader).
+From the text of the scene by the reading that floats and spans of rational numbers share (`limitsets.scene.numbers`).
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
-from limitsets.geometry import rest_of
 from limitsets.inverse.critical.dual import Dual, sine, square_root
 from limitsets.scene import Scene
-from limitsets.scene.body import shape_of
-from limitsets.scene.quantities import STANDARD_GRAVITY, base_unit, value_of
+from limitsets.scene.numbers import Numbers
+from limitsets.scene.quantities import base_unit
 from limitsets.scene.units import convert, parse
 
-__all__ = ["Numbers", "numbers_of", "present", "with_present"]
+__all__ = ["Seeded", "numbers_of", "present", "with_present"]
 
 SPEED, KAPPA = "throw.speed", "throw.kappa"
 
 
-class Numbers(NamedTuple):
+class Seeded(NamedTuple):
     """What the throw map depends on, in the scene's unit.
 
     Parameters
@@ -47,7 +45,7 @@ def present(scene: Scene, name: str) -> float:
 
     A scene given by kappa without gravity has a speed all the same: only its unit is open, and shares of it are not.
     """
-    return 1.0 if _speed_is_open(scene, name) else value_of(scene, name)
+    return 1.0 if _speed_is_open(scene, name) else scene.value(name)
 
 
 def with_present(scene: Scene, values: Mapping[str, float]) -> Scene:
@@ -63,7 +61,7 @@ def _speed_is_open(scene: Scene, name: str) -> bool:
     return name == SPEED and scene.gravity is None
 
 
-def numbers_of(scene: Scene, names: Sequence[str], before: int = 0) -> Numbers:
+def numbers_of(scene: Scene, names: Sequence[str], before: int = 0) -> Seeded:
     """Read a scene's numbers with their derivatives.
 
     Parameters
@@ -77,58 +75,46 @@ def numbers_of(scene: Scene, names: Sequence[str], before: int = 0) -> Numbers:
 
     Returns
     -------
-    Numbers
+    Seeded
 
     Raises
     ------
     SceneError
         An unknown quantity, one that this scene does not give, or two that exclude each other.
     """
-    reader = _Reader(scene, names, before)
-    a, d, length, rho = reader.body()
-    return Numbers(a, d, length, rho, reader.kappa(), reader.number("arm.surface_height"))
+    reader = _Duals(scene, names, before)
+    # the throw does not depend on the corners
+    a, d, length, *_ = zip(*reader.sides(lambda y, _x: y), strict=True)
+    rho, h = reader.shape.radius_of_gyration, reader.number("arm.surface_height")
+    return Seeded(list(a), list(d), list(length), rho, reader.kappa, h)
 
 
-class _Reader:
+class _Duals(Numbers):
+    """The numbers of one scene, differentiated by some of its quantities."""
+
     def __init__(self, scene: Scene, names: Sequence[str], before: int) -> None:
         self.open_speed = SPEED in names and _speed_is_open(scene, SPEED)
-        shown = {name: value_of(scene, name) for name in names if not (self.open_speed and name == SPEED)}
+        shown = {name: scene.value(name) for name in names if not (self.open_speed and name == SPEED)}
         # a speed is written in place of kappa, a tilt in place of an acceleration: then it is what counts
         self.scene = scene.with_values(shown)
-        self.tree: Any = self.scene.text
+        super().__init__(self.scene.text, square_root, sine)
         self.names, self.before = list(names), before
 
-    def constant(self, value: float) -> Dual:
-        return Dual(value, np.zeros(self.before + len(self.names)))
-
-    def seeded(self, value: float, name: str) -> Dual:
-        found = self.constant(value)
+    def seeded(self, value: float, name: str = "") -> Dual:
+        """Return a number, the quantity of this name if it is one."""
+        found = Dual(value, np.zeros(self.before + len(self.names)))
         if name in self.names:
             found.slope[self.before + self.names.index(name)] = 1.0
         return found
 
-    def read(self, text: str, dimension: str) -> Dual:
-        """Read a text that bears no quantity's name."""
-        return self.constant(convert(parse(text, dimension), base_unit(dimension, self.scene.unit)))
+    def constant(self, text: str, dimension: str, key: str = "") -> Dual:
+        """Return a text of a dimension."""
+        return self.seeded(convert(parse(text, dimension), base_unit(dimension, self.scene.unit)))
 
     def number(self, name: str) -> Dual:
-        return self.seeded(value_of(self.scene, name), name)
-
-    def kappa(self) -> Dual:
-        if "kappa" in self.tree["throw"]:
-            kappa = self.number(KAPPA)
+        """Return a quantity by its name; kappa by a share of the speed, where nothing else is known of the speed."""
+        found = self.seeded(self.scene.value(name), name)
+        if name == KAPPA and self.open_speed:
             speed = self.seeded(1.0, SPEED)
-            return kappa / (speed * speed) if self.open_speed else kappa
-        if "acceleration" in self.tree["gravity"]:
-            gravity = self.number("gravity.acceleration")
-        else:
-            gravity = sine(self.number("gravity.tilt")) * self.read(STANDARD_GRAVITY, "acceleration")
-        speed = self.number(SPEED)
-        return gravity / (speed * speed)
-
-    def body(self) -> tuple[list[Dual], list[Dual], list[Dual], Dual]:
-        """Return a, d and the length per side, and the radius of gyration."""
-        vertices, centre, lengths, rho = shape_of(self.tree["part"], self.number, self.read, square_root)
-        # the throw does not depend on the corners
-        sides = rest_of(vertices, centre, lengths, square_root, lambda y, _x: y)
-        return [side[0] for side in sides], [side[1] for side in sides], [side[2] for side in sides], rho
+            return found / (speed * speed)
+        return found

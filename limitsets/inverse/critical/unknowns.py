@@ -130,4 +130,4 @@ def _pair(scene: Scene, name: str, given: Sequence[Any] | None) -> tuple[float, 
 def _end(scene: Scene, name: str, value: Any, missing: float) -> float:
     if value is None:
         return missing
-    return in_units(scene, name, value, key=name)
+    return in_units(scene.unit, name, value, key=name)

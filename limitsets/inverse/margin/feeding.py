@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -38,17 +37,6 @@ class ThrowsToFeed:
     fed: int
     lost: int
     starts: int
-
-    def to_json(self) -> dict[str, Any]:
-        """Give it as a plain table for JSON."""
-        known = self.fed > 0
-        return {
-            "mean": self.mean if known else None,
-            "quantile_95": self.quantile_95 if known else None,
-            "fed": self.fed,
-            "lost": self.lost,
-            "starts": self.starts,
-        }
 
 
 def throws_to_feed(scene: Scene, x: float, side: int, *, starts: int = STARTS, seed: int = 0) -> ThrowsToFeed:

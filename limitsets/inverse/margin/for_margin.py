@@ -11,27 +11,27 @@ import copy
 import math
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from itertools import permutations
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from limitsets.errors import AnswerError
 from limitsets.goals import Goal, OrientedBeyond, Reaches
-from limitsets.inverse.margin.feeding import ThrowsToFeed, throws_to_feed
+from limitsets.inverse.margin.answer import RobustDesign
+from limitsets.inverse.margin.feeding import throws_to_feed
 from limitsets.inverse.margin.front import Option, front_of
-from limitsets.inverse.margin.lead import Lead, lead_of
+from limitsets.inverse.margin.lead import lead_of
 from limitsets.inverse.margin.polishing import polished
 from limitsets.inverse.margin.search import POPULATION, Candidate, Search, Tell, bounds_of
-from limitsets.inverse.margin.sharp import Box, Sharp, on_all_corners
 from limitsets.robust import Margin
+from limitsets.robust.margins.estimate import on_all_corners
 from limitsets.robust.margins.joint import joint_margin
+from limitsets.robust.margins.vector import Tolerance
 from limitsets.scene import Scene, load
 from limitsets.scene.quantities import base_unit, find
 
-__all__ = ["TOLERANCE", "RobustDesign", "fed_at", "robust_design"]
+__all__ = ["TOLERANCE", "fed_at", "robust_design"]
 
 TOLERANCE = {
     "throw.speed": "1 %",
@@ -52,80 +52,6 @@ DRAWN, ORDERS_KEPT = 120, 2
 POLISHED, POLISH = 3, 8
 # Seconds for the proof of a box.
 SECONDS = 240.0
-
-
-@dataclass(frozen=True, eq=False)
-class RobustDesign:
-    """A design for a large margin.
-
-    Attributes
-    ----------
-    scene : Scene
-        The design, with [goal] (the first of `goals`) and [tolerance].
-    goals : tuple of Goal
-        What has to hold, all of it.
-    x, side : float, int
-        Where parts are fed [scene's unit].
-    varied : tuple of str
-        What was varied.
-    tolerance : dict of str to str
-        What the margin multiplies.
-    sampled : Sharp
-        Its margin by floats, and the effect of each quantity.
-    margins : tuple of Margin
-        Proved and refuted, one for each of `goals`; empty where no proof was asked for.
-    lead : Lead
-        The point mass that makes it of a plate.
-    feeding : ThrowsToFeed
-        Throws to feed, sampled.
-    front : tuple of Option
-        Designs that no other one beats both in margin and in throws, by floats; the surest first.
-    history : tuple of Candidate
-        Every design tried that feeds at all.
-    before : Scene
-        Where the search began.
-    before_sampled : Sharp or None
-        The margin there, at the best X there, by floats.
-    before_margins : tuple of Margin
-        The same, proved and refuted.
-    before_feeding : ThrowsToFeed or None
-        Throws to feed there, sampled.
-    evaluations : int
-        Designs looked at.
-    seconds : float
-        Time of the search, without proofs.
-    """
-
-    scene: Scene
-    goals: tuple[Goal, ...]
-    x: float
-    side: int
-    varied: tuple[str, ...]
-    tolerance: dict[str, str]
-    sampled: Sharp
-    margins: tuple[Margin, ...]
-    lead: Lead
-    feeding: ThrowsToFeed
-    front: tuple[Option, ...]
-    history: tuple[Candidate, ...]
-    before: Scene
-    before_sampled: Sharp | None
-    before_margins: tuple[Margin, ...]
-    before_feeding: ThrowsToFeed | None
-    evaluations: int
-    seconds: float
-
-    def to_json(self) -> dict[str, Any]:
-        """Give it as plain tables for JSON (`limitsets.inverse.margin.answer`)."""
-        from limitsets.inverse.margin.answer import to_json
-
-        return to_json(self)
-
-    def save(self, folder: str | Path) -> tuple[Path, ...]:
-        """Write the scene, the answer as JSON, and what `limitsets.recheck` checks of the margin; checked before."""
-        from limitsets.inverse.margin.answer import save
-
-        return save(self, Path(folder))[1]
 
 
 def fed_at(x: float, side: int) -> tuple[Goal, Goal]:
@@ -264,9 +190,9 @@ def robust_design(
         raise AnswerError("the evaluations", evaluations, "1 or more", "allow for some designs")
     tell: Tell = progress if progress is not None else lambda what, done, of: None
     texts, begin = tolerance_of(start, tolerance), time.perf_counter()
-    box = Box.of(start, texts)
+    vector = Tolerance.of(start, texts)
     searches = [
-        Search(one, box, on, bounds_of(one, vary), number, everywhere=everywhere)
+        Search(one, vector, on, bounds_of(one, vary), number, everywhere=everywhere)
         for number, one in enumerate(orders_of(start) if orders else [start])
     ]
     search, population = _searched(searches, evaluations, seed, tell)
@@ -279,7 +205,7 @@ def robust_design(
     made, found = best
     x = round(found.x, DECIMALS_OF_X)
     design = _with_purpose(made, x, on, texts, f"{start.name}-robust")
-    before = on_all_corners(start, box, on)
+    before = on_all_corners(start, vector, on)
     history = tuple(candidate for each in searches for candidate in each.history)
     feeding = throws_to_feed(design, x, on, seed=seed)
     values = {name: design.value(name) for name in search.bounds}

@@ -8,9 +8,10 @@ from typing import Any
 
 import numpy as np
 
+from limitsets.files import as_table, picked
 from limitsets.inverse.margin.feeding import ThrowsToFeed, throws_to_feed
 from limitsets.inverse.margin.search import Candidate, Search
-from limitsets.inverse.margin.sharp import on_all_corners
+from limitsets.robust.margins.estimate import on_all_corners
 
 __all__ = ["Option", "best_of", "front_of", "unbeaten"]
 
@@ -37,14 +38,10 @@ class Option:
 
     def to_json(self) -> dict[str, Any]:
         """Give it as a plain table for JSON."""
-        found = self.candidate.found
-        return {
-            "values": self.candidate.values,
-            "order": self.candidate.order,
-            "margin": found.margin,
-            "x": found.x,
-            "throws": self.feeding.to_json(),
-        }
+        one = self.candidate
+        return as_table(
+            **picked(one, "values", "order"), **picked(one.found, "margin", "x"), throws=self.feeding
+        )
 
 
 def unbeaten(margin: Sequence[float], throws: Sequence[float]) -> list[int]:
@@ -133,7 +130,9 @@ def _sure(
         tell("designs on all corners", number, MOST_SURE)
         options.remove(option)
         one, search = option.candidate, searches[option.candidate.order]
-        found = on_all_corners(search.scene.with_values(dict(one.values)), search.box, side, search.hard)
+        found = on_all_corners(
+            search.scene.with_values(dict(one.values)), search.tolerance, side, search.hard
+        )
         if found is not None and found.margin > 0.0:
             again = _option(replace(one, found=found), search, side, seed)
             sure += [] if again is None else [again]

@@ -13,7 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from limitsets.inverse.margin.search import Search, Tell
-from limitsets.inverse.margin.sharp import FINE, FINELY, Sharp, Signs, failing, on_all_corners, sharp
+from limitsets.robust.margins.estimate import FINE, FINELY, Estimate, estimated, failing, on_all_corners
+from limitsets.robust.margins.vector import Signs
 from limitsets.scene import Scene
 
 __all__ = ["polished"]
@@ -30,7 +31,7 @@ class _Best:
         self.hard: list[Signs] = list(search.hard)
         self.unknowns: list[float] = []
         self.scene: Scene | None = None
-        self.found: Sharp | None = None
+        self.found: Estimate | None = None
         self.tried = 0
 
     def rate(self, unknowns: Sequence[float]) -> float:
@@ -38,36 +39,21 @@ class _Best:
         self.tried += 1
         self.tell("designs near the best", min(self.tried, self.of), self.of)
         scene = self.search.scene_of(unknowns)
-        if scene is None:
-            return -30.0
-        scene = self.made(scene)
-        lacking = self.search.lacking(scene)
-        if lacking < 0.0:
-            return lacking
-        best = 0.0 if self.found is None else self.found.margin
-        search = self.search
-        found = sharp(scene, search.box, search.side, hard=self.hard, steps=FINE, close=FINELY)
-        if found is not None and found.margin > best:
-            found = self._on_all_corners(scene, found)
-        if found is None:
-            return -10.0
-        if not found.margin > 0.0:
-            return found.margin
-        lacking = search.broken(scene, found)
-        if lacking < 0.0:
-            return lacking
-        if found.margin > best:
+        scene = None if scene is None else self.made(scene)
+        rating, found = self.search.rated(scene, self._estimate)
+        if found is not None and (self.found is None or found.margin > self.found.margin):
             self.unknowns, self.scene, self.found = [float(u) for u in unknowns], scene, found
-        return found.margin
+        return rating
 
-    def _on_all_corners(self, scene: Scene, found: Sharp) -> Sharp | None:
-        search = self.search
-        wrong = failing(scene, search.box, search.side, found, found.margin)
-        new = [signs for signs in wrong if signs not in self.hard]
-        if not new:
+    def _estimate(self, scene: Scene) -> Estimate | None:
+        """Estimate a margin; where it may be the best, on all corners."""
+        about = scene, self.search.tolerance, self.search.side
+        found = estimated(*about, hard=self.hard, steps=FINE, close=FINELY)
+        if found is None or not found.margin > (0.0 if self.found is None else self.found.margin):
             return found
+        new = [signs for signs in failing(*about, found, found.margin) if signs not in self.hard]
         self.hard[:0] = new
-        return on_all_corners(scene, search.box, search.side, self.hard)
+        return on_all_corners(*about, self.hard) if new else found
 
 
 def polished(
@@ -76,7 +62,7 @@ def polished(
     made: Callable[[Scene], Scene],
     evaluations: int,
     tell: Tell,
-) -> tuple[Scene, Sharp] | None:
+) -> tuple[Scene, Estimate] | None:
     """Improve the best of a few designs, rated as they would be made and on all corners.
 
     Parameters
@@ -94,7 +80,7 @@ def polished(
 
     Returns
     -------
-    (Scene, Sharp) or None
+    (Scene, Estimate) or None
         The design and its margin, which holds on all corners; None if none of the first ones feeds.
     """
     from scipy.optimize import minimize

@@ -1,6 +1,6 @@
 """Choose the part so that the margin is large: a global search by floats.
 
-The search knows one number, the joint margin by floats (`sharp`); what it ends with is for `limitsets.robust` to prove.
+The search knows one number, the joint margin by floats (`estimated`); what it ends with `limitsets.robust` proves.
 scipy's differential evolution moves a population of designs; in between, the best one is tried on all corners of the
 tolerance, and those at which it fails are kept as hard ones for all.  An answer depends on the seed and the number of
 evaluations, never on the clock.
@@ -18,9 +18,10 @@ from numpy.typing import NDArray
 
 from limitsets.errors import AnswerError, SceneError
 from limitsets.inverse.margin.lead import lead_of
-from limitsets.inverse.margin.sharp import Box, Sharp, Signs, failing, sharp
 from limitsets.inverse.margin.sound import assumptions_kept
-from limitsets.inverse.margin.trap import least_room
+from limitsets.robust.margins.estimate import Estimate, estimated, failing
+from limitsets.robust.margins.trap import least_room
+from limitsets.robust.margins.vector import Signs, Tolerance
 from limitsets.scene import Scene
 from limitsets.scene.quantities import find
 
@@ -52,14 +53,14 @@ class Candidate:
     ----------
     values : dict of str to float
         What was varied [scene's units].
-    found : Sharp
+    found : Estimate
         Its margin by floats.
     order : int
         Which of the scenes that the search began with: another order of the sides.
     """
 
     values: dict[str, float]
-    found: Sharp
+    found: Estimate
     order: int
 
 
@@ -71,7 +72,7 @@ class Search:
     ----------
     scene : Scene
         Where it begins: what is not varied stays.
-    box : Box
+    tolerance : Tolerance
         The tolerance.
     side : int
         The side on which parts are to be fed.
@@ -86,7 +87,7 @@ class Search:
     """
 
     scene: Scene
-    box: Box
+    tolerance: Tolerance
     side: int
     bounds: Mapping[str, tuple[float, float]]
     order: int = 0
@@ -110,20 +111,27 @@ class Search:
         """Rate a design: its margin, or below 0 how far it is from being one."""
         self.evaluations += 1
         scene = self.scene_of(unknowns)
-        if scene is None:
-            return -30.0
-        lacking = self.lacking(scene)
-        if lacking < 0.0:
-            return lacking
-        found = sharp(scene, self.box, self.side, hard=self.hard, above=above)
-        if found is None:
-            return -10.0
-        if found.margin > 0.0:
-            lacking = self.broken(scene, found)
-            if lacking < 0.0:
-                return lacking
+
+        def quickly(one: Scene) -> Estimate | None:
+            return estimated(one, self.tolerance, self.side, hard=self.hard, above=above)
+
+        rating, found = self.rated(scene, quickly)
+        if scene is not None and found is not None:
             self.history.append(Candidate(self._values(scene), found, self.order))
-        return found.margin
+        return rating
+
+    def rated(
+        self, scene: Scene | None, estimate: Callable[[Scene], Estimate | None]
+    ) -> tuple[float, Estimate | None]:
+        """Rate a scene by an estimate of its margin; with the estimate where it feeds, and breaks no assumption."""
+        lacking = -30.0 if scene is None else self.lacking(scene)
+        if scene is None or lacking < 0.0:
+            return lacking, None
+        found = estimate(scene)
+        if found is None or not found.margin > 0.0:
+            return (-10.0 if found is None else found.margin), None
+        lacking = self.broken(scene, found)
+        return (lacking, None) if lacking < 0.0 else (found.margin, found)
 
     def lacking(self, scene: Scene) -> float:
         """Rate a part that no lead weight makes: -20 or below; 0 where one does."""
@@ -133,7 +141,7 @@ class Search:
         lacking = max(weight.share - MOST_LEAD, -weight.inside / float(scene.sides.length.mean()))
         return 0.0 if lacking <= 0.0 else -20.0 - min(9.0, lacking)
 
-    def broken(self, scene: Scene, found: Sharp) -> float:
+    def broken(self, scene: Scene, found: Estimate) -> float:
         """Rate a design outside of the model, or one that loses parts: below 0; 0 or above for any other."""
         spare = assumptions_kept(scene, found.kept)
         if self.everywhere:
@@ -151,10 +159,10 @@ class Search:
     def harden(self, unknowns: Sequence[float]) -> None:
         """Try a design on all corners at nearly its margin, and keep those at which it fails."""
         scene = self.scene_of(unknowns)
-        found = None if scene is None else sharp(scene, self.box, self.side, hard=self.hard)
+        found = None if scene is None else estimated(scene, self.tolerance, self.side, hard=self.hard)
         if scene is None or found is None or not found.margin > 0.0:
             return
-        wrong = failing(scene, self.box, self.side, found, 0.97 * found.margin)
+        wrong = failing(scene, self.tolerance, self.side, found, 0.97 * found.margin)
         new = [signs for signs in wrong if signs not in self.hard]
         self.hard[:] = (new[: MOST_HARD // 3] + self.hard)[:MOST_HARD]
 

@@ -77,6 +77,10 @@ class State:
     kappa: float | None
     landing: float | None = None
 
+    def to_json(self) -> dict[str, Any]:
+        """Give it as a plain table for JSON."""
+        return {"x": 0.5 * (self.lo + self.hi), "between": [self.lo, self.hi], "side": self.side}
+
 
 class Choice(NamedTuple):
     """What one throw may be like: kappa, and how far beyond the model's place it lands."""

@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 
 from limitsets.errors import AnswerError
 from limitsets.goals import Goal, OrientedBeyond, Reaches
-from limitsets.robust.margins.finding import Margin, asked_of, margin
+from limitsets.proofs.query import Query
+from limitsets.robust.margins.finding import Margin, margin
 from limitsets.robust.margins.joint import joint_margin
 from limitsets.scene import Scene, load
 
@@ -141,7 +142,7 @@ def _one(
 
 def places_beyond(scene: Scene, side: int, places: int) -> NDArray[np.float64]:
     """Return places between the farthest that the limit set gets on other sides and on this one, as many as asked."""
-    extents = asked_of(scene, (OrientedBeyond(0.0, side),)).cells(None, 2).cells.extents()
+    extents = Query.of(scene, (OrientedBeyond(0.0, side),)).cells(None, 2).cells.extents()
     highest = {s: max(hi for _, hi in parts) for s, parts in extents.items() if parts}
     others = max((top for s, top in highest.items() if s != side), default=0.0)
     own = highest.get(side, -np.inf)

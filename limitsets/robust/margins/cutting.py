@@ -9,18 +9,18 @@ from __future__ import annotations
 
 import heapq
 import time
-from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from typing import NamedTuple
 
 import numpy as np
 
-from limitsets.robust.margins.asking import Asked, Question
-from limitsets.robust.margins.effect import Effects
+from limitsets.proofs.query import Outcome, Query
+from limitsets.robust.margins.brackets import Tell
+from limitsets.robust.margins.sensitivity import Sensitivity
 from limitsets.robust.margins.vector import Parts, Tolerance
 
-__all__ = ["Cutting", "Tell"]
+__all__ = ["Cutting"]
 
 # Pieces after which the proof of the box ends with what it has.
 MOST_PIECES = 4000
@@ -28,7 +28,7 @@ MOST_PIECES = 4000
 # What a piece costs, proved as a whole, against what was measured one quantity at a time; learned on the way.
 COST, LEAST_COST, MOST_COST = 1.0, 0.7, 3.0
 
-# Share of what was to spare at first, below which cells have to be finer: the steps of `Question.prove`.
+# Share of what was to spare at first, below which cells have to be finer: the steps of `Query.prove`.
 FINER = (0.06, 0.015)
 
 # A part is worth a try from this share of what its worst corner has to spare.
@@ -39,8 +39,6 @@ LEAST_SHARE = 0.2
 
 # A piece narrower than this share of the box is not cut again.
 NARROWEST = Fraction(1, 4096)
-
-Tell = Callable[[float], None]
 
 
 @dataclass(order=True)
@@ -81,24 +79,26 @@ class _Guess(NamedTuple):
 class Cutting:
     """Proof of a box, piece by piece."""
 
-    def __init__(self, question: Question, tolerance: Tolerance, factor: Fraction, effects: Effects) -> None:
-        self.question, self.tolerance, self.factor, self.effects = question, tolerance, factor, effects
+    def __init__(
+        self, query: Query, tolerance: Tolerance, factor: Fraction, sensitivity: Sensitivity
+    ) -> None:
+        self.query, self.tolerance, self.factor, self.sensitivity = query, tolerance, factor, sensitivity
         self.cost, self.noise = COST, tolerance.noise(factor)
-        self.proved: list[tuple[_Part, Asked]] = []
+        self.proved: list[tuple[_Part, Outcome]] = []
         self.tried = 0
 
     def judge(self, part: _Part) -> _Guess:
         """Guess what is to spare on a part, and where to cut it."""
         low, high = (np.array([float(x) for x in end]) * float(self.factor) for end in (part.low, part.high))
-        half, effects = 0.5 * (high - low), self.effects
+        half, known = 0.5 * (high - low), self.sensitivity
         if not half.size:
             return _Guess(1.0, 1.0, 0, Fraction(0))
-        if not effects.spare.size:
+        if not known.slack.size:
             k = int(np.argmax(half))
             return _Guess(1.0, 1.0, k, (part.low[k] + part.high[k]) / 2)
-        costs, fall = self.cost * effects.cost, np.abs(effects.fall)
-        at_corner = effects.spare - effects.fall @ (0.5 * (low + high)) - fall @ half
-        left = at_corner - np.where(effects.kept[:, None], 0.0, np.maximum(costs - fall, 0.0)) @ half
+        costs, fall = self.cost * known.cost, np.abs(known.fall)
+        at_corner = known.slack - known.fall @ (0.5 * (low + high)) - fall @ half
+        left = at_corner - np.where(known.two_throws[:, None], 0.0, np.maximum(costs - fall, 0.0)) @ half
         worst = int(np.argmin(left))
         k = int(np.argmax(costs[worst] * half))
         # the part on the good side is to be as long as it may be
@@ -107,7 +107,7 @@ class Cutting:
         share = share if 0.1 < share < 0.6 else 0.5
         steps = max(1, min(15, round(16 * share)))
         width = (part.high[k] - part.low[k]) * Fraction(steps, 16)
-        at = part.high[k] - width if effects.fall[worst, k] > 0.0 else part.low[k] + width
+        at = part.high[k] - width if known.fall[worst, k] > 0.0 else part.low[k] + width
         return _Guess(float(left[worst]), float(at_corner[worst]), k, at)
 
     def run(self, seconds: float, tell: Tell) -> tuple[Fraction, str]:
@@ -129,7 +129,7 @@ class Cutting:
                 self.cost = max(LEAST_COST, self.cost * 0.99)
                 tell(self.done(waiting))
                 continue
-            if found is not None and self.effects.spare.size:
+            if found is not None and self.sensitivity.slack.size:
                 self.cost = min(MOST_COST, self.cost * 1.03)
             k, at = self._where(part, guess, found)
             why = self._stop(part, k, found, waiting, time.perf_counter() > end)
@@ -141,7 +141,7 @@ class Cutting:
             number += 2
         return min(failed, default=(Fraction(1), ""))
 
-    def _where(self, part: _Part, guess: _Guess, found: Asked | None) -> tuple[int, Fraction]:
+    def _where(self, part: _Part, guess: _Guess, found: Outcome | None) -> tuple[int, Fraction]:
         """Say along which quantity to cut a part, and where.
 
         Where nothing attracts, or no part is proved to rest, what a quantity costs elsewhere says little: the widest.
@@ -150,11 +150,11 @@ class Cutting:
         if not part.low or found is None or (cells is not None and (cells.component >= 0).any()):
             return guess.k, guess.at
         widths = np.array([float(hi - lo) for lo, hi in zip(part.low, part.high, strict=True)])
-        cost = self.effects.cost.max(axis=0, initial=0.0)
+        cost = self.sensitivity.cost.max(axis=0, initial=0.0)
         k = int(np.argmax(widths * np.maximum(cost / max(cost.max(initial=0.0), 1e-300), LEAST_SHARE)))
         return k, (part.low[k] + part.high[k]) / 2
 
-    def _stop(self, part: _Part, k: int, found: Asked | None, waiting: list[_Part], late: bool) -> str:
+    def _stop(self, part: _Part, k: int, found: Outcome | None, waiting: list[_Part], late: bool) -> str:
         """Say why a part is given up; empty if it is to be cut."""
         if late:
             return (
@@ -168,7 +168,7 @@ class Cutting:
             found.reason if found else ""
         ) or "a piece of the box of all quantities is too narrow to be cut"
 
-    def within(self, share: Fraction) -> list[Asked]:
+    def within(self, share: Fraction) -> list[Outcome]:
         """Return what proves a share of the box: parts that reach beyond are cut back, their cells serve for less."""
         kept = []
         for part, found in self.proved:
@@ -188,11 +188,11 @@ class Cutting:
         """Share of the pieces known so far."""
         return len(self.proved) / (len(self.proved) + len(waiting))
 
-    def _try(self, part: _Part, left: float) -> Asked:
+    def _try(self, part: _Part, left: float) -> Outcome:
         self.tried += 1
         finest = 3
-        if self.effects.spare.size:
-            finest = 1 + sum(left < share * float(self.effects.spare.min()) for share in FINER)
+        if self.sensitivity.slack.size:
+            finest = 1 + sum(left < share * float(self.sensitivity.slack.min()) for share in FINER)
         # where nothing attracts the piece is cut: that helps more than finer cells
         piece = self.tolerance.piece(part.low, part.high, self.factor)
-        return self.question.prove(piece, self.noise, finest, bases=1)
+        return self.query.prove(piece, self.noise, finest, bases=1)

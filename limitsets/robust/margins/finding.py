@@ -8,113 +8,24 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
 from limitsets.errors import AnswerError
 from limitsets.goals import Goal, Predicate, unknown_goal
-from limitsets.proofs.asked import State
-from limitsets.proofs.simulated import scattered
-from limitsets.robust.margins.asking import Asked, Question
+from limitsets.proofs.query import Outcome, Query
+from limitsets.robust.margins.answer import Margin
 from limitsets.robust.margins.brackets import Bracket, bracket_fixed, bracket_per_throw
 from limitsets.robust.margins.deviations import Measure, measure, measures
+from limitsets.robust.margins.joint import joint_margin
 from limitsets.scene import Scene, load
 from limitsets.scene.units import exact_factor
 
-__all__ = ["Margin", "asked_of", "goals_of", "margin"]
+__all__ = ["Margin", "goals_of", "margin"]
 
 Progress = Callable[[str, int, int], None]
 GoalLike = Goal | Callable[..., Any]
-
-
-@dataclass(frozen=True, eq=False)
-class Margin:
-    """How much one quantity of a scene, or all of its tolerance, may deviate.
-
-    Attributes
-    ----------
-    quantity : str
-        Its name; "joint" for all of the tolerance together.
-    reading : str
-        "fixed" (but unknown), "per-throw" (another one at every throw), or "tolerance" for joint.
-    goals : tuple of Goal
-        What has to hold: all of them.
-    proved : float
-        The goals are proved for every deviation up to this; 0 if for none.
-    refuted : float or None
-        At this deviation an orbit violates a goal; None if no such deviation is found.
-    unit : str
-        Of both: "%" of the value, a length or an angle; "" for joint, a factor on the tolerance.
-    nominal : float or None
-        The value about which it deviates; of a length or angle in its `unit`.
-    reason : str
-        Why there is no upper end, or why the two are farther apart than asked; empty if they are not.
-    closed : bool
-        Whether they are as close as was asked.
-    seconds : float
-        Time it took.
-    scene : Scene
-        The scene.
-    tolerance : dict of str to str
-        Of joint: the deviations of which `proved` and `refuted` are factors; empty otherwise.
-    deviations, noise : dict of str to str
-        What may be fixed but unknown and what differs at every throw, as it is proved, as `limitsets.certify` takes it.
-    pieces : tuple of Asked
-        What proves it.
-    against : Asked or None
-        What refutes it.
-    """
-
-    quantity: str
-    reading: str
-    goals: tuple[Goal, ...]
-    proved: float
-    refuted: float | None
-    unit: str
-    nominal: float | None
-    reason: str
-    closed: bool
-    seconds: float
-    scene: Scene
-    tolerance: dict[str, str]
-    deviations: dict[str, str]
-    noise: dict[str, str]
-    pieces: tuple[Asked, ...] = field(repr=False)
-    against: Asked | None = field(repr=False)
-
-    @property
-    def counterexample(self) -> tuple[State, ...]:
-        """The orbit that violates a goal, every state enclosed; empty if there is none."""
-        return () if self.against is None else self.against.counterexample
-
-    def to_json(self) -> dict[str, Any]:
-        """Give it as a plain table for JSON."""
-        from limitsets.robust.margins.answer import to_json
-
-        return to_json(self)
-
-    def save(self, folder: str | Path, *, recheck: bool = True) -> tuple[Path, ...]:
-        """Write what `limitsets.recheck` checks: a certificate for each goal, and the orbit that refutes one.
-
-        Parameters
-        ----------
-        folder : str or Path
-            Where; it is made.
-        recheck : bool
-            Whether to have each checked before it gets its name.
-
-        Raises
-        ------
-        AnswerError
-            Effects are on, which no recheck knows, or a goal is a function of the caller's.
-        DeniedError
-            The checker does not confirm one: it is kept as NAME.denied.zip.
-        """
-        from limitsets.robust.margins.answer import save
-
-        return save(self, Path(folder), recheck=recheck)
 
 
 def goals_of(scene: Scene, goal: GoalLike | Sequence[GoalLike] | None) -> tuple[Goal, ...]:
@@ -135,26 +46,6 @@ def goals_of(scene: Scene, goal: GoalLike | Sequence[GoalLike] | None) -> tuple[
     if not found:
         raise AnswerError("the goal", "no goals", "one at least", "name one")
     return tuple(found)
-
-
-def asked_of(scene: Scene, goals: tuple[Goal, ...]) -> Question:
-    """Put a question to a scene; its own goal is left out, so that a certificate says what was asked.
-
-    Raises
-    ------
-    AnswerError
-        The scene scatters its throws: a margin is that of the quantities asked about, and of nothing else.
-    """
-    if scattered(scene):
-        raise AnswerError(
-            "the scene's effect spread",
-            "bounded",
-            "a scene whose throws are all alike",
-            "leave spread out of [effects]; reading per-throw asks about noise",
-        )
-    tree = scene.as_dict()
-    tree.pop("goal", None)
-    return Question(load(tree), goals)
 
 
 def margin(
@@ -201,19 +92,17 @@ def margin(
     >>> speed.proved < 0.733 < speed.refuted, speed.unit
     (True, '%')
     """
-    from limitsets.robust.margins.joint import joint_margin
-
     asked = scene if isinstance(scene, Scene) else load(scene)
     if not 1e-4 <= width < 1:
         raise AnswerError("the width", width, "from 0.0001 to below 1", "0.01 is a hundredth")
     goals = goals_of(asked, goal)
-    question = asked_of(asked, goals)
+    query = Query.of(asked, goals)
     names: tuple[str, ...] = tuple(dict.fromkeys(quantities))
     todo: list[Measure | str] = []
     if names:
-        todo = [name if name == "joint" else measure(question.scene, name, reading) for name in names]
+        todo = [name if name == "joint" else measure(query.scene, name, reading) for name in names]
     else:
-        todo = [*measures(question.scene, reading)]
+        todo = [*measures(query.scene, reading)]
         todo += ["joint"] if asked.tolerance and reading is None else []
     found = []
     for number, one in enumerate(todo):
@@ -227,22 +116,22 @@ def margin(
         if isinstance(one, str):
             found.append(joint_margin(asked, goals, width=width, tell=tell))
         else:
-            found.append(_single(question, one, Fraction(repr(width)), tell))
+            found.append(_single(query, one, Fraction(repr(width)), tell))
     return tuple(found)
 
 
-def _single(question: Question, one: Measure, width: Fraction, tell: Callable[[float], None]) -> Margin:
+def _single(query: Query, one: Measure, width: Fraction, tell: Callable[[float], None]) -> Margin:
     begin = time.perf_counter()
-    nominal = question.prove()
+    nominal = query.prove()
     if nominal.verdict != "proved":
-        found = _of_none(question, nominal)
+        found = _of_none(query, nominal)
     else:
         search = bracket_fixed if one.reading == "fixed" else bracket_per_throw
-        found = search(question, one, width, tell)
+        found = search(query, one, width, tell)
     return Margin(
         one.quantity,
         one.reading,
-        question.goals,
+        query.goals,
         float(found.proved),
         None if found.refuted is None else float(found.refuted),
         one.unit,
@@ -250,7 +139,7 @@ def _single(question: Question, one: Measure, width: Fraction, tell: Callable[[f
         found.reason,
         found.closed(width),
         time.perf_counter() - begin,
-        question.scene,
+        query.scene,
         {},
         *_texts(one, found.proved),
         tuple(found.pieces),
@@ -273,9 +162,9 @@ def _nominal(one: Measure) -> float | None:
     return float(one.nominal if one.relative else one.nominal * exact_factor(one.given.unit, one.unit))
 
 
-def _of_none(question: Question, nominal: Asked) -> Bracket:
+def _of_none(query: Query, nominal: Outcome) -> Bracket:
     """Answer for a scene that does not have the goal as it is: no deviation is small enough."""
-    against = question.refute()
+    against = query.refute()
     if against.verdict == "refuted":
         reason = f"the goal fails in the scene as it is: {against.reason}"
         return Bracket(Fraction(0), Fraction(0), [], against, reason)

@@ -1,7 +1,7 @@
 """The joint margin: the factor on a whole vector of tolerances, up to which goals are proved.
 
-Every quantity is fixed but unknown, but for the landing place, which differs at every throw.  The worst corners bracket
-the factor from above, the proof of the whole box from below.
+Every quantity is fixed but unknown, but for the landing place, which differs at every throw.  The worst corners, each
+a single scene, bracket the factor from above, the proof of the whole box from below.
 """
 
 from __future__ import annotations
@@ -11,11 +11,12 @@ from collections.abc import Mapping
 from fractions import Fraction
 
 from limitsets.goals import Goal
-from limitsets.robust.margins.asking import Asked
-from limitsets.robust.margins.corners import at_corners, rounded
-from limitsets.robust.margins.cutting import Cutting, Tell
-from limitsets.robust.margins.effect import Effects, effects_of
-from limitsets.robust.margins.finding import Margin, asked_of
+from limitsets.proofs.query import Outcome, Query
+from limitsets.robust.margins.answer import Margin
+from limitsets.robust.margins.brackets import Bracket, Ray, Tell
+from limitsets.robust.margins.cutting import Cutting
+from limitsets.robust.margins.halving import a_little_beyond, halved
+from limitsets.robust.margins.sensitivity import Sensitivity, sensitivity_of
 from limitsets.robust.margins.vector import Tolerance
 from limitsets.scene import Scene
 
@@ -26,6 +27,9 @@ SECONDS = 150.0
 
 # Parts of the bracket's lower end that are proved in turn.
 STAGES = tuple(Fraction(n, 32) for n in (1, 2, 4, 8, 16, 24, 32))
+
+# Corners whose factor is bracketed, the worst first; factors between which it is sought.
+CORNERS, SMALL, LEAST, MOST = 4, Fraction(1, 16), Fraction(1, 10**6), Fraction(10**6)
 
 
 def joint_margin(
@@ -61,19 +65,19 @@ def joint_margin(
         Its `quantity` is "joint", `proved` and `refuted` are factors.
     """
     begin = time.perf_counter()
-    question = asked_of(scene, goals)
+    query = Query.of(scene, goals)
     texts = dict(scene.text.get("tolerance", {}) if tolerance is None else tolerance)
-    vector = Tolerance.of(question.scene, texts)
-    share = Fraction(repr(width))
-    effects = effects_of(question, vector.measures, _sizes(vector)) if vector.measures else Effects.none(0)
-    good, bad, against, reason = at_corners(question, vector, effects, share / 8)
-    target = rounded(min(good, bad * (1 - share * Fraction(9, 10))) if bad is not None else good)
+    vector, share = Tolerance.of(query.scene, texts), Fraction(repr(width))
+    sensitivity = sensitivity_of(query, vector)
+    at_corners = _at_corners(query, vector, sensitivity, share / 8)
+    bad, reason, target = at_corners.refuted, at_corners.reason, at_corners.proved
+    target = rounded(target if bad is None else min(target, bad * (1 - share * Fraction(9, 10))))
     tell(0.05)
-    proved, pieces, noise = Fraction(0), list[Asked](), dict[str, str]()
+    proved, pieces, noise = Fraction(0), list[Outcome](), dict[str, str]()
     end = time.perf_counter() + seconds
     for stage in STAGES if target > 0 else ():
         # the smaller box first: what is proved of it stands, whatever becomes of the larger one
-        cutting = Cutting(question, vector, rounded(target * stage), effects)
+        cutting = Cutting(query, vector, rounded(target * stage), sensitivity)
         left = end - time.perf_counter()
         part, why = cutting.run(left if stage == STAGES[-1] else left / 2, tell)
         reason = why or reason
@@ -96,14 +100,44 @@ def joint_margin(
         "" if closed else reason,
         closed,
         time.perf_counter() - begin,
-        question.scene,
+        query.scene,
         dict(texts),
         vector.texts(proved) if proved else {},
         noise if proved else {},
         tuple(pieces),
-        against,
+        at_corners.against,
     )
 
 
-def _sizes(vector: Tolerance) -> dict[str, Fraction]:
-    return {one.quantity: size for one, size in zip(vector.measures, vector.sizes, strict=True)}
+def _at_corners(query: Query, tolerance: Tolerance, sensitivity: Sensitivity, width: Fraction) -> Bracket:
+    """Bracket the factor at the worst corners, as single scenes."""
+    count, found, proved = len(tolerance.measures), Bracket(), list[Fraction]()
+    for signs in (sensitivity.corners() or [(1,) * count, (-1,) * count])[:CORNERS]:
+        own = _at_one(Ray(query, tolerance, signs), width, found.refuted)
+        proved.append(own.proved)
+        if own.refuted is not None and (found.refuted is None or own.refuted < found.refuted):
+            found.refuted, found.against = own.refuted, own.against
+        found.reason = found.reason or own.reason
+    found.proved = min(proved)
+    return found
+
+
+def _at_one(ray: Ray, width: Fraction, known: Fraction | None) -> Bracket:
+    """Bracket the factor at one corner, where it is below one that is known."""
+    factor, found = known or SMALL, ray.found
+    while ray.proves(factor):
+        if known is not None or factor > MOST:
+            return found
+        factor *= 2
+    _, top = halved(found.proved, factor, ray.proves, width, LEAST, rounded)
+    beyond = (rounded(each) for each in a_little_beyond(top, Fraction(1, 400), 10))
+    bad = next((each for each in beyond if ray.refutes(each)), None)
+    if bad is not None:
+        # what is not proved need not fail: it may hold for fewer starts than all
+        halved(top, bad, lambda middle: not ray.refutes(middle), width, rounded=rounded)
+    return found
+
+
+def rounded(value: Fraction) -> Fraction:
+    """Five digits: a factor that people can read, and whose multiples are short decimals."""
+    return Fraction(f"{float(value):.5g}")

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from decimal import ROUND_CEILING, ROUND_FLOOR, Context, Decimal
 
 from limitsets.goals import Goal, OrientedBeyond
-from limitsets.robust.margins.asking import Asked
+from limitsets.proofs.query import Outcome
 
 __all__ = ["bound", "reach_of", "void_of"]
 
@@ -27,7 +27,7 @@ def bound(value: float | None, unit: str = "", *, up: bool = False) -> str:
     return f"{context.create_decimal(Decimal(repr(value))):f} {unit}".rstrip()
 
 
-def reach_of(pieces: Sequence[Asked]) -> float | None:
+def reach_of(pieces: Sequence[Outcome]) -> float | None:
     """Say how far out the cells reach that attract in all of what was proved together; None where nothing was."""
     cells = [piece.found.cells.extents() for piece in pieces if piece.found is not None]
     return max((hi for each in cells for parts in each.values() for _, hi in parts), default=None)

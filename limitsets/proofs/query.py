@@ -1,4 +1,4 @@
-"""One question: whether goals hold for all of a box of scenes, and every sequence of throws with some noise.
+"""One query: whether goals hold for all of a box of scenes, and every sequence of throws with some noise.
 
 Cells are made fine where it pays: first some hundreds of them a side, then borders spread evenly over what attracts.
 """
@@ -6,24 +6,25 @@ Cells are made fine where it pays: first some hundreds of them a side, then bord
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
 from limitsets.errors import AnswerError
-from limitsets.goals import Goal, OrientedBeyond, Predicate, Reaches
+from limitsets.goals import Goal, Reaches
 from limitsets.proofs.asked import Answer, ask, borders, prove
 from limitsets.proofs.asked.kind import against
 from limitsets.proofs.attraction import Attraction, attraction
 from limitsets.proofs.cover import cover
 from limitsets.proofs.parameters import ParameterBox, parameter_box
+from limitsets.proofs.simulated import scattered
 from limitsets.proofs.tolerance import Piece
-from limitsets.robust.margins.worst import worst_orbit
-from limitsets.scene import Scene
+from limitsets.proofs.worst import worst_orbit
+from limitsets.scene import Scene, load
 
-__all__ = ["Asked", "Question"]
+__all__ = ["Outcome", "Query"]
 
 # Cells per side to begin with, then borders over all that attracts, and pieces of a parameter where a cell is open to
 # both decisions; more cells to begin with where nothing attracts.
@@ -35,7 +36,7 @@ LADDER = (512, 2048, 8192, 32_768)
 
 
 @dataclass(frozen=True, eq=False)
-class Asked:
+class Outcome:
     """What became of the goals on one box.
 
     Attributes
@@ -72,7 +73,7 @@ class Asked:
 
 
 @dataclass(frozen=True, eq=False)
-class Question:
+class Query:
     """Some goals of a scene: all have to hold.
 
     Attributes
@@ -86,10 +87,30 @@ class Question:
     scene: Scene
     goals: tuple[Goal, ...]
 
+    @classmethod
+    def of(cls, scene: Scene, goals: tuple[Goal, ...]) -> Query:
+        """Put goals to a scene; its own goal is left out, so that a certificate says what was asked.
+
+        Raises
+        ------
+        AnswerError
+            The scene scatters its throws: a margin is that of the quantities asked about, and of nothing else.
+        """
+        if scattered(scene):
+            raise AnswerError(
+                "the scene's effect spread",
+                "bounded",
+                "a scene whose throws are all alike",
+                "leave spread out of [effects]; reading per-throw asks about noise",
+            )
+        tree = scene.as_dict()
+        tree.pop("goal", None)
+        return cls(load(tree), goals)
+
     @property
     def anywhere(self) -> bool:
         """Whether some goal is about every start on the arm."""
-        return any(goal.from_anywhere or goal.kind == "attracts_all" for goal in self.goals)
+        return any(goal.from_anywhere or goal.of_every_start for goal in self.goals)
 
     def box(self, piece: Piece | None, noise: Mapping[str, str]) -> ParameterBox:
         """Enclose the parameters."""
@@ -101,7 +122,7 @@ class Question:
         noise: Mapping[str, str] | None = None,
         finest: int = 3,
         bases: int = len(BASES),
-    ) -> Asked:
+    ) -> Outcome:
         """Prove the goals, with finer and finer cells; or say what is missing.
 
         Parameters
@@ -125,11 +146,11 @@ class Question:
                 answers = self._each(found)
                 missing = answers[-1]
                 if missing.verdict == "proved":
-                    return Asked("proved", "", found, answers, piece=piece, noise=noise)
+                    return Outcome("proved", "", found, answers, piece=piece, noise=noise)
                 if missing.final or not (found.component >= 0).any():
                     break
         except AnswerError as error:
-            return Asked("impossible", _said(error), piece=piece, noise=noise)
+            return Outcome("impossible", _said(error), piece=piece, noise=noise)
         reason = missing.reason
         if missing.verdict == "proved-on-cells":
             share = 100.0 * missing.shares["share"]
@@ -138,7 +159,7 @@ class Question:
             )
         if not (found.component >= 0).any():
             reason = f"{reason}: from some of them, parts may leave the arm"
-        return Asked("undecided", reason, found, piece=piece, noise=noise)
+        return Outcome("undecided", reason, found, piece=piece, noise=noise)
 
     def _each(self, found: Attraction) -> tuple[Answer, ...]:
         """Prove one goal after the other, up to the first that is not: it comes last then."""
@@ -178,7 +199,7 @@ class Question:
                 cuts[side] = [*cuts[side], *np.linspace(lo, hi, count).tolist()]
         return attraction(cover(box, BASE, cuts, PIECES[step]))
 
-    def refute(self, piece: Piece | None = None, noise: Mapping[str, str] | None = None) -> Asked:
+    def refute(self, piece: Piece | None = None, noise: Mapping[str, str] | None = None) -> Outcome:
         """Search for an orbit of one scene that violates one of the goals.
 
         Parameters
@@ -194,19 +215,19 @@ class Question:
             box = self.box(piece, noise)
             found = self._coarse(box)
         except AnswerError as error:
-            return Asked("impossible", _said(error), piece=piece, noise=noise)
+            return Outcome("impossible", _said(error), piece=piece, noise=noise)
         for goal in self.goals:
             answer = self._against(found, goal)
             if answer.verdict == "refuted":
-                return Asked(
+                return Outcome(
                     "refuted", answer.reason, found, (answer,), goal, answer.counterexample, piece, noise
                 )
             reason = answer.reason or reason
-        return Asked("undecided", reason, found, piece=piece, noise=noise)
+        return Outcome("undecided", reason, found, piece=piece, noise=noise)
 
     def _against(self, found: Attraction, goal: Goal) -> Answer:
         """Search for what refutes one goal: where throws differ, for the worst that they can do."""
-        wrong = _wrong(goal)
+        wrong = goal.wrong()
         if isinstance(goal, Reaches) and not goal.every_orbit:
             # refuted by where attracting cells end; a periodic orbit that attracts is not looked for each time
             return prove(self._finer(found, found.cover.box, 2), self.scene, goal)
@@ -222,19 +243,3 @@ def _said(error: AnswerError) -> str:
     """Say why there is no such scene."""
     value = f"{error.value:.6g}" if isinstance(error.value, float) else error.value
     return f"there is no such part or throw: {error.thing} is {value}; it has to be {error.allowed}"
-
-
-def _wrong(goal: Goal) -> Callable[[Any, Any], Any] | None:
-    """From places and sides to whether each violates the goal; None for goals that no single place violates."""
-    if isinstance(goal, OrientedBeyond):
-        return lambda x, side: (x > goal.x) & (side != goal.side)
-    if isinstance(goal, Predicate):
-
-        def wrong(x: Any, side: Any) -> Any:
-            bad = np.zeros(x.shape, dtype=bool)
-            for s in np.unique(side).tolist():
-                bad[side == s] = ~goal.holds(x[side == s], x[side == s], s)
-            return bad
-
-        return wrong
-    return None

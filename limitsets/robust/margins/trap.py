@@ -138,7 +138,7 @@ def trap(params: Throw, x: float, side: int, *, landing: float = 0.0) -> Trap | 
     Examples
     --------
     >>> import limitsets as ls
-    >>> from limitsets.inverse.margin.trap import trap
+    >>> from limitsets.robust.margins.trap import trap
     >>> found = trap(ls.load("paper-designed").map, 12.0, 2)
     >>> found.hi.round(4).tolist(), round(found.threshold(2), 4)
     ([19.7527, 17.4398, 23.3832], 19.7527)

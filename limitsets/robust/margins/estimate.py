@@ -10,26 +10,24 @@ worst corners are found by differences.  Where an itinerary changes they jump; c
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import product
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from limitsets.errors import SceneError
-from limitsets.inverse.margin.trap import Trap, trap
+from limitsets.files import as_table, picked
+from limitsets.robust.margins.trap import Trap, trap
+from limitsets.robust.margins.vector import Signs, Tolerance, corners, worst_corner
 from limitsets.scene import Scene
-from limitsets.scene.facts import Deviation
-from limitsets.scene.quantities import deviation
 
-__all__ = ["Box", "Sharp", "corners", "failing", "on_all_corners", "sharp"]
+__all__ = ["Estimate", "estimated", "failing", "on_all_corners"]
 
 Array = NDArray[np.float64]
-Signs = tuple[int, ...]
 
-# Steps towards the margin between two factors; corners that are tried where a box has more.
-STEPS, MOST_CORNERS = 5, 512
+# Steps towards the margin between two factors.
+STEPS = 5
 # How close the ends of that search come to each other, as a share.
 CLOSE = 0.005
 # The same for designs that are looked at on all corners.
@@ -37,47 +35,7 @@ FINE, FINELY = 20, 2e-4
 
 
 @dataclass(frozen=True, eq=False)
-class Box:
-    """A tolerance: deviations by quantity, fixed but unknown, and of each landing.
-
-    Attributes
-    ----------
-    sizes : dict of str to Deviation
-        What is fixed but unknown.
-    landing : float
-        How far a landing may be off, at every throw [scene's unit].
-    """
-
-    sizes: dict[str, Deviation]
-    landing: float
-
-    @classmethod
-    def of(cls, scene: Scene, texts: Mapping[str, str]) -> Box:
-        """Read it from texts by quantity."""
-        found = {name: deviation(text, name, scene.unit, key=name) for name, text in texts.items()}
-        off = found.pop("landing.x", None)
-        return cls(found, 0.0 if off is None else off.value)
-
-    def at(self, scene: Scene, factor: float, signs: Sequence[float]) -> Scene | None:
-        """Give the scene at a corner of the box stretched by a factor; None where there is no such part."""
-        values: dict[str, float | str] = {}
-        for (name, size), sign in zip(self.sizes.items(), signs, strict=True):
-            if name == "throw.speed" and "kappa" in scene.text["throw"]:
-                share = factor * sign * size.value
-                if not share > -1.0:
-                    return None
-                values["throw.kappa"] = scene.kappa / (1.0 + share) ** 2
-            else:
-                value = scene.value(name)
-                values[name] = value + factor * sign * size.of(value)
-        try:
-            return scene.with_values(values)
-        except SceneError:
-            return None
-
-
-@dataclass(frozen=True, eq=False)
-class Sharp:
+class Estimate:
     """A joint margin by floats.
 
     Attributes
@@ -101,19 +59,9 @@ class Sharp:
     kept: Trap
     effects: dict[str, tuple[float, float]]
 
-
-def corners(count: int) -> list[Signs]:
-    """All corners of a box of so many quantities; of a large one some, always the same.
-
-    Examples
-    --------
-    >>> corners(1)
-    [(-1,), (1,)]
-    """
-    if 2**count <= MOST_CORNERS:
-        return list(product((-1, 1), repeat=count))
-    drawn = np.random.default_rng(0).choice((-1, 1), (MOST_CORNERS, count))
-    return [tuple(row) for row in drawn.tolist()]
+    def to_json(self) -> dict[str, Any]:
+        """Give it as a plain table for JSON, without where the part is kept."""
+        return as_table(**picked(self, "margin", "x", "threshold", "reach", "effects"))
 
 
 def _kept(scene: Scene | None, start: tuple[float, int], landing: float) -> Trap | None:
@@ -132,13 +80,13 @@ def _ways(scene: Scene, found: Trap, side: int) -> Array:
 class _Fed:
     """One scene, asked at several factors."""
 
-    def __init__(self, scene: Scene, box: Box, side: int, start: tuple[float, int]) -> None:
-        self.scene, self.box, self.side, self.start = scene, box, side, start
+    def __init__(self, scene: Scene, tolerance: Tolerance, side: int, start: tuple[float, int]) -> None:
+        self.scene, self.tolerance, self.side, self.start = scene, tolerance, side, start
 
     def spare(self, factor: float, signs: Signs) -> tuple[float, float]:
         """Threshold and reach at a corner; inf and -inf where the part is not kept."""
-        landing = factor * self.box.landing
-        corner = self.box.at(self.scene, factor, signs)
+        landing = factor * self.tolerance.scatter
+        corner = self.tolerance.scene_at(self.scene, factor, signs)
         # over a surface at the joint's height nothing is proved: jogs there move a part neither out nor in
         if corner is None or not corner.surface_height * self.scene.surface_height > 0.0:
             return math.inf, -math.inf
@@ -160,9 +108,9 @@ class _Fed:
         return highest, least, None
 
 
-def sharp(
+def estimated(
     scene: Scene,
-    box: Box,
+    tolerance: Tolerance,
     side: int,
     *,
     start: tuple[float, int] | None = None,
@@ -170,14 +118,14 @@ def sharp(
     above: float = 0.0,
     steps: int = STEPS,
     close: float = CLOSE,
-) -> Sharp | None:
+) -> Estimate | None:
     """Find the joint margin and the best X by floats.
 
     Parameters
     ----------
     scene : Scene
         The scene, in the minimal model.
-    box : Box
+    tolerance : Tolerance
         The tolerance that s multiplies.
     side : int
         The side on which parts are to be fed.
@@ -194,15 +142,16 @@ def sharp(
 
     Returns
     -------
-    Sharp or None
+    Estimate or None
         None where the part leaves the arm or never lies on the side.
 
     Examples
     --------
     >>> import limitsets as ls
-    >>> from limitsets.inverse.margin.sharp import Box, sharp
+    >>> from limitsets.robust.margins.estimate import estimated
+    >>> from limitsets.robust.margins.vector import Tolerance
     >>> scene = ls.load("paper-designed")
-    >>> found = sharp(scene, Box.of(scene, {"throw.speed": "1 %"}), 2)
+    >>> found = estimated(scene, Tolerance.of(scene, {"throw.speed": "1 %"}), 2)
     >>> round(found.threshold, 3), round(found.reach, 3), found.threshold < found.x < found.reach
     (19.753, 23.383, True)
     """
@@ -212,75 +161,81 @@ def sharp(
         return None
     threshold, reach = nominal.threshold(side), float(nominal.hi[side])
     if threshold >= reach:
-        return Sharp((reach - threshold) / reach, math.nan, threshold, reach, nominal, {})
-    bare = Sharp(0.0, math.nan, threshold, reach, nominal, {})
-    fed = _Fed(scene, box, side, _start(bare, side))
+        return Estimate((reach - threshold) / reach, math.nan, threshold, reach, nominal, {})
+    bare = Estimate(0.0, math.nan, threshold, reach, nominal, {})
+    fed = _Fed(scene, tolerance, side, _start(bare, side))
     ways = _ways(scene, nominal, side)
-    falls = np.zeros((len(box.sizes), ways.size))
-    for k in range(len(box.sizes)):
-        sizes = [float(j == k) for j in range(len(box.sizes))]
-        corner = box.at(scene, 1.0, sizes)
+    falls = np.zeros((len(tolerance.deviations), ways.size))
+    for k in range(len(tolerance.deviations)):
+        sizes = [float(j == k) for j in range(len(tolerance.deviations))]
+        corner = tolerance.scene_at(scene, 1.0, sizes)
         found = _kept(corner, fed.start, 0.0)
         if corner is None or found is None:
             return bare
         falls[k] = _ways(corner, found, side) - ways
-    effects = {name: (float(abs(falls[k, 0])), float(abs(falls[k, 1]))) for k, name in enumerate(box.sizes)}
-    cost = float(np.abs(falls[:, :2]).sum()) + 3.0 * box.landing
+    effects = {
+        name: (float(abs(falls[k, 0])), float(abs(falls[k, 1])))
+        for k, name in enumerate(tolerance.deviations)
+    }
+    cost = float(np.abs(falls[:, :2]).sum()) + 3.0 * tolerance.scatter
     linear = (reach - threshold) / cost if cost > 0.0 else math.inf
     if linear <= above:
-        return Sharp(linear, math.nan, threshold, reach, nominal, effects)
+        return Estimate(linear, math.nan, threshold, reach, nominal, effects)
     asked = list(hard or [])
-    asked += [tuple(int(s) for s in np.where(row < 0.0, -1, 1)) for row in falls.T]
+    asked += [worst_corner(row) for row in falls.T]
     spare, top = reach - threshold, min(linear, 1e3)
     margin, x = _sought(fed, list(dict.fromkeys(asked)), top, above, spare, steps, close)
-    return Sharp(margin, x, threshold, reach, nominal, effects)
+    return Estimate(margin, x, threshold, reach, nominal, effects)
 
 
-def failing(scene: Scene, box: Box, side: int, found: Sharp, factor: float) -> list[Signs]:
+def failing(scene: Scene, tolerance: Tolerance, side: int, found: Estimate, factor: float) -> list[Signs]:
     """Give the corners of the box, stretched by a factor, at which parts are not fed at `found.x`.
 
     Examples
     --------
     >>> import limitsets as ls
-    >>> from limitsets.inverse.margin.sharp import Box, failing, sharp
+    >>> from limitsets.robust.margins.estimate import estimated, failing
+    >>> from limitsets.robust.margins.vector import Tolerance
     >>> scene = ls.load("paper-designed")
-    >>> box = Box.of(scene, {"throw.speed": "1 %"})
-    >>> [failing(scene, box, 2, sharp(scene, box, 2), factor) for factor in (3.0, 9.0)]
+    >>> tolerance = Tolerance.of(scene, {"throw.speed": "1 %"})
+    >>> [failing(scene, tolerance, 2, estimated(scene, tolerance, 2), factor) for factor in (3.0, 9.0)]
     [[], [(-1,), (1,)]]
     """
-    fed = _Fed(scene, box, side, _start(found, side))
+    fed = _Fed(scene, tolerance, side, _start(found, side))
     wrong = []
-    for signs in corners(len(box.sizes)):
+    for signs in corners(len(tolerance.deviations)):
         threshold, reach = fed.spare(factor, signs)
         if not threshold <= found.x <= reach:
             wrong.append(signs)
     return wrong
 
 
-def on_all_corners(scene: Scene, box: Box, side: int, hard: Sequence[Signs] = ()) -> Sharp | None:
+def on_all_corners(
+    scene: Scene, tolerance: Tolerance, side: int, hard: Sequence[Signs] = ()
+) -> Estimate | None:
     """Find the margin on all corners: those at which it fails are put first, and it is sought anew.
 
     What it gives holds at every corner at that very factor and X.  A corner is found to fail once at most.
 
     Parameters
     ----------
-    scene, box, side
-        As for `sharp`.
+    scene, tolerance, side
+        As for `estimated`.
     hard : sequence of tuple of int
         Corners to begin with.
     """
     first = list(hard)
     while True:
-        found = sharp(scene, box, side, hard=first, steps=FINE, close=FINELY)
+        found = estimated(scene, tolerance, side, hard=first, steps=FINE, close=FINELY)
         if found is None or not found.margin > 0.0:
             return found
-        new = [signs for signs in failing(scene, box, side, found, found.margin) if signs not in first]
+        new = [signs for signs in failing(scene, tolerance, side, found, found.margin) if signs not in first]
         if not new:
             return found
         first = new + first
 
 
-def _start(found: Sharp, side: int) -> tuple[float, int]:
+def _start(found: Estimate, side: int) -> tuple[float, int]:
     """Give a place in the limit set, near its end: from farther in an orbit may be lost that never comes back there."""
     return found.reach - 0.02 * (found.reach - found.threshold), side
 

@@ -1,0 +1,188 @@
+"""The numbers of a scene as floats, each checked: what cannot be is refused with its place and a remedy."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from functools import cached_property
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from limitsets.geometry import (
+    Mass,
+    OnSide,
+    RestingSides,
+    convex_polygon,
+    plate_with_points,
+    require_inside,
+    require_rest,
+    resting_sides,
+    triangle,
+)
+from limitsets.geometry.polygon import Vector
+from limitsets.scene.numbers import Numbers
+from limitsets.scene.quantities import find, text_at
+from limitsets.scene.resolve import LEAST, Resolver
+from limitsets.scene.units import density_dimension
+
+__all__ = ["Body", "Floats"]
+
+# Quantities that may be 0 or below; of the others so small a number is refused that its square is none.
+SIGNED = ("part.vertices", "part.mass.center", "arm.surface_height", "gravity.tilt")
+SIGNED_POINT = (".x", ".y")
+
+Array = npt.NDArray[np.float64]
+
+
+class Body(NamedTuple):
+    """Shape and mass in the scene's unit."""
+
+    vertices: Array
+    centre: tuple[float, float]
+    radius_of_gyration: float
+    sides: RestingSides
+
+
+class Floats(Numbers):
+    """The numbers of one scene.
+
+    Parameters
+    ----------
+    tree : mapping
+        The scene as text, its words checked.
+    resolver : Resolver
+        Its unit and file.
+    """
+
+    def __init__(self, tree: Mapping[str, Any], resolver: Resolver) -> None:
+        super().__init__(tree, math.sqrt, math.sin)
+        self.resolver, self.refusal, self.at = resolver, resolver.refusal, resolver.at
+
+    def number(self, name: str) -> float:
+        """Return a quantity by its name."""
+        text, dimension = text_at(self.tree, name), find(name).dimension
+        signed = name.startswith(SIGNED) or name.endswith(SIGNED_POINT)
+        value = (self.resolver.value if signed else self.resolver.positive)(text, dimension, name)
+        if name == "gravity.tilt" and not 0 < value <= math.pi / 2:
+            allowed = "above 0 and up to 90 deg"
+            raise self.refusal(name, "the tilt", text, allowed, "90 deg is an upright table")
+        return value
+
+    def constant(self, text: str, dimension: str, key: str) -> float:
+        """Return what no quantity's name stands for, from its text and the place of the text."""
+        if dimension == "length":
+            return self.resolver.positive(text, dimension, key)
+        # of a scene in um a density in its unit is a small number, and none is ever squared
+        value = self.resolver.value(text, dimension, key)
+        if not value > 0.0:
+            raise self.refusal(key, f"this {dimension}", text, "above 0", "correct it")
+        return value
+
+    def triangle(self, lengths: list[float]) -> Sequence[Vector]:
+        """Place the vertices of a triangle."""
+        with self.at("part.sides"):
+            return _pairs(triangle(lengths))
+
+    def polygon(self, vertices: list[Vector]) -> Sequence[Vector]:
+        """Return the vertices of a convex polygon."""
+        given: Array = np.array(vertices, dtype=np.float64).reshape(-1, 2)
+        if len(given) and np.ptp(given, axis=0).max() < LEAST:
+            allowed = f"at least {LEAST:g} {self.resolver.unit} across"
+            raise self.refusal("part.vertices", "the part", "smaller", allowed, "correct the vertices")
+        with self.at("part.vertices"):
+            return _pairs(convex_polygon(given))
+
+    def on_side(self, vertices: Sequence[Vector]) -> OnSide:
+        """Return the centre of mass where it is measured on a side."""
+        side, last = self.tree["part"]["mass"]["center"]["side"], len(vertices) - 1
+        if side > last:
+            key = "part.mass.center.side"
+            raise self.refusal(key, "the side", side, f"0 to {last}", "name a side of this part")
+        found = super().on_side(vertices)
+        with self.at("part.mass.center"):
+            require_inside(np.array(vertices), found.in_frame(vertices), "the centre of mass")
+        return found
+
+    def plate(self, vertices: Sequence[Vector], density: float, points: list[Any]) -> Mass:
+        """Add up a plate and the point masses on it."""
+        with self.at("part.mass.points"):
+            return plate_with_points(np.array(vertices), density, points)
+
+    @cached_property
+    def body(self) -> Body:
+        """The part, refused where it cannot rest on each of its sides."""
+        self._require_words_of_part()
+        pairs, centre, lengths, radius = self.shape
+        vertices: Array = np.array(pairs)
+        sides = resting_sides(vertices, centre, lengths)
+        with self.at("part.mass.center" if isinstance(centre, OnSide) else "part.mass"):
+            require_rest(sides, self.resolver.unit)
+        vertices.flags.writeable = False
+        x, y = centre.in_frame(pairs) if isinstance(centre, OnSide) else centre
+        return Body(vertices, (x, y), radius, sides)
+
+    def _require_words_of_part(self) -> None:
+        """Refuse two descriptions of shape or mass, half a one, or none."""
+        shapes = "sides = [three lengths] or vertices = [[x, y], ...]"
+        self._require_one("part", "the shape", "sides", "vertices", shapes)
+        mass: Mapping[str, Any] = self.tree["part"]["mass"]
+        measured = [name for name in ("center", "radius_of_gyration") if name in mass]
+        made = [name for name in ("plate_density", "plate_thickness", "points") if name in mass]
+        allowed = "center and radius_of_gyration, or plate_density and points"
+        if measured and made:
+            found = " and ".join(measured + made)
+            raise self.refusal("part.mass", "the mass", found, allowed, "give one of the two, not both")
+        if len(measured) == 1 or (not measured and "plate_density" not in made):
+            found = f"only {' and '.join(measured + made)}" if measured or made else "empty"
+            raise self.refusal("part.mass", "the mass", found, allowed, "add what is missing")
+        if made:
+            self._require_thickness(mass["plate_density"], mass.get("plate_thickness"))
+
+    def _require_thickness(self, density: str, thickness: str | None) -> None:
+        """Refuse a mass per volume without a thickness, and a mass per area with one."""
+        key, keys = "part.mass.plate_density", "part.mass.plate_thickness"
+        volume = density_dimension(density) == "mass per volume"
+        if volume and thickness is None:
+            allowed = "a mass per area, or a mass per volume with plate_thickness"
+            raise self.refusal(key, "this density", density, allowed, f'add {keys}, like "2 mm"')
+        if not volume and thickness is not None:
+            remedy = f"{density} holds the thickness already: leave it out, or give the density in kg/m^3 or g/cm^3"
+            raise self.refusal(keys, "the thickness", thickness, "one beside a mass per volume", remedy)
+
+    def _require_one(self, key: str, thing: str, one: str, other: str, allowed: str = "") -> None:
+        """Refuse a table with both of two words that exclude each other, or with neither."""
+        given = [word for word in (one, other) if word in self.tree[key]]
+        if len(given) != 1:
+            found = " and ".join(given) or f"neither {one} nor {other}"
+            remedy = "give one of them, not both" if given else "give one of them"
+            raise self.refusal(key, thing, found, allowed or f"{one} or {other}", remedy)
+
+    @cached_property
+    def gravity(self) -> float | None:
+        """Gravity in the plane of the motion [unit/s^2]; None where it is not given."""
+        if "gravity" not in self.tree:
+            return None
+        self._require_one("gravity", "gravity", "acceleration", "tilt")
+        found: float = super().gravity
+        return found
+
+    @cached_property
+    def kappa(self) -> float:
+        """Gravity over the squared angular speed of the throw [unit]."""
+        throw = self.tree["throw"]
+        self._require_one("throw", "the throw", "kappa", "speed")
+        if "speed" in throw and self.gravity is None:
+            remedy = "a throw given by its speed needs it; add [gravity], or give throw.kappa"
+            allowed = "acceleration or tilt in [gravity]"
+            raise self.refusal("throw.speed", "gravity", "missing", allowed, remedy)
+        found: float = super().kappa
+        if "speed" in throw and not LEAST <= found <= 1 / LEAST:
+            allowed = f"gravity/speed^2 from {LEAST:g} to {1 / LEAST:g} {self.resolver.unit}"
+            raise self.refusal("throw.speed", "this angular speed", throw["speed"], allowed, "correct it")
+        return found
+
+
+def _pairs(vertices: Array) -> list[Vector]:
+    return [(x, y) for x, y in vertices.tolist()]
