@@ -107,7 +107,7 @@ class CellSet:
         states, edges = np.asarray(x, dtype=np.float64).ravel(), self.grid.edges[side][0]
         met = self.mask[self.grid.of_side(side)].astype(np.int8)
         border = edges[np.flatnonzero(np.diff(np.concatenate([[0], met, [0]])))]
-        inside = np.searchsorted(border, states, side="right") % 2 == 1
+        inside: NDArray[np.bool_] = np.searchsorted(border, states, side="right") % 2 == 1
         if met[-1]:
             inside |= states == edges[-1]  # of the last cell, whose upper border is nobody else's
         return inside

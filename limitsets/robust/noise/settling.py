@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from limitsets.cells import CellSet
 from limitsets.graph.components import Components, strong_components
-from limitsets.graph.ranges import Ranges, one_run
+from limitsets.graph.ranges import RUN, START, Ranges, one_run
 from limitsets.maps import kind_of
 from limitsets.robust.noise.sheets import Array, Sheets
 from limitsets.robust.noise.ulam import Transfer
@@ -160,7 +160,8 @@ def closed_sets(
     # How many cells from the first on carry each label: a run stays inside if all its cells do.
     change = np.concatenate([[0], np.cumsum(np.diff(label) != 0)])
     leaves = graph.exits != 0
-    begin, last = graph.start.astype(np.int64), graph.start.astype(np.int64) + graph.run - 1
+    begin = graph.box[:, START].astype(np.int64)
+    last = begin + graph.box[:, RUN] - 1
     stays = (label[begin] == label[source]) & (change[begin] == change[last])
     leaves[source[~stays]] = True
     for cells in sets:
