@@ -63,7 +63,7 @@ def _growth(params: Any, xs: Any, sides: Any, code_after: Any, tangents: Any, su
     """
     tangent = pick(tangents, 0)
     total, size, scale, carried = sums[0], sums[1], sums[2], sums[3]
-    made = code_after.size
+    made: int = code_after.size
     for k in range(code_after.size):
         x, side = pick(xs, k), sides[k]
         after, side_after, code = step(params, x, side)
