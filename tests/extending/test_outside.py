@@ -4,7 +4,6 @@ from collections.abc import Iterator
 
 import numpy as np
 import pytest
-from limitsets.report.background import trust
 from typer.testing import CliRunner
 
 import limitsets as ls
@@ -17,10 +16,10 @@ from limitsets.graph.images.enclosed import enclosures
 from limitsets.graph.images.sampled import sampled
 from limitsets.maps import contract, images
 from limitsets.proofs.asked import KINDS, sentence
+from limitsets.proofs.query import Query
 from limitsets.report.audits import summary
 from limitsets.report.pages import page
 from limitsets.report.questions import question_of, verdict_of
-from limitsets.robust.margins.finding import asked_of
 from limitsets.scene.facts import FACTS
 from limitsets.thrower import effects
 from limitsets.thrower.effects import EFFECTS
@@ -126,7 +125,7 @@ def test_audit_and_report_name_the_effect_and_not_another():
     found = ls.audit(scene)
     assert "Simulated: wear." in " ".join(summary(found))
     assert not any(each.simulated for each in found.findings)
-    text = trust(ls.analyse(scene, cells=256))
+    text = page(ls.analyse(scene, cells=256), {})
     assert "**Simulated** beyond the minimal model: wear." in text
     assert "the arm is as new" not in text
     assert "the left bottom vertex lands first" in text
@@ -168,7 +167,7 @@ def test_the_goal_is_proved_and_refuted_and_no_certificate_is_written(tmp_path):
     (refuted,) = ls.certify(asking("22 in"), claims=["goal"]).claims
     assert refuted.verdict == "refuted"
     assert refuted.counterexample[-1].lo > 22.0
-    assert asked_of(asking("24 in"), (outside.KeepsBelow(24.0),)).prove().verdict == "proved"
+    assert Query.of(asking("24 in"), (outside.KeepsBelow(24.0),)).prove().verdict == "proved"
 
 
 @pytest.mark.usefixtures("added")
