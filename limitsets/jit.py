@@ -49,7 +49,6 @@ from numba.core.registry import cpu_target
 from limitsets.errors import LimitsetsError, MapError
 
 __all__ = [
-    "chained",
     "corners_as_numbers",
     "cover_foreign_class",
     "entries_of",
@@ -921,53 +920,14 @@ for _stub, _choose in ((entry_of, _choose_entry), (with_entry, _choose_with)):
 
 
 @overload
-def chained(stub: Callable[P, R]) -> Generic[P, R]: ...
-@overload
-def chained(*, proof: bool) -> Callable[[Callable[P, R]], Generic[P, R]]: ...
-def chained(stub: Any = None, *, proof: bool = False) -> Any:
-    """Make a function of a tuple of several classes and a value that each entry hands on to the next.
-
-    Parameters
-    ----------
-    stub : callable
-        A module-level function of (entry, value, ...); its body is never compiled.
-    proof : bool
-        Compile the methods without contraction.
-
-    Returns
-    -------
-    callable
-        A `Generic`: ``stub.on(Class, method)``.  Called with a tuple it runs the methods of its entries in their order;
-        an entry without one hands the value on as it is, and is not in the machine code.
-    """
-    if stub is None:
-        return lambda f: _chained(f, proof)
-    return _chained(stub, proof)
-
-
-def _chained(stub: Any, proof: bool) -> Any:
-    """Make the table of methods, and the method of a tuple."""
-
-    def one_after_another(entries: Any, value: Any, *rest: Any) -> Any:
-        return made(entries[1:], made(entries[0], value, *rest), *rest)
-
-    def of_tuple(first: Any) -> Callable[..., Any] | None:
-        plain = type(first) is tuple or (isinstance(first, types.BaseTuple) and not named_tuple_class(first))
-        return None if not plain else one_after_another if len(first) else _handed_on
-
-    made = _generic(stub, proof, True, _handed_on, of_tuple)
-    return made
-
-
-def _handed_on(entry: Any, value: Any, *rest: Any) -> Any:
-    return value
-
-
-@overload
 def generic(stub: Callable[P, R]) -> Generic[P, R]: ...
 @overload
 def generic(
-    *, proof: bool = False, inlined: bool = True, default: Callable[..., Any] | None = None
+    *,
+    proof: bool = False,
+    inlined: bool = True,
+    default: Callable[..., Any] | None = None,
+    chained: bool = False,
 ) -> Callable[[Callable[P, R]], Generic[P, R]]: ...
 def generic(
     stub: Any = None,
@@ -975,6 +935,7 @@ def generic(
     proof: bool = False,
     inlined: bool = True,
     default: Callable[..., Any] | None = None,
+    chained: bool = False,
 ) -> Any:
     """Make a function whose method is chosen by the class of its first argument.
 
@@ -988,6 +949,10 @@ def generic(
         False for a method that is rarely called: it then costs the loops around it no compile time.
     default : callable, optional
         The method of every class that has none of its own.
+    chained : bool
+        The arguments are an entry and a value, which the method gives back changed.  Called with a tuple of several
+        classes the function runs the methods of its entries in their order, each on the value that the last one gave;
+        an entry without one is not in the machine code.
 
     Returns
     -------
@@ -1001,21 +966,27 @@ def generic(
     in a closure: numba does not cache such code (numba issues 2065, 2952, 6264).
     """
     if stub is None:
-        return lambda f: _generic(f, proof, inlined, default)
-    return _generic(stub, proof, inlined, default)
+        return lambda f: _generic(f, proof, inlined, default, chained)
+    return _generic(stub, proof, inlined, default, chained)
 
 
-def _generic(
-    stub: Any,
-    proof: bool,
-    inlined: bool,
-    default: Callable[..., Any] | None,
-    of_tuple: Callable[[Any], Callable[..., Any] | None] = lambda first: None,
-) -> Any:
-    """Make the table of methods and the overload that reads it; `of_tuple` gives the method of a plain tuple."""
+def _handed_on(entry: Any, value: Any, *rest: Any) -> Any:
+    return value
+
+
+def _generic(stub: Any, proof: bool, inlined: bool, default: Callable[..., Any] | None, chained: bool) -> Any:
+    """Make the table of methods and the overload that reads it."""
+    default = _handed_on if chained else default
     methods: dict[Any, Callable[..., Any]] = {}
     given = _PROOF if proof else _ESTIMATE
     options = {**{key: given[key] for key in _OVERLOAD}, "forceinline": inlined}
+
+    def one_after_another(entries: Any, value: Any, *rest: Any) -> Any:
+        return chosen(entries[1:], chosen(entries[0], value, *rest), *rest)
+
+    def of_tuple(first: Any) -> Callable[..., Any] | None:
+        plain = type(first) is tuple or (isinstance(first, types.BaseTuple) and not named_tuple_class(first))
+        return None if not (chained and plain) else one_after_another if len(first) else _handed_on
 
     def choose(first: Any, *rest: Any) -> Callable[..., Any] | None:
         if (method := of_tuple(first)) is not None:

@@ -47,11 +47,7 @@ def _hindrance(scene: Scene, finding: Finding, others: tuple[str, ...]) -> str:
 
     effect = finding.effect
     if finding.called_for is None:
-        return (
-            f"world.{finding.missing} is missing: cannot tell"
-            if finding.missing
-            else "no limit set: cannot tell"
-        )
+        return f"{f'world.{finding.missing} is missing' if finding.missing else 'no limit set'}: cannot tell"
     if effect in NO_EFFECT:
         return "broken, and no effect simulates that: change the scene"
     if effect not in EFFECTS:

@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from limitsets.jit import chained, kernel
+from limitsets.jit import generic, kernel
 from limitsets.thrower.params import Side, Throw
 from limitsets.thrower.turn import Turned
 
@@ -180,32 +180,32 @@ class Face(NamedTuple):
 # lands, whether it slips and rolls, finds each of them by its class.
 
 
-@chained
+@generic(chained=True)
 def thrown(effect: Any, bare: Throw) -> Throw:
     """Return the minimal model as it is thrown with an effect."""
 
 
-@chained
+@generic(chained=True)
 def varied(effect: Any, params: FullThrow, start: int, step: int) -> FullThrow:
     """Return the map of throw number `step` of start number `start`."""
 
 
-@chained
+@generic(chained=True)
 def possible(effect: Any, so_far: bool, part: FullSide, x: float) -> bool:
     """Whether the model can say what a throw from x does."""
 
 
-@chained
+@generic(chained=True)
 def impacted(effect: Any, contact: Contact, part: FullSide) -> Contact:
     """Return a vertex that has just struck as an effect leaves it."""
 
 
-@chained
+@generic(chained=True)
 def moved(effect: Any, shift: float, part: FullSide, face: Face) -> float:
     """Return the shift of a part that stays on a side it came down on [length]; nan where the model does not say."""
 
 
-@chained
+@generic(chained=True)
 def stays(effect: Any, so_far: bool, part: FullSide, k: int) -> bool:
     """Whether a part that came to rest on side number k remains there until the next throw."""
 

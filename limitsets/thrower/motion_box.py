@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from limitsets.interval import Interval
-from limitsets.jit import chained, entries_of, generic, proof_kernel
+from limitsets.jit import entries_of, generic, proof_kernel
 from limitsets.maps import codes
 from limitsets.thrower.motion import FullThrow
 from limitsets.thrower.params import Throw
@@ -117,12 +117,12 @@ class Ways(NamedTuple):
     second: Way
 
 
-@chained(proof=True)
+@generic(proof=True, chained=True)
 def thrown_box(effect: Any, kappa: Interval) -> Interval:
     """Return the kappas of all throws with an effect: the box twin of `motion.thrown` and `motion.varied`."""
 
 
-@chained(proof=True)
+@generic(proof=True, chained=True)
 def moved_box(effect: Any, x: Interval) -> Interval:
     """Return the places of rest of all throws with an effect: the box twin of `motion.moved`."""
 

@@ -39,36 +39,21 @@ class _Best:
         self.tried += 1
         self.tell("designs near the best", min(self.tried, self.of), self.of)
         scene = self.search.scene_of(unknowns)
-        if scene is None:
-            return -30.0
-        scene = self.made(scene)
-        lacking = self.search.lacking(scene)
-        if lacking < 0.0:
-            return lacking
-        best = 0.0 if self.found is None else self.found.margin
-        search = self.search
-        found = estimated(scene, search.tolerance, search.side, hard=self.hard, steps=FINE, close=FINELY)
-        if found is not None and found.margin > best:
-            found = self._on_all_corners(scene, found)
-        if found is None:
-            return -10.0
-        if not found.margin > 0.0:
-            return found.margin
-        lacking = search.broken(scene, found)
-        if lacking < 0.0:
-            return lacking
-        if found.margin > best:
+        scene = None if scene is None else self.made(scene)
+        rating, found = self.search.rated(scene, self._estimate)
+        if found is not None and (self.found is None or found.margin > self.found.margin):
             self.unknowns, self.scene, self.found = [float(u) for u in unknowns], scene, found
-        return found.margin
+        return rating
 
-    def _on_all_corners(self, scene: Scene, found: Estimate) -> Estimate | None:
-        search = self.search
-        wrong = failing(scene, search.tolerance, search.side, found, found.margin)
-        new = [signs for signs in wrong if signs not in self.hard]
-        if not new:
+    def _estimate(self, scene: Scene) -> Estimate | None:
+        """Estimate a margin; where it may be the best, on all corners."""
+        about = scene, self.search.tolerance, self.search.side
+        found = estimated(*about, hard=self.hard, steps=FINE, close=FINELY)
+        if found is None or not found.margin > (0.0 if self.found is None else self.found.margin):
             return found
+        new = [signs for signs in failing(*about, found, found.margin) if signs not in self.hard]
         self.hard[:0] = new
-        return on_all_corners(scene, search.tolerance, search.side, self.hard)
+        return on_all_corners(*about, self.hard) if new else found
 
 
 def polished(

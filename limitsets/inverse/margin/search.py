@@ -111,20 +111,27 @@ class Search:
         """Rate a design: its margin, or below 0 how far it is from being one."""
         self.evaluations += 1
         scene = self.scene_of(unknowns)
-        if scene is None:
-            return -30.0
-        lacking = self.lacking(scene)
-        if lacking < 0.0:
-            return lacking
-        found = estimated(scene, self.tolerance, self.side, hard=self.hard, above=above)
-        if found is None:
-            return -10.0
-        if found.margin > 0.0:
-            lacking = self.broken(scene, found)
-            if lacking < 0.0:
-                return lacking
+
+        def quickly(one: Scene) -> Estimate | None:
+            return estimated(one, self.tolerance, self.side, hard=self.hard, above=above)
+
+        rating, found = self.rated(scene, quickly)
+        if scene is not None and found is not None:
             self.history.append(Candidate(self._values(scene), found, self.order))
-        return found.margin
+        return rating
+
+    def rated(
+        self, scene: Scene | None, estimate: Callable[[Scene], Estimate | None]
+    ) -> tuple[float, Estimate | None]:
+        """Rate a scene by an estimate of its margin; with the estimate where it feeds, and breaks no assumption."""
+        lacking = -30.0 if scene is None else self.lacking(scene)
+        if scene is None or lacking < 0.0:
+            return lacking, None
+        found = estimate(scene)
+        if found is None or not found.margin > 0.0:
+            return (-10.0 if found is None else found.margin), None
+        lacking = self.broken(scene, found)
+        return (lacking, None) if lacking < 0.0 else (found.margin, found)
 
     def lacking(self, scene: Scene) -> float:
         """Rate a part that no lead weight makes: -20 or below; 0 where one does."""
@@ -163,7 +170,7 @@ class Search:
         """Move a population for so many evaluations; the population and its ratings, the best first."""
         from scipy.optimize import differential_evolution
 
-        end, step = self.evaluations + evaluations, 0
+        end, step = self.evaluations + max(evaluations, 1), 0
         begin = self.evaluations
         while self.evaluations < end:
             found = differential_evolution(

@@ -128,8 +128,8 @@ def thrown_into(found: Attraction, bad: Mask) -> str:
 def place_text(goal: Any, scene: Scene) -> str:
     """Write the x of a goal as a certificate has it: the scene's own words where it is the scene's own goal."""
     own = scene.text.get("goal", {}).get(goal.kind)
-    if goal == scene.goal and isinstance(own, Mapping):
-        return " ".join(str(own["x"]).split())
+    if goal == scene.goal and own is not None:
+        return " ".join(str(own["x"] if isinstance(own, Mapping) else own).split())
     return f"{goal.x!r} {scene.unit}"
 
 

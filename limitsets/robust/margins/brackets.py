@@ -13,10 +13,12 @@ from dataclasses import dataclass, field, replace
 from fractions import Fraction
 
 from limitsets.proofs.query import Outcome, Query
+from limitsets.proofs.tolerance import Piece
 from limitsets.robust.margins.deviations import Measure, short
 from limitsets.robust.margins.halving import a_little_beyond, halved
+from limitsets.robust.margins.vector import Signs, Tolerance
 
-__all__ = ["Bracket", "Tell", "bracket_fixed", "bracket_per_throw"]
+__all__ = ["Bracket", "Ray", "Tell", "bracket_fixed", "bracket_per_throw"]
 
 Tell = Callable[[float], None]
 """Called with the share of the bracket that is closed."""
@@ -66,69 +68,74 @@ class Bracket:
         return self.refuted is not None and self.refuted - self.proved <= width * self.refuted
 
 
-@dataclass(eq=False)
-class _Reach:
-    """How far in one direction single scenes are good, bad, or cannot be."""
+class Ray:
+    """Sizes in one direction of a tolerance, each asked as a single scene, and what became of them."""
 
-    query: Query
-    measure: Measure
-    sign: int
-    good: Fraction = Fraction(0)
-    bad: Fraction | None = None
-    against: Outcome | None = None
-    end: Fraction | None = None
-    reason: str = ""
+    def __init__(self, query: Query, tolerance: Tolerance, signs: Signs) -> None:
+        self.query, self.tolerance, self.signs = query, tolerance, signs
+        self.found = Bracket()
+        self.end: Fraction | None = None
+
+    def _at(self, size: Fraction) -> tuple[Piece | None, dict[str, str]]:
+        return self.tolerance.corner(size, self.signs), self.tolerance.noise(size)
+
+    def proves(self, size: Fraction, finest: int = 3) -> bool:
+        """Whether the goals are proved at a size."""
+        one = self.query.prove(*self._at(size), finest)
+        if one.verdict != "proved":
+            self.found.reason = one.reason
+        elif size > self.found.proved:
+            self.found.proved, self.found.pieces = size, [one]
+        return one.verdict == "proved"
+
+    def refutes(self, size: Fraction) -> bool:
+        """Whether an orbit violates a goal at a size."""
+        one = self.query.refute(*self._at(size))
+        if one.verdict == "refuted":
+            self.found.refuted = size
+            self.found.against = replace(one, within=self.tolerance.texts(size))
+        return one.verdict == "refuted"
 
     def ask(self, size: Fraction) -> str:
-        """Ask a single scene, and remember what it says; the verdict."""
-        found = _point(self.query, self.measure, self.sign * size)
-        if found.verdict == "proved":
-            self.good = max(self.good, size)
-        elif found.verdict == "refuted":
-            self.bad, self.against = size, found
+        """Ask for the verdict at a size; `end` is where it was neither proved nor refuted last."""
+        one = self.query.prove(*self._at(size), finest=0)
+        if one.verdict not in ("proved", "impossible"):
+            if self.refutes(size):
+                return "refuted"
+            one = self.query.prove(*self._at(size))
+        if one.verdict == "proved":
+            self.found.proved = max(self.found.proved, size)
         else:
-            self.end, self.reason = size, found.reason
-        return found.verdict
+            self.end, self.found.reason = size, one.reason
+        return one.verdict
 
     @property
     def gap(self) -> bool:
-        """Whether nothing is known of some scene before those that are bad."""
-        return self.bad is not None and self.end is not None and self.end < self.bad
+        """Whether nothing is known of some scene before those that are refuted."""
+        return self.found.refuted is not None and self.end is not None and self.end < self.found.refuted
 
 
-def _point(query: Query, measure: Measure, size: Fraction) -> Outcome:
-    """Ask a single scene."""
-    piece = measure.piece(measure.at(size))
-    found = query.prove(piece, finest=0)
-    if found.verdict in ("proved", "impossible"):
-        return found
-    against = query.refute(piece)
-    if against.verdict == "refuted":
-        return replace(against, within={measure.quantity: measure.text(abs(size))})
-    return query.prove(piece)
-
-
-def _reach(query: Query, measure: Measure, sign: int, width: Fraction, known: Fraction | None) -> _Reach:
+def _reach(query: Query, measure: Measure, sign: int, width: Fraction, known: Fraction | None) -> Ray:
     """Go outward from the scene as it is until single scenes are refuted or cannot be, then halve."""
-    reach, step = _Reach(query, measure, sign), measure.least
+    ray, step = Ray(query, Tolerance.alone(measure), (sign,)), measure.least
+    found = ray.found
     for _ in range(STEPS):
         size = step if measure.most is None else min(step, (step / FACTOR + measure.most) / 2)
-        if known is not None and reach.good >= known:
-            return reach
-        if reach.ask(size) != "proved":
+        if known is not None and found.proved >= known:
+            return ray
+        if ray.ask(size) != "proved":
             break
         step *= FACTOR
     else:
-        return reach
-    top = next(each for each in (reach.bad, reach.end) if each is not None)
+        return ray
+    least = NONE * measure.least
     # beyond a gap what is refuted is nearly as near as can be
-    least, near = NONE * measure.least, reach.good
-    halved(near, top, lambda size: reach.ask(size) == "proved", width, least, stop=lambda: reach.gap)
-    if reach.bad is not None and reach.end is not None:
+    halved(found.proved, size, lambda s: ray.ask(s) == "proved", width, least, stop=lambda: ray.gap)
+    if found.refuted is not None and ray.end is not None:
         # lower what is refuted towards what is undecided, and raise what is proved
-        halved(reach.end, reach.bad, lambda size: reach.ask(size) != "refuted", width)
-        reach.end = None
-    return reach
+        halved(ray.end, found.refuted, lambda s: ray.ask(s) != "refuted", width)
+        ray.end = None
+    return ray
 
 
 def _grow(
@@ -161,25 +168,26 @@ def _grow(
 
 def bracket_fixed(query: Query, measure: Measure, width: Fraction, tell: Tell) -> Bracket:
     """Bracket the margin of a quantity that is fixed but unknown."""
-    ways: dict[int, _Reach] = {}
+    ways: dict[int, Ray] = {}
     for sign in (-1, 1):
-        known = min((way.bad for way in ways.values() if way.bad is not None), default=None)
+        known = min(
+            (way.found.refuted for way in ways.values() if way.found.refuted is not None), default=None
+        )
         ways[sign] = _reach(query, measure, sign, width / 4, known)
     found = Bracket()
-    bad = [way for way in ways.values() if way.bad is not None]
-    if bad:
-        nearest = min(bad, key=lambda way: way.bad or 0)
-        found.refuted, found.against = nearest.bad, nearest.against
-        found.sign = next(sign for sign, way in ways.items() if way is nearest)
+    for sign, way in ways.items():
+        bad = way.found.refuted
+        if bad is not None and (found.refuted is None or bad < found.refuted):
+            found.refuted, found.against, found.sign = bad, way.found.against, sign
     ends = [way for way in ways.values() if way.end is not None]
-    limits = [way.good for way in ends] if found.refuted is None else []
-    goal = min(limits, default=min(way.good for way in ways.values()))
     if found.refuted is not None:
         goal = found.refuted * (1 - width * Fraction(6, 10))
-        goal = min([goal, *(way.good for way in ends)])
-    first = next((way for way in ends if way.good == goal and way.end is not None), None)
+        goal = min([goal, *(way.found.proved for way in ends)])
+    else:
+        goal = min(way.found.proved for way in ends or ways.values())
+    first = next((way for way in ends if way.found.proved == goal), None)
     if first is not None and first.end is not None:
-        found.reason = f"from {measure.text(first.end)} on: {first.reason}"
+        found.reason = f"from {measure.text(first.end)} on: {first.found.reason}"
     found = _fixed_proof(query, measure, found, short(goal), tell)
     found.reason = "" if found.closed(width) else found.reason
     return found
@@ -201,89 +209,51 @@ def _fixed_proof(query: Query, measure: Measure, found: Bracket, goal: Fraction,
         found.pieces += pieces
         if far < goal:
             goal, found.reason = far, reason + NARROWER
-            _fails_beyond(query, measure, sign, far, found)
+            _fails_beyond(Ray(query, Tolerance.alone(measure), (sign,)), sign, far, found)
             if not far:
                 break
     found.proved = goal
     return found
 
 
-def _fails_beyond(query: Query, measure: Measure, sign: int, far: Fraction, found: Bracket) -> None:
+def _fails_beyond(ray: Ray, sign: int, far: Fraction, found: Bracket) -> None:
     """Where a proof stops growing, look for a scene that fails: a goal may fail at a size and hold at larger ones."""
     for beyond in a_little_beyond(far, Fraction(1, 400), 10):
         size = short(beyond, up=True)
         if found.refuted is not None and size >= found.refuted:
             return
-        against = query.refute(measure.piece(measure.at(sign * size)))
-        if against.verdict == "refuted":
-            found.refuted, found.sign = size, sign
-            found.against = replace(against, within={measure.quantity: measure.text(size)})
+        if ray.refutes(size):
+            found.refuted, found.against, found.sign = size, ray.found.against, sign
             return
-
-
-class _Sizes:
-    """Sizes of a quantity that is another one at every throw, proved and refuted."""
-
-    def __init__(self, query: Query, measure: Measure) -> None:
-        self.query, self.measure, self.found = query, measure, Bracket()
-
-    def proves(self, size: Fraction, finest: int) -> bool:
-        one = self.query.prove(None, {self.measure.quantity: self.measure.text(size)}, finest)
-        if one.verdict == "proved":
-            if size > self.found.proved:
-                self.found.proved, self.found.pieces = size, [one]
-        else:
-            self.found.reason = one.reason
-        return one.verdict == "proved"
-
-    def refutes(self, size: Fraction) -> bool:
-        one = self.query.refute(None, {self.measure.quantity: self.measure.text(size)})
-        if one.verdict == "refuted":
-            self.found.refuted, self.found.against = size, one
-        return one.verdict == "refuted"
-
-    def first(self) -> Fraction:
-        """Go outward until it is not proved with few cells, then halve to some percent; that size."""
-        size, most = self.measure.least, self.measure.most
-        for _ in range(STEPS):
-            if not self.proves(size, 1):
-                break
-            nearer = FACTOR * size
-            size = nearer if most is None or nearer < most else (size + most) / 2
-        least = NONE * self.measure.least
-        _, size = halved(
-            self.found.proved, size, lambda middle: self.proves(middle, 1), Fraction(1, 40), least
-        )
-        return size
-
-    def against(self, size: Fraction) -> None:
-        """Find a size that is refuted, from one on that is not proved."""
-        most = self.measure.most
-        for beyond in a_little_beyond(size, Fraction(1, 100), 8):
-            if (most is None or short(beyond) < most) and self.refutes(short(beyond)):
-                return
 
 
 def bracket_per_throw(query: Query, measure: Measure, width: Fraction, tell: Tell) -> Bracket:
     """Bracket the margin of a quantity that is another one at every throw."""
-    sizes = _Sizes(query, measure)
-    found = sizes.found
-    top = sizes.first()
+    ray, size, most = Ray(query, Tolerance.alone(measure), ()), measure.least, measure.most
+    found = ray.found
+    for _ in range(STEPS):
+        if not ray.proves(size, 1):
+            break
+        nearer = FACTOR * size
+        size = nearer if most is None or nearer < most else (size + most) / 2
+    _, size = halved(found.proved, size, lambda s: ray.proves(s, 1), Fraction(1, 40), NONE * measure.least)
     tell(0.3)
-    sizes.against(top)
+    for beyond in a_little_beyond(size, Fraction(1, 100), 8):
+        if (most is None or short(beyond) < most) and ray.refutes(short(beyond)):
+            break
     tell(0.5)
     if found.refuted is not None and not found.closed(width):
-        sizes.proves(short(found.refuted * (1 - width * Fraction(9, 10))), 3)
+        ray.proves(short(found.refuted * (1 - width * Fraction(9, 10))), 3)
     low = high = None  # nothing is known between them
     while found.refuted is not None and not found.closed(width) and found.refuted > NONE * measure.least:
         middle = short(((high or found.proved) + found.refuted) / 2)
         if found.refuted - (high or found.proved) > width / 4 * found.refuted:
-            if sizes.refutes(middle) or sizes.proves(middle, 3):
+            if ray.refutes(middle) or ray.proves(middle, 3):
                 continue
             low, high = low or middle, middle
         elif low is not None and low - found.proved > width / 4 * low:
             middle = short((found.proved + low) / 2)
-            low = low if sizes.proves(middle, 3) else middle
+            low = low if ray.proves(middle, 3) else middle
         else:
             break
     found.reason = "" if found.closed(width) else found.reason

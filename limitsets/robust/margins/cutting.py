@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import heapq
 import time
-from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from typing import NamedTuple
@@ -17,10 +16,11 @@ from typing import NamedTuple
 import numpy as np
 
 from limitsets.proofs.query import Outcome, Query
+from limitsets.robust.margins.brackets import Tell
 from limitsets.robust.margins.sensitivity import Sensitivity
 from limitsets.robust.margins.vector import Parts, Tolerance
 
-__all__ = ["Cutting", "Tell"]
+__all__ = ["Cutting"]
 
 # Pieces after which the proof of the box ends with what it has.
 MOST_PIECES = 4000
@@ -39,8 +39,6 @@ LEAST_SHARE = 0.2
 
 # A piece narrower than this share of the box is not cut again.
 NARROWEST = Fraction(1, 4096)
-
-Tell = Callable[[float], None]
 
 
 @dataclass(order=True)

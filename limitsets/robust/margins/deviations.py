@@ -15,7 +15,8 @@ from limitsets.proofs.parameters import VARYING
 from limitsets.proofs.rational import Span
 from limitsets.proofs.tolerance import Piece
 from limitsets.scene import Scene
-from limitsets.scene.quantities import find, parsed_deviation, text_at, texts
+from limitsets.scene.facts import Deviation
+from limitsets.scene.quantities import base_unit, find, parsed_deviation, text_at, texts
 from limitsets.scene.units import Quantity, exact_factor, parse
 
 __all__ = ["READINGS", "Measure", "decimal", "given", "measure", "measures", "short"]
@@ -138,6 +139,13 @@ class Measure:
     def text(self, size: Fraction) -> str:
         """Write a size with its unit, as `limitsets.certify` takes it."""
         return f"{decimal(size)} {self.unit}"
+
+    def deviation(self, size: Fraction) -> Deviation:
+        """Return a size in floats, in the scene's units."""
+        if self.relative:
+            return Deviation(float(size / 100), relative=True)
+        unit = base_unit(find(self.quantity).dimension, self.scene.unit)
+        return Deviation(float(size * exact_factor(self.unit, unit)), relative=False)
 
     def value(self, size: Fraction) -> Fraction:
         """Return the value of `key` at a deviation with its sign."""

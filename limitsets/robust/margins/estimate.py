@@ -165,16 +165,17 @@ def estimated(
     bare = Estimate(0.0, math.nan, threshold, reach, nominal, {})
     fed = _Fed(scene, tolerance, side, _start(bare, side))
     ways = _ways(scene, nominal, side)
-    falls = np.zeros((len(tolerance.names), ways.size))
-    for k in range(len(tolerance.names)):
-        sizes = [float(j == k) for j in range(len(tolerance.names))]
+    falls = np.zeros((len(tolerance.deviations), ways.size))
+    for k in range(len(tolerance.deviations)):
+        sizes = [float(j == k) for j in range(len(tolerance.deviations))]
         corner = tolerance.scene_at(scene, 1.0, sizes)
         found = _kept(corner, fed.start, 0.0)
         if corner is None or found is None:
             return bare
         falls[k] = _ways(corner, found, side) - ways
     effects = {
-        name: (float(abs(falls[k, 0])), float(abs(falls[k, 1]))) for k, name in enumerate(tolerance.names)
+        name: (float(abs(falls[k, 0])), float(abs(falls[k, 1])))
+        for k, name in enumerate(tolerance.deviations)
     }
     cost = float(np.abs(falls[:, :2]).sum()) + 3.0 * tolerance.scatter
     linear = (reach - threshold) / cost if cost > 0.0 else math.inf
@@ -202,7 +203,7 @@ def failing(scene: Scene, tolerance: Tolerance, side: int, found: Estimate, fact
     """
     fed = _Fed(scene, tolerance, side, _start(found, side))
     wrong = []
-    for signs in corners(len(tolerance.names)):
+    for signs in corners(len(tolerance.deviations)):
         threshold, reach = fed.spare(factor, signs)
         if not threshold <= found.x <= reach:
             wrong.append(signs)

@@ -8,16 +8,16 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping
-from dataclasses import replace
 from fractions import Fraction
 
 from limitsets.goals import Goal
 from limitsets.proofs.query import Outcome, Query
 from limitsets.robust.margins.answer import Margin
-from limitsets.robust.margins.cutting import Cutting, Tell
+from limitsets.robust.margins.brackets import Bracket, Ray, Tell
+from limitsets.robust.margins.cutting import Cutting
 from limitsets.robust.margins.halving import a_little_beyond, halved
 from limitsets.robust.margins.sensitivity import Sensitivity, sensitivity_of
-from limitsets.robust.margins.vector import Signs, Tolerance
+from limitsets.robust.margins.vector import Tolerance
 from limitsets.scene import Scene
 
 __all__ = ["joint_margin"]
@@ -69,8 +69,9 @@ def joint_margin(
     texts = dict(scene.text.get("tolerance", {}) if tolerance is None else tolerance)
     vector, share = Tolerance.of(query.scene, texts), Fraction(repr(width))
     sensitivity = sensitivity_of(query, vector)
-    good, bad, against, reason = _at_corners(query, vector, sensitivity, share / 8)
-    target = rounded(min(good, bad * (1 - share * Fraction(9, 10))) if bad is not None else good)
+    at_corners = _at_corners(query, vector, sensitivity, share / 8)
+    bad, reason, target = at_corners.refuted, at_corners.reason, at_corners.proved
+    target = rounded(target if bad is None else min(target, bad * (1 - share * Fraction(9, 10))))
     tell(0.05)
     proved, pieces, noise = Fraction(0), list[Outcome](), dict[str, str]()
     end = time.perf_counter() + seconds
@@ -104,53 +105,37 @@ def joint_margin(
         vector.texts(proved) if proved else {},
         noise if proved else {},
         tuple(pieces),
-        against,
+        at_corners.against,
     )
 
 
-def _at_corners(
-    query: Query, tolerance: Tolerance, sensitivity: Sensitivity, width: Fraction
-) -> tuple[Fraction, Fraction | None, Outcome | None, str]:
-    """Bracket the factor at the worst corners, as single scenes: proved, refuted, by what, why not."""
-    count = len(tolerance.measures)
-    goods, bad, against, reason = list[Fraction](), None, None, ""
+def _at_corners(query: Query, tolerance: Tolerance, sensitivity: Sensitivity, width: Fraction) -> Bracket:
+    """Bracket the factor at the worst corners, as single scenes."""
+    count, found, proved = len(tolerance.measures), Bracket(), list[Fraction]()
     for signs in (sensitivity.corners() or [(1,) * count, (-1,) * count])[:CORNERS]:
-        good, own, by, why = _at_one(query, tolerance, signs, width, bad)
-        goods.append(good)
-        if own is not None and (bad is None or own < bad):
-            bad, against = own, by
-        reason = reason or why
-    return min(goods), bad, against, reason
+        own = _at_one(Ray(query, tolerance, signs), width, found.refuted)
+        proved.append(own.proved)
+        if own.refuted is not None and (found.refuted is None or own.refuted < found.refuted):
+            found.refuted, found.against = own.refuted, own.against
+        found.reason = found.reason or own.reason
+    found.proved = min(proved)
+    return found
 
 
-def _at_one(
-    query: Query, tolerance: Tolerance, signs: Signs, width: Fraction, known: Fraction | None
-) -> tuple[Fraction, Fraction | None, Outcome | None, str]:
-    good, bad, against, reason = Fraction(0), None, None, ""
-
-    def proves(factor: Fraction) -> bool:
-        nonlocal good, reason
-        found = query.prove(tolerance.corner(factor, signs), tolerance.noise(factor))
-        good, reason = (max(good, factor), reason) if found.verdict == "proved" else (good, found.reason)
-        return found.verdict == "proved"
-
-    def refutes(factor: Fraction) -> bool:
-        nonlocal bad, against
-        found = query.refute(tolerance.corner(factor, signs), tolerance.noise(factor))
-        if found.verdict == "refuted":
-            bad, against = factor, replace(found, within=tolerance.texts(factor))
-        return found.verdict == "refuted"
-
-    factor = known or SMALL
-    while proves(factor):
+def _at_one(ray: Ray, width: Fraction, known: Fraction | None) -> Bracket:
+    """Bracket the factor at one corner, where it is below one that is known."""
+    factor, found = known or SMALL, ray.found
+    while ray.proves(factor):
         if known is not None or factor > MOST:
-            return good, None, None, ""
+            return found
         factor *= 2
-    _, top = halved(good, factor, proves, width, LEAST, rounded)
-    if any(refutes(rounded(beyond)) for beyond in a_little_beyond(top, Fraction(1, 400), 10)):
+    _, top = halved(found.proved, factor, ray.proves, width, LEAST, rounded)
+    beyond = (rounded(each) for each in a_little_beyond(top, Fraction(1, 400), 10))
+    bad = next((each for each in beyond if ray.refutes(each)), None)
+    if bad is not None:
         # what is not proved need not fail: it may hold for fewer starts than all
-        halved(top, bad or top, lambda middle: not refutes(middle), width, rounded=rounded)
-    return good, bad, against, reason
+        halved(top, bad, lambda middle: not ray.refutes(middle), width, rounded=rounded)
+    return found
 
 
 def rounded(value: Fraction) -> Fraction:

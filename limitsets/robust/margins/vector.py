@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
+from functools import cached_property
 from itertools import product
 
 import numpy as np
@@ -65,56 +66,59 @@ class Tolerance:
         What is fixed but unknown.
     sizes : tuple of Fraction
         A size for each.
-    deviations : tuple of Deviation
-        The same in floats of the scene's units.
-    landing : Measure or None
-        Where parts land, at every throw, if that is in it.
-    landing_size : Fraction
-        How far.
-    scatter : float
-        The same in floats [scene's unit]; 0 where it is not in it.
+    varying : Measure or None
+        What differs at every throw, if something does: where parts land.
+    varying_size : Fraction
+        How much.
     """
 
     measures: tuple[Measure, ...]
     sizes: Parts
-    deviations: tuple[Deviation, ...]
-    landing: Measure | None
-    landing_size: Fraction
-    scatter: float
+    varying: Measure | None = None
+    varying_size: Fraction = Fraction(0)
 
     @classmethod
     def of(cls, scene: Scene, texts: Mapping[str, str]) -> Tolerance:
         """Read it from texts by quantity."""
-        measures, sizes, deviations = list[Measure](), list[Fraction](), list[Deviation]()
-        landing, landing_size, scatter = None, Fraction(0), 0.0
+        measures, sizes, landing, landing_size = list[Measure](), list[Fraction](), None, Fraction(0)
         if not texts:
             raise AnswerError(
                 "the tolerance", "empty", "deviations by quantity", "give the scene [tolerance]"
             )
         for name, text in texts.items():
-            in_floats = deviation(text, name, scene.unit, key=f'tolerance."{name}"')
+            deviation(text, name, scene.unit, key=f'tolerance."{name}"')  # refuses what is none
             one, given = measure(scene, name), parsed_deviation(text, name)
             one = replace(one, unit=given.unit)
             if name == "throw.speed" and one.key != name and given.unit != "%":
                 raise AnswerError("the tolerance", text, "percent, for a scene given by kappa", "give it so")
             if name == "landing.x":
-                landing, landing_size, scatter = one, Fraction(given.number), in_floats.value
+                landing, landing_size = one, Fraction(given.number)
             else:
                 measures.append(one)
                 sizes.append(Fraction(given.number))
-                deviations.append(in_floats)
-        return cls(tuple(measures), tuple(sizes), tuple(deviations), landing, landing_size, scatter)
+        return cls(tuple(measures), tuple(sizes), landing, landing_size)
 
-    @property
-    def names(self) -> tuple[str, ...]:
-        """The quantities that are fixed but unknown."""
-        return tuple(one.quantity for one in self.measures)
+    @classmethod
+    def alone(cls, one: Measure) -> Tolerance:
+        """Return one quantity, by 1 of its unit."""
+        return cls((one,), (Fraction(1),)) if one.reading == "fixed" else cls((), (), one, Fraction(1))
+
+    @cached_property
+    def deviations(self) -> dict[str, Deviation]:
+        """What is fixed but unknown, in floats of the scene's units."""
+        return {
+            one.quantity: one.deviation(size) for one, size in zip(self.measures, self.sizes, strict=True)
+        }
+
+    @cached_property
+    def scatter(self) -> float:
+        """How far landings are off, in floats [scene's unit]; 0 where they are not."""
+        return 0.0 if self.varying is None else self.varying.deviation(self.varying_size).value
 
     def noise(self, factor: Fraction) -> dict[str, str]:
         """Say what differs at every throw."""
-        if self.landing is None:
-            return {}
-        return {"landing.x": self.landing.text(short(factor * self.landing_size))}
+        one = self.varying
+        return {} if one is None else {one.quantity: one.text(short(factor * self.varying_size))}
 
     def texts(self, factor: Fraction) -> dict[str, str]:
         """Say what is fixed but unknown, as `limitsets.certify` takes it."""
@@ -145,7 +149,7 @@ class Tolerance:
     def scene_at(self, scene: Scene, factor: float, signs: Sequence[float]) -> Scene | None:
         """Give another scene, in floats, at a corner of the same box about it; None where there is no such part."""
         values: dict[str, float | str] = {}
-        for name, size, sign in zip(self.names, self.deviations, signs, strict=True):
+        for (name, size), sign in zip(self.deviations.items(), signs, strict=True):
             if name == "throw.speed" and "kappa" in scene.text["throw"]:
                 share = factor * sign * size.value
                 if not share > -1.0:

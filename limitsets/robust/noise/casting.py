@@ -72,10 +72,9 @@ def boxes_of_pieces(
             y, to, _ = along(params, x, side, [cut.branch])
             if not 0 <= int(to[0]) < grid.sides:
                 continue
-            known = np.isfinite(y[1:]) & np.isfinite(
-                y[:-1]
-            )  # elsewhere the mass is missing: outside the model
-            y = np.where(np.isfinite(y), y, 0.0)
+            finite = np.isfinite(y)
+            known = finite[1:] & finite[:-1]  # elsewhere the mass is missing: outside the model
+            y = np.where(finite, y, 0.0)
             width, shift = _within(map_of, mean, half, 0.5 * (x[1:] + x[:-1]), side, cut.branch)
             middle = 0.5 * (y[1:] + y[:-1]) + shift
             reach = 0.5 * np.hypot(np.diff(y), width)

@@ -101,9 +101,5 @@ def first_arrival(landing: Any, part: FullSide, x: float) -> tuple[Arrival, bool
     return Arrival(vertex, psi, moved, speed - (own.h + own.d), x - own.kappa * phi, 1.0), True
 
 
-def _of(world: Any, how: Any) -> Landing:
-    return Landing()
-
-
 encloses.on(Landing, enclosed)
-declare(Effect("landing", Landing, _of, "the left bottom vertex lands first"))
+declare(Effect("landing", Landing, lambda world, how: Landing(), "the left bottom vertex lands first"))

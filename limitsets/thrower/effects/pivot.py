@@ -136,8 +136,12 @@ def turned_down(pivot: Any, slip: Any, part: FullSide, struck: Contact) -> tuple
     return hit, _come_down(part, hit), LOST
 
 
-def _of(world: Any, how: Any) -> Pivot:
-    return Pivot(float(world.friction))
-
-
-declare(Effect("pivot", Pivot, _of, "it acts as a hinge until a side lies flat", ("friction",)))
+declare(
+    Effect(
+        "pivot",
+        Pivot,
+        lambda world, how: Pivot(float(world.friction)),
+        "it acts as a hinge until a side lies flat",
+        ("friction",),
+    )
+)

@@ -85,9 +85,7 @@ def _lift(part: FullSide, foot: float, d: float) -> float:
     return gravity * right * right / (math.hypot(right, high) + high)  # ell - H
 
 
-def _of(world: Any, how: Any) -> Roll:
-    return Roll()
-
-
 encloses.on(Roll, enclosed)
-declare(Effect("roll", Roll, _of, "the part then stays where it is until the next throw"))
+declare(
+    Effect("roll", Roll, lambda world, how: Roll(), "the part then stays where it is until the next throw")
+)

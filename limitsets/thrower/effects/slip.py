@@ -109,9 +109,13 @@ def _slid_on(slip: Slip, shift: float, part: FullSide, face: Face) -> float:
     return shift + math.copysign(slide * slide / (2.0 * mu * part.own.kappa), slide)
 
 
-def _of(world: Any, how: Any) -> Slip:
-    return Slip(float(world.friction))
-
-
 moved.on(Slip, _slid_on)
-declare(Effect("slip", Slip, _of, "the vertex that lands sticks without slipping", ("friction",)))
+declare(
+    Effect(
+        "slip",
+        Slip,
+        lambda world, how: Slip(float(world.friction)),
+        "the vertex that lands sticks without slipping",
+        ("friction",),
+    )
+)
