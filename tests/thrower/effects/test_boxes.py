@@ -16,6 +16,7 @@ from limitsets.graph.images.enclosed import enclosures
 from limitsets.maps import codes, images
 from limitsets.proofs.parameters import parameter_box
 from limitsets.proofs.replay import replay
+from limitsets.thrower.motion_box import all_enclosed
 
 EFFECTS = {"landing": True, "roll": True}
 
@@ -159,6 +160,10 @@ class Wind(NamedTuple):
     """An effect that has not said that boxes follow it."""
 
     strength: float
+
+
+def test_without_any_effect_everything_is_enclosed():
+    assert all_enclosed(()) is True
 
 
 @pytest.mark.parametrize("k", [0, 1, 2])
