@@ -24,11 +24,12 @@ if TYPE_CHECKING:  # each from the file that holds it: most rooms have a file of
     from limitsets.cells import grid
     from limitsets.graph.morse import morse_graph
     from limitsets.graph.transitions import transitions
-    from limitsets.inverse import design
+    from limitsets.inverse import design, robust_design
     from limitsets.maps import critical_points, orbit, register
     from limitsets.proofs.certify import certify
     from limitsets.proofs.confirm import recheck
     from limitsets.robust.margins.finding import margin
+    from limitsets.robust.noise.statistics import noise_statistics
     from limitsets.robust.sheet.gathering import robustness
     from limitsets.scene import dump, load, scenes
     from limitsets.sets.attractors import attractors
@@ -58,10 +59,12 @@ _ROOMS = {
     "maps": "maps",
     "margin": "robust.margins.finding",
     "morse_graph": "graph",
+    "noise_statistics": "robust.noise.statistics",
     "orbit": "maps",
     "plot": "plot",
     "recheck": "proofs.confirm",
     "register": "maps",
+    "robust_design": "inverse",
     "robustness": "robust.sheet.gathering",
     "scenes": "scene",
     "transitions": "graph.transitions",
@@ -85,10 +88,12 @@ __all__ = [
     "maps",
     "margin",
     "morse_graph",
+    "noise_statistics",
     "orbit",
     "plot",
     "recheck",
     "register",
+    "robust_design",
     "robustness",
     "scenes",
     "transitions",

@@ -17,8 +17,6 @@ from dataclasses import fields, is_dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 __all__ = ["as_json", "as_plain", "as_table", "picked", "replaced"]
 
 
@@ -29,6 +27,7 @@ def as_plain(answer: Any) -> Any:
 
     Examples
     --------
+    >>> import numpy as np
     >>> as_plain({0: (np.float64(1.5), np.array([2.0, np.nan]))})
     {'0': [1.5, [2.0, None]]}
     """
@@ -36,7 +35,7 @@ def as_plain(answer: Any) -> Any:
         return answer.to_json()
     if isinstance(answer, Mapping):
         return {str(key): as_plain(value) for key, value in answer.items()}
-    if isinstance(answer, np.ndarray | np.generic):
+    if hasattr(answer, "tolist"):  # of numpy, which the commands' help does without
         return as_plain(answer.tolist())
     if is_dataclass(answer):
         return as_plain(picked(answer, *(field.name for field in fields(answer))))

@@ -27,6 +27,7 @@ import contextlib
 import functools
 import hashlib
 import inspect
+import linecache
 import os
 import pickle
 import re
@@ -48,17 +49,21 @@ from numba.core.registry import cpu_target
 from limitsets.errors import LimitsetsError, MapError
 
 __all__ = [
+    "corners_as_numbers",
     "cover_foreign_class",
     "entries_of",
+    "entry_of",
     "formula",
     "generic",
     "kernel",
     "mark_undefined",
     "named_tuple_class",
     "number",
+    "of_entries",
     "operation",
     "proof_kernel",
     "take_mark",
+    "with_entry",
 ]
 
 F = TypeVar("F", bound=Callable[..., Any])
@@ -436,6 +441,11 @@ _KERNEL = re.compile(
     r"\b(image|image_on|image_box|on_side|on_side_box|fallback_box|margin|displacement|scattered)\("
 )
 
+NUMBERS_DO = (
+    "+ - * /, whole powers, abs, min and max of two, and of math or numpy sqrt exp log sin cos tan tanh atan2 floor; "
+    "no comparison"
+)
+
 
 def _explained(error: Exception, cls: type) -> MapError:
     """Say in one line why the kernels of a class from outside do not compile."""
@@ -445,15 +455,21 @@ def _explained(error: Exception, cls: type) -> MapError:
     named = next((found for line in lines if (found := _KERNEL.search(line))), None)
     kernel = f"the kernel {named[1]} of {cls.__name__}" if named else f"a kernel of {cls.__name__}"
     places = (re.match(r'File "(.*)", line (\d+)', line) for line in lines)
-    place = next(
-        (
-            f"{Path(at[1]).name}, line {at[2]}"
-            for at in places
-            if at and PACKAGE not in Path(at[1]).resolve().parents
-        ),
-        "",
-    )
+    spots = ((Path(at[1]).resolve(), int(at[2])) for at in places if at)
+    own = (PACKAGE, Path(numba.__file__).parent)
+    spot = next((at for at in spots if not any(folder in at[0].parents for folder in own)), None)
+    place = f"{spot[0].name}, line {spot[1]}" if spot else ""
     where = f"correct {place}" if place else "correct the kernel"
+    if spot and any("Interval(float64)" in line for line in lines):  # a box, of a kernel for plain numbers
+        file, number = str(spot[0]), spot[1]
+        above = (re.match(r"\s*def (\w+)", linecache.getline(file, k)) for k in range(number, 0, -1))
+        name = next((found[1] for found in above if found), "the kernel")
+        return MapError(
+            f"what {name} of {cls.__name__} does with x or a parameter ({place})",
+            linecache.getline(file, number).strip(),
+            f"for boxes: {NUMBERS_DO}",
+            "register image_on for each branch, with margin; or an image_box",
+        )
     if field := re.match(r"Unknown attribute '(\w+)' of type", cause):
         fields = ", ".join(getattr(cls, "_fields", ()))
         return MapError(
@@ -606,50 +622,90 @@ def take_mark(typing: Any) -> Any:
 
 
 class _NumberType(types.Type):  # type: ignore[misc]  # numba has no types
-    """How numba sees a number made of two floats."""
+    """How numba sees a number of two entries of one type: floats, numbers, or arrays with an entry for each side."""
 
-    def __init__(self, cls: type) -> None:
-        self.cls = cls
-        super().__init__(name=cls.__qualname__)
+    def __init__(self, cls: type, entry: Any) -> None:
+        self.cls, self.entry = cls, entry
+        super().__init__(name=f"{cls.__qualname__}({entry})")
+
+    def unify(self, context: Any, other: Any) -> Any:
+        """Return the type of a variable that is this number on one path and a plainer one on another: this."""
+        return self if isinstance(other, types.Number) or other == self.entry else None
+
+    def can_convert_from(self, context: Any, other: Any) -> Any:
+        fits = isinstance(other, types.Number) or other == self.entry
+        return numba.core.typeconv.Conversion.safe if fits else None
 
 
-def number(cls: type[T]) -> type[T]:
-    """Make a class of two floats a number in compiled code: constructed by its name, its fields read by theirs.
+def number(*, twice: bool) -> Callable[[type[T]], type[T]]:
+    """Make a class of two entries a number in compiled code: constructed by its name, its fields read by theirs.
 
-    What the number can do is added by `operation`.
+    The entries are two floats, two numbers of one type, or two arrays.  What the number can do is added by `operation`.
+
+    Parameters
+    ----------
+    twice : bool
+        Whether a plainer number has both entries equal to itself; else the second is 0.
     """
-    kind, (first, second) = _NumberType(cls), tuple(cls.__annotations__)
+
+    def made(cls: type[T]) -> type[T]:
+        if twice:
+            _TWICE.add(cls)
+        return _number(cls)
+
+    return made
+
+
+def _number(cls: type[T]) -> type[T]:
+    first, _ = _FIELDS[cls] = tuple(cls.__annotations__)
 
     def typer(context: Any) -> Any:
-        def typed(lo: Any, hi: Any) -> Any:
-            plain = all(isinstance(each, types.Number) for each in (lo, hi))
-            return numba.core.typing.signature(kind, types.float64, types.float64) if plain else None
+        def typed(one: Any, two: Any) -> Any:
+            plain = all(isinstance(each, types.Number) for each in (one, two))
+            entry = types.float64 if plain else one
+            fits = plain or (one == two and isinstance(one, _NumberType | types.Array))
+            return numba.core.typing.signature(_NumberType(cls, entry), entry, entry) if fits else None
 
         return typed
 
     def made(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        found = cgutils.create_struct_proxy(kind)(context, builder)
-        setattr(found, first, args[0])
-        setattr(found, second, args[1])
-        return found._getvalue()
+        found = _structure(context, builder, signature.return_type, *args)
+        return numba.core.imputils.impl_ret_borrowed(context, builder, signature.return_type, found)
 
-    fields = [(first, types.float64), (second, types.float64)]
     extending.type_callable(cls)(typer)
-    extending.typeof_impl.register(cls)(lambda value, c: kind)
-    extending.lower_builtin(cls, types.float64, types.float64)(made)
-    _MODELS[kind] = fields
-    _NUMBERS[cls] = kind
+    extending.typeof_impl.register(cls)(
+        lambda value, c: _NumberType(cls, extending.typeof_impl(getattr(value, first), c))
+    )
+    extending.lower_builtin(cls, types.Any, types.Any)(made)
     return cls
 
 
-_NUMBERS: dict[type, _NumberType] = {}
-_MODELS: dict[_NumberType, list[tuple[str, Any]]] = {}
+_FIELDS: dict[type, tuple[str, ...]] = {}
+_TWICE: set[type] = set()
+
+
+def _structure(context: Any, builder: Any, kind: _NumberType, one: Any, two: Any) -> Any:
+    """Put two values together, while code is generated."""
+    found = cgutils.create_struct_proxy(kind)(context, builder)
+    for name, value in zip(_FIELDS[kind.cls], (one, two), strict=True):
+        setattr(found, name, value)
+    return found._getvalue()
 
 
 @extending.register_model(_NumberType)
 class _NumberModel(extending.models.StructModel):  # type: ignore[misc]  # numba has no types
     def __init__(self, manager: Any, kind: Any) -> None:
-        super().__init__(manager, kind, _MODELS[kind])
+        super().__init__(manager, kind, [(name, kind.entry) for name in _FIELDS[kind.cls]])
+
+
+@extending.lower_cast(types.Number, _NumberType)  # type: ignore[untyped-decorator]  # numba has no types
+@extending.lower_cast(_NumberType, _NumberType)  # type: ignore[untyped-decorator]  # numba has no types
+def _from_plainer(context: Any, builder: Any, plain: Any, kind: Any, value: Any) -> Any:
+    """Lift a plainer number where code asks for this one on another path."""
+    one = context.cast(builder, value, plain, kind.entry)
+    zero = context.get_constant(types.float64, 0.0)
+    two = one if kind.cls in _TWICE else context.cast(builder, zero, types.float64, kind.entry)
+    return _structure(context, builder, kind, one, two)
 
 
 @extending.infer_getattr
@@ -657,18 +713,19 @@ class _NumberFields(numba.core.typing.templates.AttributeTemplate):  # type: ign
     key = _NumberType
 
     def generic_resolve(self, kind: Any, name: str) -> Any:
-        return dict(_MODELS[kind]).get(name)
+        return kind.entry if name in _FIELDS[kind.cls] else None
 
 
 @extending.lower_getattr_generic(_NumberType)  # type: ignore[untyped-decorator]  # numba has no types
 def _read_field(context: Any, builder: Any, kind: Any, value: Any, name: str) -> Any:
-    return getattr(cgutils.create_struct_proxy(kind)(context, builder, value=value), name)
+    field = getattr(cgutils.create_struct_proxy(kind)(context, builder, value=value), name)
+    return numba.core.imputils.impl_ret_borrowed(context, builder, kind.entry, field)
 
 
 @extending.box(_NumberType)  # type: ignore[untyped-decorator]  # numba has no types
 def _to_python(kind: Any, value: Any, c: Any) -> Any:
     found = cgutils.create_struct_proxy(kind)(c.context, c.builder, value=value)
-    fields = [c.pyapi.float_from_double(getattr(found, name)) for name, _ in _MODELS[kind]]
+    fields = [c.box(kind.entry, getattr(found, name)) for name in _FIELDS[kind.cls]]
     cls = c.pyapi.unserialize(c.pyapi.serialize_object(kind.cls))
     made = c.pyapi.call_function_objargs(cls, fields)
     for each in (*fields, cls):
@@ -679,16 +736,24 @@ def _to_python(kind: Any, value: Any, c: Any) -> Any:
 @extending.unbox(_NumberType)  # type: ignore[untyped-decorator]  # numba has no types
 def _from_python(kind: Any, instance: Any, c: Any) -> Any:
     made = cgutils.create_struct_proxy(kind)(c.context, c.builder)
-    for name, _ in _MODELS[kind]:
+    for name in _FIELDS[kind.cls]:
         field = c.pyapi.object_getattr_string(instance, name)
-        setattr(made, name, c.pyapi.float_as_double(field))
+        setattr(made, name, c.unbox(kind.entry, field).value)
         c.pyapi.decref(field)
     return extending.NativeValue(
         made._getvalue(), is_error=cgutils.is_not_null(c.builder, c.pyapi.err_occurred())
     )
 
 
-def operation(stub: Any, cls: type, method: Callable[..., Any]) -> None:
+def operation(
+    stub: Callable[..., Any],
+    cls: type,
+    method: Callable[..., Any],
+    *,
+    left: Callable[..., Any] | None = None,
+    right: Callable[..., Any] | None = None,
+    beside: tuple[type, ...] = (),
+) -> None:
     """Give a number a method of an operator, or of any function of Python, in compiled code.
 
     Parameters
@@ -700,17 +765,91 @@ def operation(stub: Any, cls: type, method: Callable[..., Any]) -> None:
         their methods may be contracted, all others are not.
     method : callable
         A module-level function.
+    left, right : callable, optional
+        The methods where only the first of two arguments is of the class, and where only the second is; as `method`.
+    beside : tuple of type
+        Classes of numbers that may stand beside this one as plain ones may.
     """
 
     def choose(*args: Any) -> Callable[..., Any] | None:
         mine = [number_class(each) is cls for each in args]
-        plain = [isinstance(each, types.Number) for each in args]
-        fits = all(plain) if cls is float else any(mine) and all(np.logical_or(mine, plain))
-        return method if fits else None
+        plain = [isinstance(each, types.Number) or number_class(each) in beside for each in args]
+        if cls is float:
+            return method if all(plain) else None
+        if not (any(mine) and all(np.logical_or(mine, plain))):
+            return None
+        return (left or method) if not mine[-1] else (right or method) if not mine[0] else method
 
     given = _ESTIMATE if cls is float else _PROOF
     options = {**{key: given[key] for key in _OVERLOAD}, "forceinline": True}
     extending.overload(stub, jit_options=options, strict=False)(choose)
+
+
+def corners_as_numbers(number: type, array: type) -> Callable[[Any, Any], Any]:
+    """Make the function, for compiled code, that puts two NamedTuples of one class together, entry by entry.
+
+    Parameters
+    ----------
+    number, array : type
+        What two floats become, and what two arrays become.
+
+    Returns
+    -------
+    callable
+        ``f(lo, hi)``: a NamedTuple of the same class.  What is no float, array or NamedTuple is taken from `lo`.
+    """
+
+    def joined(kind: Any) -> Any:
+        if isinstance(kind, types.BaseNamedTuple):
+            return types.BaseTuple.from_types([joined(each) for each in kind], kind.instance_class)
+        if isinstance(kind, types.Float):
+            return _NumberType(number, kind)
+        return _NumberType(array, kind) if isinstance(kind, types.Array) else kind
+
+    def value(context: Any, builder: Any, kind: Any, lo: Any, hi: Any) -> Any:
+        made = joined(kind)
+        if isinstance(kind, types.BaseNamedTuple):
+            entries = [
+                value(context, builder, each, *(builder.extract_value(end, k) for end in (lo, hi)))
+                for k, each in enumerate(kind)
+            ]
+            return context.make_tuple(builder, made, entries)
+        return _structure(context, builder, made, lo, hi) if isinstance(made, _NumberType) else lo
+
+    @extending.intrinsic  # type: ignore[untyped-decorator]  # numba has no types
+    def together(typing: Any, lo: Any, hi: Any) -> Any:
+        def code(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+            found = value(context, builder, lo, *args)
+            return numba.core.imputils.impl_ret_borrowed(context, builder, signature.return_type, found)
+
+        return (joined(lo)(lo, hi), code) if lo == hi else None
+
+    return together  # type: ignore[no-any-return]  # numba has no types
+
+
+def of_entries(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Make a kernel of one entry a kernel of a tuple: ``f(entries, *more)`` is that of ``function(entry, k, *more)``.
+
+    The entries may be of several types; the answer is a tuple of as many.  For proofs, in compiled code.
+    """
+    compiled = _compile(function, _PROOF, False)
+
+    @functools.wraps(function)
+    def each(entries: Any, *more: Any) -> Any:
+        return tuple(function(entry, k, *more) for k, entry in enumerate(entries))
+
+    def choose(entries: Any, *more: Any) -> Callable[..., Any] | None:
+        if not isinstance(entries, types.BaseTuple):
+            return None
+        # Compiled code makes a tuple of a length that is written down.
+        calls = "".join(f"of(entries[{k}], {k}, *more), " for k in range(len(entries)))
+        scope: dict[str, Any] = {"of": compiled}
+        exec(f"def method(entries, *more):\n    return ({calls})", scope)  # noqa: S102  # our own text
+        return scope["method"]  # type: ignore[no-any-return]
+
+    options = {**{key: _PROOF[key] for key in _OVERLOAD}, "forceinline": True}
+    extending.overload(each, jit_options=options, strict=False)(choose)
+    return each
 
 
 def formula(function: F) -> F:
@@ -748,11 +887,47 @@ class Generic(Protocol[P, R]):
         """Add the method of a class, or of plain tuples of a length: a module-level function."""
 
 
+def entry_of(entries: Any, cls: type) -> Any:
+    """Return the entry of a class in a tuple of several classes, None where there is none; chosen at compile time."""
+    return next((entry for entry in entries if type(entry) is cls), None)
+
+
+def with_entry(entries: Any, entry: Any) -> Any:
+    """Return a tuple with its entry of the same class replaced."""
+    return tuple(entry if type(each) is type(entry) else each for each in entries)
+
+
+def _place_of(entries: Any, cls: type | None) -> int | None:
+    """Where a tuple has its entry of a class, as numba sees it."""
+    return next((k for k, each in enumerate(entries) if named_tuple_class(each) is cls), None)
+
+
+def _choose_entry(entries: Any, cls: Any) -> Callable[..., Any]:
+    at = _place_of(entries, cls.instance_class)
+    return (lambda entries, cls: None) if at is None else (lambda entries, cls: entries[at])
+
+
+def _choose_with(entries: Any, entry: Any) -> Callable[..., Any] | None:
+    at = _place_of(entries, named_tuple_class(entry))
+    if at is None:
+        return None
+    after = at + 1
+    return lambda entries, entry: entries[:at] + (entry,) + entries[after:]  # noqa: RUF005 - numba has no unpacking
+
+
+for _stub, _choose in ((entry_of, _choose_entry), (with_entry, _choose_with)):
+    extending.overload(_stub, jit_options={"forceinline": True}, strict=False)(_choose)
+
+
 @overload
 def generic(stub: Callable[P, R]) -> Generic[P, R]: ...
 @overload
 def generic(
-    *, proof: bool = False, inlined: bool = True, default: Callable[..., Any] | None = None
+    *,
+    proof: bool = False,
+    inlined: bool = True,
+    default: Callable[..., Any] | None = None,
+    chained: bool = False,
 ) -> Callable[[Callable[P, R]], Generic[P, R]]: ...
 def generic(
     stub: Any = None,
@@ -760,6 +935,7 @@ def generic(
     proof: bool = False,
     inlined: bool = True,
     default: Callable[..., Any] | None = None,
+    chained: bool = False,
 ) -> Any:
     """Make a function whose method is chosen by the class of its first argument.
 
@@ -773,12 +949,16 @@ def generic(
         False for a method that is rarely called: it then costs the loops around it no compile time.
     default : callable, optional
         The method of every class that has none of its own.
+    chained : bool
+        The arguments are an entry and a value, which the method gives back changed.  Called with a tuple of several
+        classes the function runs the methods of its entries in their order, each on the value that the last one gave;
+        an entry without one is not in the machine code.
 
     Returns
     -------
     callable
         The stub, a `Generic`: ``stub.on(Class, method)`` adds a module-level method.  For a plain tuple
-        of equal entries the key is its length instead.  In compiled code the choice is made at compile time.
+        the key is its length instead.  In compiled code the choice is made at compile time.
 
     Notes
     -----
@@ -786,26 +966,40 @@ def generic(
     in a closure: numba does not cache such code (numba issues 2065, 2952, 6264).
     """
     if stub is None:
-        return lambda f: _generic(f, proof, inlined, default)
-    return _generic(stub, proof, inlined, default)
+        return lambda f: _generic(f, proof, inlined, default, chained)
+    return _generic(stub, proof, inlined, default, chained)
 
 
-def _generic(stub: Any, proof: bool, inlined: bool, default: Callable[..., Any] | None) -> Any:
+def _handed_on(entry: Any, value: Any, *rest: Any) -> Any:
+    return value
+
+
+def _generic(stub: Any, proof: bool, inlined: bool, default: Callable[..., Any] | None, chained: bool) -> Any:
     """Make the table of methods and the overload that reads it."""
+    default = _handed_on if chained else default
     methods: dict[Any, Callable[..., Any]] = {}
     given = _PROOF if proof else _ESTIMATE
     options = {**{key: given[key] for key in _OVERLOAD}, "forceinline": inlined}
 
+    def one_after_another(entries: Any, value: Any, *rest: Any) -> Any:
+        return chosen(entries[1:], chosen(entries[0], value, *rest), *rest)
+
+    def of_tuple(first: Any) -> Callable[..., Any] | None:
+        plain = type(first) is tuple or (isinstance(first, types.BaseTuple) and not named_tuple_class(first))
+        return None if not (chained and plain) else one_after_another if len(first) else _handed_on
+
     def choose(first: Any, *rest: Any) -> Callable[..., Any] | None:
+        if (method := of_tuple(first)) is not None:
+            return method
         key: Any = type(None) if isinstance(first, types.NoneType) else named_tuple_class(first)
-        if key is None and isinstance(first, types.UniTuple):
-            key = first.count
+        if key is None and isinstance(first, types.BaseTuple):
+            key = len(first)
         return methods.get(key, default)
 
     @functools.wraps(stub)
     def chosen(first: Any, *rest: Any) -> Any:
         """Run the method in Python, on the numbers of Python: a method made of formulas alone knows no others."""
-        method = methods.get(type(first), default)
+        method = of_tuple(first) or methods.get(type(first), default)
         if method is None:
             raise MapError("the argument", type(first).__name__, "a class with a method", "add one")
         return method(first, *rest)

@@ -15,7 +15,8 @@ import limitsets
 ROOT = Path(__file__).resolve().parents[1]
 PACKAGE = ROOT / "limitsets"
 SOURCES = sorted(PACKAGE.rglob("*.py"))
-LATE = ["numba", "scipy", "networkx", "matplotlib", "pint", "pydantic", "typer", "rich", "pymunk"]
+LATE = ["numba", "scipy", "networkx", "matplotlib", "pint", "pydantic", "typer", "rich", "jinja2", "tomlkit"]
+LATE += ["pymunk"]
 
 
 def run_python(code: str, cwd: Path = ROOT) -> str:

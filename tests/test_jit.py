@@ -23,7 +23,7 @@ FUSED = re.compile(r"\bv?fn?m(?:add|sub|la|ls)\w*")
 # A small entry kernel, put into the copy of the package.
 PROBE = """
 from limitsets.jit import kernel
-from limitsets.maps.contract import image, on_side
+from limitsets.maps.kernels import image, on_side
 
 @kernel(entry=True)
 def one(params, x):

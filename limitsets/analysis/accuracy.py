@@ -27,7 +27,16 @@ if TYPE_CHECKING:
     from limitsets.scene import Scene
     from limitsets.sets import Attractor, LimitSet
 
-__all__ = ["Accuracy", "Choice", "Plan", "left_to_cells", "limit_of", "plan_for", "require_error"]
+__all__ = [
+    "Accuracy",
+    "Choice",
+    "Plan",
+    "best_extents",
+    "left_to_cells",
+    "limit_of",
+    "plan_for",
+    "require_error",
+]
 
 Extents = dict[int, list[tuple[float, float]]]
 
@@ -221,10 +230,7 @@ def _one_way(some: Sequence[tuple[float, float]], others: Sequence[tuple[float, 
 
 def _by_cells(scene: Scene, coarse: _Trial, fine: _Trial, asked: float) -> Choice:
     """Cells alone: the error of the fine trial is known from its end points, or from what the coarse one had more."""
-    exact = [
-        limit.extents if limit.converged else each.extents
-        for limit, each in zip(fine.limits, fine.attractors, strict=True)
-    ]
+    exact = best_extents(fine.attractors, fine.limits)
     known = all(limit.converged for limit in fine.limits)
     measured, at = (fine, FINE) if known else (coarse, COARSE)
     if len(measured.attractors) != len(exact):
@@ -288,6 +294,12 @@ def plan_for(scene: Scene, error: float, throws: int = 200_000) -> Plan:
     return Plan(asked, scene.unit, ranked[0], other, bool(good))
 
 
+def best_extents(attractors: Sequence[Attractor], limits: Sequence[LimitSet]) -> tuple[Extents, ...]:
+    """Give each attractor's intervals: of the limit set where its end points are known, else of the cells."""
+    pairs = zip(attractors, limits, strict=True)
+    return tuple(limit.extents if limit.converged else each.extents for each, limit in pairs)
+
+
 def left_to_cells() -> LimitSet:
     """Say that end points were not looked for, because the borders of cells meet the error."""
     from limitsets.sets import LimitSet
@@ -297,10 +309,10 @@ def left_to_cells() -> LimitSet:
 
 def limit_of(graph: TransitionGraph, attractor: Attractor) -> LimitSet:
     """Its end points; the cells where the map's branches cannot be followed one by one."""
-    from limitsets.maps import kind_of
+    from limitsets.maps import has_slope
     from limitsets.sets import LimitSet, limit_set
 
-    if kind_of(graph.map).has_image_on:
+    if has_slope(graph.map):
         return limit_set(graph, attractor)
     advice = "with effects on a throw has more branches than this version follows"
     return LimitSet(attractor.extents, (), 0, False, False, advice)

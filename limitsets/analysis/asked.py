@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from limitsets.goals import Goal, OrientedBeyond, Predicate, Reaches, Verdict, evaluate
+from limitsets.goals import Goal, OrientedBeyond, Reaches, evaluate
 
 if TYPE_CHECKING:
     from limitsets.graph import TransitionGraph
@@ -63,9 +63,9 @@ def _may_leave(graph: TransitionGraph) -> float:
 
 def _after_any_throw(graph: TransitionGraph) -> Extents:
     """Where a part can rest after one throw or more: the image of the whole domain holds all later images."""
-    from limitsets.maps import along, kind_of, monotone_pieces
+    from limitsets.maps import along, has_slope, monotone_pieces
 
-    if not kind_of(graph.map).has_image_on:
+    if not has_slope(graph.map):
         return _seen_after_a_throw(graph)
     domain = graph.grid.domain
     found: dict[int, list[tuple[float, float]]] = {}
@@ -127,10 +127,9 @@ def answer(
         evaluate(goal, each, flip_order=order, fractions=basins.attractors, leaving=leaving)
         for each in wanted or [{}]
     ]
-    # A part beyond x, and an orbit that gets there: the first goal asks for all limit sets, the second for each.
-    verdict = max(asked, key=_threshold) if isinstance(goal, OrientedBeyond) else min(asked, key=_threshold)
+    verdict = goal.worst(asked)
     holds = verdict.holds
-    if isinstance(goal, OrientedBeyond | Predicate) and not any(wanted):
+    if holds and not any(wanted):
         holds = None  # nothing stays on the arm: the sentence would hold of nothing
     if isinstance(goal, Reaches) and holds and not goal.from_anywhere and _may_leave(graph) > 0:
         holds = None  # some starts leave before they get there
@@ -141,7 +140,3 @@ def answer(
         max((hi for parts in each.values() for _, hi in parts), default=-math.inf) for each in wanted
     )
     return Answered(goal, holds, threshold, reach=reach)
-
-
-def _threshold(verdict: Verdict) -> float:
-    return 0.0 if verdict.threshold is None else verdict.threshold

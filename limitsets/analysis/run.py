@@ -10,7 +10,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from limitsets.analysis.accuracy import CELLS as BY_CELLS
-from limitsets.analysis.accuracy import Accuracy, Plan, left_to_cells, limit_of, plan_for, require_error
+from limitsets.analysis.accuracy import (
+    Accuracy,
+    Plan,
+    best_extents,
+    left_to_cells,
+    limit_of,
+    plan_for,
+    require_error,
+)
 from limitsets.analysis.asked import Answered, answer
 from limitsets.analysis.flags import other_vertex_first
 from limitsets.analysis.starts import Starts, against_starts
@@ -105,10 +113,7 @@ class Analysis:
     @property
     def extents(self) -> tuple[Extents, ...]:
         """Per attractor its intervals: of the limit set where its end points are known, else of the cells."""
-        return tuple(
-            limit.extents if limit.converged else attractor.extents
-            for limit, attractor in zip(self.limit_sets, self.attractors, strict=True)
-        )
+        return best_extents(self.attractors, self.limit_sets)
 
     @property
     def extents_from(self) -> tuple[str, ...]:
@@ -328,10 +333,7 @@ def analyse(
         morse = morse_graph(graph)
         false_sets = spurious(graph)
     with steps.step("goal"):
-        extents = [
-            limit.extents if limit.converged else each.extents
-            for limit, each in zip(limits, found, strict=True)
-        ]
+        extents = best_extents(found, limits)
         asked = None if chosen.goal is None else answer(chosen.goal, graph, found, shares, extents)
         if asked is not None and asked.holds and starts is not None and starts.elsewhere:
             asked = replace(asked, holds=None)  # some starts stay where nothing is known

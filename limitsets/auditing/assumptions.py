@@ -31,8 +31,8 @@ class Terms:
 
     Attributes
     ----------
-    limit : ndarray, shape (sides,), or None
-        What the value may be; None where a fact is missing.
+    limit : float, ndarray of shape (sides,), or None
+        What the value may be, on all sides or on each; None where a fact is missing.
     scale, offset : float
         The value is scale times the column plus offset; both are not negative.
     missing : str
@@ -41,7 +41,7 @@ class Terms:
         From the worst value to the value of the missing fact at which it would matter; None where there is no such.
     """
 
-    limit: NDArray[np.float64] | None
+    limit: float | NDArray[np.float64] | None
     scale: float = 1.0
     offset: float = 0.0
     missing: str = ""
@@ -64,14 +64,14 @@ class Assumption:
         The assumption, in the words of someone who builds a feeder.
     value : str
         What is measured.
-    dimension : str
-        "length", "angle" or "".
     column : Assumed
         What decides.
-    below : bool
-        Whether it holds below the limit, or above it.
     terms : callable
         From the scene and its box of parameters to `Terms`; without a box, as floats have it.
+    dimension : str
+        Of what is measured: "length", "angle" or "".
+    below : bool
+        Whether it holds below the limit, or above it.
     """
 
     effect: str
@@ -79,22 +79,18 @@ class Assumption:
     name: str
     words: str
     value: str
-    dimension: str
     column: Assumed
-    below: bool
     terms: Callable[[Scene, ParameterBox | None], Terms]
-
-
-def _everywhere(scene: Scene, limit: float) -> NDArray[np.float64]:
-    return np.full(len(scene.sides), limit)
+    dimension: str = ""
+    below: bool = True
 
 
 def _positive(scene: Scene, _: ParameterBox | None) -> Terms:
-    return Terms(_everywhere(scene, 0.0))
+    return Terms(0.0)
 
 
 def _enough(scene: Scene, _: ParameterBox | None) -> Terms:
-    return Terms(_everywhere(scene, 1.0))
+    return Terms(1.0)
 
 
 def _corner(scene: Scene, box: ParameterBox | None) -> Terms:
@@ -107,26 +103,26 @@ def _corner(scene: Scene, box: ParameterBox | None) -> Terms:
 
 def _friction(scene: Scene, _: ParameterBox | None) -> Terms:
     friction = scene.world.friction
-    return Terms(None, missing="friction") if friction is None else Terms(_everywhere(scene, friction))
+    return Terms(None, missing="friction") if friction is None else Terms(friction)
 
 
 def _bounce(scene: Scene, _: ParameterBox | None) -> Terms:
     """Compare the height of the bounce, e^2 times that of the fall, with the threshold."""
     e, threshold = scene.world.restitution, scene.world.bounce_threshold
     if e == 0.0:
-        return Terms(_everywhere(scene, math.inf), scale=0.0)
+        return Terms(math.inf, scale=0.0)
     if e is None and threshold is None:
         return Terms(None, missing="restitution", matters=lambda fall: None)
     if e is None:
         height = threshold or 0.0
-        return Terms(
-            None,
-            missing="restitution",
-            matters=lambda fall: math.sqrt(height / fall) if height < fall else None,
-        )
+
+        def restitution(fall: float) -> float | None:
+            return math.sqrt(height / fall) if height < fall else None
+
+        return Terms(None, missing="restitution", matters=restitution)
     if threshold is None:
         return Terms(None, scale=e * e, missing="bounce_threshold")
-    return Terms(_everywhere(scene, threshold), scale=e * e)
+    return Terms(threshold, scale=e * e)
 
 
 def _drive(scene: Scene, _: ParameterBox | None) -> Terms:
@@ -138,7 +134,7 @@ def _drive(scene: Scene, _: ParameterBox | None) -> Terms:
             return math.asin(notable / shift) if notable < shift else None
 
         return Terms(None, missing="stroke", matters=least)
-    return Terms(_everywhere(scene, notable), scale=math.sin(stroke))
+    return Terms(notable, scale=math.sin(stroke))
 
 
 def _spread(scene: Scene, _: ParameterBox | None) -> Terms:
@@ -150,7 +146,7 @@ def _spread(scene: Scene, _: ParameterBox | None) -> Terms:
     if share is not None and not share.relative and speed is None:
         return Terms(None, missing="gravity", matters=lambda shift: None)
     return Terms(
-        _everywhere(scene, notable),
+        notable,
         scale=0.0 if share is None else share.of(speed or 1.0) / (speed or 1.0),
         offset=0.0 if landing is None else landing.value,
     )
@@ -163,10 +159,10 @@ ASSUMPTIONS = (
         "throw does not tip it",
         "the throw itself does not tip the part over an end of its side",
         "room between the throw's impulse and the side's end",
-        "length",
         Assumed.UNDER,
-        False,
         _positive,
+        dimension="length",
+        below=False,
     ),
     Assumption(
         "release",
@@ -174,9 +170,7 @@ ASSUMPTIONS = (
         "no sliding in the throw",
         "the part does not slide on the arm while it is thrown",
         "friction the throw needs",
-        "",
         Assumed.RELEASE_FRICTION,
-        True,
         _friction,
     ),
     Assumption(
@@ -185,10 +179,9 @@ ASSUMPTIONS = (
         "left corner lands first",
         "the left corner lands first",
         "turned in the air",
-        "angle",
         Assumed.ANGLE,
-        True,
         _corner,
+        dimension="angle",
     ),
     Assumption(
         "slip",
@@ -196,10 +189,9 @@ ASSUMPTIONS = (
         "landing presses",
         "the corner that lands is pressed onto the arm, and need not be held back",
         "impulse at the landing, in that of the throw",
-        "",
         Assumed.PRESS,
-        False,
         _positive,
+        below=False,
     ),
     Assumption(
         "slip",
@@ -207,9 +199,7 @@ ASSUMPTIONS = (
         "landing does not slide",
         "the corner that lands sticks",
         "friction the landing needs",
-        "",
         Assumed.STICK_FRICTION,
-        True,
         _friction,
     ),
     Assumption(
@@ -218,10 +208,9 @@ ASSUMPTIONS = (
         "no bounce",
         "the corner that lands does not bounce",
         "height of the bounce",
-        "length",
         Assumed.DROP,
-        True,
         _bounce,
+        dimension="length",
     ),
     Assumption(
         "pivot",
@@ -229,10 +218,9 @@ ASSUMPTIONS = (
         "corner stays down",
         "the corner stays on the arm by itself while the part turns about it",
         "least force of the arm on the corner, in weights of the part",
-        "",
         Assumed.FORCE,
-        False,
         _positive,
+        below=False,
     ),
     Assumption(
         "pivot",
@@ -240,9 +228,7 @@ ASSUMPTIONS = (
         "corner does not slide",
         "the corner does not slide while the part turns about it",
         "friction the turning needs",
-        "",
         Assumed.HOLD_FRICTION,
-        True,
         _friction,
     ),
     Assumption(
@@ -251,9 +237,7 @@ ASSUMPTIONS = (
         "lies still, no roll",
         "the part lies still once a side has come down",
         "energy left, in that needed to roll on or back",
-        "",
         Assumed.ROLL,
-        True,
         _enough,
     ),
     Assumption(
@@ -262,10 +246,9 @@ ASSUMPTIONS = (
         "throw needs no stroke",
         "the arm has its speed at once, without a stroke",
         "shift of the landing by the stroke",
-        "length",
         Assumed.STROKE,
-        True,
         _drive,
+        dimension="length",
     ),
     Assumption(
         "spread",
@@ -273,10 +256,9 @@ ASSUMPTIONS = (
         "throws all alike",
         "every throw and landing is like the other",
         "shift of the landing by scatter",
-        "length",
         Assumed.SPEED,
-        True,
         _spread,
+        dimension="length",
     ),
     Assumption(
         "arm",
@@ -284,10 +266,10 @@ ASSUMPTIONS = (
         "rests on the arm",
         "the part comes to rest on the arm",
         "room to the arm's end or the joint",
-        "length",
         Assumed.ON_ARM,
-        False,
         _positive,
+        dimension="length",
+        below=False,
     ),
 )
 """In the order in which a throw meets them."""

@@ -137,20 +137,17 @@ def _worst(row: Row, found: Mapping[int, Array], samples: Mapping[int, Sample]) 
         excess = np.where(known, reached - limit if row.about.below else limit - reached, -np.inf)
         k = int(excess.argmax())
         if not best[1] or excess[k] > best[0]:
-            value, threshold = float(reached[k]), row.limit(side)
-            if row.terms.limit is None:
-                matters = row.terms.matters(value) if math.isfinite(value) else None
-                threshold = math.nan if matters is None else matters
-            best = (
-                excess[k],
-                {
-                    "side": side,
-                    "x": float(samples[side].x[k]),
-                    "worst": value if math.isfinite(value) else None,
-                    "threshold": threshold if math.isfinite(threshold) else None,
-                },
-            )
+            value: float | None = _finite(float(reached[k]))
+            threshold: float | None = row.limit(side)
+            if row.terms.limit is None and value is not None:
+                threshold = row.terms.matters(value)
+            x = float(samples[side].x[k])
+            best = excess[k], {"side": side, "x": x, "worst": value, "threshold": _finite(threshold)}
     return best[1]
+
+
+def _finite(value: float | None) -> float | None:
+    return None if value is None or not math.isfinite(value) else value
 
 
 def _shares(broken: Mapping[int, Flags], samples: Mapping[int, Sample]) -> dict[str, Any]:
@@ -171,10 +168,8 @@ def _ranges(box: ParameterBox, row: Row, found: Mapping[int, Array], domain: Map
         def broken(x: Array, side: int = side) -> Flags:
             return row.broken(ask(box, side, x), side)
 
-        parts = where(broken, sample.x, row.broken(found[side], side))
-        if parts:
-            ranges[side] = parts
-    return ranges
+        ranges[side] = where(broken, sample.x, row.broken(found[side], side))
+    return {side: parts for side, parts in ranges.items() if parts}
 
 
 def _findings(
@@ -247,7 +242,5 @@ def audit(scene: str | Path | Mapping[str, Any] | Scene) -> Audit:
     box = parameter_box(load({**chosen.as_dict(), "effects": {}}))
     rows = [Row(about, about.terms(chosen, box)) for about in ASSUMPTIONS]
     asked = places(chosen, box)
-    findings = [
-        finding for place in ("limit-set", "domain") for finding in _findings(place, chosen, box, rows, asked)
-    ]
-    return Audit(chosen, tuple(findings), asked.extents, asked.enclosed)
+    two = (_findings(place, chosen, box, rows, asked) for place in ("limit-set", "domain"))
+    return Audit(chosen, sum(two, ()), asked.extents, asked.enclosed)

@@ -43,33 +43,31 @@ class Choice:
 
 def _hindrance(scene: Scene, finding: Finding, others: tuple[str, ...]) -> str:
     """Why an effect that is called for, or may be, cannot be switched on beside others; empty if it can."""
-    from limitsets.thrower.effects import BUILT
+    from limitsets.thrower.effects import EFFECTS
 
     effect = finding.effect
     if finding.called_for is None:
-        return (
-            f"world.{finding.missing} is missing: cannot tell"
-            if finding.missing
-            else "no limit set: cannot tell"
-        )
+        return f"{f'world.{finding.missing} is missing' if finding.missing else 'no limit set'}: cannot tell"
     if effect in NO_EFFECT:
         return "broken, and no effect simulates that: change the scene"
-    if effect not in BUILT:
+    if effect not in EFFECTS:
         return "called for, but this version cannot simulate it"
     if scene.flight != "exact":
         return 'called for, but it needs flight = "exact"'
-    missing = [fact for fact in BUILT[effect].needs if getattr(scene.world, fact) is None]
+    missing = [fact for fact in EFFECTS[effect].needs if getattr(scene.world, fact) is None]
     if missing:
         return f"called for, but {' and '.join(f'world.{fact}' for fact in missing)} missing"
-    barred = [other for other in others if other in BUILT[effect].excludes or effect in BUILT[other].excludes]
+    barred = [each for each in others if each in EFFECTS[effect].excludes or effect in EFFECTS[each].excludes]
     return f"called for, but it cannot be simulated together with {' and '.join(barred)}" if barred else ""
 
 
 def _with(scene: Scene, effects: tuple[str, ...]) -> Scene:
     """Switch effects on, and `auto` off."""
+    from limitsets.thrower.effects import EFFECTS
+
     tree = copy.deepcopy(dict(scene.text))
     table = {key: value for key, value in tree.get("effects", {}).items() if key != "auto"}
-    table.update({effect: "bounded" if effect == "spread" else True for effect in effects})
+    table.update({effect: next(iter(EFFECTS[effect].words), True) for effect in effects})
     tree["effects"] = table
     return scene.of(tree, scene.file)
 

@@ -32,7 +32,8 @@ class Row:
 
     def limit(self, side: int) -> float:
         """Give the limit on a side, nan where a fact is missing."""
-        return math.nan if self.terms.limit is None else float(self.terms.limit[side])
+        limit = self.terms.limit
+        return math.nan if limit is None else float(limit[side] if isinstance(limit, np.ndarray) else limit)
 
     def values(self, found: Array) -> Array:
         """Both ends of the number, widened by the rounding of scale and offset."""

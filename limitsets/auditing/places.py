@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import reduce
+from operator import or_
 from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
@@ -107,21 +109,16 @@ def _throws(scene: Scene, cells: CellSet) -> tuple[Array, NDArray[np.int64], NDA
     side = int(cells.grid.side_of(middle))
     lo, hi = cells.grid.boxes(np.array([middle]), side)
     path = orbit(scene.map, 0.5 * float(lo[0, 0] + hi[0, 0]), side, TRANSIENT + THROWS)
-    on = min(TRANSIENT, path.code.size)
     made = path.code.size
-    return path.x[on:made], path.side[on:made], path.code[on:]
+    on = slice(min(TRANSIENT, made), made)
+    return path.x[on], path.side[on], path.code[on]
 
 
 def _orbits(scene: Scene, sets: list[CellSet]) -> dict[int, Sample]:
-    parts = [_throws(scene, cells) for cells in sets]
-    found = {}
-    for side in range(len(scene.sides)):
-        here = [part[1] == side for part in parts]
-        if any(mask.any() for mask in here):
-            x = np.concatenate([part[0][mask] for part, mask in zip(parts, here, strict=True)])
-            code = np.concatenate([part[2][mask] for part, mask in zip(parts, here, strict=True)])
-            found[side] = Sample(x, code)
-    return found
+    if not sets:
+        return {}
+    x, side, code = map(np.concatenate, zip(*(_throws(scene, cells) for cells in sets), strict=True))
+    return {k: Sample(x[side == k], code[side == k]) for k in np.unique(side).tolist()}
 
 
 def places(scene: Scene, box: ParameterBox) -> Places:
@@ -139,14 +136,8 @@ def places(scene: Scene, box: ParameterBox) -> Places:
     Places
     """
     sets, domain_cells, enclosed = _limit_sets(scene, box)
-    limit = _cells_of(sets[0]) if sets else {}
-    for cells in sets[1:]:
-        for side, (lo, hi) in _cells_of(cells).items():
-            before = limit.get(side, (lo[:0], hi[:0]))
-            limit[side] = (np.concatenate([before[0], lo]), np.concatenate([before[1], hi]))
-    union = sets[0] if sets else None
-    for cells in sets[1:]:
-        union = cells if union is None else union | cells
+    union = reduce(or_, sets) if sets else None
+    limit = {} if union is None else _cells_of(union)
     lo, hi = scene.domain.lo[:, 0], scene.domain.hi[:, 0]
     domain = {
         side: Sample(np.linspace(lo[side], hi[side], SAMPLES), np.full(SAMPLES, codes.UNDECIDED))

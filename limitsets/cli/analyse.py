@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from limitsets.cli.output import Json, Scene, progress, table
-from limitsets.files import as_json
+from limitsets.cli.output import Json, Scene, answer, opened, progress, table
 
 if TYPE_CHECKING:
     from limitsets.analysis import Analysis, Plan
@@ -42,29 +41,20 @@ def analyse(
 ) -> None:
     """Find limit sets, basins and critical points, and write report.md, analysis.json and figures."""
     with progress() as tell:
-        from limitsets.scene import load
-
-        chosen = load(scene)
-        folder = out if out is not None else Path(f"{chosen.name}-analysis")
-        from limitsets.report.writing import require_place, write
-
-        require_place(folder)
+        chosen, folder = opened(scene, out, "analysis")
         from limitsets.analysis import analyse as run
+        from limitsets.report import write
 
         analysis = run(chosen, cells, error=error, progress=tell, announce=_announce)
         files = write(analysis, folder, progress=tell)
-    if json:
-        print(as_json(analysis.to_json()), end="")
-    else:
-        _text(analysis)
-        typer.echo(f"report: {files[0]}")
+    answer(analysis, json, lambda: _text(analysis, files[0]))
 
 
 def _announce(plan: Plan) -> None:
     print(f"limitsets: {plan}", file=sys.stderr, flush=True)
 
 
-def _text(analysis: Analysis) -> None:
+def _text(analysis: Analysis, page: Path) -> None:
     from limitsets.report.questions import verdict_of, void_of
     from limitsets.report.tables import count, intervals, percent
 
@@ -93,3 +83,4 @@ def _text(analysis: Analysis) -> None:
         typer.echo(f"error of the ends: {found.reached:.2g} {unit} ({found.how})")
     if found is not None and not found.met:
         typer.echo(f"the error of {found.plan.asked:g} {unit} was not met: {found.advice}")
+    typer.echo(f"report: {page}")

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from limitsets.cli.output import Json, Scene, progress, table
-from limitsets.files import as_json
+from limitsets.cli.output import Json, Scene, answer, opened, progress, table
+
+if TYPE_CHECKING:
+    from limitsets.auditing import Audit
 
 __all__ = ["audit"]
 
@@ -23,13 +25,7 @@ def audit(
 ) -> None:
     """Ask which assumptions of the model a scene breaks: on its limit set, and on the whole arm."""
     with progress() as tell:
-        from limitsets.scene import load
-
-        chosen = load(scene)
-        if out is not None:
-            from limitsets.report.writing import require_place
-
-            require_place(out)
+        chosen, _ = opened(scene, out)
         tell("assumptions", 0, 1 + (out is not None))
         from limitsets.auditing import audit as run
 
@@ -40,9 +36,10 @@ def audit(
 
             tell("files", 1, 2)
             files = write_audit(found, out)
-    if json:
-        print(as_json(found.to_json()), end="")
-        return
+    answer(found, json, lambda: _text(found, files))
+
+
+def _text(found: Audit, files: list[Path]) -> None:
     from limitsets.report.audits import HEADS, lines_of, summary
 
     table(HEADS, lines_of(found))

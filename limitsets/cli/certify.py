@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from limitsets.cli.arguments import HELP_NO_RECHECK, deviations
-from limitsets.cli.output import Json, Scene, progress, saved, table
-from limitsets.files import as_json
+from limitsets.cli.output import Json, Scene, answer, progress, saved, table
 
 if TYPE_CHECKING:
     from limitsets.proofs import Claim, Proof
@@ -75,13 +74,8 @@ def certify(
                 except DeniedError as error:
                     proof, kept = proof.denied(error.claims), str(file.with_name(Path(error.file or "").name))
             seconds = None if no_recheck or not written else time.perf_counter() - begin
-    if json:
-        print(
-            as_json([each | {"timings": each["timings"] | {"recheck": seconds}} for each in proof.to_json()]),
-            end="",
-        )
-    else:
-        _text(proof, file if written else None, kept, seconds)
+    records = [each | {"timings": each["timings"] | {"recheck": seconds}} for each in proof.to_json()]
+    answer(records, json, lambda: _text(proof, file if written else None, kept, seconds))
     raise typer.Exit(0 if proof.proved else 1)
 
 

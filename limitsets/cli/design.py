@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from limitsets.cli.arguments import HELP_NO_RECHECK, ends_of, number
-from limitsets.cli.output import Json, Scene, progress, save_scene, show_scene, table
+from limitsets.cli.output import Json, Scene, answer, opened, progress, save_scene, show_scene, table
 from limitsets.errors import LimitsetsError
 from limitsets.files import as_json
 
@@ -49,25 +49,9 @@ def design(
         float,
         typer.Option("--seconds", min=0.0, metavar="S", help="With --robust: for the proof of each margin."),
     ] = 240.0,
-    starts: Annotated[
-        int,
-        typer.Option(
-            "--starts",
-            min=0,
-            max=10_000,
-            metavar="N",
-            help=HELP_STARTS,
-        ),
-    ] = 8,
+    starts: Annotated[int, typer.Option("--starts", min=0, max=10_000, metavar="N", help=HELP_STARTS)] = 8,
     stages: Annotated[
-        int | None,
-        typer.Option(
-            "--stages",
-            min=1,
-            max=1000,
-            metavar="N",
-            help=HELP_STAGES,
-        ),
+        int | None, typer.Option("--stages", min=1, max=1000, metavar="N", help=HELP_STAGES)
     ] = None,
     out: Annotated[
         Path | None,
@@ -102,13 +86,8 @@ def design(
         raise typer.Exit(run_robust(scene, names, ends_of(bounds), evaluations, seconds, out, **told))
     with progress() as tell:
         from limitsets.inverse import design as run
-        from limitsets.scene import load
 
-        chosen = load(scene)
-        if out is not None and out.suffix != ".toml":
-            from limitsets.report.writing import require_place
-
-            require_place(out)
+        chosen, _ = opened(scene, None if out and out.suffix == ".toml" else out)
         found = run(
             chosen,
             critical_points=_points(critical_points),
@@ -119,10 +98,7 @@ def design(
             progress=tell,
         )
         files = [] if out is None else _written(found, out, tell)
-    if json:
-        print(as_json(found.to_json()), end="")
-    else:
-        _text(found, files)
+    answer(found, json, lambda: _text(found, files))
     raise typer.Exit(0 if found.reached else 1)
 
 
@@ -138,15 +114,11 @@ def _written(found: Design, out: Path, tell: Callable[[str, int, int], None]) ->
         return save_scene(found.scene, out)
     from limitsets import plot
     from limitsets.inverse import limit_sets_along
-    from limitsets.report.writing import DPI, filled
+    from limitsets.report.writing import laid
 
     drawn = plot.design(found, limit_sets_along(found, tell))
-    names = [f"{found.scene.name}.toml", "design.json", "design.png"]
-    with filled(out) as folder:
-        (folder / names[0]).write_text(dump(found.scene), encoding="utf-8", newline="\n")
-        (folder / names[1]).write_text(as_json(found.to_json()), encoding="utf-8", newline="\n")
-        drawn.savefig(folder / names[2], dpi=DPI)
-    return [out / name for name in names]
+    texts = {f"{found.scene.name}.toml": dump(found.scene), "design.json": as_json(found)}
+    return laid(out, [("design", drawn)], lambda _: texts)
 
 
 def _text(found: Design, files: list[Path]) -> None:

@@ -7,9 +7,8 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from limitsets.cli.output import progress, save_scene, show_scene, table
+from limitsets.cli.output import answer, opened, progress, save_scene, show_scene, table
 from limitsets.errors import LimitsetsError
-from limitsets.files import as_json
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -35,12 +34,8 @@ def run_robust(
     """Search, prove, write and print; the exit code."""
     with progress() as tell:
         from limitsets.inverse import robust_design
-        from limitsets.report.writing import require_place
-        from limitsets.scene import load
 
-        scene = load(name)
-        if out is not None and out.suffix != ".toml":
-            require_place(out)
+        scene, _ = opened(name, None if out and out.suffix == ".toml" else out)
         found = robust_design(
             scene,
             vary=_varied(scene, vary, bounds),
@@ -49,10 +44,7 @@ def run_robust(
             progress=tell,
         )
         found, files = (found, []) if out is None else _written(found, out, recheck=recheck)
-    if json:
-        print(as_json(found.to_json()), end="")
-    else:
-        _text(found, files)
+    answer(found, json, lambda: _text(found, files))
     return 0 if seconds == 0.0 or all(one.proved > 0.0 for one in found.margins) else 1
 
 

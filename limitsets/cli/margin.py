@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from limitsets.cli.arguments import HELP_NO_RECHECK, place
-from limitsets.cli.output import Json, Scene, progress, table
+from limitsets.cli.output import Json, Scene, answer, opened, progress, table
 from limitsets.errors import LimitsetsError
 from limitsets.files import as_json
 
@@ -50,23 +50,15 @@ def margin(
     """
     with progress() as tell:
         from limitsets.robust.margins.finding import margin as run
-        from limitsets.scene import load
 
-        chosen = load(scene)
+        chosen, _ = opened(scene, out)
         goal = None if x is None else _goal_at(chosen, x)
-        if out is not None:
-            from limitsets.report.writing import require_place
-
-            require_place(out)
         found = run(chosen, *(quantity or ()), reading=reading, goal=goal, width=width, progress=tell)
         records = [each.to_json() for each in found]
         if out is not None:
             tell("files", len(found), len(found) + 1)
             found, records = _write(found, out, recheck=not no_recheck)
-    if json:
-        print(as_json(records), end="")
-    else:
-        _text(found, out, no_recheck=no_recheck)
+    answer(records, json, lambda: _text(found, out, no_recheck=no_recheck))
     raise typer.Exit(
         0 if all(each.proved > 0 and (each.closed or each.refuted is None) for each in found) else 1
     )
@@ -94,7 +86,7 @@ def _write(
     """Write the files; the margins and their JSON without what the checker denies."""
     from limitsets.errors import AnswerError
     from limitsets.plot.margins import tolerance_box, tornado
-    from limitsets.report.writing import DPI, filled
+    from limitsets.report.writing import laid
     from limitsets.robust.margins.answer import settled
 
     found, records = [], []
@@ -105,14 +97,10 @@ def _write(
             left, paths = each, ()
         found.append(left)
         records.append(left.to_json() | {"certificate": [path.name for path in paths] or None})
-    with filled(out) as draft:
-        (draft / "margins.json").write_text(as_json(records), encoding="utf-8", newline="\n")
-        single = [each for each in found if each.reading != "tolerance"]
-        if single:
-            tornado(single).savefig(draft / "margins.png", dpi=DPI)
-        for each in found:
-            if each.reading == "tolerance":
-                tolerance_box(each).savefig(draft / "joint.png", dpi=DPI)
+    single = [each for each in found if each.reading != "tolerance"]
+    drawn = [("margins", tornado(single))] if single else []
+    drawn += [("joint", tolerance_box(each)) for each in found if each.reading == "tolerance"]
+    laid(out, drawn, lambda _: {"margins.json": as_json(records)})
     return tuple(found), records
 
 

@@ -19,7 +19,18 @@ from limitsets.files import as_json, replaced
 if TYPE_CHECKING:
     from limitsets.scene import Scene as SceneOf
 
-__all__ = ["Json", "Out", "Scene", "answer", "progress", "save_scene", "saved", "show_scene", "table"]
+__all__ = [
+    "Json",
+    "Out",
+    "Scene",
+    "answer",
+    "opened",
+    "progress",
+    "save_scene",
+    "saved",
+    "show_scene",
+    "table",
+]
 
 Scene = Annotated[
     str, typer.Argument(metavar="SCENE", help="A built-in name (see: limitsets scenes) or a TOML file.")
@@ -48,6 +59,19 @@ def table(heads: Sequence[str], rows: Sequence[Sequence[object]]) -> None:
     Console(width=None if sys.stdout.isatty() else 200).print(grid)
 
 
+def opened(scene: str, out: Path | None, word: str = "") -> tuple[SceneOf, Path]:
+    """Load a scene; a folder, by default NAME-WORD, that cannot be written is refused before anything is computed."""
+    from limitsets.scene import load
+
+    chosen = load(scene)
+    folder = out or Path(f"{chosen.name}-{word}")
+    if out or word:
+        from limitsets.report.writing import require_place
+
+        require_place(folder)
+    return chosen, folder
+
+
 @contextmanager
 def saved(file: Path) -> Iterator[Path]:
     """Write one file whole: a draft to write to, which takes its place at the end."""
@@ -65,7 +89,7 @@ def saved(file: Path) -> Iterator[Path]:
         ) from None
 
 
-def answer(record: Any, json: bool, out: Path | None, text: Callable[[], None]) -> None:
+def answer(record: Any, json: bool, text: Callable[[], None], out: Path | None = None) -> None:
     """Give an answer as JSON or as text, and write it to a file where one is named."""
     words = as_json(record)
     if out is not None:

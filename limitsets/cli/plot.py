@@ -9,9 +9,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from limitsets.cli.arguments import position
-from limitsets.cli.output import Json, Scene, progress, saved
+from limitsets.cli.output import Json, Scene, answer, progress, saved
 from limitsets.errors import LimitsetsError
-from limitsets.files import as_json
 
 if TYPE_CHECKING:
     from limitsets.analysis import Analysis
@@ -65,10 +64,7 @@ def plot(
         analysis = run(scene, cells, progress=tell)
         file = out if out is not None else Path(f"{analysis.scene.name}-{kind}.png")
         _draw(analysis, kind, file, x, side)
-    if json:
-        print(as_json({"figure": str(file)}), end="")
-    else:
-        typer.echo(f"figure: {file}")
+    answer({"figure": str(file)}, json, lambda: typer.echo(f"figure: {file}"))
 
 
 def _draw(analysis: Analysis, kind: Kind, file: Path, x: str | None, side: int | None) -> None:

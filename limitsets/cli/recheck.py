@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated
 
@@ -33,8 +32,5 @@ def recheck(
 
     from limitsets.checker import EXITS, show
 
-    def text() -> None:
-        show(report, str(file))
-
-    answer(asdict(report), json, out, text)
+    answer(report, json, lambda: show(report, str(file)), out)
     raise typer.Exit(EXITS[report.verdict])

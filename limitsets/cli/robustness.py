@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from limitsets.cli.arguments import HELP_NO_RECHECK, deviations
-from limitsets.cli.output import Json, Scene, progress, table
-from limitsets.files import as_json
+from limitsets.cli.output import Json, Scene, answer, opened, progress, table
 
 if TYPE_CHECKING:
     from limitsets.robust.sheet.summary import Robustness
@@ -62,13 +61,8 @@ def robustness(
     Exit 1 where the goal is not proved of the scene as it is.
     """
     with progress() as tell:
-        from limitsets.scene import load
-
-        chosen = load(scene)
-        folder = out if out is not None else Path(f"{chosen.name}-robustness")
-        from limitsets.report.writing import require_place
-
-        require_place(folder)
+        chosen, folder = opened(scene, out, "robustness")
+        from limitsets.report import write_robustness
         from limitsets.robust.sheet.chance import scattering_from
         from limitsets.robust.sheet.gathering import robustness as run
 
@@ -87,21 +81,17 @@ def robustness(
             recheck=not no_recheck,
             progress=tell,
         )
-        from limitsets.report import write_robustness
-
         tell("files", len(found.entries), len(found.entries) + 1)
         files = write_robustness(found, folder)
-    if json:
-        print(as_json(found.to_json()), end="")
-    else:
-        _text(found, files)
+    answer(found, json, lambda: _text(found, files))
     raise typer.Exit(0 if found.verdict == "proved" else 1)
 
 
 def _text(found: Robustness, files: list[Any]) -> None:
-    from limitsets.report.robust_pages import HEADS, answer, lines_of
+    from limitsets.report.robust_pages import HEADS, lines_of
+    from limitsets.report.robust_pages import answer as said
 
-    typer.echo(answer(found).replace("**", ""))
+    typer.echo(said(found).replace("**", ""))
     if found.singles:
         table(HEADS, lines_of(found))
     for part in ("joint", "curve", "noise"):

@@ -41,4 +41,4 @@ def scenes(out: Out = None, json: Json = False) -> None:
         ]
         table(["scene", "sides", "kappa", "arm", "flight", "flip", "goal"], rows)
 
-    answer(records, json, out, text)
+    answer(records, json, text, out)

@@ -9,6 +9,7 @@ import typer
 
 from limitsets.cli.arguments import position
 from limitsets.cli.output import Json, Out, Scene, answer, table
+from limitsets.files import as_table
 
 if TYPE_CHECKING:
     from limitsets.thrower import Trace
@@ -42,7 +43,7 @@ def throw(
         unit = chosen.unit
         table(["throw", f"x [{unit}]", "side", "status", "turned by", f"displacement [{unit}]", "flag"], rows)
 
-    answer(records, json, out, text)
+    answer(records, json, text, out)
     if chosen.effects.auto:
         typer.echo(
             "limitsets: auto in [effects] is resolved by limitsets analyse; thrown with: "
@@ -57,24 +58,20 @@ def throw(
         )
 
 
-def _number(value: float) -> float | None:
-    return float(value) if math.isfinite(value) else None
-
-
 def _records(path: Trace) -> list[dict[str, Any]]:
     from limitsets.maps import codes
 
     return [
-        {
-            "x": _number(path.x[k + 1]),
-            "side": int(path.side[k + 1]),
-            "status": codes.NAMES[int(path.code[k])],
-            "phi": _number(path.phi[k]),
-            "displacement": _number(path.displacement[k]),
-            "sides_turned": int(path.turned[k]),
-            "other_vertex_first": bool(path.other_vertex_first[k]),
+        as_table(
+            x=path.x[k + 1],
+            side=path.side[k + 1],
+            status=codes.NAMES[int(path.code[k])],
+            phi=path.phi[k],
+            displacement=path.displacement[k],
+            sides_turned=path.turned[k],
+            other_vertex_first=path.other_vertex_first[k],
             **({"reason": path.reason} if path.code[k] == codes.OUTSIDE_MODEL else {}),
-        }
+        )
         for k in range(path.code.size)
     ]
 

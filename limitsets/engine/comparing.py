@@ -73,12 +73,17 @@ class Comparison:
         return other
 
 
-def compare(
-    scene: Scene,
-    x: ArrayLike,
-    side: ArrayLike,
-    **how: Any,
-) -> Comparison:
+# Fields of `Landing` that are taken over, and what they are.
+SEEN: dict[str, Any] = {
+    "status": np.str_,
+    "struck": np.int64,
+    "residual": np.float64,
+    "reverses": np.bool_,
+    "rocks": np.bool_,
+}
+
+
+def compare(scene: Scene, x: ArrayLike, side: ArrayLike, **how: Any) -> Comparison:
     """Throw parts by the scene's map, with the effects it has, and in the engine.
 
     Parameters
@@ -113,13 +118,10 @@ def compare(
     starts = np.asarray(x, dtype=np.float64)
     sides = np.asarray(side, dtype=np.int64)
     if starts.ndim != 1 or sides.shape not in ((), starts.shape):
-        raise AnswerError(
-            "the shape of the sides", sides.shape, f"{starts.shape}, or one side", "give a side per start"
-        )
+        allowed = f"{starts.shape}, or one side"
+        raise AnswerError("the shape of the sides", sides.shape, allowed, "give a side per start")
     sides = np.broadcast_to(sides, starts.shape).copy()
-    landings = [
-        throw(scene, start, on, **how) for start, on in zip(starts.tolist(), sides.tolist(), strict=True)
-    ]
+    landings = [throw(scene, *start, **how) for start in zip(starts.tolist(), sides.tolist(), strict=True)]
     x_map, side_map, code_map = _by_map(scene, starts, sides)
     return Comparison(
         x=starts,
@@ -127,14 +129,10 @@ def compare(
         x_map=x_map,
         side_map=side_map,
         code_map=code_map,
-        x_engine=np.array([landing.x for landing in landings]),
-        side_engine=np.array([landing.side for landing in landings], dtype=np.int64),
-        status=np.array([landing.status for landing in landings], dtype=np.str_),
-        struck=np.array([landing.struck for landing in landings], dtype=np.int64),
+        x_engine=np.array([each.x for each in landings]),
+        side_engine=np.array([each.side for each in landings], dtype=np.int64),
         left=-sides % len(scene.sides),
-        residual=np.array([landing.residual for landing in landings]),
-        reverses=np.array([landing.reverses for landing in landings], dtype=np.bool_),
-        rocks=np.array([landing.rocks for landing in landings], dtype=np.bool_),
+        **{name: np.array([getattr(each, name) for each in landings], kind) for name, kind in SEEN.items()},
     )
 
 

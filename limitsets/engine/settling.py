@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from limitsets.engine.stage import Stage, pymunk_module
+from limitsets.engine.stage import Stage
 
 if TYPE_CHECKING:
     from limitsets.scene import Scene
@@ -17,12 +17,6 @@ __all__ = ["IDLE", "Seen", "settle"]
 IDLE = 0.5
 # Farther from flat than this [rad] an idle part leans or stands on a vertex.
 LEANING = 0.02
-# What contacts may overlap for good, as a fraction of the part's size: without any they would come and go.
-OVERLAP = 1e-4
-# Of the overlap beyond that so much is taken back in each step, without adding to the velocity.
-TAKEN_BACK = 0.2
-# Two contacts with friction on one body; more change nothing.
-ITERATIONS = 40
 # A change of velocity in one step beyond this share of a fall by the part's size is an impact.
 SUDDEN = 0.02
 # Of a part of mass 1 with less energy than this nothing is worth watching [scene's unit squared].
@@ -61,16 +55,8 @@ def settle(
     stage: Stage, scene: Scene, friction: float, restitution: float, step: float, patience: float
 ) -> tuple[float, int, Seen]:
     """Let the engine's contact bring the part to rest: time, side (-1 where patience ends first), and what was seen."""
-    pymunk, space, body, size = pymunk_module(), stage.space, stage.body, stage.size
-    far = 4.0 * (scene.arm_length + size)
-    # As thick as the part is long: it never comes out on the other side.
-    low = stage.height - size
-    arm = pymunk.Segment(space.static_body, (-far, low), (far, low), size)
-    arm.friction = arm.elasticity = 1.0  # the engine takes products
-    stage.part.friction, stage.part.elasticity = friction, restitution
-    space.iterations = ITERATIONS
-    space.collision_slop = OVERLAP * size
-    space.collision_bias = (1.0 - TAKEN_BACK) ** (1.0 / step)
+    space, body, size = stage.space, stage.body, stage.size
+    arm = stage.arm(space.static_body, 4.0 * (scene.arm_length + size), friction, restitution, step)
     seen, sudden = Seen(), SUDDEN * math.sqrt(stage.kappa * size)
     space.on_collision(post_solve=lambda arbiter, _space, _data: _watch(arbiter, body, friction, seen))
     seen.reverses = slides_back(stage, body.velocity, body.angular_velocity, friction)
@@ -83,19 +69,20 @@ def settle(
         velocity, rate = body.velocity, body.angular_velocity
         space.step(step)  # it moves the part first
         time += step
-        if (body.velocity - velocity).length + stage.size * abs(body.angular_velocity - rate) > sudden:
+        if (body.velocity - velocity).length + size * abs(body.angular_velocity - rate) > sudden:
             seen.reverses |= slides_back(stage, velocity, rate, friction)
-            flat = min(abs(math.remainder(body.angle - flat, math.tau)) for flat in stage.flat) < LEANING
-            seen.rocks |= (
-                flat
-                and body.angular_velocity * rate > 0.0
-                and stage.size * abs(body.angular_velocity) > sudden
-            )
-    off = [abs(math.remainder(body.angle - flat, math.tau)) for flat in stage.flat]
+            rises = body.angular_velocity * rate > 0.0 and size * abs(body.angular_velocity) > sudden
+            seen.rocks |= rises and min(_leaning(stage)) < LEANING
+    off = _leaning(stage)
     side = off.index(min(off))
     at_rest = body.is_sleeping and off[side] < LEANING
     seen.residual /= stage.kappa * size
     return time, side if at_rest else -1, seen
+
+
+def _leaning(stage: Stage) -> list[float]:
+    """By which angle each side is off the arm."""
+    return [abs(math.remainder(stage.body.angle - flat, math.tau)) for flat in stage.flat]
 
 
 def _watch(arbiter: Any, body: Any, friction: float, seen: Seen) -> None:

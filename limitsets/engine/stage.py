@@ -18,14 +18,20 @@ from limitsets.errors import AnswerError
 from limitsets.geometry import side_ends
 
 if TYPE_CHECKING:
-    from pymunk import Body, Poly, Space
+    from pymunk import Body, Poly, Segment, Space
 
     from limitsets.scene import Scene
 
-__all__ = ["Stage", "pymunk_module", "set_up"]
+__all__ = ["INSTANT", "OVERLAP", "Stage", "pymunk_module", "set_up"]
 
 INSTANT = 1e-12
 """A step as short as this lets the solver act and moves nothing."""
+OVERLAP = 1e-4
+"""What contacts may overlap for good, as a fraction of the part's size: without any they would come and go."""
+# Of the overlap beyond that so much is taken back in each step, without adding to the velocity.
+TAKEN_BACK = 0.2
+# Two contacts with friction on one body; more change nothing.
+ITERATIONS = 40
 
 State: TypeAlias = tuple[Any, float, Any]
 
@@ -41,12 +47,8 @@ def pymunk_module() -> ModuleType:
     try:
         import pymunk
     except ImportError as error:
-        raise AnswerError(
-            "the rigid-body engine",
-            "not installed",
-            "pymunk",
-            "pip install 'limitsets[engine]', or pip install pymunk",
-        ) from error
+        remedy = "pip install 'limitsets[engine]', or pip install pymunk"
+        raise AnswerError("the rigid-body engine", "not installed", "pymunk", remedy) from error
     return pymunk
 
 
@@ -106,6 +108,20 @@ class Stage:
         self.space.add(against)
         self.space.step(INSTANT)
         self.space.remove(against)
+
+    def arm(self, on: Body, far: float, friction: float, restitution: float, step: float) -> Segment:
+        """Make the arm's surface, as far as that from the joint, and let it meet the part in steps of this length.
+
+        It is as thick as the part is long, which so never comes out on the other side.
+        """
+        low = self.height - self.size
+        arm: Segment = pymunk_module().Segment(on, (-far, low), (far, low), self.size)
+        arm.friction = arm.elasticity = 1.0  # the engine takes products
+        self.part.friction, self.part.elasticity = friction, restitution
+        self.space.iterations = ITERATIONS
+        self.space.collision_slop = OVERLAP * self.size
+        self.space.collision_bias = (1.0 - TAKEN_BACK) ** (1.0 / step)
+        return arm
 
     def state(self) -> State:
         """Remember where the part is in flight; its rate of turning does not change."""

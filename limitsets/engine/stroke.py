@@ -5,14 +5,12 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from limitsets.engine.stage import INSTANT, Stage, pymunk_module
+from limitsets.engine.stage import INSTANT, OVERLAP, Stage, pymunk_module
 
 __all__ = ["accelerate"]
 
 # Steps of a stroke to one of the way to rest; contact is of first order in them.
 FINER = 0.5
-# Overlap of part and arm, as a fraction of the part's size: more than the steps' straight ways lift the part.
-OVERLAP = 1e-4
 
 
 def accelerate(stage: Stage, stroke: float, friction: float, step: float) -> None:
@@ -20,9 +18,10 @@ def accelerate(stage: Stage, stroke: float, friction: float, step: float) -> Non
 
     All is seen by the arm as it stops; gravity leans towards the joint.
     """
-    pymunk, space, body, part = pymunk_module(), stage.space, stage.body, stage.part
+    pymunk, space, body = pymunk_module(), stage.space, stage.body
     sine, cosine = math.sin(stroke), math.cos(stroke)
     space.gravity = (-stage.kappa * sine, -stage.kappa * cosine)
+    # The overlap is more than the steps' straight ways lift the part.
     across, up = body.position.x, body.position.y - 0.5 * OVERLAP * stage.size
     body.position = (across * cosine + up * sine, up * cosine - across * sine)
     body.angle -= stroke
@@ -32,18 +31,13 @@ def accelerate(stage: Stage, stroke: float, friction: float, step: float) -> Non
     gain = time / (2.0 * stroke)
     arm = pymunk.Body(body_type=pymunk.Body.KINEMATIC)
     arm.angle, arm.angular_velocity = -stroke, 0.5 * gain
-    far, low = 4.0 * (across + stage.size), stage.height - stage.size
-    surface = pymunk.Segment(arm, (-far, low), (far, low), stage.size)
-    surface.friction, part.friction = 1.0, friction
+    surface = stage.arm(arm, 4.0 * (across + stage.size), friction, 0.0, time)
     gains = [gain] * (steps - 1) + [0.5 * gain]  # each step moves by the velocity of its middle
 
     def turn_faster(arm: Any, _gravity: Any, _damping: float, _time: float) -> None:
         if gains:
             arm.angular_velocity += gains.pop()
 
-    space.collision_slop = OVERLAP * stage.size
-    space.collision_bias = 0.8 ** (1.0 / time)
-    space.iterations = 40
     body.angular_velocity = 0.5 * gain
     body.velocity = (-0.5 * gain * body.position.y, 0.5 * gain * body.position.x)
     space.add(arm, surface)

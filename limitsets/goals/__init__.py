@@ -4,27 +4,48 @@ A goal is a frozen dataclass with its units resolved.  `evaluate` reads it off e
 elsewhere; it knows no map and no graph.
 """
 
-from limitsets.goals.ask import Verdict, evaluate
+from limitsets.goals.ask import evaluate
+from limitsets.goals.goal import (
+    GOALS,
+    Found,
+    Goal,
+    Place,
+    Side,
+    Sides,
+    Verdict,
+    as_written,
+    declare,
+    words_of,
+)
 from limitsets.goals.kinds import (
     AttractsAll,
     FlipOrder,
-    Goal,
     OrientedBeyond,
     Predicate,
     Reaches,
     StaysOnArm,
+    order_of,
     unknown_goal,
 )
 
 __all__ = [
+    "GOALS",
     "AttractsAll",
     "FlipOrder",
+    "Found",
     "Goal",
     "OrientedBeyond",
+    "Place",
     "Predicate",
     "Reaches",
+    "Side",
+    "Sides",
     "StaysOnArm",
     "Verdict",
+    "as_written",
+    "declare",
     "evaluate",
+    "order_of",
     "unknown_goal",
+    "words_of",
 ]

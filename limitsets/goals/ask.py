@@ -2,44 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
-from typing import NamedTuple
 
-import numpy as np
+from limitsets.goals.goal import Found, Goal, Verdict
+from limitsets.goals.kinds import unknown_goal
 
-from limitsets.goals.kinds import (
-    AttractsAll,
-    FlipOrder,
-    Goal,
-    OrientedBeyond,
-    Predicate,
-    Reaches,
-    StaysOnArm,
-    unknown_goal,
-)
-
-__all__ = ["Verdict", "evaluate"]
-
-# fractions are sums over cells: a whole one is 1 up to rounding
-_WHOLE = 1 - 1e-12
-
-
-class Verdict(NamedTuple):
-    """Whether a goal holds, and where it begins to.
-
-    Parameters
-    ----------
-    holds : bool or None
-        None where these facts cannot decide it.
-    threshold : float or None
-        oriented_beyond: the smallest X for which "x > X implies the side" holds, -inf where the part is never on
-        another side.  reaches: the largest x reached on the side, -inf where it is never on it.  None for the
-        others [scene's length unit].
-    """
-
-    holds: bool | None
-    threshold: float | None
+__all__ = ["evaluate"]
 
 
 def evaluate(
@@ -79,30 +47,11 @@ def evaluate(
 
     Examples
     --------
+    >>> from limitsets.goals import OrientedBeyond
     >>> found = {0: [(15.2, 19.75)], 1: [(12.6, 17.4)], 2: [(8.9, 23.4)]}
     >>> evaluate(OrientedBeyond(x=20.0, side=2), found)
     Verdict(holds=True, threshold=19.75)
     """
-    reached = {side: max((hi for _, hi in parts), default=-math.inf) for side, parts in extents.items()}
-    if isinstance(goal, OrientedBeyond):
-        threshold = max((x for side, x in reached.items() if side != goal.side), default=-math.inf)
-        return Verdict(threshold <= goal.x, threshold)
-    if isinstance(goal, Reaches):
-        threshold = reached.get(goal.side, -math.inf)
-        # extents say how far some orbit gets; that every one does is another question
-        return Verdict(None if goal.every_orbit and threshold >= goal.x else threshold >= goal.x, threshold)
-    if isinstance(goal, AttractsAll):
-        return Verdict(len(fractions) == 1 and fractions[0] >= _WHOLE, None)
-    if isinstance(goal, Predicate):
-        parts = [(side, np.array(spans).reshape(-1, 2)) for side, spans in extents.items()]
-        return Verdict(all(np.all(goal.holds(span[:, 0], span[:, 1], side)) for side, span in parts), None)
-    if isinstance(goal, FlipOrder):
-        return Verdict(flip_order is not None and _same_cycle(tuple(flip_order), goal.order), None)
-    if isinstance(goal, StaysOnArm):
-        return Verdict(leaving <= 0, None)
-    raise unknown_goal(goal)
-
-
-def _same_cycle(found: tuple[int, ...], asked: tuple[int, ...]) -> bool:
-    rotations = (found[start:] + found[:start] for start in range(len(found)))
-    return asked in rotations
+    if not isinstance(goal, Goal):
+        raise unknown_goal(goal)
+    return goal.decide(Found(extents, flip_order, fractions, leaving))

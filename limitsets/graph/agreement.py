@@ -76,7 +76,7 @@ def require_agreement(params: Any, grid: Grid, boxes: bool) -> None:
         if kind.has_image_on:
             _ask_forced(params, starts, side, (after, found.side, found.code), usable, size)
         if boxes and kind.has_image_box and rounding_is_sound():
-            _ask_boxes(params, starts, side, (after, found.side, found.code), usable, size)
+            _ask_boxes(params, grid, starts, side, (after, found.side, found.code), usable, size)
     _ASKED.add((cls, boxes))
 
 
@@ -103,7 +103,7 @@ def _ask_forced(params: Any, starts: Any, side: int, seen: Any, usable: Any, siz
             )
 
 
-def _ask_boxes(params: Any, starts: Any, side: int, seen: Any, usable: Any, size: Any) -> None:
+def _ask_boxes(params: Any, grid: Grid, starts: Any, side: int, seen: Any, usable: Any, size: Any) -> None:
     """Compare the boxes of single points."""
     after, to, code = seen
     points = columns(starts, starts.shape[1])
@@ -115,6 +115,7 @@ def _ask_boxes(params: Any, starts: Any, side: int, seen: Any, usable: Any, size
         inside |= held & (found.to[2 * slot] == to) & ((slot == 0) | (found.count == BOTH))
     undefined = np.isnan(after).any(axis=1)
     proved = found.count != NOTHING
+    _ask_exits(params, grid, starts, side, code, found, proved & ~usable & ~undefined)
     for k in np.flatnonzero(proved & ((usable & ~inside) | undefined))[:1]:
         box = tuple((float(lo[k]), float(hi[k])) for lo, hi in zip(*found.slots[0], strict=True))
         got = (*box, int(found.to[0, k]))
@@ -126,3 +127,21 @@ def _ask_boxes(params: Any, starts: Any, side: int, seen: Any, usable: Any, size
             got,
             (_plain(after[k]), int(to[k])),
         )
+
+
+def _ask_exits(
+    params: Any, grid: Grid, starts: Any, side: int, code: Any, found: Images, gone: NDArray[np.bool_]
+) -> None:
+    """Refuse boxes in the domain, of points that have left the map: only `image` knows of that exit."""
+    lo, hi = (np.stack(corner, axis=1) for corner in found.slots[0])
+    for k in np.flatnonzero(gone):
+        edges = grid.edges[int(found.to[0, k]) % grid.sides]
+        ends = np.array([axis[[0, -1]] for axis in edges])
+        if ((ends[:, 0] <= lo[k]) & (hi[k] <= ends[:, 1])).all():
+            x = ", ".join(f"{v:.6g}" for v in starts[k])
+            raise MapError(
+                f"the image of {kind_of(params).name} at x = {x}, side {side}",
+                f"code {int(code[k])}, an exit",
+                f"an exit of its boxes too, which lead to {_plain(lo[k])}",
+                "let image_on give nan there, or register image_box",
+            )

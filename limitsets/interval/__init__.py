@@ -41,13 +41,15 @@ from limitsets.interval.arithmetic import (
     sqrt,
     sub,
 )
+from limitsets.interval.dual import Dual, seed, slope_of, value_of
 from limitsets.interval.elementary import atan2, cos, sin
-from limitsets.interval.exponential import exp
+from limitsets.interval.exponential import exp, tanh
 from limitsets.interval.guard import guard, rounding_is_sound
 from limitsets.interval.logarithm import log
-from limitsets.interval.number import Interval
+from limitsets.interval.number import Interval, intervals_between
 
 __all__ = [
+    "Dual",
     "Interval",
     "absolute",
     "add",
@@ -58,6 +60,7 @@ __all__ = [
     "exp",
     "guard",
     "hull",
+    "intervals_between",
     "log",
     "maximum",
     "minimum",
@@ -66,8 +69,12 @@ __all__ = [
     "point",
     "power",
     "rounding_is_sound",
+    "seed",
     "sin",
+    "slope_of",
     "sqr",
     "sqrt",
     "sub",
+    "tanh",
+    "value_of",
 ]

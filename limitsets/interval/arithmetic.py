@@ -17,6 +17,7 @@ __all__ = [
     "add",
     "contains",
     "div",
+    "floor",
     "holds",
     "hull",
     "maximum",
@@ -146,12 +147,18 @@ def power(a: Ends, count: int) -> Ends:
     if count == 2:
         return sqr(a)
     n = abs(count)
-    base = absolute(a) if n % 2 == 0 else a
+    base = a if n & 1 else absolute(a)  # `&`: a power that is a float does not compile
     lo, hi = (1.0, 1.0), (1.0, 1.0)
     for _ in range(n):
         lo, hi = mul(lo, (base[0], base[0])), mul(hi, (base[1], base[1]))
     found = or_empty(holds(a), lo[0], hi[1])
     return found if count >= 0 else div((1.0, 1.0), found)
+
+
+@proof_kernel
+def floor(a: Ends) -> Ends:
+    """Largest whole number that is not above, exactly: those of all of a."""
+    return or_empty(holds(a), math.floor(a[0] + 0.0), math.floor(a[1] + 0.0))
 
 
 @proof_kernel

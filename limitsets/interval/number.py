@@ -12,12 +12,17 @@ import operator
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
-from limitsets.interval import arithmetic
+import numpy as np
+
+from limitsets.interval import arithmetic, elementary, exponential, logarithm
 from limitsets.interval.rounding import down, up
-from limitsets.jit import number, operation
+from limitsets.jit import corners_as_numbers, mark_undefined, number, operation
 
 __all__ = [
     "Interval",
+    "PerSide",
+    "ends_of",
+    "intervals_between",
     "larger",
     "signed_square",
     "smaller",
@@ -30,7 +35,7 @@ Number = TypeVar("Number", bound=Any)
 """A float, an `Interval`, or a number of Python with the same operators."""
 
 
-@number
+@number(twice=True)
 @dataclass(frozen=True, slots=True)
 class Interval:
     """All real numbers from lo to hi, with the contract of `limitsets.interval`.
@@ -90,7 +95,7 @@ class Interval:
 # One function for each: code that takes a kernel as an argument, or keeps one in a closure, is not cached on disk.
 
 
-def _ends(x: Any) -> Any:
+def ends_of(x: Any) -> Any:
     """Return an interval, or a plain number, as a pair."""
     return _ends_of_interval(x) if isinstance(x, Interval) else _ends_of_number(x)
 
@@ -103,68 +108,167 @@ def _ends_of_number(x: Any) -> Any:
     return float(x), float(x)
 
 
+def _itself(a: Any) -> Any:
+    return a
+
+
 def _neg(a: Any) -> Interval:
-    lo, hi = arithmetic.neg(_ends(a))
+    lo, hi = arithmetic.neg(ends_of(a))
     return Interval(lo, hi)
 
 
 def _add(a: Any, b: Any) -> Interval:
-    lo, hi = arithmetic.add(_ends(a), _ends(b))
+    lo, hi = arithmetic.add(ends_of(a), ends_of(b))
     return Interval(lo, hi)
 
 
 def _sub(a: Any, b: Any) -> Interval:
-    lo, hi = arithmetic.sub(_ends(a), _ends(b))
+    lo, hi = arithmetic.sub(ends_of(a), ends_of(b))
     return Interval(lo, hi)
 
 
 def _mul(a: Any, b: Any) -> Interval:
-    lo, hi = arithmetic.mul(_ends(a), _ends(b))
+    lo, hi = arithmetic.mul(ends_of(a), ends_of(b))
     return Interval(lo, hi)
 
 
 def _div(a: Any, b: Any) -> Interval:
-    lo, hi = arithmetic.div(_ends(a), _ends(b))
+    lo, hi = arithmetic.div(ends_of(a), ends_of(b))
     return Interval(lo, hi)
 
 
 def _pow(a: Any, count: Any) -> Interval:
-    lo, hi = arithmetic.power(_ends(a), count)
+    lo, hi = arithmetic.power(ends_of(a), count)
     return Interval(lo, hi)
 
 
 def _abs(a: Any) -> Interval:
-    lo, hi = arithmetic.absolute(_ends(a))
+    lo, hi = arithmetic.absolute(ends_of(a))
     return Interval(lo, hi)
 
 
 def _min(a: Any, b: Any) -> Interval:
-    lo, hi = arithmetic.minimum(_ends(a), _ends(b))
+    lo, hi = arithmetic.minimum(ends_of(a), ends_of(b))
     return Interval(lo, hi)
 
 
 def _max(a: Any, b: Any) -> Interval:
-    lo, hi = arithmetic.maximum(_ends(a), _ends(b))
+    lo, hi = arithmetic.maximum(ends_of(a), ends_of(b))
     return Interval(lo, hi)
 
 
 def _sqrt(a: Any) -> Interval:
-    lo, hi = arithmetic.sqrt(_ends(a))
+    lo, hi = arithmetic.sqrt(ends_of(a))
     return Interval(lo, hi)
 
 
-operation(_ends, Interval, _ends_of_interval)
-operation(_ends, float, _ends_of_number)
-for _stub, _method in (
-    (operator.neg, _neg),
-    (operator.add, _add),
-    (operator.sub, _sub),
-    (operator.mul, _mul),
-    (operator.truediv, _div),
-    (operator.pow, _pow),
-    (abs, _abs),
+def _floor(a: Any) -> Interval:
+    lo, hi = arithmetic.floor(ends_of(a))
+    return Interval(lo, hi)
+
+
+def _exp(a: Any) -> Interval:
+    lo, hi = exponential.exp(ends_of(a))
+    return Interval(lo, hi)
+
+
+def _log(a: Any) -> Interval:
+    lo, hi = logarithm.log(ends_of(a))
+    return Interval(lo, hi)
+
+
+def _sin(a: Any) -> Interval:
+    lo, hi = elementary.sin(ends_of(a))
+    return Interval(lo, hi)
+
+
+def _cos(a: Any) -> Interval:
+    lo, hi = elementary.cos(ends_of(a))
+    return Interval(lo, hi)
+
+
+def _tanh(a: Any) -> Interval:
+    lo, hi = exponential.tanh(ends_of(a))
+    return Interval(lo, hi)
+
+
+def _tan(a: Any) -> Interval:
+    ratio: Any = math.sin(a) / math.cos(a)
+    return ratio  # type: ignore[no-any-return]  # an interval
+
+
+def _atan2(a: Any, b: Any) -> Interval:
+    lo, hi = elementary.atan2(ends_of(a), ends_of(b))
+    return Interval(lo, hi)
+
+
+operation(ends_of, Interval, _ends_of_interval)
+operation(ends_of, float, _ends_of_number)
+for _stubs, _method in (
+    ((operator.pos,), _itself),
+    ((operator.neg,), _neg),
+    ((operator.add,), _add),
+    ((operator.sub,), _sub),
+    ((operator.mul,), _mul),
+    ((operator.truediv,), _div),
+    ((operator.pow,), _pow),
+    ((abs, math.fabs, np.abs), _abs),
+    ((min, np.minimum), _min),
+    ((max, np.maximum), _max),
+    ((math.sqrt, np.sqrt), _sqrt),
+    ((math.floor, np.floor), _floor),
+    ((math.exp, np.exp), _exp),
+    ((math.log, np.log), _log),
+    ((math.sin, np.sin), _sin),
+    ((math.cos, np.cos), _cos),
+    ((math.tan, np.tan), _tan),
+    ((math.tanh, np.tanh), _tanh),
+    ((math.atan2, np.arctan2), _atan2),
 ):
-    operation(_stub, Interval, _method)
+    for _stub in _stubs:
+        operation(_stub, Interval, _method)
+
+
+def _whole_number(x: Any) -> int:
+    """Return the whole number of an interval that has but this one, as the sides to which a map leads have."""
+    mark_undefined(math.floor(x.lo) != math.floor(x.hi))
+    return int(x.lo)
+
+
+operation(int, Interval, _whole_number)
+
+
+# ---------------------------------------------------------------- parameters
+
+
+@number(twice=True)
+@dataclass(frozen=True, slots=True)
+class PerSide:
+    """Intervals, one for each side: two arrays of ends.
+
+    Attributes
+    ----------
+    lo, hi : ndarray
+        The ends.
+    """
+
+    lo: Any
+    hi: Any
+
+
+def _of_side(ends: Any, side: Any) -> Interval:
+    return Interval(ends.lo[side], ends.hi[side])
+
+
+def _sides(ends: Any) -> int:
+    return len(ends.lo)
+
+
+operation(operator.getitem, PerSide, _of_side)
+operation(len, PerSide, _sides)
+
+intervals_between = corners_as_numbers(Interval, PerSide)
+"""The parameters between two corners, each an interval: `lo` and `hi` are of one NamedTuple class; in compiled code."""
 
 
 # ---------------------------------------------------------------- what the operators do not say tightly

@@ -14,7 +14,7 @@ from limitsets.maps.codes import (
     UNDECIDED,
     UNDEFINED,
 )
-from limitsets.maps.contract import MapKind, coerce, kind_of, register
+from limitsets.maps.contract import MapKind, coerce, has_slope, kind_of, register
 from limitsets.maps.critical import CriticalPoint, critical_points
 from limitsets.maps.drivers import Images, Orbit, advance, images, images_on, orbit
 from limitsets.maps.forced import along
@@ -22,19 +22,14 @@ from limitsets.maps.lyapunov import Lyapunov, lyapunov
 from limitsets.maps.pieces import Piece, TurningPoint, monotone_pieces, turning_points
 
 # One line for each textbook map; `as` makes the name public.
-from limitsets.maps.textbook.baker import Baker as Baker
-from limitsets.maps.textbook.contraction import Contraction as Contraction
+from limitsets.maps.textbook.circle import Circle as Circle
 from limitsets.maps.textbook.cubic import Cubic as Cubic
 from limitsets.maps.textbook.domains import domain_of
 from limitsets.maps.textbook.doubling import Doubling as Doubling
 from limitsets.maps.textbook.henon import Henon as Henon
 from limitsets.maps.textbook.leslie import Leslie as Leslie
-from limitsets.maps.textbook.linear import Linear2 as Linear2
 from limitsets.maps.textbook.logistic import Logistic as Logistic
-from limitsets.maps.textbook.product import Product as Product
 from limitsets.maps.textbook.rotation import Rotation as Rotation
-from limitsets.maps.textbook.three_state import ThreeState as ThreeState
-from limitsets.maps.textbook.two_state import TwoState as TwoState
 
 __all__ = [
     "FLIP",
@@ -58,6 +53,7 @@ __all__ = [
     "coerce",
     "critical_points",
     "domain_of",
+    "has_slope",
     "images",
     "images_on",
     "kind_of",

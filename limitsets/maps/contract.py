@@ -39,97 +39,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from limitsets.errors import MapError
-from limitsets.jit import cover_foreign_class, generic
-from limitsets.maps import codes
+from limitsets.jit import cover_foreign_class
+from limitsets.maps import codes, derived, kernels
 
-__all__ = [
-    "MapKind",
-    "coerce",
-    "displacement",
-    "fallback",
-    "fallback_box",
-    "image",
-    "image_box",
-    "image_on",
-    "kind_of",
-    "margin",
-    "on_side",
-    "on_side_box",
-    "register",
-    "require_codes",
-    "require_sides",
-    "scattered",
-]
-
-
-def _same(params: Any, side: int) -> Any:
-    return params
-
-
-def _both(lo: Any, hi: Any, side: int) -> Any:
-    return lo, hi
-
-
-def _as_they_are(params: Any, start: int, step: int) -> Any:
-    return params
-
-
-def _no_fallback_box(params_lo: Any, params_hi: Any, lo: Any, hi: Any, side: int) -> Any:
-    return image_box(params_lo, params_hi, lo, hi, side)
-
-
-def _no_fallback(params: Any, x: Any, side: int) -> Any:
-    return x, side, codes.OUTSIDE_MODEL
-
-
-@generic
-def image(params: Any, x: Any, side: int) -> Any:
-    """One step: ``(x', side', code)``."""
-
-
-@generic
-def image_on(params: Any, x: Any, side: int, branch: int) -> Any:
-    """One step on a forced branch: ``(x', side', slope)``."""
-
-
-@generic(proof=True)
-def image_box(params_lo: Any, params_hi: Any, lo: Any, hi: Any, side: int) -> Any:
-    """Boxes that contain the image of a box, for every parameter between the two."""
-
-
-@generic(proof=True, inlined=False, default=_no_fallback_box)
-def fallback_box(params_lo: Any, params_hi: Any, lo: Any, hi: Any, side: int) -> Any:
-    """As `image_box`, slow and sure."""
-
-
-@generic(proof=True, default=_both)
-def on_side_box(params_lo: Any, params_hi: Any, side: int) -> Any:
-    """Return what `image_box` needs to know of one side, for both corners."""
-
-
-@generic(default=_same)
-def on_side(params: Any, side: int) -> Any:
-    """Return what the kernels need to know of one side."""
-
-
-@generic(inlined=False, default=_no_fallback)
-def fallback(params: Any, x: Any, side: int) -> Any:
-    """One step, slow and sure."""
-
-
-@generic
-def margin(params: Any, x: Any, side: int) -> Any:
-    """Return a number whose sign decides between branches 0 and 1."""
-
-
-@generic
-def displacement(params: Any, x: Any, side: int) -> Any:
-    """x' - x without cancellation."""
-
-
-@generic(default=_as_they_are)
-def scattered(params: Any, start: int, step: int) -> Any:
-    """Return the parameters of one step of one start."""
+__all__ = ["MapKind", "coerce", "has_slope", "kind_of", "register", "require_codes", "require_sides"]
 
 
 EXITS_OF_A_MAP = {"outside": codes.OUTSIDE}
@@ -251,8 +164,8 @@ def register(
         "displacement": displacement,
         "scattered": scattered,
     }
-    kernels = {name: f for name, f in given.items() if f is not None}
-    for name, function in kernels.items():
+    mine = {name: f for name, f in given.items() if f is not None}
+    for name, function in mine.items():
         plain = getattr(function, "py_func", function)
         if (
             not callable(plain)
@@ -266,16 +179,23 @@ def register(
                 "move it out of the function",
             )
         _require_arguments(cls, name, plain)
-    cover_foreign_class(cls, list(kernels.values()))
-    for name, function in kernels.items():
-        globals()[name].on(cls, function)
+    cover_foreign_class(cls, list(mine.values()))
+    for name, function in mine.items():
+        getattr(kernels, "forced" if name == "image_on" else name).on(cls, function)
+    boxes = derived.derive(
+        cls,
+        forced=image_on is not None,
+        decided=margin is not None,
+        branches=len(branches),
+        boxes=image_box is not None,
+    )
     _KINDS[cls] = MapKind(
         cls.__name__,
         dimension,
         tuple(branches),
         {**(EXITS_OF_A_MAP if exits is None else exits), "undefined": codes.UNDEFINED},
         image_on is not None,
-        image_box is not None,
+        boxes,
         margin is not None,
         displacement is not None,
     )
@@ -338,6 +258,23 @@ def kind_of(params: Any) -> MapKind:
             "register it with limitsets.register",
         )
     return kind
+
+
+_SLOPES: dict[type, bool] = {}
+
+
+def has_slope(params: Any) -> bool:
+    """Whether slopes of a map are known: it has `image_on`, or a smooth `image` of one branch that can be derived."""
+    kind, cls = kind_of(params), type(params)
+    if kind.has_image_on or len(kind.branches) > 1:
+        return kind.has_image_on
+    if cls not in _SLOPES:
+        try:
+            derived.try_slope(coerce(params), kind.dimension)
+            _SLOPES[cls] = True
+        except MapError:
+            _SLOPES[cls] = False
+    return _SLOPES[cls]
 
 
 def _fewest_entries(params: Any) -> int | None:

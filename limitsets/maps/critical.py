@@ -15,8 +15,9 @@ from numpy.typing import ArrayLike
 
 from limitsets.errors import AnswerError
 from limitsets.jit import kernel
-from limitsets.maps.contract import kind_of, margin, on_side, require_sides
+from limitsets.maps.contract import kind_of, require_sides
 from limitsets.maps.drivers import images
+from limitsets.maps.kernels import margin, on_side
 from limitsets.maps.search import Array, Codes, hidden, inserted, located, sign_code
 
 __all__ = [

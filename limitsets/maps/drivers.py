@@ -13,19 +13,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from limitsets.errors import MapError
-from limitsets.jit import generic, kernel
+from limitsets.jit import kernel
 from limitsets.maps import codes
-from limitsets.maps.contract import (
-    displacement,
-    fallback,
-    image,
-    image_on,
-    kind_of,
-    on_side,
-    require_codes,
-    require_sides,
-    scattered,
-)
+from limitsets.maps.contract import kind_of, require_codes, require_sides
+from limitsets.maps.kernels import displacement, fallback, image, image_on, on_side, pick, put, scattered
 
 __all__ = [
     "Images",
@@ -39,45 +30,6 @@ __all__ = [
     "rows",
     "step",
 ]
-
-
-@generic
-def pick(xs: Any, k: int) -> Any:
-    """State number k of a tuple of coordinate arrays: a number, or a tuple from two coordinates up."""
-
-
-@generic
-def put(xs: Any, k: int, x: Any) -> None:
-    """Store state number k."""
-
-
-def _pick1(xs: Any, k: int) -> Any:
-    return xs[0][k]
-
-
-def _pick2(xs: Any, k: int) -> Any:
-    return xs[0][k], xs[1][k]
-
-
-def _pick3(xs: Any, k: int) -> Any:
-    return xs[0][k], xs[1][k], xs[2][k]
-
-
-def _put1(xs: Any, k: int, x: Any) -> None:
-    xs[0][k] = x
-
-
-def _put2(xs: Any, k: int, x: Any) -> None:
-    xs[0][k], xs[1][k] = x
-
-
-def _put3(xs: Any, k: int, x: Any) -> None:
-    xs[0][k], xs[1][k], xs[2][k] = x
-
-
-for _n, _get, _set in ((1, _pick1, _put1), (2, _pick2, _put2), (3, _pick3, _put3)):
-    pick.on(_n, _get)
-    put.on(_n, _set)
 
 
 @kernel

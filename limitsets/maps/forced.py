@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from limitsets.jit import kernel
-from limitsets.maps.contract import image_on, require_sides
+from limitsets.maps.contract import require_sides
+from limitsets.maps.kernels import image_on
 
 __all__ = ["along"]
 

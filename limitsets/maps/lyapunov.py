@@ -10,8 +10,9 @@ import numpy as np
 
 from limitsets.errors import MapError
 from limitsets.jit import generic, kernel
-from limitsets.maps.contract import image_on, kind_of
-from limitsets.maps.drivers import pick, start_of, step
+from limitsets.maps.contract import has_slope, kind_of
+from limitsets.maps.drivers import start_of, step
+from limitsets.maps.kernels import image_on, pick
 
 __all__ = ["Lyapunov", "lyapunov"]
 
@@ -132,7 +133,7 @@ def lyapunov(params: Any, x: Any, side: int, count: int, skip: int = 1000) -> Ly
     """
     kind = kind_of(params)
     start = start_of(params, x, side)
-    if not kind.has_image_on:
+    if not has_slope(params):
         raise MapError("the map", kind.name, "a map with image_on", "register its slope with image_on=...")
     for name, value in (("the number of steps", count), ("the number of steps to skip", skip)):
         if value < 0:

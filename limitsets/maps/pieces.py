@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from limitsets.errors import AnswerError
-from limitsets.maps.contract import kind_of
+from limitsets.maps.contract import has_slope, kind_of
 from limitsets.maps.critical import SAMPLES, Sides, branches_of_side, require_one_dimension
 from limitsets.maps.forced import along
 from limitsets.maps.search import Array, Flags, bisected, hidden, inserted, located, sign_code
@@ -147,7 +147,7 @@ def monotone_pieces(params: Any, domain: Sides, *, samples: int = SAMPLES) -> di
     [('domain', 'critical'), ('critical', 'domain')]
     """
     require_one_dimension(params)
-    if not kind_of(params).has_image_on:
+    if not has_slope(params):
         name = kind_of(params).name
         raise AnswerError(
             "the map", name, "a map with image_on", "register image_on: one step on a forced branch"

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import math
 from typing import TYPE_CHECKING, Any
 
-from matplotlib.lines import Line2D
-from matplotlib.patches import Patch, Rectangle
+from matplotlib.patches import Patch
 
 from limitsets.plot import style
 
@@ -45,53 +43,30 @@ def audit(found: Audit) -> Figure:
     ['on side 0', 'on side 1', 'on side 2']
     """
     scene, rows = found.scene, found.on("domain")
-    count = len(scene.sides)
-    columns = min(count, 3)
-    lines = math.ceil(count / columns)
-    figure, panels = style.canvas(
-        3.1 * columns + 1.9,
-        (0.29 * len(rows) + 0.75) * lines + 1.15,
-        lines,
-        columns,
-        sharex=True,
-        sharey=True,
-    )
-    for side, axes in enumerate(panels[:count]):
+    count, size = len(scene.sides), (3.1, 0.29 * len(rows) + 0.75)
+    below = f"x before the throw [{scene.unit}]"
+    figure, panels = style.panels(count, min(count, 3), size, (1.9, 1.15), below)
+    for side, axes in enumerate(panels):
         for row, finding in enumerate(rows):
             _strip(axes, found, finding, side, row)
-        _limit_set(axes, found, side, len(rows))
+        for lo, hi in found.extents.get(side, ()):
+            axes.axvspan(lo, hi, facecolor="none", edgecolor=style.JOG, lw=1.4, zorder=3, gid="limit set")
         axes.set_title(f"on side {side}", loc="left", fontsize=style.TEXT)
         axes.set_xlim(0.0, scene.arm_length)
         axes.set_ylim(len(rows) - 0.4, -0.6)
         axes.set_yticks(range(len(rows)), [finding.about.name for finding in rows], fontsize=style.SMALL)
-        axes.tick_params(axis="y", length=0)
-        for border in ("top", "right", "left"):
-            axes.spines[border].set_visible(False)
-        if side + columns >= count:
-            axes.set_xlabel(f"x before the throw [{scene.unit}]")
-            axes.xaxis.set_tick_params(labelbottom=True)
-    for axes in panels[count:]:
-        axes.set_axis_off()
+        style.lanes(axes)
     style.title(figure, f"{scene.name}: what the minimal model assumes, and where that breaks")
     style.legend(figure, _legend(found, rows), 4)
     return figure
 
 
-def _bar(axes: Axes, lo: float, hi: float, row: int, look: dict[str, Any], gid: str) -> None:
-    axes.add_patch(Rectangle((lo, row - HALF), hi - lo, 2 * HALF, gid=gid, zorder=2, **look))
-
-
 def _strip(axes: Axes, found: Audit, finding: Finding, side: int, row: int) -> None:
     first, last = float(found.scene.sides.a[side]), found.scene.arm_length
-    unknown = bool(finding.missing)
-    _bar(axes, first, last, row, UNKNOWN if unknown else HOLDS, "cannot tell" if unknown else "holds")
+    gid, look = ("cannot tell", UNKNOWN) if finding.missing else ("holds", HOLDS)
+    style.bar(axes, first, last, row, HALF, gid=gid, zorder=2, **look)
     for lo, hi in finding.ranges.get(side, ()):
-        _bar(axes, lo, hi, row, BROKEN, "broken")
-
-
-def _limit_set(axes: Axes, found: Audit, side: int, rows: int) -> None:
-    for lo, hi in found.extents.get(side, ()):
-        axes.axvspan(lo, hi, facecolor="none", edgecolor=style.JOG, lw=1.4, zorder=3, gid="limit set")
+        style.bar(axes, lo, hi, row, HALF, gid="broken", zorder=2, **BROKEN)
 
 
 def _legend(found: Audit, rows: tuple[Finding, ...]) -> list[Any]:
@@ -99,5 +74,5 @@ def _legend(found: Audit, rows: tuple[Finding, ...]) -> list[Any]:
     if any(finding.missing for finding in rows):
         handles.append(Patch(label="cannot tell: a fact is missing", **UNKNOWN))
     if found.extents:
-        handles.append(Line2D([], [], color=style.JOG, lw=1.4, label="between these lines: the limit set"))
+        handles.append(style.key("between these lines: the limit set", color=style.JOG, lw=1.4))
     return handles

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.colors import BoundaryNorm, ListedColormap
-from matplotlib.patches import Patch, Rectangle
+from matplotlib.patches import Patch
 
 from limitsets.cells import Grid
 from limitsets.errors import AnswerError
@@ -15,7 +15,6 @@ from limitsets.maps import codes
 from limitsets.plot import style
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
     from matplotlib.typing import ColorType
 
@@ -82,10 +81,10 @@ def basins(source: Scene | Grid, shares: Basins, found: Any = None) -> Figure:
     return figure
 
 
-def _look(label: int) -> tuple[str, str]:
-    if label < 0:
-        return OUT[label][:2]
-    return ATTRACTORS[label % len(ATTRACTORS)], HATCHES[label % len(HATCHES)]
+def _look(label: int) -> dict[str, Any]:
+    number = label % len(ATTRACTORS)
+    face, hatch = OUT[label][:2] if label < 0 else (ATTRACTORS[number], HATCHES[number])
+    return {"facecolor": face, "hatch": hatch, **EDGE}
 
 
 def _strips(shares: Basins, sets: list[style.Extents], unit: str) -> Figure:
@@ -95,35 +94,25 @@ def _strips(shares: Basins, sets: list[style.Extents], unit: str) -> Figure:
         edges, labels = grid.edges[side][0], shares.labels[grid.of_side(side)]
         border = np.concatenate([[0], np.flatnonzero(np.diff(labels)) + 1, [labels.size]])
         for first, last in pairwise(border.tolist()):
-            _strip(axes, float(edges[first]), float(edges[last]), side, int(labels[first]))
+            label, ends = int(labels[first]), (float(edges[first]), float(edges[last]))
+            style.bar(axes, *ends, -side, 0.32, gid=f"label {label}", **_look(label))
         for extents in sets:
             for lo, hi in extents.get(side, ()):
-                bar = Rectangle(
-                    (lo, -side - 0.07), hi - lo, 0.14, facecolor=style.INK, lw=0, zorder=3, gid="attractor"
-                )
-                axes.add_patch(bar)
+                style.bar(axes, lo, hi, -side, 0.07, facecolor=style.INK, lw=0, zorder=3, gid="attractor")
     axes.set_yticks([-side for side in range(grid.sides)], [f"side {side}" for side in range(grid.sides)])
     axes.set_ylim(-grid.sides + 0.5, 0.5)
     lo, hi = float(grid.domain.lo.min()), float(grid.domain.hi.max())
     axes.set_xlim(lo - 0.01 * (hi - lo), hi + 0.01 * (hi - lo))
     axes.set_xlabel(f"x of the start{unit}")
-    axes.tick_params(axis="y", length=0)
-    for border_line in ("left", "right", "top"):
-        axes.spines[border_line].set_visible(False)
+    style.lanes(axes)
     return figure
-
-
-def _strip(axes: Axes, lo: float, hi: float, side: int, label: int) -> None:
-    face, hatch = _look(label)
-    look: dict[str, Any] = {"facecolor": face, "hatch": hatch, **EDGE}
-    axes.add_patch(Rectangle((lo, -side - 0.32), hi - lo, 0.64, gid=f"label {label}", **look))
 
 
 def _plane(shares: Basins) -> Figure:
     grid = shares.grid
     figure, panels = style.canvas(4.6 * grid.sides + 0.6, 5.2, 1, grid.sides)
     kinds = sorted(set(shares.labels.tolist()))
-    colours: list[ColorType] = [_look(kind)[0] for kind in kinds]
+    colours: list[ColorType] = [_look(kind)["facecolor"] for kind in kinds]
     number = np.searchsorted(kinds, shares.labels)
     norm = BoundaryNorm(np.arange(len(kinds) + 1) - 0.5, len(kinds))
     for side, axes in enumerate(panels):
@@ -139,21 +128,19 @@ def _plane(shares: Basins) -> Figure:
 
 
 def _legend(shares: Basins, bars: bool) -> list[Patch]:
-    handles = []
-    present = set(shares.labels.tolist())
-    hatched = shares.grid.dimension == 1
-    for k, share in enumerate(shares.attractors[: len(ATTRACTORS)]):
-        face, hatch = _look(k)
-        text = f"to attractor {k}: {_percent(share)} of all starts"
-        handles.append(Patch(facecolor=face, hatch=hatch if hatched else "", label=text, **EDGE))
+    texts = {
+        k: f"to attractor {k}: {_percent(share)} of all starts"
+        for k, share in enumerate(shares.attractors[: len(ATTRACTORS)])
+    }
     parts = {codes.UNDECIDED: shares.undecided_between}
     names = {name: code for code, name in codes.NAMES.items()}
     parts |= {names.get(name, codes.OUTSIDE): share for name, share in shares.exits.items()}
+    present = set(shares.labels.tolist())
     for label, share in sorted(parts.items(), reverse=True):
         if label in present:
-            face, hatch, text = OUT[label]
-            text = f"{text}: {_percent(share)}"
-            handles.append(Patch(facecolor=face, hatch=hatch if hatched else "", label=text, **EDGE))
+            texts[label] = f"{OUT[label][2]}: {_percent(share)}"
+    plain = {} if shares.grid.dimension == 1 else {"hatch": ""}  # the picture of the plane has none
+    handles = [Patch(label=text, **{**_look(label), **plain}) for label, text in texts.items()]
     if bars:
         handles.append(Patch(facecolor=style.INK, label="the attractor itself"))
     return handles

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 
@@ -78,9 +77,8 @@ def counterexample(
     figure, (axes,) = style.canvas(8.0, 4.2)
     axes.plot(throws, x, color=style.FAINT, lw=0.9, zorder=2)
     for side in sorted(set(sides)):
-        look: dict[str, Any] = {"color": COLOURS[side % len(COLOURS)], "marker": MARKERS[side % len(MARKERS)]}
         mine = [k for k, on in enumerate(sides) if on == side]
-        axes.plot([throws[k] for k in mine], [x[k] for k in mine], ls="", ms=6.5, zorder=3, **look)
+        axes.plot([throws[k] for k in mine], [x[k] for k in mine], zorder=3, **_mark(side))
     low, high = min(x), max([*x, *([violated.x] if isinstance(violated, OrientedBeyond | Reaches) else [])])
     span = max(high - low, 1e-3 * scene.arm_length)
     axes.set_ylim(low - 0.12 * span, high + 0.22 * span)
@@ -88,12 +86,13 @@ def counterexample(
     if isinstance(violated, OrientedBeyond):
         axes.plot(throws[-1], x[-1], zorder=4, **RING)
         label = f"on side {sides[-1]}, {x[-1] - violated.x:.2g} {scene.unit} beyond"
-        areas.append(Line2D([], [], label=label, **RING))
+        areas.append(style.key(label, **RING))
     axes.set_xlabel("throws")
     axes.set_ylabel(f"x at rest [{scene.unit}]")
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     style.title(figure, f"{scene.name}: an orbit that violates the goal" + (f"\n{name}" if name else ""))
-    style.legend(figure, [*_sides(sides), *areas], 3)
+    marks = [style.key(f"on side {side}", **_mark(side)) for side in sorted(set(sides))]
+    style.legend(figure, [*marks, *areas], 3)
     return figure
 
 
@@ -110,16 +109,6 @@ def _areas(axes: Axes, violated: Goal | None, unit: str) -> list[Any]:
     return [Patch(label=f"beyond {at:.6g} {unit}: {words}", **look)]
 
 
-def _sides(sides: Sequence[int]) -> list[Any]:
-    return [
-        Line2D(
-            [],
-            [],
-            ls="",
-            ms=6.5,
-            color=COLOURS[side % len(COLOURS)],
-            marker=MARKERS[side % len(MARKERS)],
-            label=f"on side {side}",
-        )
-        for side in sorted(set(sides))
-    ]
+def _mark(side: int) -> dict[str, Any]:
+    colour, marker = COLOURS[side % len(COLOURS)], MARKERS[side % len(MARKERS)]
+    return {"color": colour, "marker": marker, "ms": 6.5, "ls": ""}

@@ -5,10 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
-from matplotlib.lines import Line2D
-from matplotlib.patches import Patch, Rectangle
+from matplotlib.patches import Patch
 
-from limitsets.goals import OrientedBeyond
 from limitsets.maps import critical_points
 from limitsets.plot import style
 from limitsets.plot.style import Extents
@@ -24,6 +22,8 @@ __all__ = ["design"]
 
 HALF = 0.3  # half the height of a bar; lanes are 1 apart
 GAP = 0.9  # between the lanes of one scene and the next, beside the 1
+# A second attractor of the same scene.
+ANOTHER: dict[str, Any] = {"facecolor": "white", "edgecolor": style.INK, "ls": ":"}
 
 
 def design(found: Design, sets: Sequence[Sequence[Extents]] | None = None) -> Figure:
@@ -61,7 +61,10 @@ def design(found: Design, sets: Sequence[Sequence[Extents]] | None = None) -> Fi
         ticks += [top - side for side in range(count)]
         _lanes(axes, scene, top)
         for number, extents in enumerate(attractors):
-            _bars(axes, extents, number, top)
+            for side, parts in extents.items():
+                look = ANOTHER if number else style.of_set(side)
+                for lo, hi in parts:
+                    style.bar(axes, lo, hi, top - side, HALF, lw=0.8, zorder=2, gid="limit set", **look)
         _marks(axes, scene, top)
         _words(axes, found, scene, row, top - 0.5 * (count - 1))
     axes.set_yticks(
@@ -79,33 +82,15 @@ def _lanes(axes: Axes, scene: Scene, top: float) -> None:
         axes.plot([a, scene.arm_length], [top - side] * 2, color=style.FAINT, lw=0.6, zorder=1)
 
 
-def _bars(axes: Axes, extents: Extents, number: int, top: float) -> None:
-    for side, parts in extents.items():
-        face, hatch = style.SETS[side % len(style.SETS)]
-        for lo, hi in parts:
-            look: dict[str, Any] = {"facecolor": face, "hatch": hatch, "edgecolor": style.INK}
-            if number:  # a second attractor of the same scene
-                look = {"facecolor": "white", "edgecolor": style.INK, "ls": ":"}
-            axes.add_patch(
-                Rectangle(
-                    (lo, top - side - HALF), hi - lo, 2 * HALF, lw=0.8, zorder=2, gid="limit set", **look
-                )
-            )
-
-
 def _marks(axes: Axes, scene: Scene, top: float) -> None:
     """Mark every critical point; the first of a side is the one that is designed."""
     for side, points in critical_points(scene.bare_map, scene.domain).items():
         for number, point in enumerate(points):
-            axes.plot(
-                [point.x] * 2,
-                [top - side - 0.43, top - side + 0.43],
-                color=style.FLIP,
-                lw=2.2 if number == 0 else 1.0,
-                ls="-" if number == 0 else (0, (1, 1)),
-                zorder=4,
-                gid="critical point" if number == 0 else "further critical point",
-            )
+            look: dict[str, Any] = {"lw": 2.2, "gid": "critical point"}
+            if number:
+                look = {"lw": 1.0, "ls": (0, (1, 1)), "gid": "further critical point"}
+            ends = [top - side - 0.43, top - side + 0.43]
+            axes.plot([point.x] * 2, ends, color=style.FLIP, zorder=4, **look)
 
 
 def _words(axes: Axes, found: Design, scene: Scene, row: int, middle: float) -> None:
@@ -118,48 +103,24 @@ def _words(axes: Axes, found: Design, scene: Scene, row: int, middle: float) -> 
         else:
             unit = found.quantities()[name][2]
             values.append(f"{name.split('.')[-1].replace('_', ' ')} = {scene.value(name):.4g} {unit}")
-    axes.annotate(
-        "\n".join([head, *values]),
-        (1.0, middle),
-        xycoords=("axes fraction", "data"),
-        xytext=(6, 0),
-        textcoords="offset points",
-        va="center",
-        fontsize=style.SMALL - 1.0,
-        gid="words",
-    )
+    how: dict[str, Any] = {"xycoords": ("axes fraction", "data"), "va": "center", "gid": "words"}
+    style.note(axes, "\n".join([head, *values]), (1.0, middle), (6, 0), fontsize=style.SMALL - 1.0, **how)
 
 
 def _frame(axes: Axes, found: Design, sets: Sequence[Sequence[Extents]], depth: float) -> None:
-    ends = [x for row in sets for each in row for parts in each.values() for pair in parts for x in pair]
+    ends = [x for row in sets for x in style.ends_of(row)]
     ends += [x for x in (*found.before.x.tolist(), *found.jacobian.x.tolist()) if x <= found.start.arm_length]
     lo, hi = min(ends, default=0.0), max(ends, default=found.start.arm_length)
     room = 0.05 * (hi - lo)
     axes.set_xlim(max(lo - room, 0.0), hi + room)
     axes.set_ylim(-depth + GAP + 0.1, 0.8)
     axes.set_xlabel(f"x of the centre of mass from the joint [{found.start.unit}]")
-    axes.tick_params(axis="y", length=0)
-    for border in ("left", "right", "top"):
-        axes.spines[border].set_visible(False)
-    goal = found.start.goal
-    if isinstance(goal, OrientedBeyond):
-        axes.axvline(goal.x, color=style.GOAL, lw=1.3, ls=(0, (1, 1.5)), zorder=3, gid="goal")
+    style.lanes(axes)
+    style.goal(axes, found.start, zorder=3)
 
 
 def _legend(found: Design, count: int, several: bool) -> list[Any]:
-    handles: list[Any] = []
-    for side in range(count):
-        face, hatch = style.SETS[side % len(style.SETS)]
-        handles.append(
-            Patch(facecolor=face, hatch=hatch, edgecolor=style.INK, lw=0.8, label=f"limit set on side {side}")
-        )
-    if several:
-        handles.append(Patch(facecolor="white", edgecolor=style.INK, ls=":", label="another limit set"))
-    handles.append(
-        Line2D([], [], color=style.FLIP, marker="|", ms=10, mew=2.2, ls="", label="first critical point")
-    )
-    goal = found.start.goal
-    if isinstance(goal, OrientedBeyond):
-        label = f"goal: side {goal.side} beyond {goal.x:g} {found.start.unit}"
-        handles.append(Line2D([], [], color=style.GOAL, lw=1.3, ls=(0, (1, 1.5)), label=label))
-    return handles
+    sides = [Patch(label=f"limit set on side {k}", lw=0.8, **style.of_set(k)) for k in range(count)]
+    another = [Patch(label="another limit set", **ANOTHER)] if several else []
+    mark = style.key("first critical point", color=style.FLIP, marker="|", ms=10, mew=2.2, ls="")
+    return [*sides, *another, mark, *style.key_of_goal(found.start)]

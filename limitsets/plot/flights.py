@@ -6,7 +6,6 @@ import math
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, Polygon
 from numpy.typing import NDArray
 
@@ -28,6 +27,11 @@ Array = NDArray[np.float64]
 
 SHOWN = 3  # outlines in the air, and as many on the way from the impact to rest
 AIR, LANDED = "#0072B2", "#C04A00"
+FLYING: dict[str, Any] = {"edgecolor": AIR, "ls": (0, (3, 2))}
+STRUCK: dict[str, Any] = {"edgecolor": AIR, "lw": 2.2}
+REST: dict[str, Any] = {"edgecolor": style.INK, "lw": 1.6}
+VERTEX: dict[str, Any] = {"color": LANDED, "marker": "v", "ls": ""}
+CENTRE: dict[str, Any] = {"marker": "o", "ms": 4, "mfc": "white", "mec": style.INK}
 
 
 def flight(scene: Scene, x: float, side: int) -> Figure:
@@ -84,12 +88,8 @@ def flight(scene: Scene, x: float, side: int) -> Figure:
     _flight(above, scene, x, side, phi, air)
     _landing(below, scene, rolled, after, side_after)
     _titles(above, below, scene, (x, side), (after, side_after), phi, int(seen.code[0]))
-    gap = (
-        ""
-        if scene.flight == "exact"
-        else " (small-angle formulas: the vertex need not be on the arm at the impact)"
-    )
-    style.title(figure, f"One throw of {scene.name}{gap}")
+    caveat = " (small-angle formulas: the vertex need not be on the arm at the impact)"
+    style.title(figure, f"One throw of {scene.name}{'' if scene.flight == 'exact' else caveat}")
     style.legend(figure, _legend(len(rolled) > 2), 3)
     return figure
 
@@ -160,48 +160,39 @@ def _arm(axes: Axes, scene: Scene, lo: float, hi: float) -> None:
     axes.fill_between(ends, h, h - 0.35, facecolor="#d9d9d9", hatch="////", edgecolor="#9a9a9a", lw=0)
     if lo <= 0 <= hi:
         axes.plot([0], [0], marker="o", ms=9, mfc="white", mec=style.INK, zorder=2, gid="joint")
-    for border in ("right", "top"):
-        axes.spines[border].set_visible(False)
+    style.open_frame(axes)
 
 
 def _part(axes: Axes, corners: Array, **look: Any) -> None:
     axes.add_patch(Polygon(corners, closed=True, **look))
 
 
+def _impact(axes: Axes, scene: Scene, corners: Array, zorder: float) -> None:
+    """Draw the part when it meets the arm, and the vertex that is struck."""
+    _part(axes, corners, facecolor=(0.72, 0.84, 0.93, 0.8), zorder=zorder, gid="impact", **STRUCK)
+    axes.plot(*corners[_struck(scene, corners)], **VERTEX, ms=9, zorder=7, gid="struck vertex")
+
+
 def _flight(axes: Axes, scene: Scene, x: float, side: int, phi: float, air: list[Array]) -> None:
-    _part(axes, air[0], facecolor="#dcdcdc", edgecolor=style.INK, lw=1.6, zorder=2, gid="start")
+    _part(axes, air[0], facecolor="#dcdcdc", zorder=2, gid="start", **REST)
     for k, corners in enumerate(air[1:-1]):
         # Later ones cover earlier ones in part, as a photograph with a strobe would show them.
-        look = {"edgecolor": AIR, "lw": 1.0, "ls": (0, (3, 2))}
-        _part(axes, corners, facecolor=(0.86, 0.92, 0.97, 0.72), zorder=3 + 0.1 * k, gid="in the air", **look)
-    _part(axes, air[-1], facecolor=(0.72, 0.84, 0.93, 0.8), edgecolor=AIR, lw=2.2, zorder=4, gid="impact")
+        look = {"facecolor": (0.86, 0.92, 0.97, 0.72), "lw": 1.0, "zorder": 3 + 0.1 * k, **FLYING}
+        _part(axes, corners, gid="in the air", **look)
+    _impact(axes, scene, air[-1], zorder=4)
     path = np.array([_centre(scene, x, side, angle) for angle in np.linspace(0.0, phi, 80)])
     axes.plot(path[:, 0], path[:, 1], color=style.INK, lw=1.1, ls="-.", zorder=5, gid="path")
     stops = np.array([_centre(scene, x, side, angle) for angle in np.linspace(0.0, phi, len(air))])
-    axes.plot(stops[:, 0], stops[:, 1], "o", ms=4, mfc="white", mec=style.INK, zorder=6, gid="centre of mass")
-    axes.plot(
-        *air[-1][_struck(scene, air[-1])], marker="v", ms=9, color=LANDED, zorder=7, gid="struck vertex"
-    )
+    axes.plot(stops[:, 0], stops[:, 1], ls="", zorder=6, gid="centre of mass", **CENTRE)
 
 
 def _landing(axes: Axes, scene: Scene, rolled: list[Array], after: float, side: int) -> None:
-    _part(
-        axes,
-        rolled[-1],
-        facecolor=(0.86, 0.86, 0.86, 0.85),
-        edgecolor=style.INK,
-        lw=1.6,
-        zorder=2,
-        gid="rest",
-    )
-    _part(axes, rolled[0], facecolor=(0.72, 0.84, 0.93, 0.8), edgecolor=AIR, lw=2.2, zorder=1.5, gid="impact")
+    _part(axes, rolled[-1], facecolor=(0.86, 0.86, 0.86, 0.85), zorder=2, gid="rest", **REST)
+    _impact(axes, scene, rolled[0], zorder=1.5)
     for corners in rolled[1:-1]:
         _part(axes, corners, facecolor="none", edgecolor=LANDED, lw=1.0, ls=":", zorder=3, gid="turning")
-    axes.plot(
-        *rolled[0][_struck(scene, rolled[0])], marker="v", ms=9, color=LANDED, zorder=7, gid="struck vertex"
-    )
     height = scene.surface_height + float(scene.sides.d[side])
-    axes.plot(after, height, "o", ms=4, mfc="white", mec=style.INK, zorder=6, gid="centre at rest")
+    axes.plot(after, height, ls="", zorder=6, gid="centre at rest", **CENTRE)
 
 
 def _titles(
@@ -225,21 +216,10 @@ def _titles(
 
 def _legend(turns: bool) -> list[Any]:
     handles: list[Any] = [
-        Patch(facecolor="#dcdcdc", edgecolor=style.INK, lw=1.6, label="at rest, before and after"),
-        Patch(facecolor="#dbebf7", edgecolor=AIR, ls=(0, (3, 2)), label="in the air"),
-        Patch(facecolor="#b8d6ed", edgecolor=AIR, lw=2.2, label="at the impact"),
-        Line2D(
-            [],
-            [],
-            color=style.INK,
-            ls="-.",
-            marker="o",
-            mfc="white",
-            ms=4,
-            label="path of the centre of mass",
-        ),
-        Line2D([], [], color=LANDED, marker="v", ms=8, ls="", label="struck vertex"),
+        Patch(facecolor="#dcdcdc", label="at rest, before and after", **REST),
+        Patch(facecolor="#dbebf7", label="in the air", **FLYING),
+        Patch(facecolor="#b8d6ed", label="at the impact", **STRUCK),
+        style.key("path of the centre of mass", color=style.INK, ls="-.", **CENTRE),
+        style.key("struck vertex", ms=8, **VERTEX),
     ]
-    if turns:
-        handles.append(Line2D([], [], color=LANDED, ls=":", label="turning to rest"))
-    return handles
+    return [*handles, *([style.key("turning to rest", color=LANDED, ls=":")] if turns else [])]

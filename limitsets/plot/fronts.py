@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from matplotlib.lines import Line2D
 from matplotlib.ticker import LogLocator, NullFormatter, ScalarFormatter
 
 from limitsets.errors import AnswerError
@@ -15,6 +14,7 @@ from limitsets.robust.margins.words import bound
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+    from matplotlib.lines import Line2D
 
     from limitsets.inverse import RobustDesign
 
@@ -55,10 +55,8 @@ def robust_design(found: RobustDesign, *, wanted: float | None = None, bound: fl
     for value, text, line in ((wanted, "wanted", "--"), (bound, "no part rests beyond", ":")):
         if value is not None:
             left.axvline(value, color=style.INK, ls=line, lw=1.0)
-            left.annotate(
-                f"{text}\n{value:.2f}", (value, 0.98), xycoords=("data", "axes fraction"), ha="right", va="top",
-                xytext=(-4, 0), textcoords="offset points", fontsize=9,
-            )  # fmt: skip
+            how: dict[str, Any] = {"xycoords": ("data", "axes fraction"), "ha": "right", "va": "top"}
+            style.note(left, f"{text}\n{value:.2f}", (value, 0.98), (-4, 0), fontsize=9, **how)
     _costs(right, found)
     style.legend(figure, handles, 3)
     style.title(figure, f"{found.before.name}: what the margin costs")
@@ -70,10 +68,9 @@ def _front(axes: Axes, found: RobustDesign) -> list[Line2D]:
     means = np.array([option.feeding.mean for option in found.front])
     late = np.array([option.feeding.quantile_95 for option in found.front])
     axes.vlines(margins, means, late, color=AFTER, lw=0.8, alpha=0.6)
-    axes.plot(margins, means, color=AFTER, marker="o", ms=4.0, lw=0.8)
-    handles = [
-        Line2D([], [], color=AFTER, marker="o", ms=4.0, lw=0.8, label="designs that none beats, sampled")
-    ]
+    look: dict[str, Any] = {"color": AFTER, "marker": "o", "ms": 4.0, "lw": 0.8}
+    axes.plot(margins, means, **look)
+    handles = [style.key("designs that none beats, sampled", **look)]
     points = [
         (found.before_margins, found.before_sampled, found.before_feeding, BEFORE, "s", "the scene before"),
         (found.margins, found.sampled, found.feeding, style.FLIP, "D", "the design"),
@@ -87,7 +84,7 @@ def _front(axes: Axes, found: RobustDesign) -> list[Line2D]:
         for one in margins_of:
             axes.plot([one.proved, sampled.margin], [feeding.mean] * 2, color=colour, lw=2.0, alpha=0.4)
             said += f"\n{one.goals[0].kind.replace('_', ' ')}: proved to {bound(one.proved)}"
-        handles.append(Line2D([], [], color=colour, marker=marker, ms=7.0, lw=2.5, label=said))
+        handles.append(style.key(said, color=colour, marker=marker, ms=7.0, lw=2.5))
     axes.set_xlabel("joint margin, as a factor of the tolerance")
     axes.set_ylabel("throws to feed from random starts")
     axes.set_yscale("log")

@@ -5,8 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from matplotlib.lines import Line2D
-from matplotlib.patches import FancyArrowPatch, Patch, Polygon, Rectangle
+from matplotlib.patches import FancyArrowPatch, Patch, Polygon
 from matplotlib.path import Path
 
 from limitsets.goals import OrientedBeyond
@@ -26,6 +25,10 @@ __all__ = ["limit_set"]
 BAR = 0.085  # half the height of a bar; lanes are 1 apart
 HOP = 0.36  # height of a jog's arc
 SAMPLES = 400
+BAND: dict[str, Any] = {"facecolor": "#e9e9e9", "edgecolor": "#cfcfcf"}
+START: dict[str, Any] = {"marker": "o", "ls": "", "mfc": "white", "mec": style.INK, "ms": 5}
+FLIPPED: dict[str, Any] = {"color": style.FLIP, "ls": style.FLIP_LINE}
+ROLLED: dict[str, Any] = {"color": style.ROLL, "ls": style.ROLL_LINE}
 
 
 def limit_set(scene: Scene, found: Any, *, axes: Axes | None = None) -> Figure:
@@ -73,12 +76,11 @@ def limit_set(scene: Scene, found: Any, *, axes: Axes | None = None) -> Figure:
         if path is not None:
             _throws(axes, path)
     marked = _critical(axes, scene)
-    _goal(axes, scene)
+    style.goal(axes, scene, zorder=2)
     _frame(axes, scene, sets, marked)
     style.keep_apart(axes, 0.1)
-    axes.set_title(
-        f"Limit set of {scene.name}: where the part comes to rest", fontsize=style.TEXT + 1.5, loc="left"
-    )
+    text = f"Limit set of {scene.name}: where the part comes to rest"
+    axes.set_title(text, fontsize=style.TEXT + 1.5, loc="left")
     if alone:
         rolls = any(patch.get_gid() == "roll" for patch in axes.patches)
         style.legend(figure, _legend(scene, len(sets), rolls), 4)
@@ -90,31 +92,17 @@ def _lanes(axes: Axes, scene: Scene) -> None:
     for lane in range(count + 1):
         a = float(scene.sides.a[lane % count])
         axes.plot([a, scene.arm_length], [-lane, -lane], color=style.FAINT, lw=0.8, zorder=1)
-    axes.set_yticks(
-        [-lane for lane in range(count + 1)], [*(f"side {side}" for side in range(count)), "side 0\nagain"]
-    )
+    names = [*(f"side {side}" for side in range(count)), "side 0\nagain"]
+    axes.set_yticks([-lane for lane in range(count + 1)], names)
 
 
 def _bars(axes: Axes, extents: Extents, number: int, count: int) -> None:
-    face, hatch = style.SETS[number % len(style.SETS)]
+    again: dict[str, Any] = {"facecolor": "white", "edgecolor": style.INK, "ls": ":"}
     for side, parts in extents.items():
         for lo, hi in parts:
-            for lane in {side, count if side == 0 else side}:
-                ghost = lane == count
-                axes.add_patch(
-                    Rectangle(
-                        (lo, -lane - BAR),
-                        hi - lo,
-                        2 * BAR,
-                        facecolor="white" if ghost else face,
-                        hatch="" if ghost else hatch,
-                        edgecolor=style.INK,
-                        lw=1.0,
-                        ls=":" if ghost else "-",
-                        zorder=3,
-                        gid="limit set again" if ghost else "limit set",
-                    )
-                )
+            style.bar(axes, lo, hi, -side, BAR, zorder=3, gid="limit set", **style.of_set(number))
+            if side == 0:
+                style.bar(axes, lo, hi, -count, BAR, zorder=3, gid="limit set again", **again)
 
 
 def _bands(axes: Axes, scene: Scene, extents: Extents) -> None:
@@ -129,9 +117,7 @@ def _bands(axes: Axes, scene: Scene, extents: Extents) -> None:
                     top, bottom = -side - BAR, -side - 1 + BAR
                     corners = [(x[run[0]], top), (x[run[-1]], top)]
                     corners += [(there.x[run[-1]], bottom), (there.x[run[0]], bottom)]
-                    axes.add_patch(
-                        Polygon(corners, facecolor="#e9e9e9", edgecolor="#cfcfcf", lw=0.6, zorder=0)
-                    )
+                    axes.add_patch(Polygon(corners, lw=0.6, zorder=0, **BAND))
 
 
 def _throws(axes: Axes, path: Orbit) -> None:
@@ -143,73 +129,39 @@ def _throws(axes: Axes, path: Orbit) -> None:
             # a flip goes down by one lane, from the last to the first one's repetition; a roll to wherever it goes
             lane = after if rolls else side + 1
             up = BAR if lane < side else -BAR
-            arrow = FancyArrowPatch(
-                (x, -side + up),
-                (to, -lane - up),
-                arrowstyle="-|>",
-                mutation_scale=9,
-                shrinkA=0,
-                shrinkB=0,
-                color=style.ROLL if rolls else style.FLIP,
-                lw=1.2,
-                ls=style.ROLL_LINE if rolls else style.FLIP_LINE,
-                zorder=4,
-                gid="roll" if rolls else "flip",
-            )
+            look: dict[str, Any] = {"gid": "roll", **ROLLED} if rolls else {"gid": "flip", **FLIPPED}
+            look |= {"arrowstyle": "-|>", "mutation_scale": 9, "shrinkA": 0, "shrinkB": 0}
+            arrow = FancyArrowPatch((x, -side + up), (to, -lane - up), lw=1.2, zorder=4, **look)
         elif code >= 0:
             y, middle = -side + BAR, 0.5 * (x + to)
             top = y + HOP * min(1.0, max(0.3, abs(to - x) / wide))
             arc = Path([(x, y), (middle, top), (to, y)], [Path.MOVETO, Path.CURVE3, Path.CURVE3])
             head = "-|>" if abs(to - x) > 0.25 * wide else "-"  # shorter hops than this would be all head
-            arrow = FancyArrowPatch(
-                path=arc, arrowstyle=head, mutation_scale=6, color=style.JOG, lw=1.1, zorder=4, gid="jog"
-            )
+            look = {"arrowstyle": head, "mutation_scale": 6, "color": style.JOG, "gid": "jog"}
+            arrow = FancyArrowPatch(path=arc, lw=1.1, zorder=4, **look)
         else:
             continue
         axes.add_patch(arrow)
-    axes.plot(
-        [path.x[0]], [-path.side[0] + BAR], "o", ms=5, mfc="white", mec=style.INK, zorder=5, gid="start"
-    )
+    axes.plot([path.x[0]], [-path.side[0] + BAR], zorder=5, gid="start", **START)
 
 
 def _critical(axes: Axes, scene: Scene) -> list[float]:
     marked = []
     for side, points in critical_points(scene.map, scene.domain).items():
         for number, point in enumerate(points):
-            axes.plot(
-                [point.x] * 2,
-                [-side - 0.2, -side + 0.2],
-                color=style.INK,
-                lw=1.6,
-                zorder=6,
-                gid="critical point",
-            )
-            name = f"$r_{side}$" + "'" * number
-            axes.annotate(
-                f"{name} = {point.x:.2f}",
-                (point.x, -side - 0.2),
-                xytext=(-3, -1),
-                textcoords="offset points",
-                ha="right",
-                va="top",
-                fontsize=style.SMALL,
-                zorder=7,
-                bbox={"boxstyle": "square,pad=0.1", "fc": "white", "ec": "none", "alpha": 0.85},
-                gid="name",
-            )
+            ends = [-side - 0.2, -side + 0.2]
+            axes.plot([point.x] * 2, ends, color=style.INK, lw=1.6, zorder=6, gid="critical point")
+            words = f"$r_{side}$" + "'" * number + f" = {point.x:.2f}"
+            box = {"boxstyle": "square,pad=0.1", "fc": "white", "ec": "none", "alpha": 0.85}
+            style.name(axes, words, (point.x, ends[0]), (-3, -1), zorder=7, bbox=box)
             marked.append(point.x)
     return marked
-
-
-def _goal(axes: Axes, scene: Scene) -> None:
-    if isinstance(scene.goal, OrientedBeyond):
-        axes.axvline(scene.goal.x, color=style.GOAL, lw=1.3, ls=(0, (1, 1.5)), zorder=2, gid="goal")
 
 
 def _frame(axes: Axes, scene: Scene, sets: list[Extents], marked: list[float]) -> None:
     """Limits, labels, and the intervals in figures beside each lane."""
     count = len(scene.sides)
-    ends = [x for extents in sets for parts in extents.values() for pair in parts for x in pair] + marked
+    ends = style.ends_of(sets) + marked
     if isinstance(scene.goal, OrientedBeyond):
         ends.append(scene.goal.x)
     lo, hi = min(ends, default=0.0), max(ends, default=scene.arm_length)
@@ -217,47 +169,22 @@ def _frame(axes: Axes, scene: Scene, sets: list[Extents], marked: list[float]) -
     axes.set_xlim(lo - 1.8 * margin, min(hi + margin, scene.arm_length) if hi < scene.arm_length else hi)
     axes.set_ylim(-count - 0.35, 0.62)
     axes.set_xlabel(f"x of the centre of mass from the joint [{scene.unit}]")
-    axes.tick_params(axis="y", length=0)
-    for border in ("left", "right", "top"):
-        axes.spines[border].set_visible(False)
+    style.lanes(axes)
     for side in range(count):
         parts = [pair for extents in sets for pair in extents.get(side, ())]
-        axes.annotate(
-            f"{style.interval_text(parts)} {scene.unit}" if parts else "never",
-            (1.0, -side),
-            xycoords=("axes fraction", "data"),
-            xytext=(4, 0),
-            textcoords="offset points",
-            va="center",
-            fontsize=style.SMALL,
-        )
+        words = f"{style.interval_text(parts)} {scene.unit}" if parts else "never"
+        style.note(axes, words, (1.0, -side), (4, 0), xycoords=("axes fraction", "data"), va="center")
 
 
 def _legend(scene: Scene, sets: int, rolls: bool) -> list[Any]:
-    handles: list[Any] = [
-        Patch(
-            facecolor=face,
-            hatch=hatch,
-            edgecolor=style.INK,
-            label="limit set" if sets == 1 else f"limit set {k}",
-        )
-        for k, (face, hatch) in enumerate(style.SETS[:sets])
+    shown = range(min(sets, len(style.SETS)))
+    return [
+        *(Patch(label="limit set" if sets == 1 else f"limit set {k}", **style.of_set(k)) for k in shown),
+        style.key("jog (stays on its side)", color=style.JOG),
+        style.key("flip (to the next side)", **FLIPPED),
+        *([style.key("roll (on, or back)", **ROLLED)] if rolls else []),
+        Patch(label="where the flipping part lands", **BAND),
+        style.key("start of the orbit shown", **START),
+        style.key("critical point", color=style.INK, marker="|", ms=10, mew=1.6, ls=""),
+        *style.key_of_goal(scene),
     ]
-    handles += [
-        Line2D([], [], color=style.JOG, label="jog (stays on its side)"),
-        Line2D([], [], color=style.FLIP, ls=style.FLIP_LINE, label="flip (to the next side)"),
-        *(
-            [Line2D([], [], color=style.ROLL, ls=style.ROLL_LINE, label="roll (on, or back)")]
-            if rolls
-            else []
-        ),
-        Patch(facecolor="#e9e9e9", edgecolor="#cfcfcf", label="where the flipping part lands"),
-        Line2D(
-            [], [], color=style.INK, marker="o", mfc="white", ms=5, ls="", label="start of the orbit shown"
-        ),
-        Line2D([], [], color=style.INK, marker="|", ms=10, mew=1.6, ls="", label="critical point"),
-    ]
-    if isinstance(scene.goal, OrientedBeyond):
-        label = f"goal: side {scene.goal.side} beyond {scene.goal.x:g} {scene.unit}"
-        handles.append(Line2D([], [], color=style.GOAL, lw=1.3, ls=(0, (1, 1.5)), label=label))
-    return handles

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from limitsets.errors import AnswerError
@@ -83,12 +82,10 @@ def tornado(margins: Sequence[Margin]) -> Figure:
     axes.set_xlim(low, high)
     axes.xaxis.set_major_formatter("{x:g}")
     axes.set_xlabel("deviation to either side [% of the value], logarithmic")
-    axes.tick_params(axis="y", length=0)
-    for border in ("top", "right", "left"):
-        axes.spines[border].set_visible(False)
+    style.lanes(axes)
     name = single[0].scene.name if single else "margins"
     style.title(figure, f"{name}: how much each quantity may deviate")
-    handles = [Patch(label="proved safe", **SAFE), Line2D([], [], label="shown to fail from here", **FAILS)]
+    handles = [Patch(label="proved safe", **SAFE), style.key("shown to fail from here", **FAILS)]
     if any(each.refuted is None or not each.closed for each in single):
         handles.append(Patch(label="nothing is shown", **OPEN))
     style.legend(figure, handles, 3)
@@ -109,10 +106,8 @@ def _bar(axes: Axes, margin: Margin, row: int, low: float, high: float) -> None:
 
 def _beside(axes: Axes, at: int, row: float, words: str) -> None:
     """Write into a column to the right of the axes."""
-    axes.annotate(
-        words, (1.0, row), xycoords=("axes fraction", "data"), xytext=(at, 0), textcoords="offset points",
-        ha="right", va="center", fontsize=style.SMALL, annotation_clip=False, gid="number",
-    )  # fmt: skip
+    how: dict[str, Any] = {"ha": "right", "va": "center", "annotation_clip": False, "gid": "number"}
+    style.note(axes, words, (1.0, row), (at, 0), xycoords=("axes fraction", "data"), **how)
 
 
 def margin_curve(found: MarginsBeyond) -> Figure:
@@ -136,17 +131,10 @@ def margin_curve(found: MarginsBeyond) -> Figure:
         axes.plot(found.x, refuted, "D--", color=style.FLIP, ms=3.5, lw=1.1, label="shown to fail", zorder=2)
         best, top = found.best(name)
         axes.axvline(best, color=style.FAINT, lw=0.9, ls=":")
-        axes.annotate(
-            f"best: X = {best:.4g} {found.scene.unit}",
-            (best, 0.0),
-            (5, 6),
-            textcoords="offset points",
-            fontsize=style.SMALL,
-        )
+        style.note(axes, f"best: X = {best:.4g} {found.scene.unit}", (best, 0.0), (5, 6))
         axes.set_ylabel(f"{name} [{unit or 'times the tolerance'}]", fontsize=style.SMALL)
         axes.set_ylim(0.0, 1.12 * max(float(np.nanmax([*refuted, top])), 1e-12))
-        for border in ("top", "right"):
-            axes.spines[border].set_visible(False)
+        style.open_frame(axes)
     panels[-1].set_xlabel(f"X, beyond which only side {found.side} [{found.scene.unit}]")
     panels[0].legend(fontsize=style.SMALL, frameon=False, loc="upper right")
     style.title(figure, f"{found.scene.name}: margins against X")
@@ -181,9 +169,7 @@ def tolerance_box(margin: Margin) -> Figure:
     wide = 1.1 * max(margin.proved, margin.refuted or 0.0, 1e-9)
     axes.set_xlim(-wide, wide)
     axes.set_xlabel("deviation as a factor of the tolerance")
-    axes.tick_params(axis="y", length=0)
-    for border in ("top", "right", "left"):
-        axes.spines[border].set_visible(False)
+    style.lanes(axes)
     style.title(figure, f"{margin.scene.name}: all quantities together")
     handles = [Patch(label="proved safe, all at once", **SAFE)]
     if margin.refuted is not None:

@@ -39,7 +39,7 @@ def morse(graph: nx.DiGraph[int] | TransitionGraph, name: str = "") -> Figure:
     Examples
     --------
     >>> import limitsets as ls
-    >>> graph = ls.transitions(ls.maps.TwoState(1.0), ls.grid([(-2, 2), (-2, 2)], cells=32), method="centres")
+    >>> graph = ls.transitions(ls.maps.Cubic(1.5), ls.grid([(-1.2, 1.2)], cells=100), method="corners")
     >>> "2 attracting" in ls.plot.morse(graph).axes[0].get_title(loc="left")
     True
     """
@@ -110,61 +110,27 @@ def _radius(cells: int, largest: int = 200_000) -> float:
 def _node(axes: Axes, node: Any, data: dict[str, Any], x: float, y: float, *, few: bool) -> None:
     if isinstance(node, str):
         axes.plot([x], [y], "s", ms=16, mfc="white", mec=style.FAINT, ls="none", gid="exit")
-        axes.annotate(
-            f"leaves:\n{node}",
-            (x, y),
-            xytext=(0, -13),
-            textcoords="offset points",
-            ha="center",
-            va="top",
-            fontsize=style.SMALL,
-        )
+        style.note(axes, f"leaves:\n{node}", (x, y), (0, -13), ha="center", va="top")
         return
     size = 2 * _radius(data["cells"])
-    face = style.SETS[0][0] if data["attracting"] else "white"
-    axes.plot(
-        [x],
-        [y],
-        "o",
-        ms=size,
-        mfc=face,
-        mec=style.INK,
-        mew=1.2,
-        ls="none",
-        gid="attracting" if data["attracting"] else "recurrent",
-    )
+    circle: dict[str, Any] = {"marker": "o", "mec": style.INK, "mew": 1.2, "ls": "none"}
+    face, gid = (style.SETS[0][0], "attracting") if data["attracting"] else ("white", "recurrent")
+    axes.plot([x], [y], ms=size, mfc=face, gid=gid, **circle)
     if data["attracting"]:
-        axes.plot([x], [y], "o", ms=size + 6, mfc="none", mec=style.INK, mew=1.2, ls="none", gid="border")
+        axes.plot([x], [y], ms=size + 6, mfc="none", gid="border", **circle)
     axes.annotate(str(node), (x, y), ha="center", va="center", fontsize=style.SMALL)
     lines = [f"{data['cells']} cell{'' if data['cells'] == 1 else 's'}"]
     if few:
         for side, parts in data["extents"].items():
             shown = ", ".join(f"{lo:z.2f} to {hi:z.2f}" for lo, hi in parts[:2])
             lines.append(f"side {side}: {shown}{' ...' if len(parts) > 2 else ''}")
-    axes.annotate(
-        "\n".join(lines),
-        (x, y),
-        xytext=(size / 2 + 7, 0),
-        textcoords="offset points",
-        va="center",
-        fontsize=style.SMALL,
-    )
+    style.note(axes, "\n".join(lines), (x, y), (size / 2 + 7, 0), va="center")
 
 
 def _arrow(axes: Axes, start: Place, end: Place, *, dotted: bool) -> None:
-    axes.add_patch(
-        FancyArrowPatch(
-            start,
-            end,
-            arrowstyle="-|>",
-            mutation_scale=11,
-            shrinkA=13,
-            shrinkB=16,
-            color="#555555",
-            lw=1.0,
-            ls=":" if dotted else "-",
-        )
-    )
+    head: dict[str, Any] = {"arrowstyle": "-|>", "mutation_scale": 11, "shrinkA": 13, "shrinkB": 16}
+    line: dict[str, Any] = {"color": "#555555", "lw": 1.0, "ls": ":" if dotted else "-"}
+    axes.add_patch(FancyArrowPatch(start, end, **head, **line))
 
 
 def _title(whole: nx.DiGraph[int], drawn: nx.DiGraph[Any], name: str) -> str:

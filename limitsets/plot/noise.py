@@ -48,8 +48,7 @@ def _main(found: NoiseStatistics) -> NoisyClass:
 
 
 def _plain(axes: Axes) -> None:
-    for border in ("top", "right"):
-        axes.spines[border].set_visible(False)
+    style.open_frame(axes)
     axes.tick_params(labelsize=style.SMALL)
 
 
@@ -75,24 +74,16 @@ def noise_density(found: NoiseStatistics, thrown: Thrown | None = None) -> Figur
         (edges,) = found.grid.edges[side]
         height = part.density[found.grid.of_side(side)]
         if thrown is not None:
-            bins, seen = thrown.bins[side], thrown.density[side]
-            axes.stairs(
-                seen, bins, fill=True, color=BAR, label=f"{thrown.throws:.0e} throws".replace("e+0", "e")
-            )
+            label = f"{thrown.throws:.0e} throws".replace("e+0", "e")
+            axes.stairs(thrown.density[side], thrown.bins[side], fill=True, color=BAR, label=label)
         axes.stairs(height, edges, color=style.INK, lw=1.0, label="transfer operator")
         some = np.flatnonzero(height > LEAST)
         if some.size:
             axes.set_xlim(*_widened(float(edges[some[0]]), float(edges[some[-1] + 1])))
-        axes.axvline(
-            found.goal[0],
-            color=style.GOAL,
-            lw=1.0,
-            ls=(0, (4, 2)),
-            label=f"X = {found.goal[0]:g} {found.unit}",
-        )
-        axes.set_title(
-            f"side {side}: {100 * part.sides[side]:.2f} % of the rests", loc="left", fontsize=style.TEXT
-        )
+        label = f"X = {found.goal[0]:g} {found.unit}"
+        axes.axvline(found.goal[0], color=style.GOAL, lw=1.0, ls=(0, (4, 2)), label=label)
+        words = f"side {side}: {100 * part.sides[side]:.2f} % of the rests"
+        axes.set_title(words, loc="left", fontsize=style.TEXT)
         axes.set_xlabel(f"x [{found.unit}]", fontsize=style.SMALL)
         axes.xaxis.set_major_locator(MaxNLocator(5))
         _plain(axes)
@@ -130,14 +121,10 @@ def noise_arrivals(found: NoiseStatistics, thrown: Thrown | None = None) -> Figu
         left.bar(number, counted[: number.size], width=1.0, color=BAR, label=f"{thrown.parts} parts thrown")
         still = 1.0 - np.cumsum(counted)
         right.step(number, still[: number.size], where="post", color="#7FA9C4", lw=3.0)
-    left.stairs(
-        fed.arrived[: number.size],
-        np.arange(number.size + 1) - 0.5,
-        color=style.INK,
-        lw=1.0,
-        label="transfer operator",
-    )
-    right.step(number, fed.survivors[: number.size], where="post", color=style.INK, lw=1.0)
+    look: dict[str, Any] = {"color": style.INK, "lw": 1.0}
+    edges = np.arange(number.size + 1) - 0.5
+    left.stairs(fed.arrived[: number.size], edges, label="transfer operator", **look)
+    right.step(number, fed.survivors[: number.size], where="post", **look)
     for axes in (left, right):
         _marks(axes, found)
         axes.set_xlabel("throws", fontsize=style.SMALL)

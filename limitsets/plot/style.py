@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
+from matplotlib.lines import Line2D
+from matplotlib.patches import Rectangle
 
 from limitsets.errors import AnswerError
+from limitsets.goals import OrientedBeyond
 from limitsets.maps import Orbit, orbit
 
 if TYPE_CHECKING:
@@ -17,7 +21,27 @@ if TYPE_CHECKING:
 
     from limitsets.scene import Scene
 
-__all__ = ["Extents", "canvas", "extents_of", "interval_text", "legend", "orbit_on", "stretch", "title"]
+__all__ = [
+    "Extents",
+    "bar",
+    "canvas",
+    "ends_of",
+    "extents_of",
+    "goal",
+    "interval_text",
+    "key",
+    "key_of_goal",
+    "lanes",
+    "legend",
+    "name",
+    "note",
+    "of_set",
+    "open_frame",
+    "orbit_on",
+    "panels",
+    "stretch",
+    "title",
+]
 
 Extents: TypeAlias = Mapping[int, Sequence[tuple[float, float]]]
 
@@ -38,6 +62,7 @@ SETS = (
     ("#E8E1A0", "+++"),
 )
 JOG_LINE, FLIP_LINE, ROLL_LINE = "-", (0, (4.5, 1.8)), (0, (4.5, 1.5, 1.0, 1.5))
+GOAL_LINE: dict[str, Any] = {"color": GOAL, "lw": 1.3, "ls": (0, (1, 1.5))}
 SMALL, TEXT = 8.5, 10.0
 
 # Steps before an orbit is taken to be on its attractor.
@@ -53,6 +78,25 @@ def canvas(
     return figure, list(grid.ravel())
 
 
+def panels(
+    count: int, columns: int, size: tuple[float, float], room: tuple[float, float], below: str
+) -> tuple[Figure, list[Axes]]:
+    """Make a figure of panels that share their limits, and label the lowest in each column.
+
+    `size` is that of a panel, `room` what is left around all of them [inches].
+    """
+    rows = math.ceil(count / columns)
+    wide, tall = size[0] * columns + room[0], size[1] * rows + room[1]
+    figure, found = canvas(wide, tall, rows, columns, sharex=True, sharey=True)
+    for axes in found[count:]:
+        axes.set_axis_off()
+    for k, axes in enumerate(found[:count]):
+        lowest = k + columns >= count
+        axes.xaxis.set_tick_params(labelbottom=lowest)
+        axes.set_xlabel(below if lowest else "")
+    return figure, found[:count]
+
+
 def extents_of(found: Any) -> list[Extents]:
     """Read intervals off an attractor, a limit set, an analysis, or several of them."""
     extents = getattr(found, "extents", found)
@@ -66,6 +110,11 @@ def extents_of(found: Any) -> list[Extents]:
     raise AnswerError(
         "what to draw", type(found).__name__, "attractors, limit sets or an analysis", "pass one of these"
     )
+
+
+def ends_of(sets: Iterable[Extents]) -> list[float]:
+    """List the ends of all intervals."""
+    return [x for extents in sets for parts in extents.values() for pair in parts for x in pair]
 
 
 def orbit_on(scene: Scene, extents: Extents, count: int) -> Orbit | None:
@@ -110,6 +159,56 @@ def stretch(scene: Scene, extents: Extents, throws: int = 12, most: int = 90) ->
     later = arrivals[arrivals >= begin + throws]
     end = min(int(later[0]) if later.size else begin + throws, begin + most, path.code.size)
     return Orbit(path.x[begin : end + 1], path.side[begin : end + 1], path.code[begin:end], None)
+
+
+def of_set(number: int) -> dict[str, Any]:
+    """Face, hatch and edge of a set of this number."""
+    face, hatch = SETS[number % len(SETS)]
+    return {"facecolor": face, "hatch": hatch, "edgecolor": INK}
+
+
+def bar(axes: Axes, lo: float, hi: float, middle: float, half: float, **look: Any) -> None:
+    """Draw a bar from lo to hi, `half` its height."""
+    axes.add_patch(Rectangle((lo, middle - half), hi - lo, 2 * half, **look))
+
+
+def note(axes: Axes, words: str, at: tuple[float, float], shift: tuple[float, float], **how: Any) -> None:
+    """Write words at a shift [points] from a place: in data, or as `xycoords` says."""
+    axes.annotate(words, at, xytext=shift, textcoords="offset points", **{"fontsize": SMALL, **how})
+
+
+def name(axes: Axes, words: str, at: tuple[float, float], shift: tuple[float, float], **how: Any) -> None:
+    """Name a critical point, left below a place; `keep_apart` knows such names."""
+    note(axes, words, at, shift, ha="right", va="top", gid="name", **how)
+
+
+def open_frame(axes: Axes, *borders: str) -> None:
+    """Take borders of a frame away: the top and the right one, and those named."""
+    axes.spines[["top", "right", *borders]].set_visible(False)
+
+
+def lanes(axes: Axes) -> None:
+    """Leave nothing of the frame but its base: there is a lane for each name on the left."""
+    open_frame(axes, "left")
+    axes.tick_params(axis="y", length=0)
+
+
+def goal(axes: Axes, scene: Scene, zorder: float) -> None:
+    """Draw a line where the goal begins beyond which only one side is allowed, if that is the scene's goal."""
+    if isinstance(scene.goal, OrientedBeyond):
+        axes.axvline(scene.goal.x, zorder=zorder, gid="goal", **GOAL_LINE)
+
+
+def key(label: str, **look: Any) -> Line2D:
+    """Make the entry of a line or, with ``ls=""``, of a marker in a legend."""
+    return Line2D([], [], label=label, **look)
+
+
+def key_of_goal(scene: Scene) -> list[Line2D]:
+    """Make the entry of what `goal` draws."""
+    if not isinstance(scene.goal, OrientedBeyond):
+        return []
+    return [key(f"goal: side {scene.goal.side} beyond {scene.goal.x:g} {scene.unit}", **GOAL_LINE)]
 
 
 def legend(figure: Figure, handles: Sequence[Any], columns: int) -> None:

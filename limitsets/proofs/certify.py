@@ -7,8 +7,9 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from fractions import Fraction
+from functools import singledispatch
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 from limitsets.errors import AnswerError
 from limitsets.proofs.asked import ask, borders, prove
@@ -17,6 +18,7 @@ from limitsets.proofs.attraction import Attraction, attraction, near_section
 from limitsets.proofs.cover import cover
 from limitsets.proofs.end_points import proved_ends
 from limitsets.proofs.expansion import least_slope
+from limitsets.proofs.of_map import certify_map
 from limitsets.proofs.orbits import proved_cycles
 from limitsets.proofs.parameters import ParameterBox, parameter_box
 from limitsets.proofs.proof import Claim, Proof
@@ -195,6 +197,7 @@ def _deviations(scene: Scene, given: Mapping[str, str] | None) -> dict[str, str]
     return found
 
 
+@singledispatch
 def certify(
     scene: Scene | str | Path,
     claims: Sequence[str] | None = None,
@@ -203,7 +206,9 @@ def certify(
     tolerance: Mapping[str, str] | None = None,
     progress: Progress | None = None,
 ) -> Proof:
-    """Prove claims about the limit set of a scene.
+    """Prove claims about the limit set of a scene; or of any map: ``certify(map, grid, claims)``.
+
+    Of a map see `limitsets.proofs.of_map.certify_map`; the following is about a scene.
 
     Parameters
     ----------
@@ -240,6 +245,9 @@ def certify(
     >>> proof = ls.certify("paper-designed")
     >>> [(claim.claim, claim.verdict, claim.starts) for claim in proof.claims]
     [('attracts-all', 'proved', None), ('goal', 'proved', 'every')]
+    >>> proof = ls.certify(ls.maps.Logistic(3.2), ls.grid([(0.1, 0.9)], cells=512), ["attracts-all"])
+    >>> proof.claims[0].verdict
+    'proved'
     """
     asked = scene if isinstance(scene, Scene) else load(scene)
     wanted = _chosen(asked, claims)
@@ -253,6 +261,9 @@ def certify(
         found = (one,)
     seconds = time.perf_counter() - begin
     return Proof(asked, noise, tolerance, found, answers, seconds)
+
+
+certify.register(tuple, cast(Any, certify_map))  # a map is a NamedTuple; its answer is another class
 
 
 def _attempt(

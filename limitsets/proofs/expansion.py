@@ -14,8 +14,9 @@ from numpy.typing import NDArray
 
 from limitsets.cells import CellSet
 from limitsets.interval import Interval
-from limitsets.jit import proof_kernel
+from limitsets.jit import entry_of, proof_kernel
 from limitsets.proofs.cover import Cover
+from limitsets.thrower.effects.landing import Landing
 from limitsets.thrower.motion import FullThrow
 from limitsets.thrower.side_box import gather_box
 from limitsets.thrower.throw_box import NOTHING, sure_throw_box, throw_box
@@ -75,7 +76,7 @@ def _pieces(found: Cover, cells: CellSet) -> Iterator[tuple[int, Any, Any, Any, 
         lo, hi = np.ascontiguousarray(cuts[:, :-1].ravel()), np.ascontiguousarray(cuts[:, 1:].ravel())
         _slopes(*found.box.bare, side, lo, hi, out)
         lowest = found.box.lo
-        if isinstance(lowest, FullThrow) and lowest.effects.landing is not None:
+        if isinstance(lowest, FullThrow) and entry_of(lowest.effects, Landing) is not None:
             # where another vertex may land the displacement is another function
             late = ~(found.images[side].witness[1, k] <= lowest.bare.corner[side])
             out.reshape(k.size, PIECES)[late] = -1.0

@@ -13,7 +13,7 @@ import numpy as np
 
 from limitsets.errors import AnswerError
 from limitsets.files import as_table, picked
-from limitsets.proofs.asked import State
+from limitsets.proofs.asked import State, rechecked
 from limitsets.proofs.attraction import Attraction
 from limitsets.proofs.certificate import write
 from limitsets.proofs.tiles import joined
@@ -241,6 +241,14 @@ class Proof:
                 f"with the effects {', '.join(self.effects)}",
                 "the minimal model, and noise",
                 "nothing rechecks other maps; the proof stands in .claims and .to_json()",
+            )
+        goal = self.scene.goal
+        if goal is not None and not rechecked(goal) and any(claim.claim == "goal" for claim in self.claims):
+            raise AnswerError(
+                "the certificate",
+                f"of the goal {goal.kind}",
+                "goals that the checker knows",
+                "nothing rechecks others; the proof stands in .claims and .to_json()",
             )
         good = [
             {"claim": claim.claim, "section": claim.section, "verdict": claim.verdict}

@@ -6,14 +6,14 @@ Cells are made fine where it pays: first some hundreds of them a side, then bord
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
 from limitsets.errors import AnswerError
-from limitsets.goals import Goal, OrientedBeyond, Predicate, Reaches
+from limitsets.goals import Goal, Reaches
 from limitsets.proofs.asked import Answer, ask, borders, prove
 from limitsets.proofs.asked.kind import against
 from limitsets.proofs.attraction import Attraction, attraction
@@ -110,7 +110,7 @@ class Query:
     @property
     def anywhere(self) -> bool:
         """Whether some goal is about every start on the arm."""
-        return any(goal.from_anywhere or goal.kind == "attracts_all" for goal in self.goals)
+        return any(goal.from_anywhere or goal.of_every_start for goal in self.goals)
 
     def box(self, piece: Piece | None, noise: Mapping[str, str]) -> ParameterBox:
         """Enclose the parameters."""
@@ -227,7 +227,7 @@ class Query:
 
     def _against(self, found: Attraction, goal: Goal) -> Answer:
         """Search for what refutes one goal: where throws differ, for the worst that they can do."""
-        wrong = _wrong(goal)
+        wrong = goal.wrong()
         if isinstance(goal, Reaches) and not goal.every_orbit:
             # refuted by where attracting cells end; a periodic orbit that attracts is not looked for each time
             return prove(self._finer(found, found.cover.box, 2), self.scene, goal)
@@ -243,19 +243,3 @@ def _said(error: AnswerError) -> str:
     """Say why there is no such scene."""
     value = f"{error.value:.6g}" if isinstance(error.value, float) else error.value
     return f"there is no such part or throw: {error.thing} is {value}; it has to be {error.allowed}"
-
-
-def _wrong(goal: Goal) -> Callable[[Any, Any], Any] | None:
-    """From places and sides to whether each violates the goal; None for goals that no single place violates."""
-    if isinstance(goal, OrientedBeyond):
-        return lambda x, side: (x > goal.x) & (side != goal.side)
-    if isinstance(goal, Predicate):
-
-        def wrong(x: Any, side: Any) -> Any:
-            bad = np.zeros(x.shape, dtype=bool)
-            for s in np.unique(side).tolist():
-                bad[side == s] = ~goal.holds(x[side == s], x[side == s], s)
-            return bad
-
-        return wrong
-    return None

@@ -12,8 +12,8 @@ from pathlib import Path
 from typing import Any
 
 from limitsets.errors import AnswerError
-from limitsets.goals import Goal, Predicate
-from limitsets.proofs.asked import State
+from limitsets.goals import Goal
+from limitsets.proofs.asked import State, rechecked
 from limitsets.proofs.attraction import Attraction
 from limitsets.proofs.certificate import write
 from limitsets.scene import Scene
@@ -92,14 +92,14 @@ def write_refutation(
     Raises
     ------
     AnswerError
-        A goal of the caller's code, or an orbit that no certificate can show.
+        A goal that the checker does not know, or an orbit that no certificate can show.
     """
     kind = next((word for word in KINDS if word in recurs), None)
-    if isinstance(goal, Predicate) or kind is None:
+    if not rechecked(goal) or kind is None:
         raise AnswerError(
             "the refutation",
             goal.kind,
-            "by an orbit that comes back, of a goal that a scene can name",
+            "by an orbit that comes back, of a goal that the checker knows",
             "leave it",
         )
     box = found.cover.box

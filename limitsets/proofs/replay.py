@@ -12,10 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from limitsets.interval import Interval
-from limitsets.jit import proof_kernel
+from limitsets.jit import entry_of, proof_kernel
 from limitsets.maps import codes
 from limitsets.proofs.parameters import ParameterBox
 from limitsets.thrower.arrival_box import landed
+from limitsets.thrower.effects.landing import Landing
+from limitsets.thrower.effects.roll import Roll
 from limitsets.thrower.motion_box import all_enclosed, gather_full_box
 from limitsets.thrower.roll_box import rested_one_way
 from limitsets.thrower.side_box import gather_box, with_kappa
@@ -50,7 +52,8 @@ def _replay_full(lo_map: Any, hi_map: Any, kappa: Any, landing: Any, lo: Any, hi
         state, jog, phi, _, _ = sure_throw_box(part.own, x)
         if (state == NOTHING) | (not all_enclosed(part.effects)):
             return k
-        ways = rested_one_way(part.effects.roll, part, landed(part.effects.landing, part, x, phi, jog))
+        count = landed(entry_of(part.effects, Landing), part, x, phi, jog)
+        ways = rested_one_way(entry_of(part.effects, Roll), part, count)
         if ways.number != 1:
             return k
         after = Interval(ways.first.lo, ways.first.hi) + landing[k]

@@ -10,12 +10,11 @@ from collections.abc import Mapping
 
 from limitsets.errors import AnswerError
 from limitsets.scene import Scene
-from limitsets.thrower.motion import FullThrow
+from limitsets.thrower.effects import EFFECTS
+from limitsets.thrower.effects.spread import Spread
+from limitsets.thrower.motion import FullThrow, without
 
 __all__ = ["joined", "scattered", "simulated"]
-
-ENCLOSED = ("landing", "roll")
-"""Effects whose map has an `image_box`."""
 
 REMEDY = "leave the others out of [effects] for a proof; orbits and limit sets by samples have them"
 
@@ -31,10 +30,10 @@ def simulated(scene: Scene) -> FullThrow | None:
     AnswerError
         An effect of which nothing can be proved.
     """
-    on = scene.effects.on()
-    for effect in on:
-        if effect not in (*ENCLOSED, "spread"):
-            allowed = f"{', '.join(ENCLOSED)} and bounded spread"
+    for effect in scene.effects.on():
+        if not EFFECTS[effect].enclosed:
+            known = [name for name, each in EFFECTS.items() if each.enclosed and name != "spread"]
+            allowed = f"{', '.join(known)} and bounded spread"
             raise AnswerError("the effects of a proof", effect, allowed, REMEDY)
     if scene.effects.spread not in (None, "bounded"):
         raise AnswerError(
@@ -43,10 +42,8 @@ def simulated(scene: Scene) -> FullThrow | None:
             '"bounded": normal deviations have no bound, so that nothing holds for every sequence of throws',
             'write spread = "bounded", with bounds in [world] scatter',
         )
-    found = scene.map
-    if not (isinstance(found, FullThrow) and set(on) & set(ENCLOSED)):
-        return None
-    return found._replace(effects=found.effects._replace(spread=None))
+    found = without(scene.map, Spread)
+    return found if isinstance(found, FullThrow) else None
 
 
 def scattered(scene: Scene) -> dict[str, str]:

@@ -96,17 +96,19 @@ def thinned(found: Cover, cells: Mask, group: NDArray[np.int32] | None = None) -
 
 def _rounds(found: Cover, left: Mask, steep: NDArray[np.float64], of: NDArray[np.int64], thick: Mask) -> int:
     """Bound the densities throw by throw; mark the groups that do not thin out, and count the throws of the others."""
-    source, first, count = _groups(found, left, of)
-    factor = (1.0 + SLACK) / steep[source]
+    number = np.flatnonzero(left)
+    each = _stretches(found, left, number, of)
+    largest_on = _Largest(each, number.size)
+    factor = (1.0 + SLACK) / steep[number]
     bound = np.where(left, 1.0, 0.0)
-    goes = np.unique(first)
     waiting = np.zeros(thick.size, dtype=bool)
     waiting[of[left]] = True
     half, check = np.full(thick.size, math.inf), PACE
     last = 0
     for throws in range(1, MOST + 1):
-        if source.size:
-            bound = np.bincount(count, np.maximum.reduceat(bound[source] * factor, goes), minlength=left.size)
+        if each.begins.size:
+            most = np.maximum.reduceat(largest_on(bound[number] * factor), each.begins)
+            bound = np.bincount(each.target, most, minlength=left.size)
         else:
             bound = np.zeros(left.size)
         largest = np.zeros(thick.size)
@@ -130,33 +132,91 @@ def _rounds(found: Cover, left: Mask, steep: NDArray[np.float64], of: NDArray[np
     return last if last else throws
 
 
-def _groups(
-    found: Cover, left: Mask, of: NDArray[np.int64]
-) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
-    """Edges among the cells left, within their groups, ordered by target, branch and run.
+class _Stretches(NamedTuple):
+    """Neighbouring sources whose images by one branch all meet one target, ordered by target, run and branch.
 
-    Returns their sources, where the group of each one begins, and the target of each group.
+    Attributes
+    ----------
+    first, last : ndarray of int, shape (n,)
+        Their ends, among the cells left.
+    begins : ndarray of int, shape (m,)
+        Where the stretches of a target, run and branch begin.
+    target : ndarray of int, shape (m,)
+        The target of each of these groups.
     """
-    number = np.flatnonzero(left)
-    offset = found.grid.offset
+
+    first: NDArray[np.int64]
+    last: NDArray[np.int64]
+    begins: NDArray[np.int64]
+    target: NDArray[np.int64]
+
+
+def _stretches(found: Cover, left: Mask, number: NDArray[np.int64], of: NDArray[np.int64]) -> _Stretches:
+    """Find the stretches among the cells left, `number`, within their groups.
+
+    Images of neighbours overlap, so a stretch is told by its ends: where the image of a cell meets a target and that
+    of the cell before it, or behind it, does not.  There are far fewer of these than of cells and targets that meet.
+    """
     new = np.ones(number.size, dtype=bool)
-    new[1:] = (np.diff(number) > 1) | np.isin(number[1:], offset)
+    new[1:] = (np.diff(number) > 1) | np.isin(number[1:], found.grid.offset)
     run = np.cumsum(new)
-    edges = []
+    new[1:] |= np.diff(of[number]) != 0
+    apart = np.append(new, True)
+    parts = []
     for branch in (0, 1):
-        ends = targets(found, branch)[number]
-        some = np.flatnonzero(ends[:, 0] >= 0)
-        width = ends[some, 1] - ends[some, 0] + 1
-        source = np.repeat(some, width)
-        step = np.arange(source.size) - np.repeat(np.cumsum(width) - width, width)
-        to = ends[source, 0] + step
-        kept = left[to] & (of[to] == of[number[source]])
-        key = 2 * run[source[kept]] + branch
-        edges.append((number[source[kept]], to[kept].astype(np.int64), key))
-    source, to, key = (np.concatenate(part) for part in zip(*edges, strict=True))
-    order = np.lexsort((key, to))
-    source, to, key = source[order], to[order], key[order]
+        ends = targets(found, branch)[number].astype(np.int64)
+        pairs = [_only_here(ends, apart[:-1], 1), _only_here(ends, apart[1:], -1)]
+        kept = [left[to] & (of[to] == of[number[source]]) for source, to in pairs]
+        (first, to), (last, _) = (
+            (source[which][order], to[which][order])
+            for (source, to), which in zip(pairs, kept, strict=True)
+            for order in [np.lexsort((source[which], to[which]))]
+        )
+        parts.append((first, last, to, 2 * run[first] + branch))
+    first, last, to, key = (np.concatenate(part) for part in zip(*parts, strict=True))
+    order = np.lexsort((first, key, to))
+    first, last, to, key = first[order], last[order], to[order], key[order]
     begins = np.ones(to.size, dtype=bool)
     begins[1:] = (np.diff(to) != 0) | (np.diff(key) != 0)
-    start = np.flatnonzero(begins)
-    return source, np.repeat(start, np.diff([*start, to.size])), to[start]
+    return _Stretches(first, last, np.flatnonzero(begins), to[begins])
+
+
+def _only_here(
+    ends: NDArray[np.int64], apart: Mask, step: int
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Pairs of a cell and a target that its image meets and that of its neighbour, `step` before it, does not."""
+    none = ends[:, 0] < 0
+    beside = np.roll(ends, step, axis=0)
+    beside[apart | np.roll(none, step)] = np.iinfo(np.int64).max // 2
+    pieces = np.concatenate(
+        [
+            np.stack([ends[:, 0], np.minimum(ends[:, 1], beside[:, 0] - 1)], axis=1),
+            np.stack([np.maximum(ends[:, 0], beside[:, 1] + 1), ends[:, 1]], axis=1),
+        ]
+    )
+    source = np.tile(np.arange(len(ends)), 2)
+    some = (pieces[:, 0] <= pieces[:, 1]) & ~none[source]
+    width = pieces[some, 1] - pieces[some, 0] + 1
+    within = np.arange(width.sum()) - np.repeat(np.cumsum(width) - width, width)
+    return np.repeat(source[some], width), np.repeat(pieces[some, 0], width) + within
+
+
+class _Largest:
+    """The largest of some values on each of the stretches, by the largest of 1, 2, 4 ... neighbours."""
+
+    def __init__(self, each: _Stretches, size: int) -> None:
+        level = np.frexp(each.last - each.first + 1)[1].astype(np.int64) - 1
+        self.table = np.zeros((int(level.max(initial=0)) + 1, size))
+        self.one = level * size + each.first
+        self.other = level * size + each.last + 1 - 2**level
+
+    def __call__(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return it for values of the cells left."""
+        table = self.table
+        table[0] = values
+        for level in range(1, len(table)):
+            half, end = 2 ** (level - 1), values.size - 2**level + 1
+            np.maximum(table[level - 1, :end], table[level - 1, half : half + end], out=table[level, :end])
+        flat = table.reshape(-1)
+        most: NDArray[np.float64] = np.maximum(flat[self.one], flat[self.other])
+        return most

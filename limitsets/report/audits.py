@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING
 
 from limitsets import plot
 from limitsets.files import as_json
-from limitsets.report.tables import intervals, percent, table
-from limitsets.report.writing import DPI, filled
+from limitsets.report.pages import words
+from limitsets.report.tables import percent
+from limitsets.report.writing import laid
 
 if TYPE_CHECKING:
     from limitsets.auditing import Audit, Finding
@@ -17,12 +18,6 @@ if TYPE_CHECKING:
 __all__ = ["HEADS", "audit_page", "lines_of", "summary", "write_audit"]
 
 HEADS = ("effect", "assumed", "on the limit set", "worst there", "on the whole arm")
-
-
-HOW = (
-    "Proved is by interval arithmetic on every cell, for the scene's decimals. A break was found at a throw; on the "
-    "limit set that throw is one of a long orbit."
-)
 
 
 def _measured(finding: Finding, value: float | None, unit: str) -> str:
@@ -100,39 +95,7 @@ def lines_of(found: Audit) -> list[list[str]]:
 
 def summary(found: Audit) -> list[str]:
     """Say in a few sentences what the scene calls for."""
-    limit = found.on("limit-set")
-    called = dict.fromkeys(each.effect for each in limit if each.called_for and not each.simulated)
-    missing = dict.fromkeys(each.missing for each in limit if each.missing and each.called_for is None)
-    if called:
-        lines = [f"Called for on the limit set: {', '.join(called)}."]
-    elif any(each.called_for is None and not each.missing for each in limit):
-        lines = ["No orbit was followed on a limit set: what its throws call for cannot be told."]
-    else:
-        lines = ["No throw on the limit set was seen to break an assumption that can be told."]
-    if missing:
-        lines.append(f"Give {', '.join(missing)} in [world] to have the rest told.")
-    if found.scene.effects.on():
-        names = ", ".join(found.scene.effects.on())
-        lines.append(f"Simulated: {names}. What is asked here is what the model without effects would need.")
-    if not found.extents:
-        return [*lines, "No limit set was found."]
-    where = (
-        "The limit set lies in cells that are proved to hold it."
-        if found.enclosed
-        else "The limit set was found from sampled images: nothing about it is proved."
-    )
-    return [*lines, where]
-
-
-def _broken_ranges(found: Audit) -> str:
-    """Say where on the arm each assumption breaks."""
-    rows = [
-        [finding.about.name, side, intervals(parts, 4)]
-        for finding in found.on("domain")
-        for side, parts in finding.ranges.items()
-    ]
-    heads = ["breaks", "on side", f"for x [{found.scene.unit}]"]
-    return "Where on the arm it breaks:\n\n" + table(heads, rows) if rows else ""
+    return words("audit_summary", found=found).split("\n\n")
 
 
 def audit_page(found: Audit, figure: str | None = None) -> str:
@@ -156,21 +119,9 @@ def audit_page(found: Audit, figure: str | None = None) -> str:
     >>> audit_page(ls.audit("paper-designed")).splitlines()[0]
     '# paper-designed: what the model leaves out'
     """
-    details = [
-        f"* **{each.about.name}**: {each.about.words}. Measured: {each.about.value}."
-        for each in found.on("limit-set")
-    ]
-    parts = [
-        f"# {found.scene.name}: what the model leaves out",
-        " ".join(summary(found)),
-        table(HEADS, lines_of(found)),
-        "" if figure is None else f"![Where along the arm each assumption holds and breaks]({figure})",
-        "What is assumed, and how it is measured:",
-        "\n".join(details),
-        _broken_ranges(found),
-        HOW,
-    ]
-    return "\n\n".join(part for part in parts if part) + "\n"
+    figures = {} if figure is None else {"audit": figure}
+    told = {"summary": summary(found), "heads": HEADS, "rows": lines_of(found)}
+    return words("audit", figures, found=found, **told) + "\n"
 
 
 def write_audit(found: Audit, folder: str | Path) -> list[Path]:
@@ -181,9 +132,8 @@ def write_audit(found: Audit, folder: str | Path) -> list[Path]:
     LimitsetsError
         The folder cannot be written.
     """
-    names = ["audit.md", "audit.json", "audit.png"]
-    with filled(folder) as draft:
-        plot.audit(found).savefig(draft / names[2], dpi=DPI)
-        (draft / names[1]).write_text(as_json(found.to_json()), encoding="utf-8", newline="\n")
-        (draft / names[0]).write_text(audit_page(found, names[2]), encoding="utf-8", newline="\n")
-    return [Path(folder) / name for name in names]
+    return laid(
+        folder,
+        [("audit", plot.audit(found))],
+        lambda figures: {"audit.md": audit_page(found, figures["audit"]), "audit.json": as_json(found)},
+    )

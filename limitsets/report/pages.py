@@ -1,23 +1,83 @@
-"""The page: an analysis in the words of someone who builds a feeder."""
+"""The pages: an answer in the words of someone who builds a feeder.
+
+The words stand in `templates`.  A paragraph there may be broken into lines as its sentences come: it is one line in the
+page, and one whose sentences are all left out is none.
+"""
 
 from __future__ import annotations
 
+import math
+import re
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
+from functools import cache
+from typing import TYPE_CHECKING, Any
 
 from limitsets.analysis import overlap
-from limitsets.goals import OrientedBeyond, Reaches
-from limitsets.report.background import everything, figure_line, scene_of, steps, trust
-from limitsets.report.questions import order_of, question_of, verdict_of, void_of
-from limitsets.report.tables import bands, intervals, percent, table
-from limitsets.report.tables import count as count_of
+from limitsets.goals import order_of
+from limitsets.report.questions import question_of, verdict_of, void_of
+from limitsets.report.tables import bands, count, intervals, percent, table
 
 if TYPE_CHECKING:
+    from jinja2 import Environment
+
     from limitsets.analysis import Analysis
 
-__all__ = ["page"]
+__all__ = ["page", "words"]
 
-OUTSIDE = "a throw after which the part has not landed within a full turn, or a start at x <= a"
+# Blocks of these signs keep their lines: headings, tables, lists, commands.
+LINES = ("#", "|", "* ", "    ")
+
+
+@cache
+def _environment() -> Environment:
+    from jinja2 import Environment, PackageLoader, StrictUndefined
+
+    found = Environment(
+        loader=PackageLoader("limitsets.report"),
+        trim_blocks=True,
+        undefined=StrictUndefined,
+        autoescape=False,  # Markdown, no HTML
+    )
+    found.filters |= {
+        "bands": bands,
+        "count_of": lambda pair: count(*pair),
+        "degrees": math.degrees,
+        "f": format,
+        "first_up": lambda text: text[:1].upper() + text[1:],
+        "intervals": intervals,
+        "percent": percent,
+    }
+    found.globals |= {
+        "order_of": order_of,
+        "question_of": question_of,
+        "table": table,
+        "verdict_of": verdict_of,
+        "void_of": void_of,
+    }
+    return found
+
+
+def words(template: str, figures: Mapping[str, str] | None = None, **answers: Any) -> str:
+    """Fill in a template of `templates`: paragraphs with an empty line between, without a break at the end.
+
+    Parameters
+    ----------
+    template : str
+        Its name, without endings.
+    figures : mapping of str to str, optional
+        File names of the pictures by kind; a picture that is not there is left out.
+    **answers
+        What the template speaks of.
+    """
+
+    def figure(kind: str, caption: str) -> str:
+        return f"![{caption}]({figures[kind]})" if figures and kind in figures else ""
+
+    text = _environment().get_template(f"{template}.md.j2").render(figure=figure, **answers)
+    blocks = [block.strip("\n") for block in re.split(r"\n\s*\n", text)]
+    return "\n\n".join(
+        block if block.startswith(LINES) else re.sub(r"\s*\n\s*", " ", block) for block in blocks if block
+    )
 
 
 def page(analysis: Analysis, figures: Mapping[str, str]) -> str:
@@ -42,147 +102,15 @@ def page(analysis: Analysis, figures: Mapping[str, str]) -> str:
     >>> page(ls.analyse("paper-designed"), {}).splitlines()[0]
     '# paper-designed: where the throws lead'
     """
-    parts = [
-        f"# {analysis.scene.name}: where the throws lead",
-        _summary(analysis),
-        *(_attractor(analysis, k, figures) for k in range(len(analysis.attractors))),
-        _goal(analysis),
-        _starts(analysis, figures),
-        _decisions(analysis, figures),
-        trust(analysis),
-        scene_of(analysis.scene),
-        steps(analysis, figures),
-    ]
-    return "\n\n".join(part for part in parts if part) + "\n"
+    from limitsets.thrower.effects import EFFECTS  # lazily: it loads numba
 
-
-def _summary(analysis: Analysis) -> str:
-    basins, count = analysis.basins, len(analysis.attractors)
-    if count == 0:
-        leaving = ", ".join(f"{percent(share)} {name}" for name, share in basins.exits.items() if share)
-        if basins.undecided_between:
-            leaving = ", ".join(filter(None, [f"{percent(basins.undecided_between)} undecided", leaving]))
-            return (
-                f"Thrown again and again, **no limit set was found**, and not all starts leave ({leaving})."
-            )
-        return f"Thrown again and again, **no start was found to stay on the arm** ({leaving})."
-    where = "one limit set" if count == 1 else f"{count} limit sets"
-    shares = " and ".join(percent(share) for share in basins.attractors)
-    lines = [f"Thrown again and again, the part ends up in **{where}**, reached from {shares} of all starts."]
-    orders = {attractor.flip_order for attractor in analysis.attractors}
-    if len(orders) == 1 and (order := orders.pop()) is not None:
-        lines.append(
-            f"Its sides come up in the order {order_of(order)}."
-            if len(order) > 1
-            else f"It stays on side {order[0]}."
-        )
-    if analysis.goal is not None:
-        lines.append(
-            f"The goal **{verdict_of(analysis.goal)}** ({analysis.goal.how}, not proved): see below."
-        )
-    broken = overlap(analysis.other_vertex_first, everything(analysis))
-    if broken:
-        lines.append(
-            "**In part of the limit set another vertex lands first: the model does not describe those throws.**"
-        )
-    return " ".join(lines)
-
-
-def _attractor(analysis: Analysis, k: int, figures: Mapping[str, str]) -> str:
-    found, extents, unit = analysis.attractors[k], analysis.extents[k], analysis.scene.unit
-    name = "The limit set" if len(analysis.attractors) == 1 else f"Limit set {k}"
-    rows = [
-        [
-            side,
-            intervals(extents[side]) if side in extents else "never",
-            "-" if side not in found.jogs_per_visit else count_of(*found.jogs_per_visit[side]),
-        ]
-        for side in range(len(analysis.scene.sides))
-    ]
-    lines = [
-        f"## {name}",
-        (
-            f"Where the centre of mass comes to rest, as distance from the joint [{unit}], and how many jogs in a row "
-            f"a visit to the side was seen to have ({found.throws} throws):"
-        ),
-        table(["on side", f"x [{unit}]", "jogs per visit"], rows),
-        "What lies where along the arm:",
-        table(
-            [f"x [{unit}]", "the part lies on side"],
-            [[f"{lo:.3f} to {hi:.3f}", " or ".join(map(str, sides))] for lo, hi, sides in bands(extents)],
-        ),
-        _numbers(analysis, k),
-    ]
-    text = "\n\n".join(lines)
-    return text + (
-        figure_line(figures, "limit-set", "The limit set per side, with throws of one orbit as arrows")
-        if k == 0
-        else ""
-    )
-
-
-def _numbers(analysis: Analysis, k: int) -> str:
-    found, limit = analysis.attractors[k], analysis.limit_sets[k]
-    source = (
-        "The ends were computed as images of critical points, to about 1e-12."
-        if analysis.extents_from[k] == "end points"
-        else f"The ends are borders of cells, good to about a cell: {limit.advice}."
-    )
-    flips = f"{found.flips_per_throw:.4f} flips per throw"
-    if found.lyapunov is None:
-        return f"{source} {flips}."
-    spread = (
-        "two starts close together drift apart: the sequence of jogs never settles into a cycle"
-        if found.lyapunov > 0
-        else "starts close together come closer: the throws settle"
-    )
-    return f"{source} {flips}; Lyapunov exponent {found.lyapunov:.4f} per throw ({spread})."
-
-
-def _goal(analysis: Analysis) -> str:
-    asked, unit = analysis.goal, analysis.scene.unit
-    if asked is None:
-        return ""
-    goal = asked.goal
-    verdict = "This analysis cannot tell" if asked.holds is None else f"It {verdict_of(asked)}"
-    lines = ["## The goal", f"Asked: {question_of(goal, unit)}. **{verdict}** ({asked.how}: no proof)."]
-    if isinstance(goal, OrientedBeyond) and asked.threshold is not None:
-        lines.append(f"The sentence is true from x = {asked.threshold:.3f} {unit} on.")
-    void = void_of(asked, unit)
-    if void:
-        lines.append(f"But {void}.")
-    if isinstance(goal, Reaches) and asked.threshold is not None:
-        lines.append(f"The farthest x reached on side {goal.side} is {asked.threshold:.3f} {unit}.")
-    return "\n\n".join([lines[0], " ".join(lines[1:])])
-
-
-def _starts(analysis: Analysis, figures: Mapping[str, str]) -> str:
-    basins = analysis.basins
-    rows = [[f"limit set {k}", percent(share)] for k, share in enumerate(basins.attractors)]
-    rows += [[f"leave: {name}", percent(share)] for name, share in basins.exits.items()]
-    rows.append(
-        ["undecided: paths end in different places, or may stay elsewhere", percent(basins.undecided_between)]
-    )
-    beyond = basins.exits.get("outside-model", 0.0) > 0.0
-    return (
-        "## From which starts\n\nShare of the starts (by length, over all sides, up to the arm's end):\n\n"
-        + table(["where they end", "share"], rows)
-        + f"\n\nOutside the model: {OUTSIDE}." * beyond
-        + figure_line(figures, "basins", "Basins per side")
-    )
-
-
-def _decisions(analysis: Analysis, figures: Mapping[str, str]) -> str:
-    unit = analysis.scene.unit
-    rows = [
-        [side, f"{point.x:.6f}", point.kind.replace("->", " → ")]
-        for side, points in sorted(analysis.critical_points.items())
-        for point in points
-    ]
-    return (
-        "## Where a throw changes what it does\n\n"
-        f"At a critical point a part stops jogging and begins to flip, or the reverse [{unit}]:\n\n"
-        + (table(["side", f"x [{unit}]", "change"], rows) if rows else "There is none on the arm.")
-        + figure_line(figures, "map", "x after a throw against x before it, per side")
-        + figure_line(figures, "flight", "One throw of the orbit, in the air and to rest")
-    )
+    effects = analysis.scene.effects
+    assumed = [each.lifts for name, each in EFFECTS.items() if name not in effects.words]
+    # of the throw; no effect lifts this
+    assumed.insert(0 if effects.drive else 1, "it does not tip the part")
+    everything: dict[int, list[tuple[float, float]]] = {}
+    for extents in analysis.extents:
+        for side, parts in extents.items():
+            everything.setdefault(side, []).extend(parts)
+    broken = overlap(analysis.other_vertex_first, everything)
+    return words("report", figures, analysis=analysis, broken=broken, assumed=assumed) + "\n"

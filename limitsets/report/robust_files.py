@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from limitsets import plot
 from limitsets.files import as_json
 from limitsets.report.robust_pages import deviation_of, robustness_page, shown, violated_of
-from limitsets.report.writing import DPI, filled
+from limitsets.report.writing import laid
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -17,8 +17,6 @@ if TYPE_CHECKING:
     from limitsets.robust.sheet.summary import Robustness
 
 __all__ = ["write_robustness"]
-
-Progress = Callable[[str, int, int], None]
 
 
 def _drawn(found: Robustness) -> Iterator[tuple[str, Figure]]:
@@ -59,13 +57,8 @@ def write_robustness(found: Robustness, folder: str | Path) -> list[Path]:
     LimitsetsError
         The folder cannot be written.
     """
-    figures: dict[str, str] = {}
-    with filled(folder) as draft:
-        for kind, figure in _drawn(found):
-            figures[kind] = f"{kind}.png"
-            figure.savefig(draft / figures[kind], dpi=DPI)
-        record = as_json(found.to_json())
-        (draft / "robustness.json").write_text(record, encoding="utf-8", newline="\n")
-        page = robustness_page(found, figures)
-        (draft / "report.md").write_text(page, encoding="utf-8", newline="\n")
-    return [Path(folder) / name for name in ["report.md", "robustness.json", *figures.values()]]
+    return laid(
+        folder,
+        _drawn(found),
+        lambda figures: {"report.md": robustness_page(found, figures), "robustness.json": as_json(found)},
+    )

@@ -1,4 +1,4 @@
-"""The sheet of tolerances as a page: the answer first, then what limits it, all together, and where X is best."""
+"""The sheet of tolerances as a page: what is told of a margin, of margins against X and of noise, for its template."""
 
 from __future__ import annotations
 
@@ -7,20 +7,20 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from limitsets.goals import Goal, OrientedBeyond, Reaches
-from limitsets.report.background import figure_line, scene_of
-from limitsets.report.questions import question_of
-from limitsets.report.robust_trust import called_for, checked_again, noise_of, trusted
-from limitsets.report.tables import table
+from limitsets.report.pages import words
 from limitsets.robust.margins.words import bound, void_of
+from limitsets.robust.noise.laws import Gaussian, Law, Uniform
 from limitsets.robust.sheet.entries import Entry, in_unit_of, percent_of
 from limitsets.scene.quantities import parsed_deviation
 
 if TYPE_CHECKING:
     from limitsets.robust.margins.beyond import MarginsBeyond
+    from limitsets.robust.noise.statistics import NoiseStatistics
     from limitsets.robust.sheet.summary import Robustness
 
 __all__ = [
     "HEADS",
+    "READINGS",
     "answer",
     "deviation_of",
     "lines_of",
@@ -35,6 +35,26 @@ READINGS = {"fixed": "fixed, but unknown", "per-throw": "at every throw", "toler
 
 # States of an orbit that are written: the last of them.
 LAST = 8
+
+# What the numbers of the noise are called, and whether they are shares, throws, or a rate per throw.
+NUMBERS = {
+    "time beyond": ("rests beyond X, of all", "share"),
+    "wrong beyond": ("of these on a wrong side", "share"),
+    "fed": ("random starts that come beyond X on the wanted side", "share"),
+    "mean throws": ("throws until they do, mean", "throws"),
+    "95 % throws": ("throws until 95 % of all starts have", "throws"),
+    "first beyond is wrong": ("first rest beyond X is on a wrong side", "share"),
+    "lost": ("starts that leave the arm before", "share"),
+    "escape": ("chance to leave the limit set, per throw", "rate"),
+}
+
+# Numbers whose change with the noise is shown.
+MOVING = ("wrong beyond", "mean throws", "95 % throws", "escape")
+
+# Less than this is what rounding leaves.
+NOTHING = 1e-9
+
+Table = tuple[Sequence[str], list[list[str]]]
 
 
 def robustness_page(found: Robustness, figures: Mapping[str, str]) -> str:
@@ -52,60 +72,50 @@ def robustness_page(found: Robustness, figures: Mapping[str, str]) -> str:
     str
         Markdown.
     """
-    parts = [
-        f"# {found.scene.name}: how far it may drift",
-        answer(found),
-        _margins(found, figures),
-        _limits(found, figures),
-        _joint(found, figures),
-        _curve(found, figures),
-        noise_of(found, figures),
-        trusted(found),
-        checked_again(found),
-        scene_of(found.scene),
-    ]
-    return "\n\n".join(part for part in parts if part) + "\n"
+    first, noise = shown(found), found.noise
+    own = next((goal for goal in found.goals if isinstance(goal, OrientedBeyond | Reaches)), None)
+    proofs = [name for entry in found.entries for name in (*entry.certificates, entry.against) if name]
+    return (
+        words(
+            "robustness",
+            figures,
+            **_told(found),
+            scene=found.scene,
+            heads=HEADS,
+            rows=lines_of(found),
+            first=first,
+            states=first and _states(first, found),
+            violated_of=violated_of,
+            deviation_of=deviation_of,
+            parsed_deviation=parsed_deviation,
+            own=own,
+            beyond=own and OrientedBeyond(own.x, own.side),
+            places=found.curve and _places(found.curve),
+            laws=noise
+            and [_law(name, getattr(noise.scatter, name), noise.unit) for name in noise.scatter.given()],
+            numbers=noise and _numbers(noise, len(found.scene.sides)),
+            changes=noise and _changes(noise),
+            files=list(dict.fromkeys(proofs)),
+        )
+        + "\n"
+    )
 
 
 def answer(found: Robustness) -> str:
     """Say in a few sentences what was asked, whether it holds, and what has the least room."""
-    goals = " and ".join(question_of(goal, found.scene.unit) for goal in found.goals)
-    verdict = {
-        "proved": "In the scene as it is this **holds, proved**.",
-        "refuted": "In the scene as it is this **fails**: an orbit shows it. No deviation is small enough.",
-        "undecided": "Of the scene as it is this is **neither proved nor refuted**, so no deviation is proved safe.",
-    }[found.verdict]
-    lines = [f"**Asked:** {goals}. {verdict}"]
-    void = void_of(found.goals, found.reach, found.scene.unit)
-    if void:
-        lines.append(f"But it holds vacuously: {void}.")
-    first = tightest(found)
-    if first is not None and first.holds:
-        by = ", for its tolerance" if _by_tolerance(found) else ""
-        lines.append(f"Least room{by} is left to {_named(first)}: {_bracket(first)}.")
-    joint = found.joint
-    if joint is not None:
-        lines.append(_met(joint))
-    effects = called_for(found)
-    if effects:
-        lines.append(
-            f"All of it is about the model's throws: on the limit set {', '.join(effects)} would act as well "
-            "(`limitsets audit` says where)."
-        )
-    if found.curve is not None and found.verdict != "proved":
-        lines.append(_best(found.curve))
-    return " ".join(lines)
+    return words("robust_answer", **_told(found))
 
 
-def _named(entry: Entry) -> str:
-    return f"{entry.quantity} ({READINGS[entry.reading]})"
-
-
-def _bracket(entry: Entry) -> str:
-    low, high = bound(entry.proved, entry.unit), bound(entry.refuted, entry.unit, up=True)
-    if entry.refuted is None:
-        return f"proved safe up to {low}; no deviation is shown to fail"
-    return f"proved safe up to {low}, shown to fail from {high} on"
+def _told(found: Robustness) -> dict[str, Any]:
+    return {
+        "found": found,
+        "void": void_of(found.goals, found.reach, found.scene.unit),
+        "readings": READINGS,
+        "bound": bound,
+        "tightest": tightest,
+        "by_tolerance": _by_tolerance,
+        "called_for": _called_for,
+    }
 
 
 def tightest(found: Robustness) -> Entry | None:
@@ -160,59 +170,6 @@ def lines_of(found: Robustness) -> list[list[str]]:
     return rows
 
 
-def _margins(found: Robustness, figures: Mapping[str, str]) -> str:
-    if not found.singles:
-        return ""
-    lines = [
-        "## One quantity at a time",
-        "How far each quantity may be off to either side, all others being as the scene says:",
-        table(HEADS, lines_of(found)),
-    ]
-    notes = [
-        f"* {_named(entry)}: {_why(entry)}"
-        for entry in found.singles
-        if entry.holds and entry.reason and not entry.closed
-    ]
-    if notes:
-        lines += ["Where the two columns are apart, or one is empty:", "\n".join(notes)]
-    return "\n\n".join(lines) + figure_line(figures, "margins", "How far each quantity may be off")
-
-
-def _why(entry: Entry) -> str:
-    """Say why a bracket is open."""
-    if entry.refuted is None:
-        return (
-            f"no deviation is found at which an orbit violates the goal; the proof ends with: {entry.reason}"
-        )
-    return f"in between nothing is known; the proof ends with: {entry.reason}"
-
-
-def _limits(found: Robustness, figures: Mapping[str, str]) -> str:
-    """Show the orbit at the upper end of the tightest margin."""
-    first = shown(found)
-    if first is None:
-        return ""
-    goal = None if first.violated is None else found.goals[first.violated]
-    rows, heads = _states(first, found)
-    begin = (
-        "Already in the scene as it is, an orbit violates the goal"
-        if not first.holds
-        else f"With {deviation_of(first)} an orbit violates the goal"
-    )
-    last = first.counterexample[-1]
-    how = ""
-    if isinstance(goal, OrientedBeyond):
-        how = (
-            f": after {len(first.counterexample) - 1} throws the part lies on side {last['side']}, "
-            f"{last['x'] - goal.x:.2g} {found.scene.unit} beyond {goal.x:g} {found.scene.unit}"
-        )
-    lines = ["## What limits it", f"{begin}{how}.", table(heads, rows)]
-    others = sum(entry is not first and bool(entry.counterexample) for entry in found.entries)
-    if others and first.holds:
-        lines.append(f"The orbits at the upper ends of the {others} other margins are in robustness.json.")
-    return "\n\n".join(lines) + figure_line(figures, "counterexample", "The orbit, throw by throw")
-
-
 def shown(found: Robustness) -> Entry | None:
     """Return the margin whose orbit is shown: the tightest that has one."""
     first = tightest(found)
@@ -233,15 +190,15 @@ def deviation_of(entry: Entry) -> str:
 def _value_at(entry: Entry) -> str:
     """Give the value itself at which the orbit violates the goal: it says to which side."""
     thrown = (entry.counterexample[0]["parameters"] if entry.counterexample else None) or {}
-    for name, words in ((entry.quantity, "at"), ("throw.kappa", "kappa =")):
+    for name, told in ((entry.quantity, "at"), ("throw.kappa", "kappa =")):
         given = thrown.get(name)
         if given is not None and (name == entry.quantity or entry.quantity == "throw.speed"):
             value, unit = (given if isinstance(given, str) else given[0]).split()
-            return f" ({words} {float(value):.6g} {unit})"
+            return f" ({told} {float(value):.6g} {unit})"
     return ""
 
 
-def _states(entry: Entry, found: Robustness) -> tuple[list[list[str]], list[str]]:
+def _states(entry: Entry, found: Robustness) -> Table:
     """Give the last states of an orbit as a table."""
     orbit, unit = entry.counterexample, found.scene.unit
     scattered = entry.reading == "per-throw" and entry.quantity != "landing.x"
@@ -258,7 +215,7 @@ def _states(entry: Entry, found: Robustness) -> tuple[list[list[str]], list[str]
         if lands:
             row.append(f"{float(thrown['landing.x'].split()[0]):+.6f}" if "landing.x" in thrown else "")
         rows.append(row)
-    return rows, heads
+    return heads, rows
 
 
 def _kappa_off(thrown: Mapping[str, Any], found: Robustness) -> str:
@@ -269,99 +226,93 @@ def _kappa_off(thrown: Mapping[str, Any], found: Robustness) -> str:
     return f"{100.0 * (float(text.split()[0]) / found.scene.kappa - 1.0):+.4f}"
 
 
-def _met(joint: Entry) -> str:
-    """Say whether the tolerance is met."""
-    if joint.counterexample and not joint.holds:
-        return "The tolerance is **not met**: the scene as it is fails already."
-    if joint.proved >= 1.0:
-        return f"The tolerance is **met, proved**: up to {bound(joint.proved)} times all of it together."
-    if joint.refuted is not None and joint.refuted <= 1.0:
-        low, high = bound(joint.proved), bound(joint.refuted, up=True)
-        return f"The tolerance is **not met**: safe up to {low} of it, all together, and {high} of it fails."
-    return (
-        f"Whether the tolerance is met is **not known**: proved is {bound(joint.proved)} of it, all together."
-    )
-
-
-def _joint(found: Robustness, figures: Mapping[str, str]) -> str:
-    head = "## All together"
-    joint = found.joint
-    if joint is None:
-        return f"{head}\n\nNo joint margin: {found.left_out.get('joint', 'not asked for')}."
-    if joint.counterexample and not joint.holds:
-        return f"{head}\n\nNothing is left for deviations: the scene as it is fails already."
-    rows = []
-    for name, text in found.tolerance.items():
-        given = parsed_deviation(text, name)
-        size, unit = float(given.number), given.unit
-        how = READINGS["per-throw" if name == "landing.x" else "fixed"]
-        high = None if joint.refuted is None else joint.refuted * size
-        rows.append([name, how, text, bound(joint.proved * size, unit), bound(high, unit, up=True)])
-    lines = [
-        head,
-        "Every quantity may be anywhere within its own deviation, whatever the others are:",
-        table(["quantity", "deviates", "tolerance", "proved safe up to", "fails somewhere within"], rows),
-    ]
-    if joint.reason and not joint.closed:
-        lines.append(f"The two are farther apart than asked: {joint.reason}.")
-    return "\n\n".join(lines) + figure_line(figures, "joint", "The box of all quantities together")
-
-
-def _best(curve: MarginsBeyond) -> str:
-    best, size = curve.best()
-    unit, name = curve.scene.unit, curve.names[0]
-    if not size > 0.0:
-        return "Of no X that was tried it is proved."
-    others = [
-        f"{x:.4g}"
-        for x, high in zip(curve.x.tolist(), curve.refuted[:, 0].tolist(), strict=True)
-        if x != best and not high <= size
-    ]
-    doubt = (
-        f" Whether there is more at {', '.join(others)} is not shown: those brackets reach higher."
-        if others
-        else ""
-    )
-    return (
-        f"Most room is proved at **X = {best:.4g} {unit}**, of the places that were tried: {name} is safe up to "
-        f"{bound(size, curve.units[0] or 'times the tolerance')} there.{doubt}"
-    )
-
-
-def _curve(found: Robustness, figures: Mapping[str, str]) -> str:
-    head, curve = "## Where to put X", found.curve
-    if curve is None:
-        reason = found.left_out.get("curve", "")
-        return "" if not reason or reason == "it was not asked for" else f"{head}\n\nNot asked: {reason}."
-    heads = [f"X [{found.scene.unit}]"]
+def _places(curve: MarginsBeyond) -> Table:
+    heads = [f"X [{curve.scene.unit}]"]
     for name, unit in zip(curve.names, curve.units, strict=True):
-        what = f"{name} [{unit}]" if unit else f"{name} [times the tolerance]"
-        heads += [f"{what}: proved safe up to", "shown to fail from"]
-    rows: list[Sequence[str]] = []
+        heads += [f"{name} [{unit or 'times the tolerance'}]: proved safe up to", "shown to fail from"]
+    rows = []
     for x, proved, refuted in zip(curve.x.tolist(), curve.proved, curve.refuted, strict=True):
         row = [f"{x:.4g}"]
         for low, high in zip(proved.tolist(), refuted.tolist(), strict=True):
             row += [bound(low), bound(high if math.isfinite(high) else None, up=True)]
         rows.append(row)
-    text = (
-        f"Asked of each X, on the limit set: beyond it the part lies on side {curve.side} only, and almost every orbit "
-        f"comes to rest there. {_best(curve)}"
-    )
-    joint, best = found.joint, curve.best()[1]
-    if joint is not None and joint.proved > best and curve.names[0] == "joint":
-        own = next(goal for goal in found.goals if isinstance(goal, OrientedBeyond | Reaches))
-        asks = (
-            "That asks more than the scene's goal, which"
-            if found.goals == (OrientedBeyond(own.x, own.side),)
-            else "The scene's goal"
+    return heads, rows
+
+
+def _value(value: float | None, kind: str) -> str:
+    if value is None or not math.isfinite(value):
+        return "-"
+    if kind == "throws":
+        return f"{value:.1f}"
+    if value < NOTHING:
+        return "0" if value == 0.0 else f"below {NOTHING:g}"
+    return f"{value:.1e}" if kind == "rate" else f"{100.0 * value:.4g} %"
+
+
+def _error(value: float | None, kind: str) -> str:
+    """Write an error with the two digits that it has."""
+    if value is None or not math.isfinite(value) or value < NOTHING:
+        return _value(value, "share")
+    return f"{value:.2g}" if kind != "share" else f"{100.0 * value:.2g} %"
+
+
+def _change(value: float, kind: str) -> str:
+    if not math.isfinite(value):
+        return "-"
+    if kind == "throws":
+        return f"{value:+.2f}"
+    if abs(value) < NOTHING:
+        return "0"
+    return f"{value:+.1e}" if kind == "rate" else f"{100.0 * value:+.2g} %"
+
+
+def _law(name: str, law: Law, unit: str) -> str:
+    """Say a law as people give it.
+
+    Examples
+    --------
+    >>> from limitsets.robust import Gaussian
+    >>> _law("speed", Gaussian(0.005), "in")
+    'speed: normal, standard deviation 0.5 %'
+    """
+
+    def size(value: float) -> str:
+        if name == "speed":
+            return f"{100.0 * value:.4g} %"
+        return f"{math.degrees(value):.4g} deg" if name == "tilt" else f"{value:.4g} {unit}"
+
+    if isinstance(law, Gaussian):
+        return f"{name}: normal, standard deviation {size(law.sigma)}"
+    if isinstance(law, Uniform):
+        return f"{name}: anything within {size(law.bound)}, equally likely"
+    return f"{name}: {law!r}"
+
+
+def _numbers(noise: NoiseStatistics, sides: int) -> Table:
+    rests = {f"time on side {k}": (f"rests on side {k}", "share") for k in range(sides)}
+    rows = [
+        [told, _value(noise.numbers.get(name), kind), _error(noise.errors.get(name), kind)]
+        for name, (told, kind) in (rests | NUMBERS).items()
+        if name in noise.numbers
+    ]
+    return ["number", "computed", "error, about"], rows
+
+
+def _changes(noise: NoiseStatistics) -> Table:
+    """Say what 10 % more noise of each quantity changes."""
+    rows = []
+    for quantity, slopes in noise.sensitivity.items():
+        changes = [0.1 * slopes[name].slope if name in slopes else math.nan for name in MOVING]
+        rows.append(
+            [quantity, *(_change(each, NUMBERS[name][1]) for each, name in zip(changes, MOVING, strict=True))]
         )
-        text += (
-            f" {asks} at its own X = {own.x:g} {found.scene.unit} is proved up to "
-            f"{bound(joint.proved, 'times the tolerance')}, against {bound(best)} here."
-        )
-    rest = found.left_out.get("rest of the curve")
-    text += f" ({rest[0].upper()}{rest[1:]}.)" if rest else ""
-    return "\n\n".join([head, text, table(heads, rows)]) + figure_line(figures, "curve", "Margins against X")
+    return ["with 10 % more noise of", *(NUMBERS[name][0] for name in MOVING)], rows
+
+
+def _called_for(found: Robustness) -> list[str]:
+    """Name the effects that the limit set calls for and that are not simulated."""
+    limit = found.audit.on("limit-set") if found.audit is not None else ()
+    return list(dict.fromkeys(each.effect for each in limit if each.called_for and not each.simulated))
 
 
 def violated_of(entry: Entry, goals: Sequence[Goal]) -> Goal | None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     from limitsets.analysis import Analysis
 
-__all__ = ["DPI", "FIGURES", "figure", "filled", "require_place", "write"]
+__all__ = ["DPI", "FIGURES", "figure", "filled", "laid", "require_place", "write"]
 
 Progress = Callable[[str, int, int], None]
 
@@ -109,6 +109,43 @@ def filled(folder: str | Path) -> Iterator[Path]:
         raise _refusal(folder, f"it could not be: {error.strerror or error}") from None
 
 
+def laid(
+    folder: str | Path,
+    drawn: Iterable[tuple[str, Figure]],
+    texts: Callable[[dict[str, str]], dict[str, str]],
+) -> list[Path]:
+    """Write figures and texts into a folder, all of them or none.
+
+    Parameters
+    ----------
+    folder : str or Path
+        Where to; made if it is not there.
+    drawn : iterable of (str, Figure)
+        Figures by kind: KIND.png.
+    texts : callable
+        Takes the figures' files by kind, gives texts by file.
+
+    Returns
+    -------
+    list of Path
+        The files, texts first.
+
+    Raises
+    ------
+    LimitsetsError
+        The folder cannot be written.
+    """
+    figures: dict[str, str] = {}
+    with filled(folder) as draft:
+        for kind, figure in drawn:
+            figures[kind] = f"{kind}.png"
+            figure.savefig(draft / figures[kind], dpi=DPI)
+        told = texts(figures)
+        for name, text in told.items():
+            (draft / name).write_text(text, encoding="utf-8", newline="\n")
+    return [Path(folder) / name for name in (*told, *figures.values())]
+
+
 def write(analysis: Analysis, folder: str | Path, *, progress: Progress | None = None) -> list[Path]:
     """Write report.md, analysis.json and the figures into a folder.
 
@@ -141,16 +178,17 @@ def write(analysis: Analysis, folder: str | Path, *, progress: Progress | None =
     ...     [path.name for path in write(ls.analyse("paper-designed"), folder)][:2]
     ['report.md', 'analysis.json']
     """
-    figures = {kind: f"{kind}.png" for kind in FIGURES}
-    names = ["report.md", "analysis.json", *figures.values()]
-    with filled(folder) as draft:
-        for number, (kind, name) in enumerate(figures.items()):
-            if progress is not None:
-                progress(name, number, len(names))
-            figure(analysis, kind).savefig(draft / name, dpi=DPI)
-        if progress is not None:
-            progress("report.md", len(figures), len(names))
-        record = as_json(analysis.to_json())
-        (draft / "analysis.json").write_text(record, encoding="utf-8", newline="\n")
-        (draft / "report.md").write_text(page(analysis, figures), encoding="utf-8", newline="\n")
-    return [Path(folder) / name for name in names]
+    tell = progress or (lambda file, done, of: None)
+    count = len(FIGURES) + 2
+
+    def drawn() -> Iterator[tuple[str, Figure]]:
+        for number, kind in enumerate(FIGURES):
+            tell(f"{kind}.png", number, count)
+            yield kind, figure(analysis, kind)
+        tell("report.md", len(FIGURES), count)
+
+    return laid(
+        folder,
+        drawn(),
+        lambda figures: {"report.md": page(analysis, figures), "analysis.json": as_json(analysis)},
+    )

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
 
-__all__ = ["Deviation", "Effects", "Scatter", "World"]
+__all__ = ["FACTS", "Deviation", "Effects", "Fact", "Scatter", "World"]
 
 
 @dataclass(frozen=True)
@@ -50,6 +53,37 @@ class Scatter:
 
 
 @dataclass(frozen=True)
+class Fact:
+    """How `[world]` writes a number.
+
+    Parameters
+    ----------
+    thing : str
+        What it is, for refusals: "the coefficient of friction".
+    dimension : str
+        Of a quantity, which is above 0; empty for a plain number from 0.
+    most : float
+        The largest value; below it where it has a dimension [scene's units].
+    words : str
+        A plain number's example; of a quantity with a largest value the range: "above 0 and below 90 deg".
+    """
+
+    thing: str
+    dimension: str = ""
+    most: float = math.inf
+    words: str = ""
+
+
+FACTS: dict[str, Fact] = {
+    "friction": Fact("the coefficient of friction", most=1e6, words="0.9"),
+    "restitution": Fact("the coefficient of restitution", most=1.0, words="0.4"),
+    "bounce_threshold": Fact("the threshold", "length"),
+    "stroke": Fact("the stroke", "angle", math.pi / 2, "above 0 and below 90 deg"),
+}
+"""The numbers that `[world]` may have, by name; what an effect needs that none needed before is added here."""
+
+
+@dataclass(frozen=True)
 class World:
     """Facts, known whether or not an effect is simulated; None where not known.
 
@@ -65,6 +99,8 @@ class World:
         Angle over which the arm accelerates [rad].
     scatter : Scatter or None
         Noise at every throw.
+    more : mapping of str to float
+        All other numbers of `FACTS` that are given, read as attributes too.
     """
 
     friction: float | None = None
@@ -72,40 +108,59 @@ class World:
     bounce_threshold: float | None = None
     stroke: float | None = None
     scatter: Scatter | None = None
+    more: Mapping[str, float] = field(default_factory=dict)
+
+    def __getattr__(self, name: str) -> float | None:
+        """Give a fact that only effects from outside the package need."""
+        if name in FACTS:
+            return self.more.get(name)
+        raise AttributeError(name)
 
 
 @dataclass(frozen=True)
 class Effects:
     """What is simulated beyond the minimal model.
 
+    Each effect is an attribute, too: what the scene writes after its name, None where it is off.
+
     Parameters
     ----------
-    landing, roll, pivot, slip, bounce, drive, contact : bool
-        Whether the effect is simulated.
-    spread : str or None
-        ``"bounded"`` or ``"gaussian"`` noise at every throw.
+    words : mapping of str to (bool or str)
+        What the scene writes after the name of each effect that is on, in the order in which a throw meets them.
     auto : bool
         Let the analysis switch on what the scene calls for.
     """
 
-    landing: bool = False
-    roll: bool = False
-    pivot: bool = False
-    slip: bool = False
-    bounce: bool = False
-    drive: bool = False
-    contact: bool = False
-    spread: str | None = None
+    words: Mapping[str, bool | str] = field(default_factory=dict)
     auto: bool = False
+
+    def __getattr__(self, name: str) -> Any:
+        """Give what the scene writes after the name of an effect."""
+        if name.startswith("_"):
+            raise AttributeError(name)
+        if name not in self.words:
+            from limitsets.thrower.effects import EFFECTS  # lazily: its room loads numba
+
+            if name not in EFFECTS:
+                raise AttributeError(name)
+        return self.words.get(name)
+
+    def also(self, **words: bool | str) -> Effects:
+        """Give them with more switched on.
+
+        Examples
+        --------
+        >>> Effects({"roll": True}).also(spread="bounded").on()
+        ('roll', 'spread')
+        """
+        return replace(self, words={**self.words, **words})
 
     def on(self) -> tuple[str, ...]:
         """Give the names of the effects switched on.
 
         Examples
         --------
-        >>> Effects(roll=True, auto=True).on()
+        >>> Effects({"roll": True}, auto=True).on()
         ('roll',)
         """
-        return tuple(
-            field.name for field in fields(self) if field.name != "auto" and getattr(self, field.name)
-        )
+        return tuple(self.words)

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import math
-from typing import TYPE_CHECKING
+from dataclasses import fields
+from typing import TYPE_CHECKING, Any
 
-from limitsets.goals import AttractsAll, FlipOrder, Goal, OrientedBeyond, Reaches, StaysOnArm
-from limitsets.scene.facts import Deviation, Effects, Scatter, World
+from limitsets.goals import GOALS, Goal, words_of
+from limitsets.scene.facts import FACTS, Deviation, Effects, Scatter, World
 from limitsets.scene.quantities import deviation
 from limitsets.scene.resolve import Resolver
 
@@ -15,16 +15,13 @@ if TYPE_CHECKING:
 
 __all__ = ["resolve_effects", "resolve_goal", "resolve_world"]
 
-_GOALS = ("oriented_beyond", "reaches", "attracts_all", "flip_order", "stays_on_arm")
-
 
 def resolve_goal(table: GoalTable, count: int, arm_length: float, resolver: Resolver) -> Goal:
     """Resolve ``[goal]`` for a part with `count` sides."""
-    named = [kind for kind in _GOALS if getattr(table, kind) is not None]
+    named = [kind for kind in GOALS if getattr(table, kind) is not None]
     if len(named) != 1:
         found = " and ".join(named) or "none"
-        raise resolver.refusal("goal", "the goal", found, f"one of {', '.join(_GOALS)}", "name exactly one")
-    anywhere = table.from_anywhere
+        raise resolver.refusal("goal", "the goal", found, f"one of {', '.join(GOALS)}", "name exactly one")
 
     def side(value: int, key: str) -> int:
         if value >= count:
@@ -40,40 +37,41 @@ def resolve_goal(table: GoalTable, count: int, arm_length: float, resolver: Reso
             )
         return x
 
-    if (beyond := table.oriented_beyond) is not None:
-        key = "goal.oriented_beyond"
-        x = position(beyond.x, f"{key}.x")
-        return OrientedBeyond(x, side(beyond.side, f"{key}.side"), from_anywhere=anywhere)
-    if (reaches := table.reaches) is not None:
-        key = "goal.reaches"
-        x = position(reaches.x, f"{key}.x")
-        return Reaches(x, side(reaches.side, f"{key}.side"), reaches.every_orbit, from_anywhere=anywhere)
-    if table.flip_order is not None:
-        order = tuple(side(value, f"goal.flip_order[{i}]") for i, value in enumerate(table.flip_order))
-        return FlipOrder(order, from_anywhere=anywhere)
-    plain: dict[str, type[AttractsAll | StaysOnArm]] = {
-        "attracts_all": AttractsAll,
-        "stays_on_arm": StaysOnArm,
-    }
-    return plain[named[0]](anywhere)
+    def read(word: str, value: Any, key: str) -> Any:
+        if word == "place":
+            return position(value, key)
+        if word == "sides":
+            return tuple(side(each, f"{key}[{i}]") for i, each in enumerate(value))
+        return side(value, key) if word == "side" else value
+
+    goal, given, key = GOALS[named[0]], getattr(table, named[0]), f"goal.{named[0]}"
+    words = words_of(goal)
+    if len(words) == 1:  # it stands by itself
+        ((name, word),) = words.items()
+        values = {name: read(word, given, key)}
+    else:
+        values = {name: read(word, getattr(given, name), f"{key}.{name}") for name, word in words.items()}
+    return goal(**values, from_anywhere=table.from_anywhere)  # type: ignore[call-arg]  # a kind is a dataclass
 
 
 def resolve_world(table: WorldTable, resolver: Resolver) -> World:
     """Resolve ``[world]``."""
-    threshold = stroke = scatter = None
-    if table.bounce_threshold is not None:
-        threshold = resolver.positive(table.bounce_threshold, "length", "world.bounce_threshold")
-    if table.stroke is not None:
-        stroke = resolver.positive(table.stroke, "angle", "world.stroke")
-        if not stroke < math.pi / 2:
-            allowed = "above 0 and below 90 deg"
-            raise resolver.refusal("world.stroke", "the stroke", table.stroke, allowed, "correct it")
+    scatter, found, own = None, {}, {each.name for each in fields(World)}
+    for name, fact in FACTS.items():
+        given, key = getattr(table, name), f"world.{name}"
+        if given is not None and fact.dimension:
+            text, given = given, resolver.positive(given, fact.dimension, key)
+            if not given < fact.most:
+                raise resolver.refusal(key, fact.thing, text, fact.words, "correct it")
+        if given is not None:
+            found[name] = given
     if table.scatter is not None and (table.scatter.speed or table.scatter.landing):
         scatter = Scatter(
             _noise(table.scatter.speed, "throw.speed", "world.scatter.speed", resolver),
             _noise(table.scatter.landing, "landing.x", "world.scatter.landing", resolver),
         )
-    return World(table.friction, table.restitution, threshold, stroke, scatter)
+    more = {name: found.pop(name) for name in found.keys() - own}
+    return World(**found, scatter=scatter, more=more)
 
 
 def _noise(text: str | None, name: str, key: str, resolver: Resolver) -> Deviation | None:
@@ -84,23 +82,23 @@ def _noise(text: str | None, name: str, key: str, resolver: Resolver) -> Deviati
 
 def resolve_effects(table: EffectsTable, world: World, flight: str, resolver: Resolver) -> Effects:
     """Resolve ``[effects]``: refuse what this version cannot simulate, then what lacks its facts."""
-    effects = Effects(**table.model_dump())
-    if not effects.on():
-        return effects
-    from limitsets.thrower.effects import BUILT  # lazily: its room loads numba
+    given = {name: how for name, how in table.model_dump().items() if how and name != "auto"}
+    if not given:
+        return Effects(auto=table.auto)
+    from limitsets.thrower.effects import EFFECTS  # lazily: its room loads numba
 
-    for effect in effects.on():
+    for effect in given:
         key = f"effects.{effect}"
-        if effect not in BUILT:
-            allowed = f"the effects that this version can simulate: {', '.join(BUILT)}"
+        if effect not in EFFECTS:
+            allowed = f"the effects that this version can simulate: {', '.join(EFFECTS)}"
             raise resolver.refusal(key, "the effect", effect, allowed, f"leave {key} out")
         if flight != "exact":
             allowed = 'flight = "exact" in [model]'
             raise resolver.refusal(
                 key, "the flight", flight, allowed, f"{effect} has no meaning in it; use the exact one"
             )
-        for other in BUILT[effect].excludes:
-            if other in effects.on():
+        for other in EFFECTS[effect].excludes:
+            if other in given:
                 allowed = f"{effect} or {other}"
                 raise resolver.refusal(
                     key,
@@ -109,7 +107,7 @@ def resolve_effects(table: EffectsTable, world: World, flight: str, resolver: Re
                     allowed,
                     "they cannot be simulated together",
                 )
-        for fact in BUILT[effect].needs:
+        for fact in EFFECTS[effect].needs:
             if getattr(world, fact) is None:
                 raise resolver.refusal(
                     key,
@@ -118,4 +116,4 @@ def resolve_effects(table: EffectsTable, world: World, flight: str, resolver: Re
                     f"{fact} in [world]",
                     f"{effect} needs it: add world.{fact}, or leave {key} out",
                 )
-    return effects
+    return Effects({name: given[name] for name in EFFECTS if name in given}, table.auto)

@@ -112,12 +112,11 @@ class Scene:
     @cached_property
     def map(self) -> Throw | FullThrow:
         """The throw map of the scene, as kernels take it, with the effects it switches on."""
-        on = self.effects.on()
-        if not on:
+        if not self.effects.words:
             return self.bare_map
-        from limitsets.thrower.effects import with_effects  # lazily: it loads numba
+        from limitsets.thrower.full import with_effects  # lazily: it loads numba
 
-        return with_effects(self.bare_map, {name: getattr(self.effects, name) for name in on}, self._facts())
+        return with_effects(self.bare_map, self.effects.words, self._facts())
 
     def _facts(self) -> World:
         """Return the world with its scatter of the speed as a share, where the scene knows the speed."""

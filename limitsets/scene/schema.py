@@ -1,22 +1,26 @@
 """The words of a scene, as pydantic models: which keys there are and what may stand under each.
 
 Values stay the text they were written as; `build` gives them units.  Each leaf type carries what is allowed and what
-to do, so that a refusal reads the same whether a type, a range or a unit is wrong.  Only `reading` imports this file,
-lazily: pydantic takes 0.1 s.
+to do, so that a refusal reads the same whether a type, a range or a unit is wrong.  Goals, facts and effects are those
+that are declared.  Only `validation` imports this file, lazily: pydantic takes 0.1 s.
 """
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable
+from dataclasses import MISSING
 from typing import Annotated, Any, TypeAlias
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, create_model
 from pydantic_core import PydanticCustomError
 
 from limitsets.errors import SceneError
+from limitsets.goals import GOALS, Goal, words_of
+from limitsets.scene.facts import FACTS, Fact
 from limitsets.scene.units import density_dimension, parse
 
-__all__ = ["SceneTable"]
+__all__ = ["SceneTable", "Table", "scene_table"]
 
 
 def _refusal(thing: str, allowed: str, remedy: str) -> PydanticCustomError:
@@ -90,11 +94,8 @@ Yes: TypeAlias = Annotated[
 SideNumber: TypeAlias = Annotated[
     int, _fitting(_is_side, "the side", "a whole number from 0", "count the sides in flip order")
 ]
-Friction: TypeAlias = Annotated[float, _number("the coefficient of friction", 1e6, "0.9")]
-Restitution: TypeAlias = Annotated[float, _number("the coefficient of restitution", 1.0, "0.4")]
 Flight: TypeAlias = Annotated[str, _word("exact", "small-angle", "small-angle-2")]
 Flip: TypeAlias = Annotated[str, _word("signed", "energy")]
-Spread: TypeAlias = Annotated[str, _word("bounded", "gaussian")]
 Deviation: TypeAlias = Annotated[
     str,
     _fitting(
@@ -183,29 +184,9 @@ class ModelTable(Table):
     flip: Flip = "signed"
 
 
-class OrientedBeyondTable(Table):
-    """Beyond x only this side."""
-
-    x: Length
-    side: SideNumber
-
-
-class ReachesTable(Table):
-    """Comes to rest on the side at x or beyond."""
-
-    x: Length
-    side: SideNumber
-    every_orbit: Flag = False
-
-
 class GoalTable(Table):
-    """What is asked of the feeder."""
+    """What is asked of the feeder: one goal of those declared, and of what."""
 
-    oriented_beyond: OrientedBeyondTable | None = None
-    reaches: ReachesTable | None = None
-    attracts_all: Yes | None = None
-    flip_order: Annotated[list[SideNumber], Field(min_length=1, max_length=1000)] | None = None
-    stays_on_arm: Yes | None = None
     from_anywhere: Flag = False
 
 
@@ -217,26 +198,15 @@ class ScatterTable(Table):
 
 
 class WorldTable(Table):
-    """Facts, whether or not an effect uses them."""
+    """Facts, whether or not an effect uses them: numbers of those declared, and the scatter."""
 
-    friction: Friction | None = None
-    restitution: Restitution | None = None
-    bounce_threshold: Length | None = None
-    stroke: Angle | None = None
     scatter: ScatterTable | None = None
 
 
 class EffectsTable(Table):
-    """What is simulated beyond the minimal model."""
+    """What is simulated beyond the minimal model: effects of those declared."""
 
-    landing: Flag = False
-    roll: Flag = False
-    pivot: Flag = False
-    slip: Flag = False
-    bounce: Flag = False
-    drive: Flag = False
-    contact: Flag = False
-    spread: Spread | None = None
+    contact: Flag = False  # a word that is kept; no version simulates it
     auto: Flag = False
 
 
@@ -253,3 +223,68 @@ class SceneTable(Table):
     world: WorldTable = Field(default_factory=WorldTable)
     effects: EffectsTable = Field(default_factory=EffectsTable)
     tolerance: dict[str, Deviation] = Field(default_factory=dict)
+
+
+WRITTEN: dict[str, Any] = {
+    "place": Length,
+    "side": SideNumber,
+    "sides": Annotated[list[SideNumber], Field(min_length=1, max_length=1000)],
+    "flag": Flag,
+}
+"""How a scene writes a field of a goal, by its word of `limitsets.goals.words_of`."""
+
+
+def _goal_field(goal: type[Goal]) -> Any:
+    """Type what is written after a goal's word: `true`, the one field it has, or a table of several."""
+    words = words_of(goal)
+    if not words:
+        return Yes
+    if len(words) == 1:
+        return WRITTEN[next(iter(words.values()))]
+    own = {name: goal.__dataclass_fields__[name].default for name in words}
+    given = {
+        name: (WRITTEN[word], ... if own[name] is MISSING else own[name]) for name, word in words.items()
+    }
+    return create_model(goal.__name__, __base__=Table, **given)  # type: ignore[call-overload]
+
+
+def _fact_field(fact: Fact) -> Any:
+    if fact.dimension:
+        return Annotated[str, _quantity(fact.dimension)]
+    return Annotated[float, _number(fact.thing, fact.most, fact.words)]
+
+
+def scene_table(*, with_effects: bool) -> type[SceneTable]:
+    """Put the declared goals, facts and, where the scene switches any on, effects into the tables that have them."""
+    effects: dict[str, tuple[str, ...]] = {}
+    if with_effects:
+        from limitsets.thrower.effects import EFFECTS  # lazily: its room loads numba
+
+        effects = {name: effect.words for name, effect in EFFECTS.items()}
+    return _scene_table(tuple(GOALS.values()), tuple(FACTS.items()), tuple(effects.items()))
+
+
+@functools.cache
+def _scene_table(
+    goals: tuple[type[Goal], ...],
+    facts: tuple[tuple[str, Fact], ...],
+    effects: tuple[tuple[str, tuple[str, ...]], ...],
+) -> type[SceneTable]:
+    fields: dict[type[Table], dict[str, Any]] = {
+        GoalTable: {goal.kind: (_goal_field(goal) | None, None) for goal in goals},
+        WorldTable: {name: (_fact_field(fact) | None, None) for name, fact in facts},
+        EffectsTable: {
+            name: (Annotated[str, _word(*words)] | None, None) if words else (Flag, False)
+            for name, words in effects
+        },
+    }
+    tables: list[Any] = [create_model(base.__name__, __base__=base, **more) for base, more in fields.items()]
+    goal, world, on = tables
+    whole: type[SceneTable] = create_model(
+        "SceneTable",
+        __base__=SceneTable,
+        goal=(goal | None, None),
+        world=(world, Field(default_factory=world)),
+        effects=(on, Field(default_factory=on)),
+    )
+    return whole

@@ -10,7 +10,7 @@ from limitsets.errors import SceneError
 from limitsets.scene.units import shown
 
 if TYPE_CHECKING:
-    from limitsets.scene.schema import SceneTable
+    from limitsets.scene.schema import SceneTable, Table
 
 __all__ = ["Tree", "plain", "validate"]
 
@@ -78,7 +78,7 @@ def validate(tree: Tree, file: str | None) -> SceneTable:
     # pydantic takes 0.1 s to import
     from pydantic import ValidationError
 
-    from limitsets.scene.schema import SceneTable
+    from limitsets.scene.schema import scene_table
 
     for word in _LATER:
         if word in tree:
@@ -86,15 +86,17 @@ def validate(tree: Tree, file: str | None) -> SceneTable:
                 "this table", f"[{word}]", "the other tables of a scene", "leave it out: this version does not "
                 "have it yet", key=word, file=file,
             )  # fmt: skip
+    on = tree.get("effects")
+    table = scene_table(with_effects=isinstance(on, dict) and bool(on.keys() - {"auto", "contact"}))
     try:
-        return SceneTable.model_validate(tree)
+        return table.model_validate(tree)
     except ValidationError as error:
         problems = error.errors(include_url=False)
     rank = {"extra_forbidden": 0, "missing": 2}
-    raise _refusal(min(problems, key=lambda problem: rank.get(problem["type"], 1)), file)
+    raise _refusal(min(problems, key=lambda problem: rank.get(problem["type"], 1)), table, file)
 
 
-def _refusal(problem: Any, file: str | None) -> SceneError:
+def _refusal(problem: Any, table: type[SceneTable], file: str | None) -> SceneError:
     kind, path = problem["type"], problem["loc"]
     key = ""
     for word in path:
@@ -104,7 +106,7 @@ def _refusal(problem: Any, file: str | None) -> SceneError:
     if kind == "refused":
         return SceneError(context["thing"], value, context["allowed"], context["remedy"], key=key, file=file)
     if kind == "extra_forbidden":
-        return _unknown(path, key, file)
+        return _unknown(path, key, table, file)
     if kind == "missing":
         return SceneError("a required key", "missing", "a value for it", "add it", key=key, file=file)
     if kind in ("too_short", "too_long"):
@@ -118,8 +120,8 @@ def _refusal(problem: Any, file: str | None) -> SceneError:
     )
 
 
-def _unknown(path: tuple[str | int, ...], key: str, file: str | None) -> SceneError:
-    names = _names_beside(path)
+def _unknown(path: tuple[str | int, ...], key: str, table: type[SceneTable], file: str | None) -> SceneError:
+    names = _names_beside(path, table)
     word = str(path[-1])
     near = difflib.get_close_matches(word[:64], names, n=1, cutoff=0.0)
     return SceneError(
@@ -132,11 +134,8 @@ def _unknown(path: tuple[str | int, ...], key: str, file: str | None) -> SceneEr
     )
 
 
-def _names_beside(path: tuple[str | int, ...]) -> list[str]:
+def _names_beside(path: tuple[str | int, ...], table: type[Table]) -> list[str]:
     """Give the keys that the table of an unknown key may have."""
-    from limitsets.scene.schema import SceneTable, Table
-
-    table: type[Table] = SceneTable
     for word in path[:-1]:
         if isinstance(word, str):
             table = next(model for model in _models_in(table.model_fields[word].annotation))

@@ -3,9 +3,6 @@
 from __future__ import annotations
 
 import errno
-import json
-import re
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -46,43 +43,27 @@ def dump(scene: Scene, path: str | Path | None = None) -> str:
     >>> dump(load("paper-designed")).splitlines()[0]
     'name = "paper-designed"'
     """
-    text = "\n".join(_table(scene.text, "")).strip("\n") + "\n"
+    from tomlkit import dumps
+
+    text = dumps({key: _item(value, key) for key, value in scene.text.items()})
     if path is not None:
         _replace(Path(path), text)
     return text
 
 
-def _table(table: Mapping[str, Any], heading: str) -> list[str]:
-    def headed(key: str, value: object) -> bool:
-        return isinstance(value, dict) and (not heading or f"{heading}.{key}" in _HEADED)
+def _item(value: Any, path: str) -> Any:
+    import tomlkit
 
-    plain = {key: value for key, value in table.items() if not headed(key, value)}
-    lines = ["", f"[{heading}]"] if heading and (plain or not table) else []
-    lines += [f"{_key(key)} = {_value(value)}" for key, value in plain.items()]
-    for key, value in table.items():
-        if headed(key, value):
-            lines += _table(value, f"{heading}.{_key(key)}" if heading else _key(key))
-    return lines
-
-
-def _key(key: str) -> str:
-    return key if re.fullmatch(r"[A-Za-z0-9_-]+", key) else _value(key)
-
-
-def _value(value: Any) -> str:
-    if isinstance(value, str):
-        # a JSON string is a basic string of TOML, but for the one sign that JSON leaves bare
-        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
-    if isinstance(value, bool):
-        return "true" if value else "false"
     if isinstance(value, dict):
-        inner = ", ".join(f"{_key(key)} = {_value(item)}" for key, item in value.items())
-        return f"{{ {inner} }}" if inner else "{}"
+        table = tomlkit.table() if "." not in path or path in _HEADED else tomlkit.inline_table()
+        for key, inner in value.items():
+            table[key] = _item(inner, f"{path}.{key}")
+        return table
     if isinstance(value, list):
-        items = [_value(item) for item in value]
-        line = f"[{', '.join(items)}]"
-        return line if len(line) <= _WIDTH else "[\n" + "".join(f"    {item},\n" for item in items) + "]"
-    return repr(value)
+        array = tomlkit.array()
+        array.extend(_item(each, f"{path}.") for each in value)
+        return array.multiline(len(array.as_string()) > _WIDTH)
+    return value
 
 
 def _replace(path: Path, text: str) -> None:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from limitsets.cells import CellSet
 from limitsets.errors import AnswerError
 from limitsets.graph import TransitionGraph
-from limitsets.maps import kind_of, orbit
+from limitsets.maps import has_slope, orbit
 from limitsets.maps.lyapunov import lyapunov
 
 __all__ = ["Attractor", "attractors"]
@@ -106,8 +106,7 @@ def _attractor(graph: TransitionGraph, cells: CellSet, throws: int) -> Attractor
             here[sides == s] = graph.grid.index(states[sides == s], s)
     inside = float((cells.mask[here] & (here >= 0)).mean())
     order, jogs = _visits(sides)
-    kind = kind_of(graph.map)
-    exponent = lyapunov(graph.map, x, side, throws, skip=TRANSIENT).exponent if kind.has_image_on else None
+    exponent = lyapunov(graph.map, x, side, throws, skip=TRANSIENT).exponent if has_slope(graph.map) else None
     flips = float((np.diff(sides) != 0).mean()) if sides.size > 1 else 0.0
     return Attractor(
         cells, cells.extents(), order, jogs, flips, exponent, max(sides.size - 1, 0), inside, path.stopped

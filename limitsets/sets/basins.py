@@ -72,9 +72,9 @@ def basins(graph: TransitionGraph, found: tuple[Attractor, ...]) -> Basins:
     Examples
     --------
     >>> import limitsets as ls
-    >>> graph = ls.transitions(ls.maps.TwoState(1.0), ls.grid([(-2, 2), (-2, 2)], cells=32), method="centres")
+    >>> graph = ls.transitions(ls.maps.Cubic(1.5), ls.grid([(-1.2, 1.2)], cells=100), method="corners")
     >>> ls.basins(graph, ls.attractors(graph)).attractors
-    (0.5, 0.5)
+    (0.49, 0.49)
     """
     attracting = graph.survey().attracting
     if any(a.cells.grid is not graph.grid for a in found) or len(found) != int(attracting.sum()):

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from limitsets.cells import Grid
 from limitsets.graph import TransitionGraph
-from limitsets.maps import along, images, kind_of, monotone_pieces
+from limitsets.maps import along, has_slope, images, monotone_pieces
 
 __all__ = ["Shares", "sample_points", "shares_of"]
 
@@ -124,7 +124,7 @@ def shares_of(graph: TransitionGraph, cells: NDArray[np.int64]) -> Shares:
         Weights from one cell add up to 1 less what leaves the grid.
     """
     grid = graph.grid
-    exact = grid.dimension == 1 and kind_of(graph.map).has_image_on
+    exact = grid.dimension == 1 and has_slope(graph.map)
     pieces = monotone_pieces(graph.map, grid.domain) if exact else {}
     parts: list[Shares] = []
     for side in range(grid.sides):

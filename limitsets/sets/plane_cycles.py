@@ -13,8 +13,9 @@ from numpy.typing import ArrayLike
 
 from limitsets.errors import AnswerError
 from limitsets.jit import kernel
-from limitsets.maps.contract import image_on, kind_of
+from limitsets.maps.contract import has_slope, kind_of
 from limitsets.maps.drivers import images, step
+from limitsets.maps.kernels import image_on
 from limitsets.sets.cycle import NEAR, Array, Cycle, Cycles, Ints, distinct, require_period
 
 __all__ = ["cycles_from"]
@@ -126,7 +127,7 @@ def cycles_from(params: Any, starts: ArrayLike, side: ArrayLike, up_to: int) -> 
     """
     require_period(up_to)
     kind = kind_of(params)
-    if kind.dimension != 2 or not kind.has_image_on:
+    if kind.dimension != 2 or not has_slope(params):
         raise AnswerError("the map", kind.name, "a map of the plane with image_on", "register image_on")
     x = np.asarray(starts, dtype=np.float64).reshape(-1, 2)
     sides = np.array(np.broadcast_to(np.asarray(side, dtype=np.int64), (len(x),)))

@@ -1,32 +1,46 @@
 """One throw with effects beyond the minimal model, its steps in the order in which nature applies them.
 
-Each step is a kernel of the effect's own file, which begins by asking whether its effect is there: what a scene does
-not ask for is dropped before it is typed and is not in the machine code.  The bare map does not come through here.
+Each step is a kernel of an effect's own file, which begins by asking whether its effect is there, or one that effects
+may add to (`motion.py`): what a scene does not ask for is dropped before it is typed and is not in the machine code.
+The bare map does not come through here.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import Any
 
-from limitsets.jit import kernel
+from limitsets.errors import MapError
+from limitsets.jit import entry_of, kernel
 from limitsets.maps import codes
 from limitsets.maps.contract import register
-from limitsets.thrower.effects.bounce import struck
-from limitsets.thrower.effects.drive import driven, holds_in_stroke, rests_leant
-from limitsets.thrower.effects.landing import first_arrival
-from limitsets.thrower.effects.pivot import turned_down
-from limitsets.thrower.effects.roll import next_arrival
-from limitsets.thrower.effects.slip import slid_on
-from limitsets.thrower.effects.spread import moved_by, spread_over
+from limitsets.thrower.effects import EFFECTS
+from limitsets.thrower.effects.bounce import Bounce, struck
+from limitsets.thrower.effects.landing import Landing, first_arrival
+from limitsets.thrower.effects.pivot import Pivot, turned_down
+from limitsets.thrower.effects.roll import Roll, next_arrival
+from limitsets.thrower.effects.slip import Slip
 from limitsets.thrower.free_flight import fly_on
 from limitsets.thrower.full_box import full_fallback_box, full_image_box, gather_full_pair
-from limitsets.thrower.motion import LOST, OFF, FullSide, FullThrow, side_number
-from limitsets.thrower.params import gather
+from limitsets.thrower.motion import (
+    LOST,
+    OFF,
+    FullSide,
+    FullThrow,
+    moved,
+    outline_of,
+    possible,
+    side_number,
+    stays,
+    thrown,
+    varied,
+)
+from limitsets.thrower.params import Exact, Throw, gather
 from limitsets.thrower.throw import EXITS
 from limitsets.thrower.trace import details
 
-__all__ = ["MOST_EVENTS"]
+__all__ = ["MOST_EVENTS", "with_effects"]
 
 # Impacts of one throw at which it is given up, as outside the model: far more than the energy of any allows.
 MOST_EVENTS = 10_000
@@ -40,7 +54,7 @@ def gather_full(params: FullThrow, side: int) -> FullSide:
     """Return what the kernels need to know of one side (`on_side` of the throw map with effects)."""
     bare = params.bare
     return FullSide(
-        _gather(driven(params.effects.drive, bare), side),
+        _gather(thrown(params.effects, bare), side),
         bare.a,
         bare.d,
         bare.length,
@@ -54,27 +68,28 @@ def gather_full(params: FullThrow, side: int) -> FullSide:
 @kernel
 def full_outcome(part: FullSide, x: float, side: int) -> tuple[float, int, int]:
     """Where a throw ends: shift of the centre of mass, sides turned, code."""
-    on = part.effects
-    hit, moving = first_arrival(on.landing, part, x)
-    if not (moving and holds_in_stroke(on.drive, part.own, part.length[side], x)):
+    roll, bounce = entry_of(part.effects, Roll), entry_of(part.effects, Bounce)
+    pivot, slip = entry_of(part.effects, Pivot), entry_of(part.effects, Slip)
+    hit, moving = first_arrival(entry_of(part.effects, Landing), part, x)
+    if not (moving and possible(part.effects, True, part, x)):
         return 0.0, 0, codes.OUTSIDE_MODEL
     impacts, rolls, before = 0, -1, side
     while moving and impacts < MOST_EVENTS:
         impacts += 1
-        contact, face, ends = turned_down(on.pivot, on.slip, part, struck(on.bounce, on.slip, part, hit))
+        contact, face, ends = turned_down(pivot, slip, part, struck(bounce, slip, part, hit))
         if ends == LOST:
             return 0.0, 0, codes.OUTSIDE_MODEL
         if ends == OFF:
-            hit, moving = fly_on(on.pivot, on.slip, on.bounce, part, contact, hit)
+            hit, moving = fly_on(pivot, slip, bounce, part, contact, hit)
             if not moving:
                 return 0.0, 0, codes.OUTSIDE_MODEL
         else:
-            hit, moving = next_arrival(on.roll, on.bounce, on.slip, part, face)
+            hit, moving = next_arrival(roll, bounce, slip, part, face)
             rolls += rolls < 0 or face.side != before
             before = face.side
     k = side_number(part, face.side)
-    shift = moved_by(on.spread, face.shift + slid_on(on.slip, part, face))
-    if moving or not math.isfinite(shift) or not rests_leant(on.drive, part.a[k], part.d[k]):
+    shift = moved(part.effects, face.shift, part, face)
+    if moving or not math.isfinite(shift) or not stays(part.effects, True, part, k):
         return 0.0, 0, codes.OUTSIDE_MODEL
     turned = face.side - side
     code = codes.JOG if turned == 0 else codes.FLIP
@@ -103,12 +118,13 @@ def full_side_displacement(part: FullSide, x: float, side: int) -> float:
 def full_details(params: FullThrow, x: float, side: int) -> tuple[float, float, int, bool]:
     """`details` of the throw with effects."""
     part = gather_full(params, side)
-    hit, _ = first_arrival(part.effects.landing, part, x)
+    landing = entry_of(part.effects, Landing)
+    hit, _ = first_arrival(landing, part, x)
     shift, turned, _ = full_outcome(part, x, side)
     phi = hit.psi.phi
     for number in range(side, hit.vertex):
         phi += part.corner[side_number(part, number)]
-    return phi, shift, turned, False if part.effects.landing is not None else phi > part.own.corner
+    return phi, shift, turned, False if landing is not None else phi > part.own.corner
 
 
 details.on(FullThrow, full_details)
@@ -119,7 +135,7 @@ def _image(params: FullThrow, x: float, side: int) -> Any:
 
 
 def _scattered(params: FullThrow, start: int, step: int) -> Any:
-    return spread_over(params.effects.spread, params, start, step)
+    return varied(params.effects, params, start, step)
 
 
 def _displacement(params: FullThrow, x: float, side: int) -> Any:
@@ -147,3 +163,33 @@ register(
     branches=BRANCHES,
     exits=EXITS,
 )
+
+
+def with_effects(bare: Throw, effects: Mapping[str, Any], world: Any) -> FullThrow:
+    """Add effects to the minimal model.
+
+    Parameters
+    ----------
+    bare : Throw
+        Part, arm and throw; its flight is the exact one.
+    effects : mapping
+        By name, of `EFFECTS`, what the scene writes after it: true, or a word.
+    world : object
+        The facts, as attributes.
+
+    Returns
+    -------
+    FullThrow
+        A map, of a class of its own: what is not named is not in its machine code.
+
+    Raises
+    ------
+    MapError
+        For a small-angle flight, in which angles and heights of the part's corners have no meaning.
+    """
+    if not isinstance(bare.flight, Exact):
+        raise MapError(
+            "the flight", type(bare.flight).__name__, "the exact one", 'effects need flight = "exact"'
+        )
+    chosen = [effect.build(world, effects[name]) for name, effect in EFFECTS.items() if name in effects]
+    return FullThrow(bare, outline_of(bare), tuple(chosen))

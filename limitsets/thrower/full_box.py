@@ -1,4 +1,4 @@
-"""The box twin of the throw with effects: landing, roll and bounded spread; of any other nothing is proved.
+"""The box twin of the throw with effects; of one whose file has not said that boxes follow it nothing is proved.
 
 The steps are those of `full.py`, each effect's in its own file.  What is not decided is followed in every way; where it
 comes to rest in more than two, the cell is said to be undecided, and whoever asked asks again for parts of it.
@@ -9,23 +9,25 @@ from __future__ import annotations
 from typing import Any
 
 from limitsets.interval import Interval
-from limitsets.jit import generic, proof_kernel
-from limitsets.maps.contract import fallback_box, image_box
+from limitsets.jit import entry_of, generic, proof_kernel
+from limitsets.maps.kernels import fallback_box, image_box
 from limitsets.thrower.arrival_box import landed
+from limitsets.thrower.effects.landing import Landing
+from limitsets.thrower.effects.roll import Roll
 from limitsets.thrower.motion import FullThrow
-from limitsets.thrower.motion_box import NOTHING, FullSideBox, Ways, all_enclosed, gather_full_box, no_way
+from limitsets.thrower.motion_box import (
+    NOTHING,
+    FullSideBox,
+    Ways,
+    all_enclosed,
+    gather_full_box,
+    moved_box,
+    no_way,
+)
 from limitsets.thrower.roll_box import rested
 from limitsets.thrower.throw_box import sure_throw_box, throw_box
 
 __all__ = ["full_fallback_box", "full_image_box", "full_ways", "gather_full_pair"]
-
-
-@proof_kernel
-def _scattered(spread: Any, x: Interval) -> Interval:
-    """Widen a place of rest by what a landing deviates by."""
-    if spread is None:
-        return x
-    return x + Interval(-spread.landing, spread.landing)
 
 
 @proof_kernel
@@ -44,7 +46,8 @@ def full_ways(part: FullSideBox, x: Interval, state: int, phi: Interval, jog: In
 def _full_ways(part: FullSideBox, x: Interval, state: int, phi: Interval, jog: Interval) -> Ways:
     if (state == NOTHING) | (not all_enclosed(part.effects)):
         return _none()
-    return rested(part.effects.roll, part, landed(part.effects.landing, part, x, phi, jog))
+    count = landed(entry_of(part.effects, Landing), part, x, phi, jog)
+    return rested(entry_of(part.effects, Roll), part, count)
 
 
 full_ways.on(FullSideBox, _full_ways)
@@ -55,8 +58,8 @@ def _slots(part: FullSideBox, ways: Ways, phi: Interval) -> Any:
     """Count, images per branch, witness."""
     n = part.lo.a.size
     one, two = ways.first, ways.second
-    first = _scattered(part.effects.spread, Interval(one.lo, one.hi))
-    second = _scattered(part.effects.spread, Interval(two.lo, two.hi))
+    first = moved_box(part.effects, Interval(one.lo, one.hi))
+    second = moved_box(part.effects, Interval(two.lo, two.hi))
     return (
         ways.number if ways.number > 0 else NOTHING,
         (first.lo, first.hi, (part.own.side + one.turned) % n, one.branch),

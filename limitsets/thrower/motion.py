@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from limitsets.jit import kernel
+from limitsets.jit import generic, kernel
 from limitsets.thrower.params import Side, Throw
 from limitsets.thrower.turn import Turned
 
@@ -27,17 +27,23 @@ __all__ = [
     "ON",
     "Arrival",
     "Contact",
-    "Effects",
     "Face",
     "FullSide",
     "FullThrow",
     "Outline",
     "above",
     "at_kappa",
+    "impacted",
+    "moved",
     "on_to_next",
     "outline_of",
+    "possible",
     "right_of",
     "side_number",
+    "stays",
+    "thrown",
+    "varied",
+    "without",
 ]
 
 # What a vertex on the arm comes to: it stays there, a side comes down, it lets go, or the model does not say.
@@ -57,18 +63,6 @@ class Outline(NamedTuple):
     q: NDArray[np.float64]
 
 
-class Effects(NamedTuple):
-    """What is simulated beyond the minimal model: each effect's numbers, None where it is not."""
-
-    landing: Any = None
-    roll: Any = None
-    pivot: Any = None
-    slip: Any = None
-    bounce: Any = None
-    drive: Any = None
-    spread: Any = None
-
-
 class FullThrow(NamedTuple):
     """The throw map with effects beyond the minimal model; build it with `effects.with_effects`.
 
@@ -78,19 +72,27 @@ class FullThrow(NamedTuple):
         The minimal model: part, arm and throw.
     outline : Outline
         The part's vertices.
-    effects : Effects
-        What is simulated.
+    effects : tuple
+        What is simulated: the numbers of each effect, in the order of `effects.EFFECTS`.
     """
 
     bare: Throw
     outline: Outline
-    effects: Effects
+    effects: tuple[Any, ...]
 
     def __getattr__(self, name: str) -> Any:
         """Give the numbers of the minimal model under their own names, for all who only read them."""
         if name in Throw._fields:
             return getattr(self.bare, name)
         raise AttributeError(name)
+
+
+def without(params: Throw | FullThrow, numbers: type) -> Throw | FullThrow:
+    """Return a map without the effect of these numbers; the bare one where no other is left."""
+    if not isinstance(params, FullThrow):
+        return params
+    left = tuple(each for each in params.effects if type(each) is not numbers)
+    return params._replace(effects=left) if left else params.bare
 
 
 class FullSide(NamedTuple):
@@ -103,7 +105,7 @@ class FullSide(NamedTuple):
     corner: NDArray[np.float64]
     p: NDArray[np.float64]
     q: NDArray[np.float64]
-    effects: Effects
+    effects: tuple[Any, ...]
 
 
 class Arrival(NamedTuple):
@@ -172,6 +174,40 @@ class Face(NamedTuple):
     vertex: int
     omega: float
     slide: float
+
+
+# Where an effect may act by itself, `.on` the class of its numbers.  What several effects decide together, which vertex
+# lands, whether it slips and rolls, finds each of them by its class.
+
+
+@generic(chained=True)
+def thrown(effect: Any, bare: Throw) -> Throw:
+    """Return the minimal model as it is thrown with an effect."""
+
+
+@generic(chained=True)
+def varied(effect: Any, params: FullThrow, start: int, step: int) -> FullThrow:
+    """Return the map of throw number `step` of start number `start`."""
+
+
+@generic(chained=True)
+def possible(effect: Any, so_far: bool, part: FullSide, x: float) -> bool:
+    """Whether the model can say what a throw from x does."""
+
+
+@generic(chained=True)
+def impacted(effect: Any, contact: Contact, part: FullSide) -> Contact:
+    """Return a vertex that has just struck as an effect leaves it."""
+
+
+@generic(chained=True)
+def moved(effect: Any, shift: float, part: FullSide, face: Face) -> float:
+    """Return the shift of a part that stays on a side it came down on [length]; nan where the model does not say."""
+
+
+@generic(chained=True)
+def stays(effect: Any, so_far: bool, part: FullSide, k: int) -> bool:
+    """Whether a part that came to rest on side number k remains there until the next throw."""
 
 
 @kernel

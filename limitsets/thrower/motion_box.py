@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from limitsets.interval import Interval
 from limitsets.jit import entries_of, generic, proof_kernel
 from limitsets.maps import codes
-from limitsets.thrower.motion import Effects, FullThrow
+from limitsets.thrower.motion import FullThrow
 from limitsets.thrower.params import Throw
 from limitsets.thrower.side_box import SideBox, gather_box, with_kappa
 
@@ -32,8 +32,10 @@ __all__ = [
     "enclosed",
     "encloses",
     "gather_full_box",
+    "moved_box",
     "no_way",
     "put",
+    "thrown_box",
     "vertex_box",
     "wait",
 ]
@@ -58,7 +60,7 @@ class FullSideBox(NamedTuple):
         Corners of the minimal model's parameters.
     p_lo, p_hi, q_lo, q_hi : ndarray, shape (n,)
         Bounds of where the vertices are, see `motion.Outline`.
-    effects : Effects
+    effects : tuple
         What is simulated.
     waiting : ndarray, shape (ROOM, 7)
         A side the part may have come down on, see `wait`.
@@ -71,7 +73,7 @@ class FullSideBox(NamedTuple):
     p_hi: NDArray[np.float64]
     q_lo: NDArray[np.float64]
     q_hi: NDArray[np.float64]
-    effects: Effects
+    effects: tuple[Any, ...]
     waiting: NDArray[np.float64]
 
 
@@ -87,9 +89,6 @@ def enclosed(effect: Any) -> bool:
 @generic(proof=True, default=_not_enclosed)
 def encloses(effect: Any) -> bool:
     """Whether the box kernels follow an effect; nothing is proved of throws with one whose file has not said so."""
-
-
-encloses.on(type(None), enclosed)
 
 
 @proof_kernel
@@ -118,19 +117,20 @@ class Ways(NamedTuple):
     second: Way
 
 
-@proof_kernel
-def _scattered(spread: Any, kappa: Interval) -> Interval:
-    """kappa / (1 + delta)^2 for all the deviations of the speed."""
-    if spread is None:
-        return kappa
-    factor = Interval(1.0, 1.0) + Interval(-spread.speed, spread.speed)
-    return kappa / factor**2
+@generic(proof=True, chained=True)
+def thrown_box(effect: Any, kappa: Interval) -> Interval:
+    """Return the kappas of all throws with an effect: the box twin of `motion.thrown` and `motion.varied`."""
+
+
+@generic(proof=True, chained=True)
+def moved_box(effect: Any, x: Interval) -> Interval:
+    """Return the places of rest of all throws with an effect: the box twin of `motion.moved`."""
 
 
 @proof_kernel
 def gather_full_box(lo: FullThrow, hi: FullThrow, side: int, kappa: Interval) -> FullSideBox:
     """Intervals of one side, from the two corners of a parameter box, for throws with these kappa."""
-    thrown = _scattered(lo.effects.spread, kappa)
+    thrown = thrown_box(lo.effects, kappa)
     return FullSideBox(
         with_kappa(gather_box(lo.bare, hi.bare, side), thrown.lo, thrown.hi),
         lo.bare,

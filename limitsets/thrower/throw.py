@@ -11,7 +11,8 @@ from typing import Any
 
 from limitsets.jit import kernel
 from limitsets.maps import codes
-from limitsets.maps.contract import fallback_box, image_box, register
+from limitsets.maps.contract import register
+from limitsets.maps.kernels import fallback_box, image_box
 from limitsets.thrower.flight import impact_angle, sure_impact_angle
 from limitsets.thrower.impact import jog_displacement, margin, strike
 from limitsets.thrower.params import Side, Throw, gather

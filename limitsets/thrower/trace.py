@@ -12,8 +12,8 @@ from numpy.typing import ArrayLike, NDArray
 from limitsets.errors import MapError
 from limitsets.jit import generic, kernel
 from limitsets.maps import codes
-from limitsets.maps.contract import scattered
 from limitsets.maps.drivers import orbit
+from limitsets.maps.kernels import scattered
 from limitsets.thrower.impact import strike
 from limitsets.thrower.motion import FullThrow
 from limitsets.thrower.params import Throw, gather

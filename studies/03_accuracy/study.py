@@ -115,7 +115,7 @@ def _duration(seconds: float) -> str:
 
 def table(numbers: dict[str, Any]) -> str:
     """Write the limit set's row of each method as Markdown: exponent, and what a smaller error takes."""
-    lines = ["| method | error falls as | least error shown [in] | in |", "|---|---|---|---|"]
+    lines = ["| method | error falls as | least error shown [in] | time |", "|---|---|---|---|"]
     fitted = numbers["limit_set"]["exponents"]
     rows: dict[str, list[dict[str, Any]]] = {}
     for point in numbers["points"]["limit set"]:

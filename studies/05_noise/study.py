@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import limitsets as ls
-from limitsets.robust import Gaussian, Scattering, noise_levels, noise_statistics
+from limitsets.robust import Gaussian, Scattering, noise_levels
 from limitsets.robust.noise.sampling import throw_many
 from limitsets.robust.noise.solving import starts_from
 
@@ -35,7 +35,7 @@ def compared(
     scene: Any, noise: Scattering, throws: int, parts: int, seed: int, *, slopes: bool = False
 ) -> tuple[dict[str, Any], Any, Any]:
     """Solve one case both ways: numbers, the statistics, the throws."""
-    found = noise_statistics(scene, noise, goal=GOAL, sensitivity=slopes)
+    found = ls.noise_statistics(scene, noise, goal=GOAL, sensitivity=slopes)
     thrown = throw_many(scene, noise, GOAL, starts_from(scene), throws=throws, parts=parts, seed=seed)
     rows = {
         number: {

@@ -15,7 +15,6 @@ from typing import Any
 import numpy as np
 
 import limitsets as ls
-from limitsets.inverse import robust_design
 
 HERE = Path(__file__).resolve().parent
 
@@ -81,7 +80,7 @@ def bound_of_rest() -> tuple[float, dict[str, float]]:
 def main(evaluations: int = 1200, seconds: float = 240.0, out: Path = HERE) -> dict[str, Any]:
     """Answer the study's question, and draw the figure."""
     bound, orders = bound_of_rest()
-    found = robust_design("paper-designed", tolerance=TOLERANCE, evaluations=evaluations, prove=seconds)
+    found = ls.robust_design("paper-designed", tolerance=TOLERANCE, evaluations=evaluations, prove=seconds)
     before = found.before_sampled
     wanted = None if before is None else WANTED * before.margin
     ls.plot.robust_design(found, wanted=wanted, bound=bound).savefig(out / "front.png", dpi=110)

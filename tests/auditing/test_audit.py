@@ -10,11 +10,12 @@ import pytest
 
 import limitsets as ls
 from limitsets.auditing import ASSUMPTIONS, choose, where
+from limitsets.jit import entry_of
 from limitsets.proofs.parameters import parameter_box
 from limitsets.thrower.assumed_box import Assumed, assumed, corner_bounds
-from limitsets.thrower.effects import BUILT
+from limitsets.thrower.effects import EFFECTS
 from limitsets.thrower.effects.bounce import struck
-from limitsets.thrower.effects.landing import first_arrival
+from limitsets.thrower.effects.landing import Landing, first_arrival
 from limitsets.thrower.effects.slip import Slip
 from limitsets.thrower.full import gather_full
 from limitsets.thrower.motion import above, right_of
@@ -226,7 +227,7 @@ def test_the_friction_a_landing_needs_is_that_from_which_on_it_does_not_slip():
         for x in random.uniform(6.0, 20.0, 12):
             need = assumed(box.lo, box.hi, side, [x], [x])[0, Assumed.STICK_FRICTION].mean()
             part = gather_full(scene.map, side)
-            hit, _ = first_arrival(part.effects.landing, part, x)
+            hit, _ = first_arrival(entry_of(part.effects, Landing), part, x)
             right, high = right_of(part, hit.vertex, hit.psi), above(part, hit.vertex, hit.psi)
             held += need == pytest.approx(abs(right * high) / (part.own.rho2 + high * high), rel=1e-9)
             slides = [struck(None, Slip(need * by), part, hit).slide != 0.0 for by in (1 - 1e-6, 1 + 1e-6)]
@@ -356,7 +357,7 @@ def test_auto_switches_on_what_is_called_for_and_names_the_rest():
     assert "pivot" in chosen.left_out
     assert "landing" not in (*chosen.left_out, *chosen.switched_on)
     # only what this version builds can be switched on
-    assert set(chosen.switched_on) <= set(BUILT)
+    assert set(chosen.switched_on) <= set(EFFECTS)
     assert ls.load(chosen.scene.as_dict()) == chosen.scene
 
 

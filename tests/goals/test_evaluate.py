@@ -1,11 +1,11 @@
 import math
 from dataclasses import dataclass
-from typing import get_args
 
 import pytest
 
 from limitsets.errors import AnswerError
 from limitsets.goals import (
+    GOALS,
     AttractsAll,
     FlipOrder,
     Goal,
@@ -92,7 +92,7 @@ def test_what_is_no_goal_of_these_has_no_verdict_and_no_words():
             ask(Upright())
 
 
-@pytest.mark.parametrize("kind", get_args(Goal))
+@pytest.mark.parametrize("kind", [*GOALS.values(), Predicate])
 def test_every_goal_has_words_of_its_own(kind):
     goals = {
         OrientedBeyond: OrientedBeyond(20.0, 2),
@@ -100,6 +100,10 @@ def test_every_goal_has_words_of_its_own(kind):
         FlipOrder: FlipOrder((0, 1)),
         Predicate: Predicate(lambda lo, hi, side: lo < 9.0, "below 9 in"),
     }
-    words = {each: question_of(goals.get(each, each), "in") for each in get_args(Goal) if each in goals}
+    words = {
+        each: question_of(goals.get(each, each), "in")
+        for each in (*GOALS.values(), Predicate)
+        if each in goals
+    }
     words |= {each: question_of(each(), "in") for each in (AttractsAll, StaysOnArm)}
     assert [each for each, text in words.items() if text == words[kind]] == [kind]

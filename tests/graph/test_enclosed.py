@@ -12,6 +12,7 @@ from limitsets import interval as iv
 from limitsets.cells import CellSet, Domain
 from limitsets.errors import AnswerError
 from limitsets.graph.target import Target, place
+from tests.maps_of_tests import Baker, Product, TwoState
 
 # The name of the module is hidden by that of its function.
 enclosed = importlib.import_module("limitsets.graph.images.enclosed")
@@ -163,13 +164,13 @@ def test_leslie_images_hold_sampled_ones_and_are_no_looser_than_padded_corners()
 
 
 def test_two_states_and_the_baker_have_both_images_on_the_break():
-    graph = ls.transitions(ls.maps.TwoState(1.0), ls.grid([(-2, 2), (-2, 2)], cells=32), method="boxes")
+    graph = ls.transitions(TwoState(1.0), ls.grid([(-2, 2), (-2, 2)], cells=32), method="boxes")
     assert len(attracting(graph)) == 2
     beside = graph.grid.index([[0.01, 0.5], [-0.01, 0.5]], 0)
     targets = graph.grid.index([[1.01, 1.01], [-1.01, -1.01]], 0)
     for cell in beside.tolist():  # each meets x = 0
         assert set(targets.tolist()) <= set(graph.successors(cell).tolist())
-    params = ls.maps.Baker(0.4)
+    params = Baker(0.4)
     graph = ls.transitions(params, ls.grid([(0, 1), (0, 1)], cells=33), method="boxes")
     assert holds(graph, params, np.random.default_rng(3).uniform(0, 1, (2000, 2)))
 
@@ -211,7 +212,7 @@ def test_a_map_on_two_sides_goes_to_both():
             [(-0.001, 90), (-0.001, 70)],
             32,
         ),
-        (ls.maps.TwoState(0.4), ls.maps.TwoState(0.6), [(-2, 2), (-2, 2)], 30),
+        (TwoState(0.4), TwoState(0.6), [(-2, 2), (-2, 2)], 30),
         (Spiral(0.4, 0.5), Spiral(0.5, 0.6), [(-1, 1)] * 3, 9),
     ],
     ids=lambda value: type(value).__name__ if isinstance(value, tuple) else "",
@@ -312,7 +313,7 @@ def test_a_side_that_does_not_exist_is_refused():
 
 
 def test_beyond_the_pole_nothing_is_proved_and_before_it_all():
-    graph = ls.transitions(ls.maps.Product(), ls.grid([(0, 4), (0, 4)], cells=16), method="boxes")
+    graph = ls.transitions(Product(), ls.grid([(0, 4), (0, 4)], cells=16), method="boxes")
     _, hi = graph.grid.boxes(np.arange(graph.n_cells), 0)
     lost = (hi >= 2.0).any(axis=1)
     counts = np.array([len(graph.successors(k)) for k in range(graph.n_cells)])

@@ -6,6 +6,7 @@ import pytest
 
 import limitsets as ls
 from limitsets.cells import CellSet
+from tests.maps_of_tests import Linear2, Product, ThreeState, TwoState
 
 # Leslie's map on dyadic cells, corners + one cell: cells, edges, recurrent components (cells) from the top of the
 # order to the attractor. Published example of CMGDB; its counts were reproduced with CMGDB 1.5.2.
@@ -35,7 +36,7 @@ def test_leslie(depth, cells, edges, chain):
 def test_the_product_map_recurs_at_its_four_fixed_points_in_diamond_order(cells):
     """Beside a fixed point of slope 2 a cell at less than its own width from it meets its image, so each fixed point
     has several one-cell components; none lies elsewhere, and between fixed points the order is the diamond."""
-    graph = ls.transitions(ls.maps.Product(), ls.grid([(0, 1.2), (0, 1.2)], cells=cells), method="corners")
+    graph = ls.transitions(Product(), ls.grid([(0, 1.2), (0, 1.2)], cells=cells), method="corners")
     morse = ls.morse_graph(graph)
     width = 1.2 / np.array(cells)
     at = {}
@@ -63,7 +64,7 @@ def test_the_product_map_recurs_at_its_four_fixed_points_in_diamond_order(cells)
 def test_a_line_of_fixed_points_is_covered():
     """F = (x, y/2): the x axis attracts, and each of its cells is recurrent."""
     graph = ls.transitions(
-        ls.maps.Linear2(1.0, 0.0, 0.0, 0.5), ls.grid([(-1, 1), (-1, 1)], cells=32), method="corners"
+        Linear2(1.0, 0.0, 0.0, 0.5), ls.grid([(-1, 1), (-1, 1)], cells=32), method="corners"
     )
     recurrent = graph.recurrent_set()
     axis = CellSet.of(
@@ -75,7 +76,7 @@ def test_a_line_of_fixed_points_is_covered():
 def test_the_unstable_set_of_a_saddle_covers_its_axis():
     """diag(0.5, 2): what can be reached from the fixed point's cell covers the y axis."""
     graph = ls.transitions(
-        ls.maps.Linear2(0.5, 0.0, 0.0, 2.0), ls.grid([(-1, 1), (-1, 1)], cells=33), method="corners"
+        Linear2(0.5, 0.0, 0.0, 2.0), ls.grid([(-1, 1), (-1, 1)], cells=33), method="corners"
     )
     (origin,) = graph.grid.index([[0.0, 0.0]], 0)
     reached = [n for n in nx.descendants(graph, int(origin)) if n < graph.n_cells]
@@ -87,7 +88,7 @@ def test_the_unstable_set_of_a_saddle_covers_its_axis():
 
 @pytest.mark.parametrize("method", ["centres", "corners", "random", "corners-padded"])
 def test_two_states_share_the_square(method):
-    graph = ls.transitions(ls.maps.TwoState(1.0), ls.grid([(-2, 2), (-2, 2)], cells=32), method=method)
+    graph = ls.transitions(TwoState(1.0), ls.grid([(-2, 2), (-2, 2)], cells=32), method=method)
     found = ls.attractors(graph)
     share = ls.basins(graph, found)
     assert len(found) == 2
@@ -99,12 +100,12 @@ def test_two_states_share_the_square(method):
 
 
 def test_one_state_for_small_r():
-    graph = ls.transitions(ls.maps.TwoState(0.3), ls.grid([(-2, 2), (-2, 2)], cells=32), method="centres")
+    graph = ls.transitions(TwoState(0.3), ls.grid([(-2, 2), (-2, 2)], cells=32), method="centres")
     assert len(ls.attractors(graph)) == 1
 
 
 def test_three_states_and_no_cell_without_a_label():
-    graph = ls.transitions(ls.maps.ThreeState(), ls.grid([(-3, 3)], cells=60))
+    graph = ls.transitions(ThreeState(), ls.grid([(-3, 3)], cells=60))
     found = ls.attractors(graph)
     share = ls.basins(graph, found)
     assert len(found) == 3

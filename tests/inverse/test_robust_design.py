@@ -228,8 +228,8 @@ def test_the_figure_of_the_front(small, tmp_path):
 def test_a_quantity_that_is_no_length_keeps_its_unit():
     """The speed is in rad/s, whatever the unit of the part: kappa w^2 is the gravity of the scene."""
     bounds = {"throw.speed": (2.6, 3.2), "part.mass.center.along": (4.0, 4.4)}
-    found = robust_design(
-        "paper-designed", vary=bounds, tolerance=SPEED, evaluations=5, orders=False, prove=0.0
+    found = robust_design(  # of a single design to look at, too, something is found
+        "paper-designed", vary=bounds, tolerance=SPEED, evaluations=1, orders=False, prove=0.0
     )
     speed, unit = found.scene.as_dict()["throw"]["speed"].split()
     assert unit == "rad/s"
@@ -241,13 +241,14 @@ def test_a_quantity_that_is_no_length_keeps_its_unit():
     ("options", "words"),
     [
         ({"side": 3}, "0 to 2"),
+        ({"evaluations": 0}, "1 or more"),
         ({"vary": ["arm.length"]}, "give bounds"),
         ({"vary": {"part.mass.center.along": (0.1, 0.2)}}, "none that feeds"),
     ],
 )
 def test_what_cannot_be_designed_is_refused(options, words):
     with pytest.raises(LimitsetsError, match=words):
-        robust_design("paper-designed", evaluations=5, orders=False, prove=0.0, **options)
+        robust_design("paper-designed", **({"evaluations": 5, "orders": False, "prove": 0.0} | options))
 
 
 def test_the_usual_bounds_are_in_the_scenes_unit():

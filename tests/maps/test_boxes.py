@@ -12,12 +12,14 @@ import limitsets as ls
 from limitsets import maps
 from limitsets.graph.images.hulls import Images
 from limitsets.jit import proof_kernel
-from limitsets.maps.contract import image_box
-from limitsets.maps.drivers import pick
-from limitsets.maps.textbook.domains import DOMAINS
+from limitsets.maps.kernels import image_box, pick
+from limitsets.maps.textbook.domains import DOMAINS as PUBLIC
 from tests.interval.exact import arb
+from tests.maps_of_tests import DOMAINS as OWN
+from tests.maps_of_tests import Baker, Contraction, Linear2, Product, ThreeState, TwoState
 
 POINTS = 6000
+DOMAINS = PUBLIC | OWN
 HALF = Fraction(1, 2)
 
 
@@ -25,6 +27,14 @@ def circle(x, times, turn):
     """Images on the closed circle, both at the break: a branch and a number each."""
     y = times * x + turn
     return [(b, [y - b]) for b, met in ((0, y <= 1), (1, y >= 1)) if met]
+
+
+def wave(omega, coupling, x):
+    """As balls, in Arb; both branches where a ball holds the break."""
+    omega, coupling, x = (arb(float(v)) for v in (omega, coupling, x))
+    tau = 2 * flint.arb.pi()
+    y = x + omega - coupling / tau * (tau * x).sin()
+    return [(b, [y - b]) for b, met in ((0, not y > 1), (1, not y < 1)) if met]
 
 
 def three(v, e, x):
@@ -51,21 +61,22 @@ def leslie(young, old, crowding, survival, x, y):
 
 # Map -> relative width of its parameter box in the tests with one, its images in exact arithmetic.
 EXACT = {
-    maps.Baker: (0.1, baker),
-    maps.Contraction: (0.1, lambda s, o, x: [(0, [s * x + o])]),
+    Baker: (0.1, baker),
+    maps.Circle: (0.1, wave),
+    Contraction: (0.1, lambda s, o, x: [(0, [s * x + o])]),
     maps.Cubic: (0.1, lambda r, x: [(None, [r * x - x**3])]),
     maps.Doubling: (0.1, lambda f, x: circle(x, f, 0)),
     maps.Henon: (0.1, lambda a, b, x, y: [(0, [1 - a * x * x + y, b * x])]),
     maps.Leslie: (0.1, leslie),
-    maps.Linear2: (0.1, lambda a, b, c, d, x, y: [(0, [a * x + b * y, c * x + d * y])]),
+    Linear2: (0.1, lambda a, b, c, d, x, y: [(0, [a * x + b * y, c * x + d * y])]),
     maps.Logistic: (0.1, lambda r, x: [(None, [r * x * (1 - x)])]),
-    maps.Product: (0.1, lambda p, x, y: [(0, [x / (p - x), y / (p - y)])]),
+    Product: (0.1, lambda p, x, y: [(0, [x / (p - x), y / (p - y)])]),
     maps.Rotation: (0.1, lambda a, x: circle(x, 1, a)),
-    maps.ThreeState: (0.1, three),
-    maps.TwoState: (0.9, two),
+    ThreeState: (0.1, three),
+    TwoState: (0.9, two),
 }
 ALL = pytest.mark.parametrize("cls", EXACT, ids=lambda cls: cls.__name__)
-DEFAULTS = {maps.Linear2: maps.Linear2(0.7, -0.4, 0.3, 1.1), maps.Contraction: maps.Contraction(-0.7, 0.1)}
+DEFAULTS = {Linear2: Linear2(0.7, -0.4, 0.3, 1.1), Contraction: Contraction(-0.7, 0.1)}
 
 
 def test_every_textbook_map_has_boxes():
@@ -119,7 +130,7 @@ def violations(cls, width, count, seed):
                 slots = [(s, int(got.to[2 * s + 1, k])) for s in range(got.count[k])]
                 boxes = [np.stack(got.slots[s], axis=0)[:, :, k] for s in range(2)]
                 held = [b for s, b in slots if inside(*boxes[s], image)]
-                named = branch is None or branch in held or (cls is maps.ThreeState and len(slots) == 2)
+                named = branch is None or branch in held or (cls is ThreeState and len(slots) == 2)
                 bad += not (held and named)
     return bad, lost
 
@@ -130,8 +141,8 @@ def param_boxes(rng, params, width):
         size = [abs(v) * width * rng.choice([0.01, 0.5]) for v in params]
         lo = type(params)(*at)
         hi = type(params)(*(v + s for v, s in zip(at, size, strict=True))) if width else lo
-        if isinstance(params, maps.Rotation | maps.Doubling | maps.Baker):  # within their range
-            most = {maps.Rotation: 0.999, maps.Doubling: 2.0, maps.Baker: 0.5}[type(params)]
+        if isinstance(params, maps.Rotation | maps.Doubling | Baker):  # within their range
+            most = {maps.Rotation: 0.999, maps.Doubling: 2.0, Baker: 0.5}[type(params)]
             lo, hi = (type(params)(min(v[0], most)) for v in (lo, hi))
         yield lo, hi
 
@@ -156,13 +167,14 @@ def test_images_for_parameters_of_a_box_lie_in_the_box(cls):
 @pytest.mark.parametrize(
     "cls",
     [
-        maps.Baker,
-        maps.Contraction,
+        Baker,
+        Contraction,
+        maps.Circle,
         maps.Cubic,
         maps.Henon,
-        maps.Linear2,
+        Linear2,
         maps.Logistic,
-        maps.Product,
+        Product,
         maps.Leslie,
     ],
     ids=lambda cls: cls.__name__,
@@ -181,7 +193,8 @@ def test_boxes_of_small_cells_are_tight(cls, size):
         found = [dict(EXACT[cls][1](*map(Fraction, params), *corner)) for corner in corners]
         branch = None if None in found[0] else int(got.to[1, k])
         for axis in range(len(lo)):
-            values = [float(u[branch][axis].mid() if cls is maps.Leslie else u[branch][axis]) for u in found]
+            values = [u[branch][axis] for u in found]
+            values = [float(v.mid() if isinstance(v, flint.arb) else v) for v in values]
             slack = 1e-12 * max(1.0, *map(abs, values))
             turns = 1e-3 * size if cls is maps.Leslie else 0.0  # near a crest the corners are not the range
             assert got.slots[0][0][axis][k] >= min(values) - slack
@@ -205,17 +218,28 @@ def test_wide_cells_are_exact_where_a_map_turns():
     assert one(maps.Leslie(), (1.0, 50.0), (0.0, 1e-12))[0][1] == pytest.approx(196 / math.e, rel=1e-9)
 
 
+ONTO_THE_UNIT = [
+    maps.Logistic(4.0),
+    maps.Doubling(2.0),
+    maps.Rotation(0.0),
+    maps.Rotation(),
+    maps.Circle(0.0, 1.0),
+    maps.Circle(),
+]
+
+
 def test_the_unit_interval_and_square_are_not_left_by_rounding():
     grids = {1: ls.grid([(0, 1)], cells=97), 2: ls.grid([(0, 1), (0, 1)], cells=31)}
-    for params in [maps.Logistic(4.0), maps.Doubling(2.0), maps.Rotation(0.0), maps.Rotation(), maps.Baker()]:
+    for params in [*ONTO_THE_UNIT, Baker()]:
         graph = ls.transitions(params, grids[maps.kind_of(params).dimension], method="boxes")
         assert not graph.ranges.exits.any(), params
 
 
 def test_nothing_is_claimed_beyond_a_pole_or_off_the_circle():
     for params, pair in [
-        (maps.Product(), (1.5, 2.5)),
+        (Product(), (1.5, 2.5)),
         (maps.Rotation(), (-0.5, 0.5)),
+        (maps.Circle(), (-0.5, 0.5)),
         (maps.Doubling(), (0.9, 1.1)),
     ]:
         dimension = maps.kind_of(params).dimension
@@ -223,11 +247,28 @@ def test_nothing_is_claimed_beyond_a_pole_or_off_the_circle():
         assert Images(params, params, 0, lo, hi).count[0] == -1
 
 
+def test_boxes_of_a_circle_map_that_folds_hold_its_images():
+    """Beyond a coupling of 1: both turning points inside one cell, and images below 0, which are outside."""
+    params = maps.Circle(0.1, 4.0)
+    edges = np.linspace(0.0, 1.0, 8)
+    got = Images(params, params, 0, (edges[:-1],), (edges[1:],))
+    assert (got.count >= 1).all()
+    for k, x in enumerate(np.linspace(0.0, 1.0, 1401)[:-1].reshape(7, 200)):
+        for point in x:
+            slots = {
+                int(got.to[2 * s + 1, k]): np.stack(got.slots[s], axis=0)[:, :, k]
+                for s in range(got.count[k])
+            }
+            for branch, image in wave(*params, Fraction(point)):
+                assert inside(*slots[branch], image)
+    assert got.slots[0][0][0].min() < 0.0
+
+
 def test_parameters_that_are_no_numbers_prove_nothing():
     lo, hi = (np.array([0.1, 0.6]),), (np.array([0.2, 0.7]),)
     for bad in (math.nan, math.inf):
-        for cls in (maps.Logistic, maps.Cubic, maps.ThreeState):
-            params = cls(bad, 1.0) if cls is maps.ThreeState else cls(bad)
+        for cls in (maps.Logistic, maps.Cubic, ThreeState):
+            params = cls(bad, 1.0) if cls is ThreeState else cls(bad)
             assert (Images(params, params, 0, lo, hi).count == -1).all()
 
 

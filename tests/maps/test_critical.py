@@ -14,6 +14,7 @@ from limitsets.errors import AnswerError
 from limitsets.maps import along, critical_points, monotone_pieces, turning_points
 from limitsets.maps.critical import margins
 from limitsets.thrower import Energy, Exact, Signed, SmallAngle, throw_map
+from tests.maps_of_tests import ThreeState
 
 CRITERIA = [(SmallAngle, Energy), (SmallAngle, Signed), (Exact, Energy), (Exact, Signed)]
 
@@ -159,12 +160,14 @@ maps.register(Switch, image=_switch, branches=("low", "high"))
     [
         (maps.Doubling(2.0), (-0.5, 1.5), [0.5]),
         (maps.Cubic(1.5), (-1.2, 1.2), [-math.sqrt(0.5), math.sqrt(0.5)]),
-        (maps.ThreeState(), (-3.0, 3.0), [-1.0, 1.0]),
+        (ThreeState(), (-3.0, 3.0), [-1.0, 1.0]),
         (Switch(1.0), (-2.0, 1.0), [0.0]),
+        # At 1/2 there is no wave: omega = 1/2 wraps there; `Circle` has a margin.
+        (maps.Circle(0.5, 0.9), (0.0, 1.0), [0.5]),
         (maps.Logistic(3.9), (0.0, 1.0), [0.5]),
     ],
 )
-def test_changes_of_code_without_a_margin(params, pair, expected):
+def test_changes_of_code_with_and_without_a_margin(params, pair, expected):
     domain = as_domain([pair])
     assert [p.x for p in critical_points(params, domain)[0]] == pytest.approx(expected, abs=1e-15)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from typing import Any, NamedTuple
 
@@ -10,6 +11,7 @@ import pytest
 
 from limitsets import maps
 from limitsets.errors import MapError
+from tests.maps_of_tests import Baker, Contraction, Linear2, Product, ThreeState, TwoState
 
 
 def end_of_orbit(params: Any, x: Any, skip: int, count: int) -> np.ndarray:
@@ -32,7 +34,15 @@ EXPONENTS = {
     "doubling": (maps.Doubling(), 0.3, 10_000, math.log(2.0), 1e-12),
     "beta": (maps.Doubling(1.7), 0.3, 10_000, math.log(1.7), 1e-12),
     "rotation": (maps.Rotation(), 0.3, 10_000, 0.0, 0.0),
-    "contraction": (maps.Contraction(-0.7, 0.1), 0.3, 10_000, math.log(0.7), 1e-12),
+    # Locked: the slope at the attracting fixed point.
+    "circle": (
+        maps.Circle(0.05, 0.8),
+        0.3,
+        10_000,
+        math.log(1 - math.sqrt(0.64 - (0.1 * math.pi) ** 2)),
+        1e-9,
+    ),
+    "contraction": (Contraction(-0.7, 0.1), 0.3, 10_000, math.log(0.7), 1e-12),
     # sin^2 turns it into the doubling map.
     "logistic": (maps.Logistic(4.0), 0.3, 1_000_000, math.log(2.0), 1e-3),
     # The slope over a period is r^2 (1 - 2 x)(1 - 2 y) = 4 + 2 r - r^2.
@@ -43,12 +53,12 @@ EXPONENTS = {
         0.5 * math.log(abs(4.0 + 2 * 3.2 - 3.2**2)),
         1e-9,
     ),
-    "baker": (maps.Baker(), (0.3, 0.4), 10_000, math.log(2.0), 1e-9),
+    "baker": (Baker(), (0.3, 0.4), 10_000, math.log(2.0), 1e-9),
     "henon": (maps.Henon(), (0.1, 0.1), 1_000_000, 0.4192, 1e-3),
     # Fixed point (0, 0), slope 1/2.
-    "product": (maps.Product(), (0.3, 0.5), 10_000, -math.log(2.0), 1e-9),
+    "product": (Product(), (0.3, 0.5), 10_000, -math.log(2.0), 1e-9),
     # Rotation by 30 degrees, times 0.9.
-    "spiral": (maps.Linear2(0.9 * TURN, -0.45, 0.45, 0.9 * TURN), (1.0, 0.0), 10_000, math.log(0.9), 1e-3),
+    "spiral": (Linear2(0.9 * TURN, -0.45, 0.45, 0.9 * TURN), (1.0, 0.0), 10_000, math.log(0.9), 1e-3),
 }
 
 
@@ -97,23 +107,23 @@ def test_lyapunov_exponent_in_three_dimensions() -> None:
 def test_a_slope_of_zero_gives_minus_infinity() -> None:
     found = maps.lyapunov(maps.Logistic(2.0), 0.5, 0, 100, skip=0)
     assert (found.exponent, found.steps, found.stopped) == (-math.inf, 1, None)
-    assert maps.lyapunov(maps.TwoState(), (1.0, 1.0), 0, 100).exponent == -math.inf
+    assert maps.lyapunov(TwoState(), (1.0, 1.0), 0, 100).exponent == -math.inf
 
 
 def test_an_orbit_that_leaves_says_so() -> None:
     # From (1, 1) the y coordinate doubles until it overflows: 2^1023 is the last number.
-    found = maps.lyapunov(maps.Linear2(), (1.0, 1.0), 0, 5000, skip=10)
+    found = maps.lyapunov(Linear2(), (1.0, 1.0), 0, 5000, skip=10)
     assert found.exponent == pytest.approx(math.log(2.0), abs=1e-6)
     assert (found.steps, found.stopped) == (1013, "outside")
-    early = maps.lyapunov(maps.Linear2(), (1.0, 1.0), 0, 5000, skip=2000)
+    early = maps.lyapunov(Linear2(), (1.0, 1.0), 0, 5000, skip=2000)
     assert (early.exponent, early.steps, early.stopped) == (None, 0, "outside")
-    assert maps.lyapunov(maps.Linear2(), (1.0, 1.0), 0, 0, skip=0) == maps.Lyapunov(None, 0, None)
+    assert maps.lyapunov(Linear2(), (1.0, 1.0), 0, 0, skip=0) == maps.Lyapunov(None, 0, None)
 
 
 def test_the_sum_neither_overflows_nor_underflows() -> None:
     for slope in (1e-90, 1e90, 1e-150, 1e150):
         # 0 is fixed whatever the slope.
-        found = maps.lyapunov(maps.Contraction(slope, 0.0), 0.0, 0, 1000)
+        found = maps.lyapunov(Contraction(slope, 0.0), 0.0, 0, 1000)
         assert found.exponent == pytest.approx(math.log(slope), rel=1e-12)
 
 
@@ -169,6 +179,39 @@ def test_henon_chaos_and_its_window() -> None:
         assert (maps.lyapunov(maps.Henon(a, 0.3), (0.1, 0.1), 0, 10_000, skip=100_000).exponent or 1.0) < 0.0
 
 
+def rotation_number(params: Any, x: float, count: int = 20_000) -> float:
+    """Whole turns per step, within 1 / count of the limit: the lift of an orbit grows by its wraps."""
+    return int(maps.orbit(params, x, 0, count).code.sum()) / count
+
+
+def test_a_circle_map_without_coupling_is_the_rotation() -> None:
+    x = np.linspace(0.0, 1.0, 1001)
+    for omega in (0.0, 0.25, 0.6180339887498949, 1.0 - 2.0**-53):
+        turned, plain = maps.images(maps.Circle(omega, 0.0), x, 0), maps.images(maps.Rotation(omega), x, 0)
+        assert turned.x.tolist() == plain.x.tolist()
+        assert turned.code.tolist() == plain.code.tolist()
+        assert rotation_number(maps.Circle(omega, 0.0), 0.1) == pytest.approx(omega, abs=1e-4)
+
+
+@pytest.mark.parametrize("coupling", [0.3, 1.0])
+def test_a_circle_map_is_locked_just_where_it_has_a_fixed_point(coupling: float) -> None:
+    edge = coupling / math.tau
+    for x in (0.05, 0.4, 0.9):
+        assert rotation_number(maps.Circle(0.999 * edge, coupling), x) == pytest.approx(0.0, abs=1e-4)
+        assert rotation_number(maps.Circle(1.0 - 0.999 * edge, coupling), x) == pytest.approx(1.0, abs=1e-4)
+        assert 1e-3 < rotation_number(maps.Circle(1.01 * edge, coupling), x) < 0.1
+        # x -> -x turns omega into -omega: at 1/2 the number is its own mirror image.
+        assert rotation_number(maps.Circle(0.5, coupling), x) == pytest.approx(0.5, abs=1e-4)
+
+
+def test_a_circle_map_has_one_rotation_number_that_grows_with_omega() -> None:
+    numbers = [
+        [rotation_number(maps.Circle(omega, 0.9), x) for x in (0.1, 0.7)] for omega in np.linspace(0, 0.9, 46)
+    ]
+    assert all(one == pytest.approx(other, abs=1.5e-4) for one, other in numbers)
+    assert all(before[0] <= after[0] + 1e-4 for before, after in itertools.pairwise(numbers))
+
+
 def test_leslie_attractor_has_period_three() -> None:
     assert period(end_of_orbit(maps.Leslie(), (10.0, 10.0), 5000, 60)) == 3
 
@@ -176,7 +219,7 @@ def test_leslie_attractor_has_period_three() -> None:
 @pytest.mark.parametrize(("r", "states"), [(1.0, {-1.0, 1.0}), (0.5, {-0.5, 0.5}), (0.49, {0.0})])
 def test_two_states(r: float, states: set[float]) -> None:
     rng = np.random.default_rng(5)
-    x, *_ = maps.advance(maps.TwoState(r), rng.uniform(-2.0, 2.0, (2000, 2)), 0, 3)
+    x, *_ = maps.advance(TwoState(r), rng.uniform(-2.0, 2.0, (2000, 2)), 0, 3)
     assert {abs(v) * math.copysign(1.0, v) if v else 0.0 for v in x[:, 0].tolist()} == states
     assert (x[:, 0] == x[:, 1]).all()
     if r == 1.0:
@@ -185,20 +228,20 @@ def test_two_states(r: float, states: set[float]) -> None:
 
 def test_three_states() -> None:
     x = [-3.0, -1.0 - 1e-12, -1.0, 0.3, 1.0, 1.0 + 1e-12, 3.0]
-    assert maps.advance(maps.ThreeState(), x, 0, 5)[0].tolist() == [-2.0, -2.0, 0.0, 0.0, 0.0, 2.0, 2.0]
+    assert maps.advance(ThreeState(), x, 0, 5)[0].tolist() == [-2.0, -2.0, 0.0, 0.0, 0.0, 2.0, 2.0]
 
 
 def test_product_orbits_run_to_the_corner() -> None:
     starts = [(0.99, 0.5), (1.0, 0.5), (0.5, 1.0), (1.0, 1.0)]
-    x, *_ = maps.advance(maps.Product(), starts, 0, 200)
+    x, *_ = maps.advance(Product(), starts, 0, 200)
     assert x == pytest.approx(np.array([(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (1.0, 1.0)]), abs=1e-12)
-    assert maps.orbit(maps.Product(), (1.1, 0.5), 0, 50).stopped == "outside"
+    assert maps.orbit(Product(), (1.1, 0.5), 0, 50).stopped == "outside"
 
 
 def test_the_baker_map_keeps_areas() -> None:
     # Each of 16 x 16 equal cells gets as many of the images of a fine lattice.
     axis = (np.arange(256) + 0.5) / 256
     lattice = np.stack(np.meshgrid(axis, axis), axis=-1).reshape(-1, 2)
-    after = maps.images(maps.Baker(), lattice, 0).x
+    after = maps.images(Baker(), lattice, 0).x
     counts, *_ = np.histogram2d(after[:, 0], after[:, 1], bins=16, range=[[0, 1], [0, 1]])
     assert (counts == 256).all()

@@ -14,8 +14,9 @@ from limitsets import maps
 from limitsets.errors import LimitsetsError
 from limitsets.jit import kernel
 from limitsets.maps import contract
-from limitsets.maps.textbook import domains
+from limitsets.maps.textbook.domains import DOMAINS as PUBLIC
 from limitsets.maps.textbook.exponential import exponential
+from tests.maps_of_tests import DOMAINS, Baker, Contraction, Linear2, Product, ThreeState, TwoState
 
 GOLDEN = (math.sqrt(5.0) - 1.0) / 2.0
 HENON_X = (-0.7 + math.sqrt(0.49 + 5.6)) / 2.8
@@ -23,16 +24,25 @@ LESLIE_X = math.log(19.6 + 0.7 * 23.68) / 0.17
 
 # Map, its images as a formula on lists of numbers, branches met on its domain, fixed points.
 TABLE: dict[str, tuple[Any, Any, int, list[Any]]] = {
-    "contraction": (maps.Contraction(0.5, 0.25), lambda x: [0.5 * x[0] + 0.25], 1, [0.5]),
-    "saddle": (maps.Linear2(), lambda x: [x[0] / 2, 2 * x[1]], 1, [(0.0, 0.0)]),
-    "x, y/2": (maps.Linear2(1.0, 0.0, 0.0, 0.5), lambda x: [x[0], x[1] / 2], 1, [(0.3, 0.0), (-1.0, 0.0)]),
+    "contraction": (Contraction(0.5, 0.25), lambda x: [0.5 * x[0] + 0.25], 1, [0.5]),
+    "saddle": (Linear2(), lambda x: [x[0] / 2, 2 * x[1]], 1, [(0.0, 0.0)]),
+    "x, y/2": (Linear2(1.0, 0.0, 0.0, 0.5), lambda x: [x[0], x[1] / 2], 1, [(0.3, 0.0), (-1.0, 0.0)]),
     "shear": (
-        maps.Linear2(1.0, 0.5, -0.5, 1.0),
+        Linear2(1.0, 0.5, -0.5, 1.0),
         lambda x: [x[0] + x[1] / 2, x[1] - x[0] / 2],
         1,
         [(0.0, 0.0)],
     ),
     "rotation": (maps.Rotation(), lambda x: [math.fmod(x[0] + GOLDEN, 1.0)], 2, []),
+    "circle": (
+        maps.Circle(0.9, 0.7),
+        lambda x: [math.fmod(x[0] + 0.9 - 0.35 / math.pi * math.sin(2 * math.pi * x[0]), 1.0)],
+        2,
+        [
+            math.asin(-0.2 * math.pi / 0.7) / (2 * math.pi) + 1,
+            0.5 - math.asin(-0.2 * math.pi / 0.7) / (2 * math.pi),
+        ],
+    ),
     "doubling": (maps.Doubling(), lambda x: [math.fmod(2 * x[0], 1.0)], 2, [0.0, 1.0]),
     "beta": (maps.Doubling(1.7), lambda x: [math.fmod(1.7 * x[0], 1.0)], 2, [0.0]),
     "logistic": (maps.Logistic(3.2), lambda x: [3.2 * x[0] * (1 - x[0])], 2, [0.0, 1.0 - 1.0 / 3.2]),
@@ -55,26 +65,26 @@ TABLE: dict[str, tuple[Any, Any, int, list[Any]]] = {
         [(0.0, 0.0), (LESLIE_X, 0.7 * LESLIE_X)],
     ),
     "baker": (
-        maps.Baker(),
+        Baker(),
         lambda x: [math.fmod(2 * x[0], 1.0), (x[1] + math.floor(2 * x[0])) / 2],
         2,
         [(0.0, 0.0), (1.0, 1.0)],
     ),
     "two states": (
-        maps.TwoState(),
+        TwoState(),
         lambda x: [1.0, 1.0] if x[0] >= 0 else [-1.0, -1.0],
         2,
         [(1.0, 1.0), (-1.0, -1.0)],
     ),
-    "one state": (maps.TwoState(0.4), lambda x: [0.0, 0.0], 2, [(0.0, 0.0)]),
+    "one state": (TwoState(0.4), lambda x: [0.0, 0.0], 2, [(0.0, 0.0)]),
     "three states": (
-        maps.ThreeState(),
+        ThreeState(),
         lambda x: [-2.0 if x[0] < -1 else 0.0 if x[0] <= 1 else 2.0],
         3,
         [-2.0, 0.0, 2.0],
     ),
     "product": (
-        maps.Product(),
+        Product(),
         lambda x: [v / (2 - v) for v in x],
         1,
         [(0.0, 0.0), (0.0, 1.0), (1.0, 0.0), (1.0, 1.0)],
@@ -83,10 +93,14 @@ TABLE: dict[str, tuple[Any, Any, int, list[Any]]] = {
 ONE_OF_EACH = pytest.mark.parametrize("name", TABLE)
 
 
+def domain(params: Any) -> Any:
+    return (PUBLIC | DOMAINS)[type(params)]
+
+
 def points(params: Any, count: int = 400) -> np.ndarray:
     """Random states of the domain, shape (count, dimension); none within 1e-4 of a side."""
     rng = np.random.default_rng(11)
-    return np.stack([rng.uniform(lo + 1e-4, hi - 1e-4, count) for lo, hi in maps.domain_of(params)], axis=1)
+    return np.stack([rng.uniform(lo + 1e-4, hi - 1e-4, count) for lo, hi in domain(params)], axis=1)
 
 
 def state(x: np.ndarray) -> Any:
@@ -190,15 +204,16 @@ def test_what_is_no_number_gets_no_branch(name: str) -> None:
 @ONE_OF_EACH
 def test_states_of_the_domain_have_an_image(name: str) -> None:
     params, *_ = TABLE[name]
-    pairs = maps.domain_of(params)
+    pairs = domain(params)
     corners = np.array(np.meshgrid(*pairs)).reshape(len(pairs), -1).T
     assert (maps.images(params, corners, 0).code >= 0).all()
 
 
 def test_every_textbook_map_is_in_the_table_and_public() -> None:
-    assert {type(params) for params, *_ in TABLE.values()} == set(domains.DOMAINS)
-    for cls in domains.DOMAINS:
+    assert {type(params) for params, *_ in TABLE.values()} == set(PUBLIC | DOMAINS)
+    for cls in PUBLIC:
         assert getattr(maps, cls.__name__) is cls
+        assert tuple(maps.domain_of(cls())) == PUBLIC[cls]
         assert type(cls()) is cls  # every one has defaults
         assert all(type(value) is float for value in cls())
 
@@ -208,7 +223,7 @@ def test_a_map_without_a_known_domain() -> None:
         maps.domain_of((1.0, 2.0))
 
 
-@pytest.mark.parametrize("params", [maps.Rotation(0.25), maps.Doubling(), maps.Baker()])
+@pytest.mark.parametrize("params", [maps.Rotation(0.25), maps.Circle(0.25), maps.Doubling(), Baker()])
 def test_the_circle_has_an_end(params: Any) -> None:
     other = (0.5,) * (maps.kind_of(params).dimension - 1)
     starts = [(x, *other) for x in (-1e-300, 1.0 + 2.0**-52, 2.0, -1.0)]
@@ -224,6 +239,12 @@ def test_no_orbit_of_the_circle_leaves_by_rounding(factor: float) -> None:
     assert set(after.code.tolist()) == {0, 1}
     turned = maps.images(maps.Rotation(edge), 1.0 - near, 0)
     assert ((turned.x >= 0.0) & (turned.x <= 1.0)).all()
+    # At a coupling of 1 the slope at 0 is 0: images near 0 are smaller than the rounding of their terms.
+    small = np.concatenate((10.0 ** np.linspace(-300, -1, 4000), near - near.min()))
+    for circle in (maps.Circle(0.0, 1.0), maps.Circle(1.0 - 2.0**-53, 1.0)):
+        turned = maps.images(circle, np.concatenate((small, 1.0 - small)), 0)
+        assert ((turned.x >= 0.0) & (turned.x <= 1.0)).all()
+        assert (turned.code >= 0).all()
 
 
 def test_branches_of_the_cubic_meet_at_its_turning_points() -> None:

@@ -18,6 +18,7 @@ from limitsets import plot
 from limitsets.errors import AnswerError, MapError
 from limitsets.plot.style import SETS, extents_of, keep_apart, stretch
 from limitsets.thrower import fly
+from tests.maps_of_tests import TwoState
 
 SCENES = Path(__file__).parents[1] / "analysis"
 SOURCES = [
@@ -182,7 +183,7 @@ def test_basins_in_strips(source):
 
 
 def test_basins_in_the_plane():
-    graph = ls.transitions(ls.maps.TwoState(1.0), ls.grid([(-2, 2), (-2, 2)], cells=32), method="centres")
+    graph = ls.transitions(TwoState(1.0), ls.grid([(-2, 2), (-2, 2)], cells=32), method="centres")
     shares = ls.basins(graph, ls.attractors(graph))
     figure = plot.basins(graph.grid, shares)
     (axes,) = figure.axes

@@ -1,10 +1,46 @@
-"""Files that are replaced whole, or not at all."""
+"""Files that are replaced whole, or not at all, and answers as JSON."""
 
+import json
+import math
+from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
 import pytest
 
-from limitsets.files import replaced
+from limitsets.files import as_json, as_table, replaced
+
+
+@dataclass
+class Place:
+    x: float
+    side: int
+
+
+class Told:
+    def to_json(self):
+        return as_table(place=Place(math.nan, np.int64(2)))
+
+
+def test_an_answer_as_json():
+    answer = {
+        1: (Told(), Place(np.float64(0.1), 0)),
+        "sizes": np.array([[1.5, -np.inf], [np.nan, 2.0]]),
+        "none": None,
+        "words": iter(["a", "é"]),
+        "sure": np.True_,
+    }
+    text = as_json(answer)
+    assert json.loads(text) == {
+        "1": [{"place": {"x": None, "side": 2}}, {"x": 0.1, "side": 0}],
+        "sizes": [[1.5, None], [None, 2.0]],
+        "none": None,
+        "words": ["a", "é"],
+        "sure": True,
+    }
+    assert text == json.dumps(json.loads(text), indent=2) + "\n"
+    with pytest.raises(TypeError):
+        as_json(object())
 
 
 def test_all_at_once(tmp_path):

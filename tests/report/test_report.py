@@ -7,6 +7,7 @@ from functools import lru_cache
 from pathlib import Path
 
 import pytest
+from jinja2 import UndefinedError
 
 import limitsets as ls
 from limitsets.analysis import Answered
@@ -15,6 +16,7 @@ from limitsets.goals import OrientedBeyond
 from limitsets.report import page, write
 from limitsets.report import write as write_report
 from limitsets.report.audits import audit_page
+from limitsets.report.pages import words
 from limitsets.report.questions import verdict_of, void_of
 from limitsets.report.tables import bands
 
@@ -26,6 +28,21 @@ FILES = {"report.md", "analysis.json", "limit-set.png", "map.png", "basins.png",
 @lru_cache(maxsize=8)
 def analysed(source):
     return ls.analyse(source)
+
+
+@pytest.mark.parametrize("figures", [{}, {"limit-set": "a.png", "flight": "b.png"}])
+def test_a_paragraph_is_a_line_and_one_without_sentences_is_none(figures):
+    blocks = page(analysed("paper-designed"), figures).removesuffix("\n").split("\n\n")
+    assert all(block == block.strip() != "" for block in blocks)
+    assert all("  " not in block for block in blocks)
+    assert {block[0] for block in blocks if "\n" in block} == {"|"}
+    pictures = [block for block in blocks if block[0] == "!"]
+    assert [re.search(r"\((.*)\)$", each)[1] for each in pictures] == list(figures.values())
+
+
+def test_a_template_that_speaks_of_what_it_was_not_told_is_refused():
+    with pytest.raises(UndefinedError, match="scene"):
+        words("scene")
 
 
 def bytes_of(folder):

@@ -195,7 +195,7 @@ def test_a_function_of_the_callers_is_a_goal(tmp_path, reading):
     (found,) = ls.margin("paper-designed", "throw.speed", goal=goal, reading=reading, width=0.03)
     assert found.proved < 100 * sharp_speed(reading == "per-throw") < found.refuted
     assert found.closed
-    with pytest.raises(LimitsetsError, match="goals that a scene can name"):
+    with pytest.raises(LimitsetsError, match="goals that the checker knows"):
         found.save(tmp_path)
     assert not list(tmp_path.iterdir())
 

@@ -170,7 +170,7 @@ def test_scene_with_scatter_and_a_goal_needs_no_more():
 
 def test_maps_without_forced_branches_go_by_points():
     """The same throw as a map with (no) effects: points of cells instead of pieces."""
-    from limitsets.thrower.effects import with_effects
+    from limitsets.thrower.full import with_effects
 
     scene = ls.load("paper-designed")
     cover = ls.grid(scene.domain, cells=400, grading="uniform")

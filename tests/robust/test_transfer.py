@@ -12,6 +12,7 @@ from limitsets.robust import Gaussian, Samples, Scattering, Uniform, classes, tr
 from limitsets.robust.noise.scattering import kappa_strata, still_map, thrown
 from limitsets.robust.noise.sheets import Boxes, Sheets, laid
 from limitsets.sets import invariant_measures
+from tests.maps_of_tests import Baker
 
 LINE = [(0.0, 1.0)]
 
@@ -103,7 +104,7 @@ def test_doubling_map_with_noise_stays_uniform():
 
 
 def test_baker_map_is_uniform_in_two_dimensions():
-    chain = transfer(ls.maps.Baker(), ls.grid([(0.0, 1.0), (0.0, 1.0)], cells=16))
+    chain = transfer(Baker(), ls.grid([(0.0, 1.0), (0.0, 1.0)], cells=16))
     (found,) = classes(chain)
     np.testing.assert_allclose(found.density, 1.0, rtol=0, atol=1e-11)
     assert found.escape == 0.0
@@ -232,9 +233,9 @@ def test_implicit_and_written_out_give_the_same_classes(monkeypatch):
 
 def test_noise_of_x_in_two_dimensions_is_refused():
     with pytest.raises(AnswerError, match="noise of x"):
-        transfer(ls.maps.Baker(), ls.grid([(0.0, 1.0), (0.0, 1.0)], cells=4), landing=Uniform(0.1))
+        transfer(Baker(), ls.grid([(0.0, 1.0), (0.0, 1.0)], cells=4), landing=Uniform(0.1))
     with pytest.raises(AnswerError, match="dimension"):
-        transfer(ls.maps.Baker(), ls.grid(LINE, cells=4))
+        transfer(Baker(), ls.grid(LINE, cells=4))
 
 
 class Shifted(NamedTuple):

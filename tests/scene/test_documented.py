@@ -6,7 +6,8 @@ from pathlib import Path
 
 import limitsets as ls
 from limitsets.scene.quantities import NAMES
-from limitsets.scene.schema import SceneTable
+from limitsets.scene.schema import scene_table
+from limitsets.thrower.effects import EFFECTS
 
 PAGE = (Path(__file__).resolve().parents[2] / "docs" / "scene.md").read_text(encoding="utf-8")
 
@@ -42,7 +43,14 @@ def documented():
 
 
 def test_the_table_has_the_keys_that_there_are():
-    assert sorted(documented()) == sorted(keys(SceneTable))
+    assert sorted(documented()) == sorted(keys(scene_table(with_effects=True)))
+
+
+def test_the_model_s_table_has_every_effect_and_the_facts_that_it_needs():
+    page = (Path(__file__).resolve().parents[2] / "docs" / "model.md").read_text(encoding="utf-8")
+    rows = re.findall(r"^\| `(\w+)` \| ([^|]*) \|", page.split("## Effects", 1)[1], re.M)
+    told = {name: tuple(re.findall(r"`(\w+)`", facts)) for name, facts in rows}
+    assert told == {name: effect.needs for name, effect in EFFECTS.items()}
 
 
 def test_every_quantity_is_named():

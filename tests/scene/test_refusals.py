@@ -10,7 +10,7 @@ import pytest
 
 from limitsets.errors import GeometryError, SceneError
 from limitsets.scene import dump, load
-from limitsets.thrower.effects import Effect
+from limitsets.thrower.effects import EFFECTS
 
 GONE = object()
 BOTH = {"sides": ["3 in", "4 in", "5 in"], "vertices": [["0 in", "0 in"], ["1 in", "0 in"], ["0 in", "1 in"]]}
@@ -182,18 +182,26 @@ def test_refuses(changes: dict[str, Any], key: str, words: str, whole: dict[str,
     assert error.__cause__ is None
 
 
-@pytest.mark.parametrize("effect", ["landing", "roll", "pivot", "slip", "bounce", "drive", "contact"])
-def test_effects_that_are_not_built_are_refused(
-    effect: str, whole: dict[str, Any], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    row = Effect((), lambda world, how: None)
-    monkeypatch.setattr("limitsets.thrower.effects.BUILT", {"spread": row})
-    whole["effects"][effect] = True
-    with pytest.raises(SceneError, match=f"{effect}.*this version can simulate: spread") as caught:
+def test_an_effect_that_no_version_simulates_is_refused_with_those_that_are(whole: dict[str, Any]) -> None:
+    whole["effects"]["contact"] = True
+    with pytest.raises(
+        SceneError, match=f"contact.*this version can simulate: {', '.join(EFFECTS)}"
+    ) as caught:
         load(whole)
-    assert caught.value.key == f"effects.{effect}"
-    monkeypatch.setattr("limitsets.thrower.effects.BUILT", {effect: row})
-    assert load(whole).effects.on() == (effect,)
+    assert caught.value.key == "effects.contact"
+
+
+def test_an_effect_that_is_not_declared_is_an_unknown_key(
+    whole: dict[str, Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    whole["effects"] = {"roll": True}
+    assert load(whole).effects.on() == ("roll",)
+    monkeypatch.delitem(EFFECTS, "roll")
+    with pytest.raises(
+        SceneError, match=r"auto, bounce, contact, drive, landing, pivot, slip, spread.*known"
+    ) as caught:
+        load(whole)
+    assert caught.value.key == "effects.roll"
 
 
 def test_part_that_tips_over_names_the_side_and_the_lack(plate: dict[str, Any]) -> None:

@@ -9,6 +9,7 @@ import pytest
 
 import limitsets as ls
 from limitsets.maps import OUTSIDE, UNDECIDED, UNDEFINED, images
+from tests.maps_of_tests import Baker, Contraction, Linear2, Product, ThreeState, TwoState
 
 # ---------------------------------------------------------------- maps with holes: roots, logarithms, quotients
 
@@ -196,22 +197,22 @@ HOLES = [
     (Nothing(0.0), [(0.0, 1.0)], 50),
 ]
 TEXTBOOK = [
-    (ls.maps.Baker(), [(0.0, 1.0), (0.0, 1.0)], 64),
-    (ls.maps.Contraction(0.5), [(-1.0, 1.0)], 333),
+    (Baker(), [(0.0, 1.0), (0.0, 1.0)], 64),
+    (Contraction(0.5), [(-1.0, 1.0)], 333),
     (ls.maps.Cubic(1.5), [(-1.7, 1.7)], 1000),
     (ls.maps.Cubic(2.6), [(-1.7, 1.7)], 1001),
     (ls.maps.Doubling(2.0), [(0.0, 1.0)], 333),
     (ls.maps.Henon(1.4, 0.3), SQUARE, 128),
     (ls.maps.Henon(1.0, 0.3), SQUARE, 256),
     (ls.maps.Leslie(), ls.maps.domain_of(ls.maps.Leslie()), 128),
-    (ls.maps.Linear2(0.5, 0.0, 0.0, 2.0), SQUARE, 64),
+    (Linear2(0.5, 0.0, 0.0, 2.0), SQUARE, 64),
     (ls.maps.Logistic(3.2), [(-0.2, 1.2)], 1000),
     (ls.maps.Logistic(3.83), [(-0.2, 1.2)], 777),
     (ls.maps.Logistic(4.1), [(0.0, 1.0)], 999),
-    (ls.maps.Product(), [(0.0, 1.2), (0.0, 1.2)], 64),
+    (Product(), [(0.0, 1.2), (0.0, 1.2)], 64),
     (ls.maps.Rotation(), [(0.0, 1.0)], 100),
-    (ls.maps.ThreeState(), [(-3.0, 3.0)], 100),
-    (ls.maps.TwoState(1.0), SQUARE, 32),
+    (ThreeState(), [(-3.0, 3.0)], 100),
+    (TwoState(1.0), SQUARE, 32),
 ]
 
 
@@ -354,7 +355,7 @@ def test_cells_that_reach_a_set_that_is_not_closed_are_undecided():
 
 def test_a_set_that_orbits_pass_through_takes_no_label_away():
     """x/2 on padded cells: one cell after the attracting ones meets its own image, and nothing stays there."""
-    graph = ls.transitions(ls.maps.Contraction(0.5), ls.grid([(0.0, 1.0)], cells=64), method="corners-padded")
+    graph = ls.transitions(Contraction(0.5), ls.grid([(0.0, 1.0)], cells=64), method="corners-padded")
     assert len(graph.recurrent_components()) > 1
     shares = ls.basins(graph, ls.attractors(graph, throws=100))
     assert shares.attractors == (pytest.approx(1.0),)

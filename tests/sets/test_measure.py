@@ -7,6 +7,7 @@ import pytest
 
 import limitsets as ls
 from limitsets.sets import invariant_measures
+from tests.maps_of_tests import Baker, Linear2
 
 
 class Swap(NamedTuple):
@@ -54,7 +55,7 @@ def test_doubling_map_is_uniform():
 
 
 def test_baker_map_is_uniform():
-    (found,) = measures(ls.maps.Baker(), [(0.0, 1.0), (0.0, 1.0)], 16)
+    (found,) = measures(Baker(), [(0.0, 1.0), (0.0, 1.0)], 16)
     np.testing.assert_allclose(found.density, 1.0, rtol=0, atol=1e-10)
 
 
@@ -113,5 +114,5 @@ def test_shares_of_the_sides_agree_with_an_orbit():
 
 
 def test_nothing_stays():
-    graph = ls.transitions(ls.maps.Linear2(xx=3.0, yy=3.0), ls.grid([(1.0, 2.0), (1.0, 2.0)], cells=8))
+    graph = ls.transitions(Linear2(xx=3.0, yy=3.0), ls.grid([(1.0, 2.0), (1.0, 2.0)], cells=8))
     assert invariant_measures(graph) == ()

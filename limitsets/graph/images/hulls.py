@@ -13,8 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from limitsets.jit import proof_kernel, take_mark
-from limitsets.maps.contract import fallback_box, image_box, on_side_box
-from limitsets.maps.drivers import pick, put
+from limitsets.maps.kernels import fallback_box, image_box, on_side_box, pick, put
 
 __all__ = ["BOTH", "DECIDED", "NOTHING", "Columns", "Hulls", "Images"]
 

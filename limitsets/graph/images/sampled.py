@@ -19,8 +19,8 @@ from limitsets.graph.images.undecided import bent, every_branch, split
 from limitsets.graph.target import Target, place
 from limitsets.jit import kernel
 from limitsets.maps import codes, images
-from limitsets.maps.contract import fallback, image, on_side
-from limitsets.maps.drivers import judged, pick, put
+from limitsets.maps.drivers import judged
+from limitsets.maps.kernels import fallback, image, on_side, pick, put
 
 __all__ = ["sampled"]
 

@@ -21,8 +21,8 @@ from limitsets.graph.images.samples import Samples
 from limitsets.graph.target import Target
 from limitsets.jit import kernel
 from limitsets.maps import codes, images, images_on, kind_of
-from limitsets.maps.contract import on_side
 from limitsets.maps.drivers import step
+from limitsets.maps.kernels import on_side
 
 __all__ = ["bent", "every_branch", "split"]
 

@@ -173,9 +173,21 @@ def robust_design(
     ------
     AnswerError
         A scene with effects, a side that it does not have, or no design that feeds at all.
+
+    Examples
+    --------
+    >>> import limitsets as ls
+    >>> speed, along = {"throw.speed": "1 %"}, ["part.mass.center.along"]
+    >>> found = ls.robust_design(
+    ...     "paper-designed", vary=along, tolerance=speed, orders=False, evaluations=4, prove=0.0
+    ... )
+    >>> found.scene.name, found.side
+    ('paper-designed-robust', 2)
     """
     start = scene if isinstance(scene, Scene) else load(scene)
     on = _side(start, side)
+    if evaluations < 1:
+        raise AnswerError("the evaluations", evaluations, "1 or more", "allow for some designs")
     tell: Tell = progress if progress is not None else lambda what, done, of: None
     texts, begin = tolerance_of(start, tolerance), time.perf_counter()
     vector = Tolerance.of(start, texts)

@@ -170,7 +170,7 @@ class Search:
         """Move a population for so many evaluations; the population and its ratings, the best first."""
         from scipy.optimize import differential_evolution
 
-        end, step = self.evaluations + evaluations, 0
+        end, step = self.evaluations + max(evaluations, 1), 0
         begin = self.evaluations
         while self.evaluations < end:
             found = differential_evolution(

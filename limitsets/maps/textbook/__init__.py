@@ -1,4 +1,4 @@
-"""Maps with answers on paper, one file each: tests and benchmarks use them, and they are templates for a new map.
+"""Maps with answers on paper, one file each: examples and benchmarks use them, and they are templates for a new map.
 
 A new one needs a file here and one line in `limitsets.maps`.
 """

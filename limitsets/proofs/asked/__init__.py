@@ -2,7 +2,8 @@
 
 A file gives a `Kind`: how the goal is proved of the attracting cells, how it is refuted, how a proved one reads, and
 the borders that the cells need.  For which starts it is proved is added here, for all kinds alike, from the basin.
-`limitsets/goals/ask.py` reads the same goals off samples; what each means is said there and in docs/certificates.md.
+`limitsets/goals/` declares the goals and reads them off samples; what each means is said there and in
+docs/certificates.md.
 """
 
 from __future__ import annotations
@@ -12,13 +13,13 @@ from typing import Any
 
 from limitsets.goals import Goal, unknown_goal
 from limitsets.proofs.asked import attracts_all, flip_order, oriented_beyond, predicate, reaches, stays_on_arm
-from limitsets.proofs.asked.kind import Answer, Kind
+from limitsets.proofs.asked.kind import Answer, Kind, undecided
 from limitsets.proofs.asked.reaches import not_null
 from limitsets.proofs.asked.search import State
 from limitsets.proofs.attraction import Attraction, near_section
 from limitsets.scene import Scene
 
-__all__ = ["Answer", "State", "ask", "borders", "prove", "sentence"]
+__all__ = ["KINDS", "Answer", "Kind", "State", "ask", "borders", "prove", "rechecked", "sentence"]
 
 # A goal of whose starts so small a share is open, while others leave, is not asked again with finer cells.
 LITTLE = 1e-3
@@ -33,6 +34,24 @@ KINDS: dict[str, Kind] = {
     "reaches": reaches.KIND,
     "stays_on_arm": stays_on_arm.KIND,
 }
+"""What proves each goal, by its word."""
+
+
+def _nothing(found: Attraction, scene: Scene, goal: Goal) -> Answer:
+    return undecided(f"nothing proves {goal.kind} in this version", final=True)
+
+
+# Of a goal that is declared without a proof.
+NONE = Kind(_nothing, _nothing, lambda _: "", lambda _: ())
+
+
+def _kind(goal: Goal) -> Kind:
+    return KINDS.get(goal.kind, NONE)
+
+
+def rechecked(goal: Goal) -> bool:
+    """Whether the checker knows a goal, so that a certificate of it can be written."""
+    return _kind(goal).rechecked
 
 
 def prove(found: Attraction, scene: Scene, goal: Goal) -> Answer:
@@ -60,11 +79,11 @@ def prove(found: Attraction, scene: Scene, goal: Goal) -> Answer:
     """
     if not isinstance(goal, Goal):  # whatever it calls itself
         raise unknown_goal(goal)
-    kind = KINDS[goal.kind]
+    kind = _kind(goal)
     answer = kind.prove(found, scene, goal)
     if answer.verdict != "proved":
         return answer
-    if goal.from_anywhere and goal.kind != "attracts_all":  # of every start, as its kind proves it
+    if goal.from_anywhere and not goal.of_every_start:  # of every start, as its kind proves it
         starts = "almost-every" if kind.almost(goal) else "every"
         return answer._replace(section={**answer.section, "starts": starts}, starts=starts, shares=WHOLE)
     return _for_starts(found, answer, almost=kind.almost(goal))
@@ -75,7 +94,7 @@ def ask(found: Attraction, scene: Scene, goal: Goal) -> Answer:
     answer = prove(found, scene, goal)
     if answer.verdict == "proved":
         return answer
-    against = KINDS[goal.kind].refute(found, scene, goal)
+    against = _kind(goal).refute(found, scene, goal)
     if against.verdict == "refuted":
         return against._replace(reason=against.reason or answer.reason)
     return answer
@@ -111,7 +130,7 @@ def _for_starts(found: Attraction, answer: Answer, *, almost: bool) -> Answer:
 
 def borders(goal: Goal | None) -> Sequence[float]:
     """Borders of cells that the goal needs on every side."""
-    return () if goal is None else KINDS[goal.kind].borders(goal)
+    return () if goal is None else _kind(goal).borders(goal)
 
 
 def sentence(section: Mapping[str, Any]) -> str:

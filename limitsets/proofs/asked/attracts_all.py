@@ -51,4 +51,4 @@ def _sentence(_: Mapping[str, Any]) -> str:
     return "The attracting cells are one component."
 
 
-KIND = Kind(_prove, _refute, _sentence, lambda _: ())
+KIND = Kind(_prove, _refute, _sentence, lambda _: (), rechecked=True)

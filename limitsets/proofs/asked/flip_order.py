@@ -87,4 +87,4 @@ def _sentence(section: Mapping[str, Any]) -> str:
     return f"{where}, parts come to lie on sides {order} in turn, again and again; {jogs}."
 
 
-KIND = Kind(_prove, _refute, _sentence, lambda _: ())
+KIND = Kind(_prove, _refute, _sentence, lambda _: (), rechecked=True)

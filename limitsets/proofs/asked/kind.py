@@ -71,6 +71,8 @@ class Kind(NamedTuple):
         From the goal to the borders of cells that it needs.
     almost : callable
         From the goal to whether it speaks of almost every orbit only.
+    rechecked : bool
+        Whether the checker knows the goal, so that a certificate of it can be written.
     """
 
     prove: Callable[[Attraction, Scene, Any], Answer]
@@ -78,6 +80,7 @@ class Kind(NamedTuple):
     sentence: Callable[[Mapping[str, Any]], str]
     borders: Callable[[Any], Sequence[float]]
     almost: Callable[[Any], bool] = lambda _: False
+    rechecked: bool = False
 
 
 def undecided(reason: str, *, final: bool = False) -> Answer:
@@ -125,8 +128,8 @@ def thrown_into(found: Attraction, bad: Mask) -> str:
 def place_text(goal: Any, scene: Scene) -> str:
     """Write the x of a goal as a certificate has it: the scene's own words where it is the scene's own goal."""
     own = scene.text.get("goal", {}).get(goal.kind)
-    if goal == scene.goal and isinstance(own, Mapping):
-        return " ".join(str(own["x"]).split())
+    if goal == scene.goal and own is not None:
+        return " ".join(str(own["x"] if isinstance(own, Mapping) else own).split())
     return f"{goal.x!r} {scene.unit}"
 
 

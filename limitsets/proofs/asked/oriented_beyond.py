@@ -73,9 +73,7 @@ def section_of(goal: OrientedBeyond, scene: Scene) -> dict[str, Any]:
 
 
 def _refute(found: Attraction, scene: Scene, goal: OrientedBeyond) -> Answer:
-    def wrong(x: Any, side: Any) -> Any:
-        return (x > goal.x) & (side != goal.side)
-
+    wrong = goal.wrong()
     if not goal.from_anywhere:
         refutation = recurrent_violation(found, scene, wrong)
         again = _again(found, goal) if refutation.of == "every" else {}
@@ -125,4 +123,4 @@ def _sentence(section: Mapping[str, Any]) -> str:
     return f"In the attracting cells, every part {beyond}"
 
 
-KIND = Kind(_prove, _refute, _sentence, lambda goal: [below(goal.x)])
+KIND = Kind(_prove, _refute, _sentence, lambda goal: [below(goal.x)], rechecked=True)

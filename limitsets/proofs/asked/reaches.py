@@ -138,4 +138,11 @@ def _sentence(section: Mapping[str, Any]) -> str:
     return f"From every start {where}, but for starts of total length zero, a part {there}."
 
 
-KIND = Kind(_prove, _refute, _sentence, lambda goal: [above(goal.x)], lambda goal: not goal.every_orbit)
+KIND = Kind(
+    _prove,
+    _refute,
+    _sentence,
+    lambda goal: [above(goal.x)],
+    lambda goal: not goal.every_orbit,
+    rechecked=True,
+)

@@ -31,4 +31,4 @@ def _sentence(section: Mapping[str, Any]) -> str:
     return "No throw leads out of the attracting cells, so none leads off the arm."
 
 
-KIND = Kind(_prove, _refute, _sentence, lambda _: ())
+KIND = Kind(_prove, _refute, _sentence, lambda _: (), rechecked=True)

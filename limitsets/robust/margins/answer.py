@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import re
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 from limitsets.errors import AnswerError
 from limitsets.files import as_table, picked
-from limitsets.goals import Goal, Predicate
-from limitsets.proofs.asked import State
+from limitsets.goals import Goal, Predicate, as_written
+from limitsets.proofs.asked import State, rechecked
 from limitsets.proofs.certify import weakest_of
 from limitsets.proofs.confirm import DeniedError
 from limitsets.proofs.proof import Claim, Proof
@@ -159,12 +159,12 @@ class Margin:
                 "nothing rechecks other maps; the margin stands",
             )
         for goal in self.goals:
-            if isinstance(goal, Predicate):
+            if not rechecked(goal):
                 raise AnswerError(
                     "the certificate",
-                    goal.name,
-                    "goals that a scene can name",
-                    "nothing rechecks the caller's code; the margin stands",
+                    f"of the goal {goal.kind}",
+                    "goals that the checker knows",
+                    "nothing rechecks others; the margin stands",
                 )
 
 
@@ -172,12 +172,7 @@ def goal_table(goal: Goal, unit: str) -> dict[str, Any]:
     """Give a goal as a scene would name it; a function by its name."""
     if isinstance(goal, Predicate):
         return {"predicate": goal.name, "from_anywhere": goal.from_anywhere}
-    table: dict[str, Any] = asdict(goal)
-    anywhere = table.pop("from_anywhere")
-    if "x" in table:
-        table["x"] = f"{table['x']!r} {unit}"
-    words = list(table["order"]) if "order" in table else table or True
-    return {goal.kind: words, "from_anywhere": anywhere}
+    return as_written(goal, unit)
 
 
 def _state(state: State, fixed: dict[str, Any], unit: str) -> dict[str, Any]:

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from limitsets.graph.components import strong_components
 from limitsets.robust.noise.settling import closed_sets, graph_of
 from limitsets.robust.noise.sheets import Array
-from limitsets.robust.noise.ulam import Transfer
+from limitsets.robust.noise.ulam import Part, Transfer
 
 __all__ = ["Absorption", "absorption"]
 
@@ -67,33 +67,27 @@ class _Equations:
     """(I - Q) y = b on the cells where nothing is decided yet."""
 
     def __init__(self, chain: Transfer, open_: NDArray[np.bool_], label: NDArray[np.int32]) -> None:
-        self.chain, self.cells, self.worst = chain, np.flatnonzero(open_), 0.0
-        self.matrix: Any = None
-        self.inverse: Any = None
-        if chain.written_out and self.cells.size:
+        cells = np.flatnonzero(open_)
+        if chain.written_out:
             # In the order of the graph's components an edge leads back, or stays in its component: a triangle holds
             # most of Q, and, larger cells first, the long ways by which orbits creep outward from the joint.
-            self.cells = self.cells[np.lexsort((-self.cells, label[self.cells]))]
-            self.matrix = chain.matrix[self.cells][:, self.cells]
-            self.inverse = _triangle(self.matrix)
+            cells = cells[np.lexsort((-cells, label[cells]))]
+        self.part, self.worst = Part(chain, cells), 0.0
+        self.inverse = _triangle(self.part.matrix) if chain.written_out and cells.size else None
 
     def _product(self, values: Array) -> Array:
-        if self.matrix is not None:
-            return values - self.matrix @ values  # type: ignore[no-any-return]  # scipy is untyped
-        whole = np.zeros(self.chain.n_cells)
-        whole[self.cells] = values
-        return values - self.chain.apply(whole)[self.cells]
+        return values - self.part.apply(values)
 
     def solve(self, right: Array) -> Array:
         """Solve for a right side that is given on all cells; 0 elsewhere."""
         from scipy.sparse.linalg import LinearOperator, gmres
 
-        answer = np.zeros(self.chain.n_cells)
-        b = right[self.cells]
+        cells, answer = self.part.cells, np.zeros(self.part.chain.n_cells)
+        b = right[cells]
         size = float(np.abs(b).max(initial=0.0))
         if size == 0.0:
             return answer
-        n = self.cells.size
+        n = cells.size
         operator = LinearOperator((n, n), matvec=self._product, dtype=np.float64)
         found = np.zeros(n)
         for _ in range(4):  # once more on what is left over: refines small answers
@@ -103,7 +97,7 @@ class _Equations:
             step, _ = gmres(operator, rest, rtol=1e-12, restart=min(150, n), maxiter=20, M=self.inverse)
             found = found + step
         self.worst = max(self.worst, float(np.abs(b - self._product(found)).max()) / size)
-        answer[self.cells] = found
+        answer[cells] = found
         return answer
 
 

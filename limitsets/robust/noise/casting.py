@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from limitsets.cells import Grid
-from limitsets.maps import along, images, kind_of
+from limitsets.maps import along, has_slope, images, kind_of
 from limitsets.robust.noise.cutting import Pieces
 from limitsets.robust.noise.sheets import Boxes
 
@@ -72,10 +72,9 @@ def boxes_of_pieces(
             y, to, _ = along(params, x, side, [cut.branch])
             if not 0 <= int(to[0]) < grid.sides:
                 continue
-            known = np.isfinite(y[1:]) & np.isfinite(
-                y[:-1]
-            )  # elsewhere the mass is missing: outside the model
-            y = np.where(np.isfinite(y), y, 0.0)
+            finite = np.isfinite(y)
+            known = finite[1:] & finite[:-1]  # elsewhere the mass is missing: outside the model
+            y = np.where(finite, y, 0.0)
             width, shift = _within(map_of, mean, half, 0.5 * (x[1:] + x[:-1]), side, cut.branch)
             middle = 0.5 * (y[1:] + y[:-1]) + shift
             reach = 0.5 * np.hypot(np.diff(y), width)
@@ -135,4 +134,4 @@ def _spread_of_points(
 def uses_pieces(params: Any) -> bool:
     """Whether cells of a map can be cut into monotone pieces."""
     kind = kind_of(params)
-    return kind.dimension == 1 and kind.has_image_on
+    return kind.dimension == 1 and has_slope(params)

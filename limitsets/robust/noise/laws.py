@@ -8,6 +8,7 @@ follow the probability and half the length: rare deviations decide about rare es
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple, Protocol, runtime_checkable
 
@@ -16,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from limitsets.errors import MapError
 
-__all__ = ["Gaussian", "Given", "Law", "Samples", "Strata", "Uniform", "regrouped", "transformed"]
+__all__ = ["Gaussian", "Given", "Law", "Samples", "Strata", "Uniform", "certain", "regrouped", "transformed"]
 
 # Standard deviations at which a Gaussian is cut off; beyond lies a probability of 2e-9.
 SIGMAS = 6.0
@@ -50,6 +51,10 @@ class Strata(NamedTuple):
     hi: float
     cut: float = 0.0
 
+    def rows(self) -> Iterator[tuple[float, float, float]]:
+        """Weight, mean and standard deviation of one piece after the other."""
+        return zip(self.weight.tolist(), self.mean.tolist(), self.sd.tolist(), strict=True)
+
 
 @runtime_checkable
 class Law(Protocol):
@@ -69,9 +74,9 @@ def _require_scale(value: float, name: str) -> None:
         raise MapError(f"{name} of the noise", value, "a finite number from 0", "correct it")
 
 
-def _still(cut: float = 0.0) -> Strata:
-    """No deviation at all."""
-    return Strata(np.ones(1), np.zeros(1), np.zeros(1), 0.0, 0.0, cut)
+def certain(value: float) -> Strata:
+    """Return the law of one value."""
+    return Strata(np.ones(1), np.full(1, value), np.zeros(1), value, value)
 
 
 def _cuts(law: Any, lo: float, hi: float, count: int) -> NDArray[np.float64]:
@@ -128,7 +133,7 @@ class Gaussian:
         from scipy import stats
 
         if self.sigma == 0.0:
-            return _still()
+            return certain(0.0)
         reach = SIGMAS * self.sigma
         return _strata(stats.norm(scale=self.sigma), -reach, reach, count)
 
@@ -155,7 +160,7 @@ class Uniform:
     def strata(self, count: int) -> Strata:
         """Cut it into `count` pieces."""
         if self.bound == 0.0:
-            return _still()
+            return certain(0.0)
         borders = np.linspace(-self.bound, self.bound, count + 1)
         width = 2.0 * self.bound / count
         sd = np.full(count, width / math.sqrt(12.0))
@@ -184,29 +189,21 @@ class Given:
 
     def __post_init__(self) -> None:
         _require_scale(self.factor, "the factor")
-        if not all(
-            hasattr(self.distribution, name) for name in ("cdf", "sf", "pdf", "ppf", "isf", "support")
-        ):
+        needed = ("cdf", "sf", "pdf", "ppf", "isf", "support")
+        if not all(hasattr(self.distribution, name) for name in needed):
             allowed = "a frozen continuous distribution of scipy.stats"
             raise MapError("the law", self.distribution, allowed, "pass Samples(values) for a discrete one")
 
     def strata(self, count: int) -> Strata:
         """Cut it into at most `count` pieces."""
         if self.factor == 0.0:
-            return _still()
+            return certain(0.0)
         law = self.distribution
         lo, hi = (float(end) for end in law.support())
         lo = lo if math.isfinite(lo) else float(law.ppf(TAIL))
         hi = hi if math.isfinite(hi) else float(law.isf(TAIL))
-        found = _strata(law, lo, hi, count)
-        return Strata(
-            found.weight,
-            found.mean * self.factor,
-            found.sd * self.factor,
-            lo * self.factor,
-            hi * self.factor,
-            found.cut,
-        )
+        found, by = _strata(law, lo, hi, count), self.factor
+        return found._replace(mean=found.mean * by, sd=found.sd * by, lo=lo * by, hi=hi * by)
 
     def scaled(self, factor: float) -> Given:
         """Return the law of `factor` times the deviation."""
@@ -285,12 +282,6 @@ def transformed(strata: Strata, function: Any) -> Strata:
     """Strata of a monotone function of the deviation, its curvature taken into account to second order."""
     half = math.sqrt(3.0) * strata.sd
     below, at, above = (function(strata.mean + shift) for shift in (-half, 0.0, half))
-    ends = sorted((float(function(strata.lo)), float(function(strata.hi))))
-    return Strata(
-        strata.weight,
-        (below + 4.0 * at + above) / 6.0,
-        np.abs(above - below) / math.sqrt(12.0),
-        ends[0],
-        ends[1],
-        strata.cut,
-    )
+    lo, hi = sorted((float(function(strata.lo)), float(function(strata.hi))))
+    mean, sd = (below + 4.0 * at + above) / 6.0, np.abs(above - below) / math.sqrt(12.0)
+    return strata._replace(mean=mean, sd=sd, lo=lo, hi=hi)

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,6 +27,9 @@ __all__ = ["Thrown", "scattering_map", "throw_many"]
 # Throws that are not counted: the part comes onto the limit set first.
 BEFORE = 400
 MOST_THROWS = 20_000
+
+Answers: TypeAlias = dict[str, tuple[float, float]]
+"""By name a number and its standard error."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,8 +69,8 @@ def scattering_map(scene: Scene, scatter: Scattering, seed: int = 0) -> Any:
     AnswerError
         For laws that counted throws do not know: they are Gaussian or Uniform, both alike, of speed and landing place.
     """
-    from limitsets.thrower.effects import with_effects
     from limitsets.thrower.effects.spread import Even, Normal, Spread
+    from limitsets.thrower.full import with_effects
 
     laws = [getattr(scatter, name) for name in scatter.given()]
     alike = {type(law) for law in laws}
@@ -81,7 +84,7 @@ def scattering_map(scene: Scene, scatter: Scattering, seed: int = 0) -> Any:
     full = plain if hasattr(plain, "bare") else with_effects(plain, {}, None)
     law = Even() if alike == {Uniform} else Normal()
     spread = Spread(law, scale["speed"], scale["landing"], float(seed))
-    return full._replace(effects=full.effects._replace(spread=spread))
+    return full._replace(effects=(*full.effects, spread))
 
 
 def _scale(law: Any) -> float:
@@ -144,12 +147,12 @@ def throw_many(
     x, side = _starts(random, starts_from, goal[0], parts)
     rounds = max(throws // parts, 1)
     many = _Many(scattering_map(scene, scatter, seed), x, side)
-    long_run = _long_run(many, scene, goal, rounds, bins, progress)
+    long_run, density, borders = _long_run(many, scene, goal, rounds, bins, progress)
     x, side = _starts(random, starts_from, goal[0], parts)
-    fed = _to_goal(_Many(scattering_map(scene, scatter, seed + 1), x, side), goal)
-    numbers = {**long_run[0], **fed[0]}
-    errors = {**long_run[1], **fed[1]}
-    return Thrown(rounds * parts, numbers, errors, long_run[2], long_run[3], fed[2], parts)
+    fed, arrived = _to_goal(_Many(scattering_map(scene, scatter, seed + 1), x, side), goal)
+    answers = {**long_run, **fed}
+    numbers, errors = ({name: pair[k] for name, pair in answers.items()} for k in (0, 1))
+    return Thrown(rounds * parts, numbers, errors, density, borders, arrived, parts)
 
 
 def _starts(
@@ -161,6 +164,7 @@ def _starts(
 
 
 def _mean(per_part: NDArray[np.float64]) -> tuple[float, float]:
+    """Mean over parts and its standard error."""
     return float(per_part.mean()), float(per_part.std(ddof=1)) / math.sqrt(per_part.size)
 
 
@@ -174,7 +178,8 @@ def _ratio(over: NDArray[np.float64], under: NDArray[np.float64]) -> tuple[float
 
 def _long_run(
     many: _Many, scene: Scene, goal: tuple[float, int], rounds: int, bins: int, progress: Any
-) -> tuple[dict[str, float], dict[str, float], tuple[Any, ...], tuple[Any, ...]]:
+) -> tuple[Answers, tuple[Any, ...], tuple[Any, ...]]:
+    """Divide the time: on sides, branches, beyond the goal's x; densities per side and the borders of their bins."""
     names = kind_of(many.params).branches
     for _ in range(BEFORE):
         code = many.throw()
@@ -203,16 +208,18 @@ def _long_run(
     answers |= {f"share of {name}": _ratio(by_branch[k], total) for k, name in enumerate(names)}
     answers["wrong beyond"] = _ratio(wrong, beyond)
     answers["time beyond"] = _ratio(beyond, total)
-    density = tuple(
-        counts / float(total.sum()) / np.diff(edges) for counts, edges in zip(found, borders, strict=True)
-    )
-    numbers = {name: value for name, (value, _) in answers.items()}
-    return numbers, {name: error for name, (_, error) in answers.items()}, density, borders
+    seen = float(total.sum())
+    density = (counts / seen / np.diff(edges) for counts, edges in zip(found, borders, strict=True))
+    return answers, tuple(density), borders
 
 
-def _to_goal(
-    many: _Many, goal: tuple[float, int]
-) -> tuple[dict[str, float], dict[str, float], NDArray[np.int64]]:
+def _share(count: int, parts: int) -> tuple[float, float]:
+    share = count / parts
+    return share, math.sqrt(max(share * (1.0 - share), 1.0 / parts) / parts)
+
+
+def _to_goal(many: _Many, goal: tuple[float, int]) -> tuple[Answers, NDArray[np.int64]]:
+    """Throw until all are at the goal or gone: shares, throws that it takes, and those of each part."""
     parts = many.x.size
     arrived, first_wrong, first_far = [], 0, 0
     waits = np.ones(parts, dtype=bool)  # has not yet been beyond the goal's x, on any side
@@ -231,26 +238,13 @@ def _to_goal(
         if not many.x.size:
             break
     counts = np.concatenate(arrived)
-    share = counts.size / parts
-    wrong = first_wrong / parts
-    numbers = {"fed": share, "first beyond is wrong": wrong}
-    errors = {
-        "fed": math.sqrt(max(share * (1.0 - share), 1.0 / parts) / parts),
-        "first beyond is wrong": math.sqrt(max(wrong * (1.0 - wrong), 1.0 / parts) / parts),
-    }
+    answers = {"fed": _share(counts.size, parts), "first beyond is wrong": _share(first_wrong, parts)}
     if counts.size > 1:
-        numbers["mean throws"], errors["mean throws"] = _mean(counts.astype(np.float64))
-        _add_quantile(numbers, errors, counts, parts)
-    return numbers, errors, counts
-
-
-def _add_quantile(
-    numbers: dict[str, float], errors: dict[str, float], counts: NDArray[np.int64], parts: int
-) -> None:
-    """95 % quantile of all starts, and half the range of order statistics one standard error away."""
-    ordered = np.sort(counts)
-    off = math.sqrt(parts * 0.95 * 0.05)
-    places = [math.ceil(0.95 * parts + k * off) - 1 for k in (-1, 0, 1)]
-    if places[2] < ordered.size:
-        low, at, high = (float(ordered[k]) for k in places)
-        numbers["95 % throws"], errors["95 % throws"] = at, max(0.5 * (high - low), 0.5)
+        answers["mean throws"] = _mean(counts.astype(np.float64))
+        # 95 % quantile of all starts, and half the range of order statistics one standard error away.
+        off = math.sqrt(parts * 0.95 * 0.05)
+        places = [math.ceil(0.95 * parts + k * off) - 1 for k in (-1, 0, 1)]
+        if places[2] < counts.size:
+            low, at, high = np.sort(counts)[places].tolist()
+            answers["95 % throws"] = float(at), max(0.5 * (high - low), 0.5)
+    return answers, counts

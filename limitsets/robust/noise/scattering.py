@@ -10,12 +10,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from limitsets.errors import SceneError
-from limitsets.robust.noise.laws import Gaussian, Law, Strata, Uniform, regrouped, transformed
+from limitsets.robust.noise.laws import Gaussian, Law, Strata, Uniform, certain, regrouped, transformed
 
 if TYPE_CHECKING:
     from limitsets.scene import Scene
 
-__all__ = ["Scattering", "kappa_strata", "scattering_of", "still_map", "thrown"]
+__all__ = ["LAWS", "Scattering", "kappa_strata", "scattering_of", "still_map", "thrown"]
+
+LAWS: dict[str, Any] = {"gaussian": Gaussian, "bounded": Uniform}
+"""Words for laws: a deviation is the standard deviation of the one, the bound of the other."""
 
 
 @dataclass(frozen=True)
@@ -82,14 +85,11 @@ def scattering_of(scene: Scene) -> Scattering:
             key=key,
             file=scene.file,
         )
-    kind = Uniform if how == "bounded" else Gaussian
-    speed = scatter.speed
-    share = None
-    if speed is not None:
-        share = speed.value if speed.relative else speed.value / scene.value("throw.speed")
+    speed, landing, law = scatter.speed, scatter.landing, LAWS[how]
+    whole = 1.0 if speed is None or speed.relative else scene.value("throw.speed")
     return Scattering(
-        speed=None if share is None else kind(share),
-        landing=None if scatter.landing is None else kind(scatter.landing.value),
+        speed=None if speed is None else law(speed.value / whole),
+        landing=None if landing is None else law(landing.value),
     )
 
 
@@ -107,7 +107,7 @@ def kappa_strata(scattering: Scattering, scene: Scene, count: int) -> Strata:
     if scattering.tilt is not None:
         parts.append(_tilted(scattering.tilt.strata(fine), scene))
     if not parts:
-        return Strata(np.ones(1), np.ones(1), np.zeros(1), 1.0, 1.0)
+        return certain(1.0)
     whole = parts[0] if len(parts) == 1 else regrouped(_sum(*parts), count)
     return transformed(whole, np.exp)
 
@@ -137,10 +137,10 @@ def still_map(scene: Scene) -> Any:
     """Return the scene's map without its scatter: the minimal one where no other effect is on."""
     if scene.effects.spread is None:
         return scene.map
-    full: Any = scene.map
-    plain = full._replace(effects=full.effects._replace(spread=None))
-    effects = replace(scene.effects, spread=None)
-    return plain if effects.on() else scene.bare_map
+    from limitsets.thrower.effects.spread import Spread
+    from limitsets.thrower.motion import without
+
+    return without(scene.map, Spread)
 
 
 def thrown(params: Any) -> Callable[[float], Any]:

@@ -15,11 +15,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from limitsets.cells import CellSet
+from limitsets.files import as_table, picked
 from limitsets.graph.components import Components, strong_components
 from limitsets.graph.ranges import Ranges
 from limitsets.maps import kind_of
-from limitsets.robust.noise.sheets import Array, Sheets
-from limitsets.robust.noise.ulam import Transfer
+from limitsets.robust.noise.sheets import Array, Sheets, cells_met
+from limitsets.robust.noise.ulam import Part, Transfer
 
 __all__ = ["NoisyClass", "classes", "closed_sets", "distribution", "graph_of"]
 
@@ -67,6 +68,11 @@ class NoisyClass:
     residual: float
     steps: int
 
+    def to_json(self) -> dict[str, Any]:
+        """Give it as plain tables for JSON, without the distribution."""
+        names = ("escape", "leads_to", "sides", "branches", "residual")
+        return as_table(closed=self.closed, extents=self.cells.extents(), **picked(self, *names))
+
     @property
     def density(self) -> Array:
         """Share of the time per length, area or volume of each cell, shape (n_cells,)."""
@@ -100,8 +106,7 @@ def graph_of(chain: Transfer) -> Ranges:
 
 def _cells_hit(chain: Transfer, sheet: Any, stage: Sheets) -> tuple[Cells, Cells]:
     """First and last cell of a side that boxcars and the noise of the landing place after them can reach."""
-    first = sheet.lo.astype(np.int64)
-    last = np.maximum(np.ceil(sheet.hi).astype(np.int64) - 1, first)
+    first, last = cells_met(sheet.lo, sheet.hi)
     if chain.landing is None:
         return first, last
     between, edges = stage.edges[sheet.target], chain.grid.edges[sheet.target][0]
@@ -117,7 +122,7 @@ def _ranges(chain: Transfer, source: Cells, start: Cells, run: Cells) -> Ranges:
     one = np.ones(start.size, dtype=np.int32)
     bits = (chain.sinks > 0.0) @ (1 << np.arange(chain.sinks.shape[1]))
     return Ranges(
-        np.concatenate([[0], np.cumsum(counts)]).astype(np.int64),
+        np.cumulative_sum(counts, include_initial=True),
         start.astype(np.int32),
         run.astype(np.int32),
         one,
@@ -131,29 +136,16 @@ def _ranges(chain: Transfer, source: Cells, start: Cells, run: Cells) -> Ranges:
 
 def _members(parts: Components) -> list[Cells]:
     """Cells of each recurrent component."""
-    ends = np.concatenate([[0], np.cumsum(parts.size)])
-    return [
-        np.sort(parts.order[ends[c] : ends[c + 1]]).astype(np.int64) for c in np.flatnonzero(parts.recurrent)
-    ]
+    cells = np.split(parts.order.astype(np.int64), np.cumsum(parts.size)[:-1])
+    return [np.sort(each) for each, again in zip(cells, parts.recurrent, strict=True) if again]
 
 
 def _without(r: Ranges, cells: NDArray[np.bool_]) -> Ranges:
     """Return the graph in which the marked cells lead nowhere."""
     counts = np.where(cells, 0, np.diff(r.first))
     kept = np.repeat(~cells, np.diff(r.first))
-    first = np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
-    return r._replace(
-        first=first,
-        start=r.start[kept],
-        run=r.run[kept],
-        rows=r.rows[kept],
-        planes=r.planes[kept],
-        side=r.side[kept],
-    )
-
-
-def _first(cells: Cells) -> int:
-    return int(cells[0])
+    boxes = {name: getattr(r, name)[kept] for name in ("start", "run", "rows", "planes", "side")}
+    return r._replace(first=np.cumulative_sum(counts, include_initial=True), **boxes)
 
 
 def closed_sets(
@@ -163,40 +155,31 @@ def closed_sets(
     gone = np.zeros(chain.n_cells, dtype=bool) if absorbing is None else absorbing
     sets = _members(strong_components(graph if absorbing is None else _without(graph, gone)))
     source = np.repeat(np.arange(chain.n_cells), np.diff(graph.first))
-    closed: list[Cells] = []
-    open_: list[Cells] = []
     label = np.full(chain.n_cells, -1)
     for number, cells in enumerate(sets):
         label[cells] = number
     # How many cells from the first on carry each label: a run stays inside if all its cells do.
-    change = np.concatenate([[0], np.cumsum(np.diff(label) != 0)])
+    change = np.cumulative_sum(np.diff(label) != 0, include_initial=True)
     leaves = graph.exits != 0
     begin, last = graph.start.astype(np.int64), graph.start.astype(np.int64) + graph.run - 1
     stays = (label[begin] == label[source]) & (change[begin] == change[last])
     leaves[source[~stays]] = True
-    for cells in sets:
-        (open_ if leaves[cells].any() else closed).append(cells)
-    return sorted(closed, key=_first), sorted(open_, key=_first)
+    sets.sort(key=lambda cells: int(cells[0]))
+    open_ = [cells for cells in sets if leaves[cells].any()]
+    return [cells for cells in sets if not leaves[cells].any()], open_
 
 
-class _Part:
-    """The operator on some of the cells; the others are left out."""
+class _Counted(Part):
+    """The operator on one component, whose products are counted."""
 
-    def __init__(self, chain: Transfer, cells: Cells) -> None:
-        self.chain, self.cells, self.products = chain, cells, 0
-        self.matrix = chain.matrix[cells][:, cells].T.tocsr() if chain.written_out else None
+    products = 0
 
     def adjoint(self, masses: Array) -> Array:
-        """Masses on the cells one step later."""
         self.products += 1
-        if self.matrix is not None:
-            return self.matrix @ masses  # type: ignore[no-any-return]  # scipy is untyped
-        whole = np.zeros(self.chain.n_cells)
-        whole[self.cells] = masses
-        return self.chain.adjoint(whole)[self.cells]
+        return super().adjoint(masses)
 
 
-def _arnoldi(part: _Part) -> Array | None:
+def _arnoldi(part: _Counted) -> Array | None:
     """Leading left eigenvector by Arnoldi's method; None where it does not come out."""
     from scipy.sparse.linalg import ArpackError, LinearOperator, eigs
 
@@ -219,7 +202,7 @@ def distribution(chain: Transfer, cells: Cells, *, tolerance: float = TOLERANCE)
 
     Arnoldi's method finds it; steps that stay with probability 1/2, which no period survives, finish it.
     """
-    part = _Part(chain, cells)
+    part = _Counted(chain, cells)
     even = chain.grid.measure[cells] / chain.grid.measure[cells].sum()
     found = _arnoldi(part)
     weight = even if found is None else found

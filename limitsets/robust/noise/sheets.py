@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Boxes", "Sheet", "Sheets", "laid", "mass_rows", "shared"]
+__all__ = ["Boxes", "Sheet", "Sheets", "cells_met", "first_cells", "laid", "mass_rows"]
 
 Array = NDArray[np.float64]
 
@@ -74,7 +74,7 @@ class Sheet(NamedTuple):
 
 
 def _position(edges: Array, x: Array) -> Array:
-    """Where x lies, counted in cells."""
+    """Where x lies, counted in cells; at the nearer end if beyond all edges."""
     k = np.clip(np.searchsorted(edges, x, side="right") - 1, 0, edges.size - 2)
     base = edges[k]
     share: Array = np.clip((x - base) / (edges[k + 1] - base), 0.0, 1.0)
@@ -97,7 +97,14 @@ def _over(pieces: Array, running: Array, lo: Array, hi: Array) -> Array:
 
 
 def _running(values: Array) -> Array:
-    return np.concatenate([[0.0], np.cumsum(values)])
+    running: Array = np.cumulative_sum(values, include_initial=True)
+    return running
+
+
+def cells_met(lo: Array, hi: Array) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """First and last cell that intervals of positions meet."""
+    first = lo.astype(np.int64)
+    return first, np.maximum(np.ceil(hi).astype(np.int64) - 1, first)
 
 
 def laid(boxes: Boxes, edges: Array) -> tuple[Sheet, Array, Array]:
@@ -110,10 +117,7 @@ def laid(boxes: Boxes, edges: Array) -> tuple[Sheet, Array, Array]:
     below = per_width * np.clip(edges[0] - lo, 0.0, hi - lo)
     above = per_width * np.clip(hi - edges[-1], 0.0, hi - lo)
     mass = np.maximum(boxes.weight - below - above, 0.0)
-    at_lo, at_hi = (
-        _position(edges, np.clip(lo, *edges[[0, -1]])),
-        _position(edges, np.clip(hi, *edges[[0, -1]])),
-    )
+    at_lo, at_hi = _position(edges, lo), _position(edges, hi)
     # The length as the operator will find it: the rows then add up to the mass exactly.
     extent = np.diff(edges)
     length = _over(extent, _running(extent), at_lo, at_hi)
@@ -122,23 +126,22 @@ def laid(boxes: Boxes, edges: Array) -> tuple[Sheet, Array, Array]:
     return Sheet(boxes.first, boxes.target, at_lo, at_hi, np.where(some, mass, 0.0), per_length), below, above
 
 
-def shared(lo: Array, hi: Array) -> tuple[NDArray[np.int64], NDArray[np.int64], Array]:
-    """Cells that intervals of positions meet, and which share of the cell's length: owner, cell, share of the cell."""
-    first = lo.astype(np.int64)
-    last = np.maximum(np.ceil(hi).astype(np.int64) - 1, first)
+def mass_rows(sheet: Sheet, edges: Array) -> tuple[NDArray[np.int64], NDArray[np.int64], Array]:
+    """Write the entries of a sheet out: source, cell of the target side, mass."""
+    lo, hi = sheet.lo, np.minimum(sheet.hi, edges.size - 1.0)
+    first, last = cells_met(lo, hi)
     count = last - first + 1
     owner = np.repeat(np.arange(lo.size), count)
     cell = np.arange(owner.size) - np.repeat(np.cumsum(count) - count, count) + first[owner]
-    part = np.minimum(hi[owner], cell + 1.0) - np.maximum(lo[owner], cell)
-    return owner, cell, np.maximum(part, 0.0)
-
-
-def mass_rows(sheet: Sheet, edges: Array) -> tuple[NDArray[np.int64], NDArray[np.int64], Array]:
-    """Write the entries of a sheet out: source, cell of the target side, mass."""
-    owner, cell, part = shared(sheet.lo, np.minimum(sheet.hi, edges.size - 1.0))
+    part = np.maximum(np.minimum(hi[owner], cell + 1.0) - np.maximum(lo[owner], cell), 0.0)
     cell = np.minimum(cell, edges.size - 2)
     mass = sheet.per_length[owner] * part * np.diff(edges)[cell]
     return owner + sheet.first, cell, mass
+
+
+def first_cells(edges: tuple[Array, ...]) -> NDArray[np.int64]:
+    """Return the number of the first cell of each side, and last that of all."""
+    return np.cumulative_sum([each.size - 1 for each in edges], include_initial=True)
 
 
 @dataclass(frozen=True, eq=False)
@@ -160,18 +163,13 @@ class Sheets:
     sheets: tuple[Sheet, ...]
 
     @property
-    def offset(self) -> NDArray[np.int64]:
-        """Number of the first target cell of each side, and last that of all."""
-        return np.concatenate([[0], np.cumsum([edges.size - 1 for edges in self.edges])]).astype(np.int64)
-
-    @property
     def entries(self) -> int:
         """Entries that the sheets have when they are written out."""
         return int(sum(float((np.ceil(s.hi) - np.floor(s.lo)).sum()) for s in self.sheets))
 
     def apply(self, values: Array) -> Array:
         """Mean of a function after one stage, from each source cell."""
-        offset, after = self.offset, np.zeros(self.rows)
+        offset, after = first_cells(self.edges), np.zeros(self.rows)
         pieces = [values[offset[k] : offset[k + 1]] * np.diff(edges) for k, edges in enumerate(self.edges)]
         running = [_running(part) for part in pieces]
         for sheet in self.sheets:
@@ -200,7 +198,7 @@ class Sheets:
         """Write the stage out as a sparse matrix of masses."""
         from scipy.sparse import coo_array
 
-        offset = self.offset
+        offset = first_cells(self.edges)
         rows, columns, masses = [], [], []
         for sheet in self.sheets:
             source, cell, mass = mass_rows(sheet, self.edges[sheet.target])

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from limitsets.cells import grid
+from limitsets.cells import Grid, grid
 from limitsets.errors import AnswerError
 from limitsets.goals import OrientedBeyond, Reaches
 from limitsets.robust.noise.absorbing import Absorption, absorption
@@ -61,9 +61,8 @@ class Asked:
     starts: NDArray[np.float64]
     cells: int
     strata: int
-    cutters: dict[
-        tuple[float, float], Cutter
-    ]  # by range of the factor on kappa: found once, used at every solution
+    # By range of the factor on kappa: found once, used at every solution.
+    cutters: dict[tuple[float, float], Cutter] = field(default_factory=dict)
 
     def cutter(self, factors: Strata) -> Cutter | None:
         """Where the sides are cut; None for a map without pieces."""
@@ -83,9 +82,10 @@ class Asked:
 
 @dataclass(frozen=True, eq=False)
 class Solved:
-    """The operator and all that was read off it; fields as in `NoiseStatistics`."""
+    """All that was read off the operator at one level of the noise; `NoiseStatistics` says what the fields are."""
 
-    chain: Transfer
+    grid: Grid
+    cut: float
     classes: tuple[NoisyClass, ...]
     settles: dict[str, float]
     ends: Absorption
@@ -119,7 +119,7 @@ def solve(asked: Asked, scatter: Scattering) -> Solved:
     first = absorption(chain, goal, other=beyond & ~goal).probability["other"]
     numbers = {**_long_run(chain, parts, settles, beyond, goal), **_from_starts(chain, fed)}
     numbers["first beyond is wrong"] = float(starts @ first)
-    return Solved(chain, parts, settles, ends, fed, numbers)
+    return Solved(cover, chain.cut, parts, settles, ends, fed, numbers)
 
 
 def _main(parts: Sequence[NoisyClass], settles: dict[str, float]) -> NoisyClass | None:
@@ -166,34 +166,30 @@ def _goal_of(scene: Scene, goal: Any) -> tuple[float, int]:
     asked = scene.goal if goal is None else goal
     if isinstance(asked, OrientedBeyond | Reaches):
         asked = (asked.x, asked.side)
-    if (
-        isinstance(asked, tuple)
-        and len(asked) == 2
-        and 0.0 < float(asked[0]) < scene.arm_length
-        and int(asked[1]) in range(len(scene.sides))
-    ):
-        return float(asked[0]), int(asked[1])
+    if isinstance(asked, tuple) and len(asked) == 2:
+        x, side = float(asked[0]), int(asked[1])
+        if 0.0 < x < scene.arm_length and side in range(len(scene.sides)):
+            return x, side
     allowed = "(x, side) on the arm, OrientedBeyond or Reaches"
     raise AnswerError("the goal of the noise", asked, allowed, "pass goal=(20.0, 2)")
 
 
-def asked_of(
-    scene: Scene | str, goal: Any, cells: int, strata: int, offset: float | None
-) -> tuple[Asked, Scene]:
-    """Read what is asked: the question, and the scene it is about."""
+def asked_of(scene: Scene | str, goal: Any, cells: int, strata: int, offset: float | None) -> Asked:
+    """Read what is asked."""
     from limitsets.scene import load
 
     read = load(scene) if isinstance(scene, str) else scene
-    return Asked(read, _goal_of(read, goal), starts_from(read, offset), cells, strata, {}), read
+    return Asked(read, _goal_of(read, goal), starts_from(read, offset), cells, strata)
+
+
+def _half_cells(asked: Asked) -> Asked:
+    return replace(asked, cells=max(asked.cells // 2, 1))
 
 
 def errors_of(asked: Asked, noise: Scattering, numbers: dict[str, float]) -> dict[str, float]:
     """How much the numbers change from half as many cells, and from half as many strata, added up."""
     total = dict.fromkeys(numbers, 0.0)
-    for coarse in (
-        replace(asked, cells=max(asked.cells // 2, 1)),
-        replace(asked, strata=max(asked.strata // 2, 1)),
-    ):
+    for coarse in (_half_cells(asked), replace(asked, strata=max(asked.strata // 2, 1))):
         check = solve(coarse, noise).numbers
         total = {key: total[key] + abs(value - check.get(key, math.nan)) for key, value in numbers.items()}
     return total
@@ -203,7 +199,7 @@ def slopes_of(asked: Asked, noise: Scattering, name: str) -> dict[str, Sensitivi
     """Take central differences over two steps and extrapolate; once more on half as many cells, for the error."""
     wide = _differences(asked, noise, name, STEP)
     narrow = _differences(asked, noise, name, 0.5 * STEP)
-    coarse = _differences(replace(asked, cells=max(asked.cells // 2, 1)), noise, name, 0.5 * STEP)
+    coarse = _differences(_half_cells(asked), noise, name, 0.5 * STEP)
     found = {}
     for key, value in narrow.items():
         unsure = abs(value - wide.get(key, math.nan)) + abs(value - coarse.get(key, math.nan))

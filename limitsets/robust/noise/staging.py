@@ -14,7 +14,7 @@ from limitsets.maps import codes, kind_of
 from limitsets.robust.noise.casting import boxes_of_pieces, rows_of_points
 from limitsets.robust.noise.cutting import Cutter
 from limitsets.robust.noise.laws import Strata
-from limitsets.robust.noise.sheets import Array, Boxes, Sheet, Sheets, laid, shared
+from limitsets.robust.noise.sheets import Array, Boxes, Sheet, Sheets, first_cells, laid, mass_rows
 
 __all__ = ["beyond", "from_pieces", "from_points", "landing_stage"]
 
@@ -56,7 +56,7 @@ def from_pieces(
     branches = np.zeros((grid.n_cells, len(kind.branches)))
     sheets: list[Sheet] = []
     cuts = Cutter(map_of, grid.domain, strata.mean) if cutter is None else cutter
-    for weight, mean, sd in zip(*(column.tolist() for column in strata[:3]), strict=True):
+    for weight, mean, sd in strata.rows():
         for boxes in boxes_of_pieces(map_of, grid, cuts.at(mean), mean, sd, weight):
             sheet, under, over = laid(boxes, edges[boxes.target])
             sheets.append(sheet)
@@ -95,10 +95,10 @@ def from_points(
     number = {code: k for k, code in enumerate(kind.exits.values())}
     sinks = np.zeros((grid.n_cells, len(kind.exits)))
     branches = np.zeros((grid.n_cells, len(kind.branches)))
-    offset = np.concatenate([[0], np.cumsum([e.size - 1 for e in edges])]) if edges else grid.offset
+    offset = first_cells(edges) if edges else grid.offset
     shape = (grid.n_cells, int(offset[-1]))
     whole = csr_array(shape)
-    for weight, mean, sd in zip(*(column.tolist() for column in strata[:3]), strict=True):
+    for weight, mean, sd in strata.rows():
         for side in range(grid.sides):
             source, x, to, code, share, width = rows_of_points(map_of, grid, mean, sd, weight, side)
             for branch in range(len(kind.branches)):
@@ -111,9 +111,8 @@ def from_points(
             for target in range(grid.sides):
                 here = to == target
                 here &= (code >= 0) | (np.isin(code, (codes.INWARD, codes.OUTWARD)) if edges else False)
-                rows, cells, mass, under, over = _landed(
-                    grid, edges, target, x[here], width[here], share[here]
-                )
+                some = (x[here], width[here], share[here])
+                rows, cells, mass, under, over = _landed(grid, edges, target, *some)
                 sinks[:, low] += np.bincount(source[here], under, grid.n_cells)
                 sinks[:, high] += np.bincount(source[here], over, grid.n_cells)
                 place = (source[here][rows], cells + offset[target])
@@ -128,10 +127,7 @@ def _landed(
     if edges:
         boxes = Boxes(0, target, 0, x - 0.5 * width, x + 0.5 * width, share)
         sheet, below, above = laid(boxes, edges[target])
-        last = edges[target].size - 1
-        owner, cell, part = shared(sheet.lo, np.minimum(sheet.hi, last))
-        cell = np.minimum(cell, last - 1)
-        return owner, cell, sheet.per_length[owner] * part * np.diff(edges[target])[cell], below, above
+        return *mass_rows(sheet, edges[target]), below, above
     cell = grid.index(x, target) - grid.offset[target]
     inside = cell >= 0
     outside = np.where(inside, 0.0, share)
@@ -150,9 +146,9 @@ def landing_stage(
     for side, borders in enumerate(edges):
         middle, extent = 0.5 * (borders[1:] + borders[:-1]), np.diff(borders)
         here = slice(first, first + middle.size)
-        for weight, mean, sd in zip(*strata[:3], strict=True):
+        for weight, mean, sd in strata.rows():
             reach = 0.5 * np.hypot(extent, math.sqrt(12.0) * sd)
-            share = np.full(middle.size, float(weight))
+            share = np.full(middle.size, weight)
             boxes = Boxes(first, side, 0, middle + mean - reach, middle + mean + reach, share)
             sheet, below, above = laid(boxes, targets[side])
             sheets.append(sheet)

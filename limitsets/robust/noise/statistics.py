@@ -10,12 +10,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from limitsets.cells import Grid
-from limitsets.robust.noise.absorbing import Absorption
-from limitsets.robust.noise.arrivals import Feeding
+from limitsets.files import as_table, picked
 from limitsets.robust.noise.scattering import Scattering, scattering_of
-from limitsets.robust.noise.settling import NoisyClass
-from limitsets.robust.noise.solving import Sensitivity, asked_of, errors_of, slopes_of, solve
+from limitsets.robust.noise.solving import Sensitivity, Solved, asked_of, errors_of, slopes_of, solve
 from limitsets.robust.noise.ulam import STRATA
 
 if TYPE_CHECKING:
@@ -28,8 +25,8 @@ CELLS = 1024
 Progress = Callable[[str, int, int], None]
 
 
-@dataclass(frozen=True, eq=False)
-class NoiseStatistics:
+@dataclass(frozen=True, eq=False, kw_only=True)
+class NoiseStatistics(Solved):
     """Answers about a noisy scene from the transfer operator; approximations between cells, not proved.
 
     Attributes
@@ -83,46 +80,28 @@ class NoiseStatistics:
     scatter: Scattering
     goal: tuple[float, int]
     starts: NDArray[np.float64]
-    grid: Grid
     strata: int
-    cut: float
-    classes: tuple[NoisyClass, ...]
-    settles: dict[str, float]
-    ends: Absorption
-    feeding: Feeding
-    numbers: dict[str, float]
     errors: dict[str, float]
     sensitivity: dict[str, dict[str, Sensitivity]]
     how: str = "sampled"
 
     def to_json(self) -> dict[str, Any]:
         """Give the answers as JSON takes them: null, never nan."""
-        return {
-            "scene": self.scene,
-            "unit": self.unit,
-            "how": self.how,
-            "scatter": self.scatter.words(),
-            "noise_cut_off": self.cut,
-            "goal": {"x": self.goal[0], "side": self.goal[1]},
-            "starts_from": self.starts.tolist(),
-            "cells": self.grid.n_cells,
-            "strata": self.strata,
-            "classes": [_class_as_json(part) for part in self.classes],
-            "settles": {name: _number(value) for name, value in self.settles.items()},
-            "ends": {name: _number(value) for name, value in self.feeding.ends.items()},
-            "arrived": self.feeding.arrived.tolist(),
-            "numbers": {
-                name: {"value": _number(value), "error": _number(self.errors.get(name))}
-                for name, value in self.numbers.items()
+        return as_table(
+            **picked(self, "scene", "unit", "how"),
+            scatter=self.scatter.words(),
+            noise_cut_off=self.cut,
+            goal={"x": self.goal[0], "side": self.goal[1]},
+            starts_from=self.starts,
+            cells=self.grid.n_cells,
+            **picked(self, "strata", "classes", "settles"),
+            ends=self.feeding.ends,
+            arrived=self.feeding.arrived,
+            numbers={
+                name: {"value": value, "error": self.errors.get(name)} for name, value in self.numbers.items()
             },
-            "sensitivity": {
-                quantity: {
-                    name: {"slope": _number(found.slope), "error": _number(found.error)}
-                    for name, found in rows.items()
-                }
-                for quantity, rows in self.sensitivity.items()
-            },
-        }
+            sensitivity=self.sensitivity,
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,24 +118,6 @@ class Levels:
 
     factors: NDArray[np.float64]
     numbers: dict[str, NDArray[np.float64]]
-
-
-def _number(value: float | None) -> float | None:
-    return None if value is None or not math.isfinite(value) else float(value)
-
-
-def _class_as_json(part: NoisyClass) -> dict[str, Any]:
-    return {
-        "closed": part.closed,
-        "extents": {
-            str(side): [list(pair) for pair in pairs] for side, pairs in part.cells.extents().items()
-        },
-        "escape": part.escape,
-        "leads_to": part.leads_to,
-        "sides": {str(side): share for side, share in part.sides.items()},
-        "branches": part.branches,
-        "residual": part.residual,
-    }
 
 
 def noise_statistics(
@@ -204,14 +165,15 @@ def noise_statistics(
 
     Examples
     --------
-    >>> from limitsets.robust import Gaussian, Scattering, noise_statistics
+    >>> import limitsets as ls
+    >>> from limitsets.robust import Gaussian, Scattering
     >>> noise = Scattering(speed=Gaussian(0.01), landing=Gaussian(0.05))
-    >>> found = noise_statistics("paper-designed", noise, goal=(20.5, 2), cells=512, sensitivity=False)
+    >>> found = ls.noise_statistics("paper-designed", noise, goal=(20.5, 2), cells=512, sensitivity=False)
     >>> round(found.numbers["mean throws"], 1), round(float(found.feeding.survivors[40]), 2)
     (23.2, 0.2)
     """
-    asked, read = asked_of(scene, goal, cells, strata, offset)
-    noise = scattering_of(read) if scatter is None else scatter
+    asked = asked_of(scene, goal, cells, strata, offset)
+    noise = scattering_of(asked.scene) if scatter is None else scatter
     names = noise.given() if sensitivity else ()
     stages = 3 + 6 * len(names)
     tell = progress or (lambda stage, done, total: None)
@@ -225,21 +187,13 @@ def noise_statistics(
         slopes[name] = slopes_of(asked, noise, name)
     tell("noise", stages, stages)
     return NoiseStatistics(
-        read.name,
-        read.unit,
-        noise,
-        asked.goal,
-        asked.starts,
-        found.chain.grid,
-        strata,
-        found.chain.cut,
-        found.classes,
-        found.settles,
-        found.ends,
-        found.feeding,
-        found.numbers,
-        errors,
-        slopes,
+        **vars(found),
+        **picked(asked, "goal", "starts", "strata"),
+        **picked(asked.scene, "unit"),
+        scene=asked.scene.name,
+        scatter=noise,
+        errors=errors,
+        sensitivity=slopes,
     )
 
 
@@ -260,8 +214,8 @@ def noise_levels(
     factors : sequence of float
         Factors on all deviations; 0 is the throw without noise.
     """
-    asked, read = asked_of(scene, goal, cells, strata, offset)
-    noise = scattering_of(read) if scatter is None else scatter
+    asked = asked_of(scene, goal, cells, strata, offset)
+    noise = scattering_of(asked.scene) if scatter is None else scatter
     rows = [solve(asked, noise.scaled(float(factor))).numbers for factor in factors]
     names = {name: None for row in rows for name in row}
     table = {name: np.array([row.get(name, math.nan) for row in rows]) for name in names}

@@ -16,17 +16,18 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from limitsets.cells import Grid
 from limitsets.errors import AnswerError
 from limitsets.maps import kind_of
 from limitsets.robust.noise.casting import uses_pieces
 from limitsets.robust.noise.cutting import Cutter
-from limitsets.robust.noise.laws import Law, Strata
+from limitsets.robust.noise.laws import Law, Strata, certain
 from limitsets.robust.noise.sheets import Array, Sheets
 from limitsets.robust.noise.staging import beyond, from_pieces, from_points, landing_stage
 
-__all__ = ["STRATA", "Transfer", "transfer"]
+__all__ = ["STRATA", "Part", "Transfer", "transfer"]
 
 STRATA = 24
 # Landing places are cut more finely, into boxcars about as narrow as cells, as long as there are no more than this.
@@ -128,6 +129,47 @@ class Transfer:
         return LinearOperator(shape, matvec=self.apply, rmatvec=self.adjoint, dtype=np.float64)
 
 
+class Part:
+    """The operator on some of the cells; what leaves them is missing.
+
+    Parameters
+    ----------
+    chain : Transfer
+        The operator.
+    cells : ndarray of int
+        The cells, in the order in which values and masses are given.
+    """
+
+    def __init__(self, chain: Transfer, cells: NDArray[np.int64]) -> None:
+        self.chain, self.cells = chain, cells
+
+    @cached_property
+    def matrix(self) -> Any:
+        """The entries among the cells; None where the operator is not written out."""
+        return self.chain.matrix[self.cells][:, self.cells] if self.chain.written_out else None
+
+    @cached_property
+    def _transposed(self) -> Any:
+        return self.matrix.T.tocsr()
+
+    def _whole(self, some: Array) -> Array:
+        whole = np.zeros(self.chain.n_cells)
+        whole[self.cells] = some
+        return whole
+
+    def apply(self, values: Array) -> Array:
+        """Return a function's expected value one step later; it is 0 on all other cells."""
+        if self.matrix is not None:
+            return self.matrix @ values  # type: ignore[no-any-return]  # scipy is untyped
+        return self.chain.apply(self._whole(values))[self.cells]
+
+    def adjoint(self, masses: Array) -> Array:
+        """Where masses on the cells are one step later."""
+        if self.matrix is not None:
+            return self._transposed @ masses  # type: ignore[no-any-return]  # scipy is untyped
+        return self.chain.adjoint(self._whole(masses))[self.cells]
+
+
 def transfer(
     map_of: Any,
     grid: Grid,
@@ -173,13 +215,13 @@ def transfer(
     """
     fixed = isinstance(map_of, tuple)
     at: Callable[[float], Any] = (lambda _: map_of) if fixed else map_of
-    pieces = _still() if parameter is None else _cut(parameter, strata)
+    law = certain(1.0) if parameter is None else parameter
+    pieces = law if isinstance(law, Strata) else law.strata(strata)
     params = at(float(pieces.mean[0]))
     kind = kind_of(params)
     if kind.dimension != grid.dimension:
-        raise AnswerError(
-            "the dimension of the grid", grid.dimension, f"{kind.dimension}, the map's", "cut another domain"
-        )
+        allowed = f"{kind.dimension}, the map's"
+        raise AnswerError("the dimension of the grid", grid.dimension, allowed, "cut another domain")
     if landing is not None and kind.dimension != 1:
         raise AnswerError("the noise of x", landing, "none in more than one dimension", "leave it out")
     finer = max(strata, min(LANDING_STRATA, LANDING_BOXCARS // grid.n_cells))
@@ -198,11 +240,3 @@ def transfer(
         sinks = sinks + np.stack(columns, axis=1)
         cut += added.cut
     return Transfer(params, grid, throw, second, sinks, branches, reach, cut)
-
-
-def _still() -> Strata:
-    return Strata(np.ones(1), np.ones(1), np.zeros(1), 1.0, 1.0)
-
-
-def _cut(parameter: Law | Strata, count: int) -> Strata:
-    return parameter if isinstance(parameter, Strata) else parameter.strata(count)

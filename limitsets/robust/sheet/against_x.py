@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-import math
 import time
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
+from limitsets.files import as_table, picked
 from limitsets.robust.margins.beyond import MarginsBeyond, margins_beyond, places_beyond
 from limitsets.scene import Scene
 
@@ -20,41 +21,31 @@ PLACES, COARSE, EACH, SECONDS = 7, 0.1, 15.0, 150.0
 
 def curve_table(found: MarginsBeyond) -> dict[str, Any]:
     """Give margins against X as a plain table; null where nothing is refuted."""
-    return {
-        "side": found.side,
-        "x": found.x.tolist(),
-        "quantities": list(found.names),
-        "units": list(found.units),
-        "proved": found.proved.tolist(),
-        "refuted": [[x if math.isfinite(x) else None for x in row] for row in found.refuted.tolist()],
-    }
+    return as_table(
+        **picked(found, "side", "x"),
+        quantities=found.names,
+        **picked(found, "units", "proved", "refuted"),
+    )
 
 
 def curve_read(table: Mapping[str, Any], scene: Scene) -> MarginsBeyond:
     """Read what `curve_table` wrote, without the proofs."""
-    refuted = [[math.nan if x is None else x for x in row] for row in table["refuted"]]
-    return MarginsBeyond(
-        scene,
-        table["side"],
-        np.array(table["x"]),
-        tuple(table["quantities"]),
-        tuple(table["units"]),
-        np.array(table["proved"]),
-        np.array(refuted, dtype=np.float64),
-        (),
-    )
+    names, units = tuple(table["quantities"]), tuple(table["units"])
+    # null becomes nan
+    x, proved, refuted = (np.array(table[key], dtype=np.float64) for key in ("x", "proved", "refuted"))
+    return MarginsBeyond(scene, table["side"], x, names, units, proved, refuted, ())
 
 
 def _joined(one: MarginsBeyond | None, other: MarginsBeyond) -> MarginsBeyond:
     """Put the places of both together, ascending, without the proofs."""
     if one is None:
         return other
-    x = np.concatenate([one.x, other.x])
-    order = np.argsort(x)
-    proved, refuted = (
-        np.concatenate(pair)[order] for pair in ((one.proved, other.proved), (one.refuted, other.refuted))
-    )
-    return MarginsBeyond(one.scene, one.side, x[order], one.names, one.units, proved, refuted, ())
+    order = np.argsort(np.concatenate([one.x, other.x]))
+    columns: dict[str, Any] = {
+        name: np.concatenate([getattr(one, name), getattr(other, name)])[order]
+        for name in ("x", "proved", "refuted")
+    }
+    return replace(one, **columns, margins=())
 
 
 def curve(

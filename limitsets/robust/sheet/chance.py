@@ -7,15 +7,11 @@ from dataclasses import replace
 from typing import Any
 
 from limitsets.errors import AnswerError
-from limitsets.robust.noise.laws import Gaussian, Uniform
-from limitsets.robust.noise.scattering import Scattering, scattering_of
+from limitsets.robust.noise.scattering import LAWS, Scattering, scattering_of
 from limitsets.scene import Scene, load
 from limitsets.scene.quantities import deviation, find
 
-__all__ = ["LAWS", "noise_of", "scattering_from", "still"]
-
-LAWS: dict[str, Any] = {"gaussian": Gaussian, "bounded": Uniform}
-"""Words for laws: a deviation is the standard deviation of the one, the bound of the other."""
+__all__ = ["noise_of", "scattering_from", "still"]
 
 FIELDS = {"throw.speed": "speed", "gravity.tilt": "tilt", "landing.x": "landing"}
 
@@ -37,11 +33,9 @@ def noise_of(scene: Scene, given: Scattering | None) -> tuple[Scattering | None,
         return None, ""
     if scene.effects.spread is not None:
         return scattering_of(scene), "the scene's, [world] scatter with [effects] spread"
-    normal = replace(scene, effects=replace(scene.effects, spread="gaussian"))
-    return scattering_of(normal), (
-        "the scene's, [world] scatter, taken as standard deviations of normal laws; "
-        'spread = "bounded" in [effects] would make them bounds'
-    )
+    normal = replace(scene, effects=scene.effects.also(spread="gaussian"))
+    words = "the scene's, [world] scatter, taken as standard deviations of normal laws; "
+    return scattering_of(normal), words + 'spread = "bounded" in [effects] would make them bounds'
 
 
 def scattering_from(scene: Scene, texts: Mapping[str, str], law: str = "gaussian") -> Scattering:
@@ -54,7 +48,7 @@ def scattering_from(scene: Scene, texts: Mapping[str, str], law: str = "gaussian
     texts : mapping of str to str
         By quantity, ``{"throw.speed": "0.5 %", "landing.x": "0.02 in"}``.
     law : str
-        Of `LAWS`.
+        Of `limitsets.robust.noise.scattering.LAWS`.
 
     Raises
     ------

@@ -11,6 +11,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from limitsets.files import picked
 from limitsets.scene.quantities import find, text_at
 from limitsets.scene.units import exact_factor, parse
 
@@ -138,7 +139,7 @@ class Entry:
     def to_json(self) -> dict[str, Any]:
         """Give it as a plain table for JSON, in the words of `Margin.to_json` and some more."""
         proofs = self.certificates
-        return {name: getattr(self, name) for name in SAME} | {
+        return picked(self, *SAME) | {
             "goal": list(self.goals) if len(self.goals) > 1 else self.goals[0],
             "unit": self.unit or None,
             "reason": self.reason or None,

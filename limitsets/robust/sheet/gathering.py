@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from limitsets.errors import AnswerError
 from limitsets.goals import Goal, OrientedBeyond, Reaches
@@ -68,100 +69,80 @@ class _Gathering:
         """Say what is being done."""
         self.progress(step if not share else f"{step}, {100 * share:.0f} %", self.done, self.steps)
 
+    @contextmanager
+    def step(self, words: str) -> Iterator[None]:
+        """One of the steps: said when it begins, counted when it is done."""
+        self.tell(words)
+        yield
+        self.done += 1
+
     def singles(self, width: float, verdict: str) -> list[Entry]:
         """Find the margins of single quantities."""
         found: list[Entry] = []
         for one in self.todo:
-            label = f"margin of {one.quantity}, {one.reading}"
-            self.tell(label)
-            entry = self.kept.find(one.quantity, one.reading, one.unit)
-            if entry is None and verdict != "proved" and found:
-                entry = _same(found[0], one, self.scene)
-            found.append(entry or self.kept.add(self._single(one, width, label)))
-            self.done += 1
+            with self.step(f"margin of {one.quantity}, {one.reading}"):
+                entry = self.kept.find(one.quantity, one.reading, one.unit)
+                if entry is None and verdict != "proved" and found:
+                    entry = _same(found[0], one, self.scene)
+                found.append(entry or self.kept.add(self._single(one, width)))
         return found
 
-    def _single(self, one: Measure, width: float, label: str) -> Margin:
-        def told(step: str, _: int, __: int) -> None:
-            self.progress(step, self.done, self.steps)
-
-        (found,) = margin(
-            self.scene, one.quantity, reading=one.reading, goal=self.goals, width=width, progress=told
-        )
+    def _single(self, one: Measure, width: float) -> Margin:
+        asked: dict[str, Any] = {"reading": one.reading, "goal": self.goals, "width": width}
+        (found,) = margin(self.scene, one.quantity, progress=lambda step, _, __: self.tell(step), **asked)
         return found
 
     def joint(self, width: float) -> Entry:
         """Find the factor on the tolerance."""
         label = "margin of all together"
-        self.tell(label)
-        entry = self.kept.find("joint", "tolerance", "")
-        if entry is None:
-            found = joint_margin(
-                self.scene,
-                self.goals,
-                self.tolerance,
-                width=width,
-                tell=lambda share: self.tell(label, share),
-            )
-            entry = self.kept.add(found)
-        self.done += 1
-        return entry
+        with self.step(label):
+            entry = self.kept.find("joint", "tolerance", "")
+            if entry is not None:
+                return entry
+            asked: dict[str, Any] = {"width": width, "tell": lambda share: self.tell(label, share)}
+            return self.kept.add(joint_margin(self.scene, self.goals, self.tolerance, **asked))
 
     def curve(self, side: int) -> MarginsBeyond | None:
         """Find margins against X; None where the part gets farther out on another side."""
-        self.tell("margins against X")
-        try:
-            found, left = curve(
-                self.scene, side, self.tolerance, self.kept.curve, tell=self.tell, keep=self.kept.add_curve
-            )
-        except AnswerError as error:
-            self.left_out["curve"], found, left = str(error), None, 0
+        told: dict[str, Any] = {"tell": self.tell, "keep": self.kept.add_curve}
+        with self.step("margins against X"):
+            try:
+                found, left = curve(self.scene, side, self.tolerance, self.kept.curve, **told)
+            except AnswerError as error:
+                self.left_out["curve"] = str(error)
+                return None
         if left:
-            self.left_out["rest of the curve"] = (
-                f"there was no time for {left} more places; the same command goes on with them"
-            )
-        self.done += 1
+            words = f"there was no time for {left} more places; the same command goes on with them"
+            self.left_out["rest of the curve"] = words
         return found
 
     def audit(self) -> Audit:
         """Ask which assumptions of the model the scene breaks."""
         from limitsets.auditing import audit
 
-        self.tell("assumptions")
-        self.done += 1
-        return audit(self.scene)
+        with self.step("assumptions"):
+            return audit(self.scene)
 
     def chance(
         self, scene: Scene, noise: Scattering, place: tuple[float, int], cells: int
     ) -> tuple[NoiseStatistics, Levels]:
         """Find what noise does, at its level and at others."""
-        self.tell("noise")
-        found = noise_statistics(
-            scene,
-            noise,
-            goal=place,
-            cells=cells,
-            progress=lambda _, done, of: self.tell("noise", done / of),
-        )
-        self.done += 1
-        self.tell("noise at other levels")
-        levels = noise_levels(scene, noise, factors=FACTORS, goal=place, cells=max(cells // 2, 1))
-        self.done += 1
+
+        def told(_: str, done: int, of: int) -> None:
+            self.tell("noise", done / of)
+
+        with self.step("noise"):
+            found = noise_statistics(scene, noise, goal=place, cells=cells, progress=told)
+        with self.step("noise at other levels"):
+            levels = noise_levels(scene, noise, factors=FACTORS, goal=place, cells=max(cells // 2, 1))
         return found, levels
 
 
 def _same(entry: Entry, one: Measure, scene: Scene) -> Entry:
     """Return the margin of a quantity where the scene as it is fails or is not proved: that of any other."""
     nominal, unit = nominal_of(scene, one.quantity)
-    return replace(
-        entry,
-        quantity=one.quantity,
-        reading=one.reading,
-        unit=one.unit,
-        nominal=nominal,
-        nominal_unit=unit,
-        seconds=0.0,
-    )
+    own: dict[str, Any] = {"quantity": one.quantity, "reading": one.reading, "unit": one.unit}
+    return replace(entry, nominal=nominal, nominal_unit=unit, seconds=0.0, **own)
 
 
 def _place(goals: Sequence[Goal]) -> tuple[float, int] | None:
@@ -173,14 +154,8 @@ def _goals(scene: Scene, goal: GoalLike | Sequence[GoalLike] | None) -> tuple[Go
     if goal is None and scene.goal is None:
         x, last = 0.7 * scene.arm_length, len(scene.sides) - 1
         example = f'oriented_beyond = {{ x = "{x:.4g} {scene.unit}", side = {last} }}'
-        raise AnswerError(
-            "the goal",
-            None,
-            "a scene with [goal]",
-            f"say what has to hold: add [goal] with, for instance, {example}",
-            key="goal",
-            file=scene.file,
-        )
+        remedy = f"say what has to hold: add [goal] with, for instance, {example}"
+        raise AnswerError("the goal", None, "a scene with [goal]", remedy, key="goal", file=scene.file)
     return goals_of(scene, goal)
 
 
@@ -296,11 +271,10 @@ def _filled(
     sheet.steps += sum(part not in missing for part in ("joint", "curve", "audit")) + 2 * (
         "noise" not in missing
     )
-    sheet.tell("the goal in the scene as it is")
-    question = Query.of(scene, goals)
-    nominal = question.prove()
-    verdict = nominal.verdict if nominal.verdict == "proved" else question.refute().verdict
-    sheet.done += 1
+    with sheet.step("the goal in the scene as it is"):
+        question = Query.of(scene, goals)
+        nominal = question.prove()
+        verdict = nominal.verdict if nominal.verdict == "proved" else question.refute().verdict
     entries = [] if "margins" in missing else sheet.singles(width, verdict)
     entries += [] if "joint" in missing else [sheet.joint(width)]
     against = None if "curve" in missing or place is None else sheet.curve(place[1])

@@ -138,7 +138,7 @@ class Kept:
             "complete": False,
             "digests": self.digests,
             "scene": self.scene.as_dict(),
-            "margins": [each.to_json() for each in self.entries.values()],
+            "margins": list(self.entries.values()),
             "curve": self.curve,
         }
         with replaced(self.folder) as draft:

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from limitsets.files import as_table, picked
 from limitsets.goals import Goal
 from limitsets.robust.margins.beyond import MarginsBeyond
 from limitsets.robust.margins.finding import Margin
@@ -121,28 +121,17 @@ class Robustness:
 
     def to_json(self) -> dict[str, Any]:
         """Give it as plain tables for JSON: null, never nan."""
-        levels = self.levels
-        return {
-            "complete": True,
-            "digests": self.digests,
-            "scene": self.scene.as_dict(),
-            "holds": {"proved": True, "refuted": False}.get(self.verdict),
-            "vacuous": bool(void_of(self.goals, self.reach, self.scene.unit)),
-            "margins": [entry.to_json() for entry in self.entries],
-            "tolerance": self.tolerance or None,
-            "curve": None if self.curve is None else curve_table(self.curve),
-            "noise": None if self.noise is None else self.noise.to_json() | {"law": self.law},
-            "noise_levels": None
-            if levels is None
-            else {
-                "factors": levels.factors.tolist(),
-                "numbers": {
-                    name: [float(value) if math.isfinite(value) else None for value in row]
-                    for name, row in levels.numbers.items()
-                },
-            },
-            "assumptions": None if self.audit is None else self.audit.to_json(),
-            "left_out": self.left_out,
-            "width": self.width,
-            "seconds": self.seconds,
-        }
+        return as_table(
+            complete=True,
+            digests=self.digests,
+            scene=self.scene.as_dict(),
+            holds={"proved": True, "refuted": False}.get(self.verdict),
+            vacuous=bool(void_of(self.goals, self.reach, self.scene.unit)),
+            margins=self.entries,
+            tolerance=self.tolerance or None,
+            curve=None if self.curve is None else curve_table(self.curve),
+            noise=None if self.noise is None else self.noise.to_json() | {"law": self.law},
+            noise_levels=self.levels,
+            assumptions=self.audit,
+            **picked(self, "left_out", "width", "seconds"),
+        )

@@ -13,8 +13,9 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 from limitsets.jit import kernel
+from limitsets.thrower.declared import Effect, declare
 from limitsets.thrower.effects.slip import compressed, dragged
-from limitsets.thrower.motion import Arrival, Contact, FullSide, above, right_of
+from limitsets.thrower.motion import Arrival, Contact, FullSide, above, impacted, right_of
 
 __all__ = ["Bounce", "struck"]
 
@@ -45,4 +46,11 @@ def _rebound(bounce: Any, slip: Any, part: FullSide, hit: Contact, push: float) 
 def struck(bounce: Any, slip: Any, part: FullSide, hit: Arrival) -> Contact:
     """Return the part just after its vertex struck."""
     after, push = compressed(slip, part, hit)
-    return _rebound(bounce, slip, part, after, push)
+    return impacted(part.effects, _rebound(bounce, slip, part, after, push), part)
+
+
+def _of(world: Any, how: Any) -> Bounce:
+    return Bounce(float(world.restitution), float(world.bounce_threshold))
+
+
+declare(Effect("bounce", Bounce, _of, "it does not bounce", ("restitution", "bounce_threshold")))

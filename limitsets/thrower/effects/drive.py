@@ -22,10 +22,11 @@ import math
 from typing import Any, NamedTuple
 
 from limitsets.jit import kernel
-from limitsets.thrower.motion import at_kappa
-from limitsets.thrower.params import Side, Throw
+from limitsets.thrower.declared import Effect, declare
+from limitsets.thrower.motion import FullSide, at_kappa, possible, stays, thrown
+from limitsets.thrower.params import Throw
 
-__all__ = ["Drive", "all_the_way", "drive_of", "driven", "holds_in_stroke", "leant", "pulled", "rests_leant"]
+__all__ = ["Drive", "all_the_way", "leant", "pulled"]
 
 
 class Drive(NamedTuple):
@@ -48,10 +49,8 @@ class Drive(NamedTuple):
 
 
 @kernel
-def driven(drive: Any, bare: Throw) -> Throw:
-    """Return the minimal model with gravity's share across the arm; without the effect as it is."""
-    if drive is None:
-        return bare
+def _driven(drive: Drive, bare: Throw) -> Throw:
+    """Return the minimal model with gravity's share across the arm."""
     return at_kappa(bare, bare.kappa * drive.cosine)
 
 
@@ -77,12 +76,11 @@ def leant(drive: Any, across: float, right: float, high: float) -> tuple[float, 
 
 
 @kernel
-def rests_leant(drive: Any, a: float, d: float) -> bool:
+def _rests_leant(drive: Drive, so_far: bool, part: FullSide, k: int) -> bool:
     """Whether the part stays on a side of the stopped arm."""
-    if drive is None:
-        return True
+    a, d = part.a[k], part.d[k]
     over, slides = a * drive.cosine <= d * drive.sine, drive.sine > drive.friction * drive.cosine
-    return not (over or slides)
+    return so_far and not (over or slides)
 
 
 @kernel
@@ -101,10 +99,9 @@ def all_the_way(stroke: float, a: float, b: float, c: float, d: float) -> bool:
 
 
 @kernel
-def holds_in_stroke(drive: Any, own: Side, length: float, x: float) -> bool:
+def _holds_in_stroke(drive: Drive, so_far: bool, part: FullSide, x: float) -> bool:
     """Whether the part stays on the arm, and still, while that accelerates."""
-    if drive is None:
-        return True
+    own, length = part.own, part.length[part.own.side]
     s, mu = drive.stroke, drive.friction
     kappa, high, alpha = own.kappa / drive.cosine, own.h + own.d, 0.5 / drive.stroke
     # N and T as (constant, theta, sin, cos), and the moment N c
@@ -112,7 +109,7 @@ def holds_in_stroke(drive: Any, own: Side, length: float, x: float) -> bool:
     t0, t1, t2 = -alpha * high, -x / s, kappa
     m0, m1, m2 = alpha * own.rho2 - own.d * t0, -own.d * t1, -own.d * t2
     right = length - own.a
-    good = all_the_way(s, n0, n1, 0.0, n3)
+    good = so_far & all_the_way(s, n0, n1, 0.0, n3)
     good &= all_the_way(s, right * n0 - m0, right * n1 - m1, -m2, right * n3)
     good &= all_the_way(s, own.a * n0 + m0, own.a * n1 + m1, m2, own.a * n3)
     if mu < math.inf:
@@ -121,7 +118,12 @@ def holds_in_stroke(drive: Any, own: Side, length: float, x: float) -> bool:
     return good
 
 
-def drive_of(world: Any, how: Any) -> Drive:
-    """Build the effect from the facts of a scene."""
+def _of(world: Any, how: Any) -> Drive:
     friction = math.inf if world.friction is None else world.friction
     return Drive(world.stroke, math.sin(world.stroke), math.cos(world.stroke), friction)
+
+
+thrown.on(Drive, _driven)
+possible.on(Drive, _holds_in_stroke)
+stays.on(Drive, _rests_leant)
+declare(Effect("drive", Drive, _of, "the throw is impulsive", ("stroke",), ("slip", "pivot", "bounce")))

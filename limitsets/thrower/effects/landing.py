@@ -12,8 +12,9 @@ from __future__ import annotations
 import math
 from typing import Any, NamedTuple
 
-from limitsets.jit import kernel
-from limitsets.thrower.effects.drive import pulled
+from limitsets.jit import entry_of, kernel
+from limitsets.thrower.declared import Effect, declare
+from limitsets.thrower.effects.drive import Drive, pulled
 from limitsets.thrower.impact import jog_displacement
 from limitsets.thrower.motion import Arrival, FullSide, side_number
 from limitsets.thrower.motion_box import enclosed, encloses
@@ -74,7 +75,8 @@ def first_arrival(landing: Any, part: FullSide, x: float) -> tuple[Arrival, bool
     own = part.own
     at, _ = settle(own, x)
     shift, _ = jog_displacement(own.flight, own, at)
-    pull, speed = pulled(part.effects.drive, own.kappa, at.phi)
+    drive = entry_of(part.effects, Drive)
+    pull, speed = pulled(drive, own.kappa, at.phi)
     left = Arrival(own.side, at, shift + pull, speed - (own.h + own.d), x - own.kappa * at.phi, 1.0)
     flies = (x > own.a) & (at.phi > 0.0) & (at.phi <= own.flight.full_turn)
     if landing is None:
@@ -90,7 +92,7 @@ def first_arrival(landing: Any, part: FullSide, x: float) -> tuple[Arrival, bool
     now = turn(phi)
     # X, how far the centre is right of the vertex that lands, and its shift if the part fell back on side `vertex`
     right = part.q[k] * now.s - part.p[k] * (1.0 - now.v)
-    pull, speed = pulled(part.effects.drive, own.kappa, phi)
+    pull, speed = pulled(drive, own.kappa, phi)
     moved = pull - (own.h + own.d) * phi + (part.a[k] - right)
     offset = own.corner
     for number in range(own.side + 1, vertex):
@@ -100,3 +102,4 @@ def first_arrival(landing: Any, part: FullSide, x: float) -> tuple[Arrival, bool
 
 
 encloses.on(Landing, enclosed)
+declare(Effect("landing", Landing, lambda world, how: Landing(), "the left bottom vertex lands first"))

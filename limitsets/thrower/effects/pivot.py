@@ -15,8 +15,9 @@ import math
 from typing import Any, NamedTuple
 
 from limitsets.interval.number import signed_square
-from limitsets.jit import kernel
-from limitsets.thrower.effects.drive import leant
+from limitsets.jit import entry_of, kernel
+from limitsets.thrower.declared import Effect, declare
+from limitsets.thrower.effects.drive import Drive, leant
 from limitsets.thrower.held import gives_way, holds_now, lets_go
 from limitsets.thrower.impact import margin
 from limitsets.thrower.motion import (
@@ -80,7 +81,8 @@ def _hinged(pivot: Any, part: FullSide, hit: Contact) -> Face:
     inertia = part.own.rho2 + (right * right + high * high)
     kinetic = 0.5 * inertia * hit.omega * hit.omega
     ell = math.sqrt(right * right + high * high)
-    gravity, right, high = leant(part.effects.drive, part.own.kappa, right, high)
+    drive = entry_of(part.effects, Drive)
+    gravity, right, high = leant(drive, part.own.kappa, right, high)
     near = right * abs(right) / (ell + abs(high))  # sgn(X) (ell - H), see impact.py
     far = (ell - high) if right > 0.0 else (high - ell)
     barrier = gravity * (near if high > 0.0 else far)
@@ -88,7 +90,7 @@ def _hinged(pivot: Any, part: FullSide, hit: Contact) -> Face:
     side = hit.vertex + 1 if over else hit.vertex
     k = side_number(part, side)
     foot = part.a[k] - part.length[k] if over else part.a[k]
-    _, _, low = leant(part.effects.drive, part.own.kappa, foot, part.d[k])
+    _, _, low = leant(drive, part.own.kappa, foot, part.d[k])
     energy = kinetic + gravity * (high - low)
     rate = math.sqrt(max(2.0 * energy / inertia, 0.0))
     shift = hit.shift - on_to_next(part, hit.vertex) if over else hit.shift
@@ -132,3 +134,14 @@ def turned_down(pivot: Any, slip: Any, part: FullSide, struck: Contact) -> tuple
         if ends != ON:
             return hit, _come_down(part, hit), ends
     return hit, _come_down(part, hit), LOST
+
+
+declare(
+    Effect(
+        "pivot",
+        Pivot,
+        lambda world, how: Pivot(float(world.friction)),
+        "it acts as a hinge until a side lies flat",
+        ("friction",),
+    )
+)

@@ -14,9 +14,10 @@ from __future__ import annotations
 import math
 from typing import Any, NamedTuple
 
-from limitsets.jit import kernel
+from limitsets.jit import entry_of, kernel
+from limitsets.thrower.declared import Effect, declare
 from limitsets.thrower.effects.bounce import struck
-from limitsets.thrower.effects.drive import leant
+from limitsets.thrower.effects.drive import Drive, leant
 from limitsets.thrower.motion import Arrival, Contact, Face, FullSide, on_to_next, right_of, side_number
 from limitsets.thrower.motion_box import enclosed, encloses
 from limitsets.thrower.turn import turn
@@ -80,8 +81,11 @@ def next_arrival(roll: Any, bounce: Any, slip: Any, part: FullSide, face: Face) 
 @kernel
 def _lift(part: FullSide, foot: float, d: float) -> float:
     """Energy it takes from lying on a side to the top over one of its ends, which is `foot` left of the centre."""
-    gravity, right, high = leant(part.effects.drive, part.own.kappa, foot, d)
+    gravity, right, high = leant(entry_of(part.effects, Drive), part.own.kappa, foot, d)
     return gravity * right * right / (math.hypot(right, high) + high)  # ell - H
 
 
 encloses.on(Roll, enclosed)
+declare(
+    Effect("roll", Roll, lambda world, how: Roll(), "the part then stays where it is until the next throw")
+)

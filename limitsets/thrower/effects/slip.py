@@ -19,9 +19,10 @@ import math
 from typing import Any, NamedTuple
 
 from limitsets.jit import kernel
-from limitsets.thrower.motion import Arrival, Contact, Face, FullSide, above, right_of, side_number
+from limitsets.thrower.declared import Effect, declare
+from limitsets.thrower.motion import Arrival, Contact, Face, FullSide, above, moved, right_of, side_number
 
-__all__ = ["Slip", "compressed", "dragged", "slid_on"]
+__all__ = ["Slip", "compressed", "dragged"]
 
 
 class Slip(NamedTuple):
@@ -89,22 +90,32 @@ def compressed(slip: Any, part: FullSide, hit: Arrival) -> tuple[Contact, float]
 
 
 @kernel
-def slid_on(slip: Any, part: FullSide, face: Face) -> float:
-    """How far the part slides on the side it stays on [length]; nan or inf where the model does not say.
+def _slid_on(slip: Slip, shift: float, part: FullSide, face: Face) -> float:
+    """Shift of a part that slides on, on the side it stays on [length]; nan or inf where the model does not say.
 
     The stop is one impact of both ends: J_n is what stops the fall, and the side's one velocity along the arm follows
     Routh's method with A = 1 and B = -omega d / J_n, all of the rotation gone at its end.  A part that tips over its
     leading end, or finds no friction, is outside the model.
     """
-    if slip is None:
-        return 0.0
     mu, k = slip.friction, side_number(part, face.side)
     reach = part.a[k] if face.vertex == face.side else part.length[k] - part.a[k]
     b = -math.copysign(part.d[k] / reach, face.omega)
     _, slide = _dragged(mu, 1.0, b, face.slide, abs(face.omega) * reach)
     if slide == 0.0:
-        return 0.0
+        return shift
     ahead = part.length[k] - part.a[k] if slide > 0.0 else part.a[k]
     if mu * part.d[k] > ahead:
         return math.nan
-    return math.copysign(slide * slide / (2.0 * mu * part.own.kappa), slide)
+    return shift + math.copysign(slide * slide / (2.0 * mu * part.own.kappa), slide)
+
+
+moved.on(Slip, _slid_on)
+declare(
+    Effect(
+        "slip",
+        Slip,
+        lambda world, how: Slip(float(world.friction)),
+        "the vertex that lands sticks without slipping",
+        ("friction",),
+    )
+)

@@ -14,12 +14,14 @@ import math
 from typing import Any, NamedTuple
 
 from limitsets.errors import MapError
-from limitsets.jit import generic, kernel
+from limitsets.interval import Interval
+from limitsets.jit import generic, kernel, proof_kernel, with_entry
 from limitsets.maps.counting_random import normal_pair, uniform_pair
-from limitsets.thrower.motion import Effects, FullThrow, at_kappa
-from limitsets.thrower.motion_box import encloses
+from limitsets.thrower.declared import Effect, declare
+from limitsets.thrower.motion import Face, FullSide, FullThrow, at_kappa, moved, varied
+from limitsets.thrower.motion_box import encloses, moved_box, thrown_box
 
-__all__ = ["Even", "Normal", "Spread", "moved_by", "spread_of", "spread_over"]
+__all__ = ["Even", "Normal", "Spread"]
 
 
 class Even(NamedTuple):
@@ -79,31 +81,38 @@ drawn.on(Normal, _normal)
 
 
 @kernel
-def moved_by(spread: Any, shift: float) -> float:
+def _moved(spread: Spread, shift: float, part: FullSide, face: Face) -> float:
     """Return the displacement of a throw with what its landing place deviates by."""
-    if spread is None:
-        return shift
-    return shift + spread.shift  # type: ignore[no-any-return]  # effects are Any
+    return shift + spread.shift
 
 
 @kernel
-def spread_over(spread: Any, params: FullThrow, start: int, step: int) -> FullThrow:
-    """Return the map of throw number `step` of start number `start`; without the effect the map as it is."""
-    if spread is None:
-        return params
+def _varied(spread: Spread, params: FullThrow, start: int, step: int) -> FullThrow:
+    """Return the map of throw number `step` of start number `start`."""
     speed, landing = drawn(spread.law, int(spread.seed), start, step)
     factor = 1.0 + spread.speed * speed
-    on = params.effects
     thrown = Spread(spread.law, spread.speed, spread.landing, spread.seed, spread.landing * landing)
     return FullThrow(
         at_kappa(params.bare, params.bare.kappa / (factor * factor)),
         params.outline,
-        Effects(on.landing, on.roll, on.pivot, on.slip, on.bounce, on.drive, thrown),
+        with_entry(params.effects, thrown),
     )
 
 
-def spread_of(world: Any, how: str) -> Spread:
-    """Build the effect from the facts of a scene and its word, "bounded" or "gaussian"."""
+@proof_kernel
+def _thrown_box(spread: Spread, kappa: Interval) -> Interval:
+    """kappa / (1 + delta)^2 for all the deviations of the speed."""
+    factor = Interval(1.0, 1.0) + Interval(-spread.speed, spread.speed)
+    return kappa / factor**2
+
+
+@proof_kernel
+def _moved_box(spread: Spread, x: Interval) -> Interval:
+    """Widen a place of rest by what a landing deviates by."""
+    return x + Interval(-spread.landing, spread.landing)
+
+
+def _of(world: Any, how: str) -> Spread:
     speed, landing = world.scatter.speed, world.scatter.landing
     if speed is not None and not speed.relative:
         raise MapError(
@@ -117,4 +126,13 @@ def _bounded(spread: Spread) -> bool:
     return spread.law.bound < math.inf  # type: ignore[no-any-return]  # laws are Any
 
 
+varied.on(Spread, _varied)
+moved.on(Spread, _moved)
 encloses.on(Spread, _bounded)
+thrown_box.on(Spread, _thrown_box)
+moved_box.on(Spread, _moved_box)
+declare(
+    Effect(
+        "spread", Spread, _of, "every throw is like the other", ("scatter",), words=("bounded", "gaussian")
+    )
+)

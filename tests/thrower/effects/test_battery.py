@@ -13,14 +13,15 @@ from typing import Any
 import numpy as np
 import pytest
 
-from limitsets.jit import kernel
+from limitsets.jit import entry_of, kernel
 from limitsets.maps.drivers import images
 from limitsets.thrower import impact_angles
-from limitsets.thrower.effects import BUILT
-from limitsets.thrower.effects.bounce import struck
-from limitsets.thrower.effects.landing import first_arrival
-from limitsets.thrower.effects.pivot import turned_down
-from limitsets.thrower.effects.roll import next_arrival
+from limitsets.thrower.effects import EFFECTS
+from limitsets.thrower.effects.bounce import Bounce, struck
+from limitsets.thrower.effects.landing import Landing, first_arrival
+from limitsets.thrower.effects.pivot import Pivot, turned_down
+from limitsets.thrower.effects.roll import Roll, next_arrival
+from limitsets.thrower.effects.slip import Slip
 from limitsets.thrower.free_flight import fly_on
 from limitsets.thrower.full import gather_full
 from limitsets.thrower.motion import DOWN, LOST, above, right_of
@@ -78,7 +79,7 @@ ROWS = [
 
 @pytest.mark.parametrize("row", ROWS, ids=lambda row: row.effect)
 def test_it_is_built(row: Row) -> None:
-    assert row.effect in BUILT
+    assert row.effect in EFFECTS
 
 
 def test_absent_effects_are_the_bare_map() -> None:
@@ -117,23 +118,30 @@ def _note(book: Any, line: int, column: int, one: float, two: float, three: floa
 def ledger(params: Any, x: float, side: int, book: Any) -> int:
     """Fill a book with the steps of a throw: kind, X and H, then height, velocities and rate before and after."""
     part = gather_full(params, side)
-    hit, moving = first_arrival(part.effects.landing, part, x)
+    on = part.effects
+    roll, bounce, pivot, slip = (
+        entry_of(on, Roll),
+        entry_of(on, Bounce),
+        entry_of(on, Pivot),
+        entry_of(on, Slip),
+    )
+    hit, moving = first_arrival(entry_of(on, Landing), part, x)
     line = 0
     while moving and line + 3 < book.shape[0]:
         right, high = right_of(part, hit.vertex, hit.psi), above(part, hit.vertex, hit.psi)
-        start = struck(part.effects.bounce, part.effects.slip, part, hit)
+        start = struck(bounce, slip, part, hit)
         # the height, fourth, is written again by the next line
         _note(book, line, 0, IMPACT, right, high, high)
         _note(book, line, 3, high, hit.vx, hit.vy, hit.omega)
         vx, vy = start.slide - start.omega * high, start.lift + start.omega * right
         _note(book, line, 7, high, vx, vy, start.omega)
-        contact, face, ends = turned_down(part.effects.pivot, part.effects.slip, part, start)
+        contact, face, ends = turned_down(pivot, slip, part, start)
         if ends == LOST:
             return -1
         book[line + 1, 0] = TURN
         _note(book, line + 1, 3, high, vx, vy, start.omega)
         if ends == DOWN:
-            hit, moving = next_arrival(part.effects.roll, part.effects.bounce, part.effects.slip, part, face)
+            hit, moving = next_arrival(roll, bounce, slip, part, face)
             d = above(part, hit.vertex, hit.psi)
             _note(book, line + 1, 7, d, hit.vx, hit.vy, hit.omega)
             line += 2
@@ -144,9 +152,7 @@ def ledger(params: Any, x: float, side: int, book: Any) -> int:
             )
             vx, vy = contact.slide - contact.omega * high, contact.lift + contact.omega * right
             _note(book, line + 1, 7, high, vx, vy, contact.omega)
-            hit, moving = fly_on(
-                part.effects.pivot, part.effects.slip, part.effects.bounce, part, contact, hit
-            )
+            hit, moving = fly_on(pivot, slip, bounce, part, contact, hit)
             book[line + 2, 0] = FLIGHT
             _note(book, line + 2, 3, high, vx, vy, contact.omega)
             _note(book, line + 2, 7, above(part, hit.vertex, hit.psi), hit.vx, hit.vy, hit.omega)

@@ -10,11 +10,10 @@ import pytest
 
 from limitsets.maps.drivers import images
 from limitsets.thrower import throw_map
-from limitsets.thrower.effects import with_effects
 from limitsets.thrower.effects.bounce import Bounce, struck
 from limitsets.thrower.effects.slip import Slip
 from limitsets.thrower.free_flight import next_contact
-from limitsets.thrower.full import gather_full
+from limitsets.thrower.full import gather_full, with_effects
 from limitsets.thrower.motion import Arrival, FullSide, above, right_of
 from limitsets.thrower.turn import turn
 from tests.thrower.effects.throws import agree, cases, same_end

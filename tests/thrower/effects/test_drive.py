@@ -8,11 +8,11 @@ import pytest
 from scipy.optimize import brentq
 
 import limitsets as ls
-from limitsets.jit import kernel
+from limitsets.jit import entry_of, kernel
 from limitsets.maps import codes, images
 from limitsets.scene import Scene
 from limitsets.thrower.effects.drive import all_the_way
-from limitsets.thrower.effects.landing import first_arrival
+from limitsets.thrower.effects.landing import Landing, first_arrival
 from limitsets.thrower.full import gather_full
 from limitsets.thrower.motion import above, right_of
 
@@ -150,7 +150,7 @@ def test_the_least_value_is_found_inside_the_stroke() -> None:
 def arrivals(params: Any, x: np.ndarray, side: int, out: np.ndarray) -> None:
     part = gather_full(params, side)
     for k in range(x.size):
-        hit, _ = first_arrival(part.effects.landing, part, x[k])
+        hit, _ = first_arrival(entry_of(part.effects, Landing), part, x[k])
         out[k, 0], out[k, 1], out[k, 2], out[k, 3] = hit.shift, hit.vx, hit.vy, hit.omega
         out[k, 4], out[k, 5] = right_of(part, hit.vertex, hit.psi), above(part, hit.vertex, hit.psi)
 

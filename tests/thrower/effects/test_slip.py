@@ -9,12 +9,12 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from limitsets.jit import entry_of
 from limitsets.thrower import throw_map
-from limitsets.thrower.effects import with_effects
 from limitsets.thrower.effects.bounce import Bounce, struck
-from limitsets.thrower.effects.slip import Slip, slid_on
-from limitsets.thrower.full import gather_full
-from limitsets.thrower.motion import LOST, Arrival, Contact, Face, FullSide, above, right_of
+from limitsets.thrower.effects.slip import Slip
+from limitsets.thrower.full import gather_full, with_effects
+from limitsets.thrower.motion import LOST, Arrival, Contact, Face, FullSide, above, moved, right_of
 from limitsets.thrower.sliding import slide_on
 from limitsets.thrower.turn import Turned, turn
 from tests.thrower.effects.routh import routh, smoothed
@@ -224,7 +224,7 @@ def test_without_friction_the_horizontal_velocity_stays_and_nothing_rests() -> N
     for case in cases(20, 1, friction=0.0):
         part = gather_full(case.full(("slip",)), case.side)
         hit = Arrival(case.side, turn(0.3 * part.own.corner), 0.0, -0.7, -2.0, 1.0)
-        after = struck(None, part.effects.slip, part, hit)
+        after = struck(None, entry_of(part.effects, Slip), part, hit)
         high = part.own.a * hit.psi.s + part.own.d * (1.0 - hit.psi.v)
         assert after.slide - after.omega * high == pytest.approx(hit.vx, rel=1e-12)
         assert case.mapped(("slip",)) is None
@@ -263,14 +263,14 @@ def _landing(a: float, d: float, kappa: float, x: float) -> float:
 def test_the_rest_slides_on_by_its_braking_distance() -> None:
     part = square(0.5)
     # speed 2, braked by mu kappa = 2: 2^2/(2 * 2) = 1, either way
-    assert slid_on(Slip(0.5), part, Face(0, 0.0, 0, 0.0, 2.0)) == pytest.approx(1.0, rel=1e-15)
-    assert slid_on(Slip(0.5), part, Face(0, 0.0, 0, 0.0, -2.0)) == pytest.approx(-1.0, rel=1e-15)
+    assert moved(Slip(0.5), 0.0, part, Face(0, 0.0, 0, 0.0, 2.0)) == pytest.approx(1.0, rel=1e-15)
+    assert moved(Slip(0.5), 0.0, part, Face(0, 0.0, 0, 0.0, -2.0)) == pytest.approx(-1.0, rel=1e-15)
     # turning down about its left end by 1, xdot = d = 1 and J_n = a = 1: friction takes half of it
-    assert slid_on(Slip(0.5), part, Face(0, 0.0, 0, -1.0, 0.0)) == pytest.approx(0.25 / 4.0, rel=1e-14)
-    assert slid_on(Slip(1.5), part, Face(0, 0.0, 0, -1.0, 0.0)) == 0.0
+    assert moved(Slip(0.5), 0.0, part, Face(0, 0.0, 0, -1.0, 0.0)) == pytest.approx(0.25 / 4.0, rel=1e-14)
+    assert moved(Slip(1.5), 0.0, part, Face(0, 0.0, 0, -1.0, 0.0)) == 0.0
     # with mu d beyond the leading end the part would tip over it; without friction it slides for ever
-    assert math.isnan(slid_on(Slip(1.5), part, Face(0, 0.0, 0, 0.0, 2.0)))
-    assert math.isinf(slid_on(Slip(0.0), part, Face(0, 0.0, 0, 0.0, 2.0)))
+    assert math.isnan(moved(Slip(1.5), 0.0, part, Face(0, 0.0, 0, 0.0, 2.0)))
+    assert math.isinf(moved(Slip(0.0), 0.0, part, Face(0, 0.0, 0, 0.0, 2.0)))
 
 
 def test_painleves_paradox_is_outside_the_model() -> None:

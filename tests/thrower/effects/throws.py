@@ -10,7 +10,7 @@ import numpy as np
 
 from limitsets.maps.drivers import images
 from limitsets.thrower import Throw, throw_map
-from limitsets.thrower.effects import with_effects
+from limitsets.thrower.full import with_effects
 from limitsets.thrower.motion import FullThrow
 from tests.thrower.effects.simulation import Body, Law, OutsideError, Simulation, random_body
 

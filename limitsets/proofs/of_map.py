@@ -1,0 +1,403 @@
+"""Proofs about any map on a grid: what the enclosed images of the cells imply, and periodic orbits.
+
+*Invariant, trapping*: no image of an attracting component meets a cell outside; cells are closed, so the images lie in
+the interior of the component, relative to the domain.
+*Attracts all*: besides, no image leaves the domain and every recurrent component attracts: then the rank of a cell, the
+longest path to an attracting cell, falls along every orbit outside.
+*Expanding*, in one dimension: |dx'/dx| > 1 on every attracting cell, on every branch that is possible there.
+*Cycles*: for the iterate G = F^p along an itinerary and a box X, K(X) = m - C (G(m) - m) + (1 - C (DG(X) - 1)) (X - m)
+lies in the interior of X.  Then G has one fixed point in X, whatever the matrix C, and it is no multiple one (Krawczyk;
+Neumaier, "Interval Methods for Systems of Equations", 1990, section 5.1).  Along X every branch is proved to be taken.
+
+For two corners of parameters all of it holds for each of the maps between.  No certificate is written: the independent
+checker knows the throw only.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import reduce
+from itertools import product
+from operator import add, mul
+from typing import Any, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from limitsets.cells import CellSet, Grid
+from limitsets.errors import AnswerError
+from limitsets.graph import TransitionGraph, transitions
+from limitsets.graph.components import ranks
+from limitsets.graph.survey import attracting_of
+from limitsets.interval import guard
+from limitsets.maps import coerce, has_slope, kind_of
+from limitsets.maps.derived import NEVER, SURE, UNKNOWN, BranchBoxes, branch_boxes
+from limitsets.proofs.intervals import Intervals
+from limitsets.proofs.proof import Claim
+from limitsets.sets import Cycle, cycles
+
+__all__ = ["CLAIMS_OF_MAP", "CycleOfMap", "ProofOfMap", "certify_map"]
+
+Floats: TypeAlias = NDArray[np.float64]
+Matrix: TypeAlias = list[list[Intervals]]
+
+# Largest period of the search for cycles.
+UP_TO = 16
+
+# Half widths of X that are tried, relative to the extent of the orbit.
+FIRST, GROWTH, TRIES = 2.0**-40, 8.0, 8
+
+
+@dataclass(frozen=True, eq=False)
+class CycleOfMap:
+    """A periodic orbit that is proved to exist, alone in its boxes.
+
+    Attributes
+    ----------
+    lo, hi : ndarray, shape (p, d)
+        Boxes of its points in the order of the steps; the first is the one in which it is alone.
+    side, branches : ndarray of int, shape (p,)
+        The side of each point, and the branch taken from it.
+    slope_lo, slope_hi : ndarray, shape (d, d)
+        Enclosure of the derivative of F^p.
+    attracts : bool or None
+        Whether every eigenvalue of it is below 1 in modulus; None where that is open.
+    """
+
+    lo: Floats
+    hi: Floats
+    side: NDArray[np.int64]
+    branches: NDArray[np.int64]
+    slope_lo: Floats
+    slope_hi: Floats
+    attracts: bool | None
+
+    @property
+    def period(self) -> int:
+        """p, the smallest one."""
+        return int(self.side.size)
+
+
+@dataclass(frozen=True, eq=False)
+class ProofOfMap:
+    """What was proved of a map on a grid.
+
+    Attributes
+    ----------
+    map, upper : NamedTuple
+        The corners of the parameters.
+    graph : TransitionGraph
+        Cells and enclosed images.
+    component : ndarray of int32, shape (n_cells,)
+        Number of the attracting component of each cell, -1 outside.
+    claims : tuple of Claim
+        One per claim asked for.
+    cycles : tuple of CycleOfMap
+        The periodic orbits that are proved, if "cycles" was asked for.
+    seconds : float
+        Time it took.
+    """
+
+    map: Any
+    upper: Any
+    graph: TransitionGraph
+    component: NDArray[np.int32]
+    claims: tuple[Claim, ...]
+    cycles: tuple[CycleOfMap, ...]
+    seconds: float
+
+    @property
+    def proved(self) -> bool:
+        """Whether every claim is proved."""
+        return all(claim.verdict == "proved" for claim in self.claims)
+
+    @property
+    def cells(self) -> CellSet:
+        """The attracting cells: proved to be positively invariant."""
+        return CellSet(self.graph.grid, self.component >= 0)
+
+    @property
+    def enters(self) -> CellSet:
+        """The cells all of whose points are proved to enter the attracting cells."""
+        destination = self.graph.survey().destination
+        return CellSet(self.graph.grid, destination >= 0)
+
+
+# ---------------------------------------------------------------- claims about cells
+
+
+def _place(grid: Grid, cell: int) -> str:
+    """Name a cell for people."""
+    side = int(grid.side_of(np.array([cell]))[0])
+    lo, hi = (corner[0] for corner in grid.boxes(np.array([cell]), side))
+    spans = ", ".join(f"[{a:.6g}, {b:.6g}]" for a, b in zip(lo, hi, strict=True))
+    return f"side {side}, x in {spans}" if grid.sides > 1 else f"x in {spans}"
+
+
+def _components(graph: TransitionGraph) -> tuple[NDArray[np.int32], NDArray[np.int64]]:
+    """Attracting component of each cell, and the recurrent cells that do not attract."""
+    sets = graph.recurrent_components()
+    good = attracting_of(graph.ranges, graph.components(), sets)
+    component = np.full(graph.n_cells, -1, dtype=np.int32)
+    for number, cells in enumerate(k for k, attracts in zip(sets, good, strict=True) if attracts):
+        component[cells] = number
+    lost = [cells for cells, attracts in zip(sets, good, strict=True) if not attracts]
+    return component, np.concatenate([np.zeros(0, np.int64), *lost])
+
+
+def _invariant(proof: ProofOfMap) -> Claim:
+    if not len(proof.cells):
+        return Claim("invariant", "undecided", "there are no attracting cells", {})
+    return Claim("invariant", "proved", "", {})
+
+
+def _trapping(proof: ProofOfMap) -> Claim:
+    found = _invariant(proof)
+    return Claim("trapping", found.verdict, found.reason, {})
+
+
+def _attracts_all(proof: ProofOfMap) -> Claim:
+    graph = proof.graph
+    _, lost = _components(graph)
+    leaving = np.flatnonzero(graph.ranges.exits)
+    reason = ""
+    if leaving.size:
+        reason = (
+            f"the image of {_place(graph.grid, int(leaving[0]))} may leave the domain, or is not enclosed"
+        )
+    elif lost.size:
+        reason = f"{lost.size} recurrent cells do not attract: first {_place(graph.grid, int(lost.min()))}"
+    elif not len(proof.cells):
+        reason = "there are no attracting cells"
+    if reason:
+        return Claim("attracts-all", "undecided", reason, {})
+    parts = graph.components()
+    rank = ranks(graph.ranges, parts, np.asarray(parts.recurrent))
+    return Claim("attracts-all", "proved", "", {"max_rank": int(rank.max())})
+
+
+def _expanding(proof: ProofOfMap) -> Claim:
+    grid = proof.graph.grid
+    if grid.dimension != 1:
+        reason = "expansion is proved in one dimension only"
+        return Claim("expanding", "undecided", reason, {}, final=True)
+    if not len(proof.cells):
+        return Claim("expanding", "undecided", "there are no attracting cells", {})
+    numbers = proof.cells.numbers()
+    sides, least, place = grid.side_of(numbers), np.inf, ""
+    for side in np.unique(sides).tolist():
+        mine = numbers[sides == side]
+        lo, hi = grid.boxes(mine, side)
+        for branch in range(len(kind_of(proof.map).branches)):
+            found = branch_boxes(proof.map, proof.upper, side, branch, lo, hi)
+            low, high = found.slope_lo[:, 0, 0], found.slope_hi[:, 0, 0]
+            slope = np.where(low > 0.0, low, np.where(high < 0.0, -high, 0.0))
+            slope[found.state == UNKNOWN] = 0.0
+            slope[found.state == NEVER] = np.inf
+            worst = int(slope.argmin())
+            if slope[worst] < least:
+                least, place = float(slope[worst]), _place(grid, int(mine[worst]))
+    if not least > 1.0:
+        return Claim("expanding", "undecided", f"slope {least:.6g} at {place}", {})
+    return Claim("expanding", "proved", "", {"least_slope": least.hex()})
+
+
+# ---------------------------------------------------------------- cycles
+
+
+def _follow(proof: ProofOfMap, lo: Floats, hi: Floats, cycle: Cycle) -> list[BranchBoxes] | str:
+    """Enclose the orbit of a box along an itinerary; or say what is missing."""
+    steps: list[BranchBoxes] = []
+    for k, (side, branch) in enumerate(zip(cycle.side.tolist(), cycle.branches.tolist(), strict=True)):
+        found = branch_boxes(proof.map, proof.upper, side, branch, lo[None, :], hi[None, :])
+        if found.state[0] != SURE:
+            return f"the branch of point {k} is not proved"
+        if found.side != cycle.side[(k + 1) % cycle.period]:
+            return "it ends on another side"
+        steps.append(found)
+        lo, hi = found.lo[0], found.hi[0]
+    return steps
+
+
+def _matrix(lo: Floats, hi: Floats) -> Matrix:
+    return [[Intervals.of(a, b) for a, b in zip(*rows, strict=True)] for rows in zip(lo, hi, strict=True)]
+
+
+def _times(a: Matrix, b: Matrix) -> Matrix:
+    columns = list(zip(*b, strict=True))
+    return [[reduce(add, map(mul, row, column)) for column in columns] for row in a]
+
+
+def _ends(a: Matrix) -> tuple[Floats, Floats]:
+    lo, hi = (np.array([[getattr(entry, end)[0] for entry in row] for row in a]) for end in ("lo", "hi"))
+    return lo, hi
+
+
+def _slope(steps: Sequence[BranchBoxes]) -> Matrix:
+    """Enclose the derivative of the steps together."""
+    each = [_matrix(step.slope_lo[0], step.slope_hi[0]) for step in steps]
+    return reduce(lambda total, step: _times(step, total), each)
+
+
+_ONE = {d: _matrix(np.eye(d), np.eye(d)) for d in (1, 2, 3)}
+
+
+def _contracts(lo: Floats, hi: Floats, middle: Floats, at: BranchBoxes, slope: Matrix) -> bool:
+    """Whether Krawczyk's operator maps the box into its interior."""
+    d = middle.size
+    with np.errstate(all="ignore"):  # a singular matrix gives nan, which fails below
+        below, above = _ends(slope)
+        inverse = np.asarray(np.linalg.pinv(0.5 * (below + above) - np.eye(d)), dtype=np.float64)
+    c, one = _matrix(inverse, inverse), _ONE[d]
+    off = [
+        [Intervals.of(float(a), float(b)) - float(m)]
+        for a, b, m in zip(at.lo[0], at.hi[0], middle, strict=True)
+    ]
+    wide = [[Intervals.of(float(a), float(b)) - float(m)] for a, b, m in zip(lo, hi, middle, strict=True)]
+    less = [[slope[i][j] - one[i][j] for j in range(d)] for i in range(d)]
+    rest = [[one[i][j] - term for j, term in enumerate(row)] for i, row in enumerate(_times(c, less))]
+    newton, spread = _times(c, off), _times(rest, wide)
+    moved = [float(m) - a[0] + b[0] for m, a, b in zip(middle, newton, spread, strict=True)]
+    return all(low < k.lo[0] and k.hi[0] < high for k, low, high in zip(moved, lo, hi, strict=True))
+
+
+def _attracts(slope: Matrix) -> bool | None:
+    """Whether every eigenvalue lies in the unit disc: of a 2 x 2 matrix by |det| < 1 and |trace| < 1 + det (Jury)."""
+    if len(slope) == 1:
+        size = slope[0][0].absolute()
+        return True if size.hi[0] < 1.0 else (False if size.lo[0] > 1.0 else None)
+    (a, b), (c, d) = slope
+    det, trace = a * d - b * c, (a + d).absolute()
+    room = det + 1.0 - trace
+    if det.absolute().hi[0] < 1.0 and room.lo[0] > 0.0:
+        return True
+    return False if det.absolute().lo[0] > 1.0 or room.hi[0] < 0.0 else None
+
+
+def _prove(proof: ProofOfMap, cycle: Cycle) -> CycleOfMap | str:
+    """Prove that there is one orbit near one found in floats; or say what is missing."""
+    middle = np.atleast_1d(cycle.x[0]).astype(np.float64)
+    radius = FIRST * np.maximum(np.abs(middle), 1.0)
+    missing = "no box is found that Newton's operator contracts"
+    for _ in range(TRIES):
+        lo, hi = middle - radius, middle + radius
+        radius = radius * GROWTH
+        at, steps = _follow(proof, middle, middle, cycle), _follow(proof, lo, hi, cycle)
+        if isinstance(at, str) or isinstance(steps, str):
+            return at if isinstance(at, str) else str(steps)
+        slope = _slope(steps)
+        if not _contracts(lo, hi, middle, at[-1], slope):
+            continue
+        points = [(lo, hi), *((step.lo[0], step.hi[0]) for step in steps[:-1])]
+        if any(
+            _meet(points[0], points[k])
+            for k in range(1, cycle.period)
+            if cycle.period % k == 0 and cycle.side[k] == cycle.side[0]
+        ):
+            return "its period may be smaller"
+        if not _within(proof.cells, lo, hi, int(cycle.side[0])):
+            return "it is not in the attracting cells"
+        first, last = (np.stack(ends) for ends in zip(*points, strict=True))
+        return CycleOfMap(first, last, cycle.side, cycle.branches, *_ends(slope), _attracts(slope))
+    return missing
+
+
+def _meet(one: tuple[Floats, Floats], two: tuple[Floats, Floats]) -> bool:
+    return bool(((one[0] <= two[1]) & (two[0] <= one[1])).all())
+
+
+def _within(cells: CellSet, lo: Floats, hi: Floats, side: int) -> bool:
+    """Whether a box lies in the cells: one that is smaller than any cell, if all its corners do."""
+    least = np.array([np.diff(edges).min() for edges in cells.grid.edges[side]])
+    numbers = cells.grid.index(np.array(list(product(*zip(lo, hi, strict=True)))), side)
+    return bool((hi - lo < least).all() and (numbers >= 0).all() and cells.mask[numbers].all())
+
+
+def _cycles(proof: ProofOfMap) -> tuple[Claim, tuple[CycleOfMap, ...]]:
+    kind = kind_of(proof.map)
+    if (len(kind.branches) > 1 and not kind.has_margin) or kind.dimension > 2 or not has_slope(proof.map):
+        reason = "cycles need slopes, at most two dimensions, and `margin` where there are branches"
+        return Claim("cycles", "undecided", reason, {}, final=True), ()
+    found = cycles(proof.graph, UP_TO, proof.cells) if len(proof.cells) else ()
+    proved: list[CycleOfMap] = []
+    missing = []
+    for cycle in found:
+        answer = _prove(proof, cycle)
+        if isinstance(answer, CycleOfMap):
+            proved.append(answer)
+        else:
+            missing.append(f"period {cycle.period} through {np.atleast_1d(cycle.x[0])}: {answer}")
+    if not proved:
+        reason = missing[0] if missing else f"none is found of period up to {UP_TO} in attracting cells"
+        return Claim("cycles", "undecided", reason, {}), ()
+    return Claim(
+        "cycles", "proved", "", {"cycles": len(proved), "missing": missing, "complete": False}
+    ), tuple(proved)
+
+
+# ---------------------------------------------------------------- all together
+
+
+PROVERS = {
+    "attracts-all": _attracts_all,
+    "expanding": _expanding,
+    "invariant": _invariant,
+    "trapping": _trapping,
+}
+CLAIMS_OF_MAP = (*PROVERS, "cycles")
+"""What can be claimed of any map."""
+
+
+def certify_map(
+    map: Any,  # noqa: A002  # the field's word
+    grid: Grid,
+    claims: Sequence[str] | None = None,
+    *,
+    upper: Any = None,
+) -> ProofOfMap:
+    """Prove claims about the attracting cells of any map; called by `limitsets.certify`.
+
+    Parameters
+    ----------
+    map : NamedTuple
+        A map, or the lower corner of a box of its parameters.
+    grid : Grid
+        The cells; finer ones prove more.
+    claims : sequence of str, optional
+        Of `CLAIMS_OF_MAP`; default ("attracts-all",).
+    upper : NamedTuple, optional
+        The upper corner of the parameters; default `map`.
+
+    Returns
+    -------
+    ProofOfMap
+
+    Raises
+    ------
+    AnswerError
+        For a word that is no claim of a map, or a thread that does not round to nearest.
+    MapError
+        For a map whose images cannot be enclosed: the line names the function and the way out.
+    """
+    begin = time.perf_counter()
+    wanted = tuple(dict.fromkeys(claims or ("attracts-all",)))
+    for claim in wanted:
+        if claim not in CLAIMS_OF_MAP:
+            raise AnswerError("the claim about a map", claim, ", ".join(CLAIMS_OF_MAP), "correct the word")
+    guard()
+    lower = coerce(map)
+    upper = lower if upper is None else coerce(upper)
+    graph = transitions(lower, grid, "boxes", upper=upper)
+    component, _ = _components(graph)
+    proof = ProofOfMap(lower, upper, graph, component, (), (), 0.0)
+    found: tuple[CycleOfMap, ...] = ()
+    answers = []
+    for word in wanted:
+        if word == "cycles":
+            answer, found = _cycles(proof)
+        else:
+            answer = PROVERS[word](proof)
+        answers.append(answer)
+    return replace(proof, claims=tuple(answers), cycles=found, seconds=time.perf_counter() - begin)

@@ -1,0 +1,299 @@
+"""Maps with answers on paper that only tests use, registered from outside the package as a user's maps are."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import limitsets as ls
+import limitsets.interval as iv
+from limitsets.interval.arithmetic import Ends
+from limitsets.jit import proof_kernel
+from limitsets.maps import OUTSIDE
+from limitsets.maps.textbook.slots import NO_WITNESS, Line, Plane, Point, plane, plane_of_two
+
+
+class Contraction(NamedTuple):
+    """x' = slope x + offset, a contraction for abs(slope) < 1.
+
+    Known answer: the fixed point offset / (1 - slope) attracts everything; the Lyapunov exponent is
+    ln abs(slope).
+
+    Attributes
+    ----------
+    slope : float
+        Factor per step.
+    offset : float
+        Image of 0.
+    """
+
+    slope: float = 0.5
+    offset: float = 0.0
+
+
+def _contraction(params: Contraction, x: float, side: int) -> tuple[float, int, int]:
+    after = params.slope * x + params.offset
+    return after, side, 0 if abs(after) < math.inf else OUTSIDE
+
+
+def _contraction_on(params: Contraction, x: float, side: int, branch: int) -> tuple[float, int, float]:
+    return params.slope * x + params.offset, side, params.slope
+
+
+ls.register(Contraction, image=_contraction, image_on=_contraction_on)
+
+
+class Linear2(NamedTuple):
+    """(x, y)' = (xx x + xy y, yx x + yy y); by default the saddle diag(0.5, 2).
+
+    Known answers: the unstable set of the saddle is the y axis. For f = (x, y/2), that is
+    ``Linear2(1.0, 0.0, 0.0, 0.5)``, the relative attractor of [-1, 1]^2 is the x axis.
+
+    Attributes
+    ----------
+    xx, xy, yx, yy : float
+        Entries of the matrix, row by row.
+    """
+
+    xx: float = 0.5
+    xy: float = 0.0
+    yx: float = 0.0
+    yy: float = 2.0
+
+
+def _linear(params: Linear2, x: Point, side: int) -> tuple[Point, int, int]:
+    u = params.xx * x[0] + params.xy * x[1]
+    v = params.yx * x[0] + params.yy * x[1]
+    return (u, v), side, 0 if (abs(u) < math.inf) & (abs(v) < math.inf) else OUTSIDE
+
+
+def _linear_on(params: Linear2, x: Point, side: int, branch: int) -> tuple[Point, int, tuple[Point, Point]]:
+    u = params.xx * x[0] + params.xy * x[1]
+    v = params.yx * x[0] + params.yy * x[1]
+    return (u, v), side, ((params.xx, params.xy), (params.yx, params.yy))
+
+
+ls.register(Linear2, image=_linear, image_on=_linear_on, dimension=2)
+
+
+class Baker(NamedTuple):
+    """(x, y)' = (2 x, c y) for x < 1/2, else (2 x - 1, c y + 1 - c), on 0 <= x <= 1; c is the contraction.
+
+    Known answers: Lyapunov exponents ln 2 and ln c; for c = 1/2 areas are kept, and the invariant measure is
+    uniform.
+
+    Attributes
+    ----------
+    contraction : float
+        Factor across the dough, 0 < contraction <= 1/2.
+
+    Notes
+    -----
+    Doubles are multiples of a power of 2, so every x ends in 0, as for `limitsets.maps.Doubling`.
+    """
+
+    contraction: float = 0.5
+
+
+def _baker(params: Baker, x: Point, side: int) -> tuple[Point, int, int]:
+    right = x[0] >= 0.5
+    u = 2.0 * x[0] - 1.0 if right else 2.0 * x[0]
+    v = params.contraction * x[1]
+    v = v + (1.0 - params.contraction) if right else v
+    code = 1 if right else 0
+    return (u, v), side, code if (x[0] >= 0.0) & (x[0] <= 1.0) & (abs(v) < math.inf) else OUTSIDE
+
+
+def _baker_on(params: Baker, x: Point, side: int, branch: int) -> tuple[Point, int, tuple[Point, Point]]:
+    c = params.contraction
+    slope = ((2.0, 0.0), (0.0, c))
+    if branch == 1:
+        return (2.0 * x[0] - 1.0, c * x[1] + (1.0 - c)), side, slope
+    return (2.0 * x[0], c * x[1]), side, slope
+
+
+def _baker_box(params_lo: Baker, params_hi: Baker, lo: Point, hi: Point, side: int) -> Plane:
+    """Both branches at x = 1/2; products with 2 are exact, and the unit square is not left by rounding."""
+    c = (params_lo.contraction, params_hi.contraction)
+    dough = (lo[0] >= 0.0) & (hi[0] <= 1.0)
+    y = (lo[1], hi[1])
+    thin = iv.mul(c, y)
+    # c y + 1 - c = 1 - c (1 - y), with each number once
+    lifted = iv.sub((1.0, 1.0), iv.mul(c, iv.sub((1.0, 1.0), y)))
+    bottom = 0.0 if (c[0] >= 0.0) & (y[0] >= 0.0) else -math.inf
+    top = 1.0 if (c[0] >= 0.0) & (y[1] <= 1.0) else math.inf
+    left = (2.0 * lo[0], min(2.0 * hi[0], 1.0)), (max(thin[0], bottom), thin[1])
+    right = iv.sub((2.0 * lo[0], 2.0 * hi[0]), (1.0, 1.0))
+    moved = (max(right[0], 0.0), min(right[1], 1.0)), (lifted[0], min(lifted[1], top))
+    return plane_of_two(dough & (lo[0] <= 0.5), left, dough & (hi[0] >= 0.5), moved, side)
+
+
+ls.register(
+    Baker, image=_baker, image_on=_baker_on, image_box=_baker_box, dimension=2, branches=("left", "right")
+)
+
+
+class Product(NamedTuple):
+    """x_i' = x_i / (pole - x_i) in each of two coordinates, for x_i < pole.
+
+    Known answers for pole = 2 on [0, 1.2]^2: four fixed points, with slopes 1/2 at 0 and 2 at 1; the order of
+    the recurrent sets is the diamond (1, 1) -> (1, 0), (0, 1) -> (0, 0), and (0, 0) attracts.
+
+    Attributes
+    ----------
+    pole : float
+        Where the image is infinite; the second fixed point is at pole - 1.
+    """
+
+    pole: float = 2.0
+
+
+def _product(params: Product, x: Point, side: int) -> tuple[Point, int, int]:
+    u, v = x[0] / (params.pole - x[0]), x[1] / (params.pole - x[1])
+    inside = (x[0] < params.pole) & (x[1] < params.pole) & (abs(u) < math.inf) & (abs(v) < math.inf)
+    return (u, v), side, 0 if inside else OUTSIDE
+
+
+def _product_on(params: Product, x: Point, side: int, branch: int) -> tuple[Point, int, tuple[Point, Point]]:
+    left, below = params.pole - x[0], params.pole - x[1]
+    slope = ((params.pole / (left * left), 0.0), (0.0, params.pole / (below * below)))
+    return (x[0] / left, x[1] / below), side, slope
+
+
+@proof_kernel
+def _moebius(pole: Ends, lo: float, hi: float) -> Ends:
+    """Exact range of x / (pole - x) left of the pole: monotone in x; nan or infinite where it may be met."""
+    first = iv.div((lo, lo), iv.sub(pole, (lo, lo)))
+    last = iv.div((hi, hi), iv.sub(pole, (hi, hi)))
+    after = iv.hull(first, last)
+    left = iv.sub(pole, (hi, hi))[0] > 0.0
+    return (max(after[0], 0.0) if lo >= 0.0 else after[0]) if left else -math.inf, after[
+        1
+    ] if left else math.inf
+
+
+def _product_box(params_lo: Product, params_hi: Product, lo: Point, hi: Point, side: int) -> Plane:
+    pole = (params_lo.pole, params_hi.pole)
+    return plane((_moebius(pole, lo[0], hi[0]), _moebius(pole, lo[1], hi[1])), side, 0)
+
+
+ls.register(Product, image=_product, image_on=_product_on, image_box=_product_box, dimension=2)
+
+
+class TwoState(NamedTuple):
+    """(x, y)' = (r, r) for x >= 0, (-r, -r) for x < 0; for r < 1/2 the origin in both cases.
+
+    Known answers: for r = 1 on [-2, 2]^2 two attractors with half of the starts each; for r < 1/2 one.
+
+    Attributes
+    ----------
+    r : float
+        Where the two states lie.
+    """
+
+    r: float = 1.0
+
+
+def _two_state(params: TwoState, x: Point, side: int) -> tuple[Point, int, int]:
+    reach = params.r if params.r >= 0.5 else 0.0
+    after = reach if x[0] >= 0.0 else -reach
+    code = 1 if x[0] >= 0.0 else 0
+    return (after, after), side, code if (abs(x[0]) < math.inf) & (abs(x[1]) < math.inf) else OUTSIDE
+
+
+def _two_state_on(
+    params: TwoState, x: Point, side: int, branch: int
+) -> tuple[Point, int, tuple[Point, Point]]:
+    reach = params.r if params.r >= 0.5 else 0.0
+    after = reach if branch == 1 else -reach
+    return (after, after), side, ((0.0, 0.0), (0.0, 0.0))
+
+
+def _two_state_box(params_lo: TwoState, params_hi: TwoState, lo: Point, hi: Point, side: int) -> Plane:
+    """Both states on x = 0."""
+    r = (params_lo.r, params_hi.r)
+    # below 1/2 both states are the origin
+    reach = (r[0] if r[0] >= 0.5 else 0.0, r[1] if r[1] >= 0.5 else 0.0)
+    down = iv.neg(reach)
+    return plane_of_two(lo[0] <= 0.0, (down, down), hi[0] >= 0.0, (reach, reach), side)
+
+
+ls.register(
+    TwoState,
+    image=_two_state,
+    image_on=_two_state_on,
+    image_box=_two_state_box,
+    dimension=2,
+    branches=("down", "up"),
+)
+
+
+class ThreeState(NamedTuple):
+    """x' = -value for x < -edge, 0 for -edge <= x <= edge, value for x > edge.
+
+    Known answer: for value > edge three attractors, whose basins are the three intervals.
+
+    Attributes
+    ----------
+    value : float
+        Where the outer states lie.
+    edge : float
+        Where the basins end.
+    """
+
+    value: float = 2.0
+    edge: float = 1.0
+
+
+def _three_state(params: ThreeState, x: float, side: int) -> tuple[float, int, int]:
+    code = 1 if x >= -params.edge else 0
+    code = 2 if x > params.edge else code
+    after = params.value * (code - 1.0)
+    return after, side, code if abs(x) < math.inf else OUTSIDE
+
+
+def _three_state_on(params: ThreeState, x: float, side: int, branch: int) -> tuple[float, int, float]:
+    return params.value * (branch - 1.0), side, 0.0
+
+
+def _three_state_box(params_lo: ThreeState, params_hi: ThreeState, lo: float, hi: float, side: int) -> Line:
+    """Both values at an edge.  A box over both edges has the first slot from low to middle, the second up to high."""
+    v, edge = (params_lo.value, params_hi.value), (params_lo.edge, params_hi.edge)
+    low, high = lo <= -edge[0], hi >= edge[0]
+    middle = (hi >= -edge[1]) & (lo <= edge[1])
+    zero = (0.0, 0.0)
+    below, above = iv.neg(v), v
+    # Slot 0 holds the lowest value that is possible, slot 1 the highest; the middle is with either or alone.
+    first = below if low else (zero if middle else above)
+    last = above if high else (zero if middle else below)
+    first = iv.hull(first, zero) if low & middle & high else first
+    code_first = 0 if low else (1 if middle else 2)
+    code_last = 2 if high else (1 if middle else 0)
+    two = code_first != code_last
+    sound = (v[1] - v[0] < math.inf) & (abs(lo) < math.inf) & (abs(hi) < math.inf) & (low | middle | high)
+    count = 2 if two else 1
+    return (
+        count if sound else -1,
+        (first[0], first[1], side, code_first),
+        (last[0], last[1], side, code_last),
+        NO_WITNESS,
+    )
+
+
+ls.register(
+    ThreeState,
+    image=_three_state,
+    image_on=_three_state_on,
+    image_box=_three_state_box,
+    branches=("low", "middle", "high"),
+)
+
+
+DOMAINS: dict[type, tuple[tuple[float, float], ...]] = {
+    Contraction: ((-1.0, 1.0),),
+    Linear2: ((-1.0, 1.0), (-1.0, 1.0)),
+    Baker: ((0.0, 1.0), (0.0, 1.0)),
+    Product: ((0.0, 1.2), (0.0, 1.2)),
+    TwoState: ((-2.0, 2.0), (-2.0, 2.0)),
+    ThreeState: ((-3.0, 3.0),),
+}
