@@ -154,7 +154,8 @@ class Tolerance:
                 values["throw.kappa"] = scene.kappa / (1.0 + share) ** 2
             else:
                 value = scene.value(name)
-                values[name] = value + factor * sign * size.of(value)
+                # a share of a negative value is negative, here as in a proof
+                values[name] = value + factor * sign * (size.value * value if size.relative else size.value)
         try:
             return scene.with_values(values)
         except SceneError:
