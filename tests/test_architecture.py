@@ -50,7 +50,7 @@ def imported_names(source: Path) -> set[str]:
 @pytest.mark.parametrize("source", SOURCES, ids=lambda path: str(path.relative_to(PACKAGE)))
 def test_only_jit_imports_numba(source):
     numba = {"numba", "llvmlite"} & imported_names(source)
-    assert not numba or source == PACKAGE / "jit.py"
+    assert not numba or source.parent == PACKAGE / "jit"
 
 
 def test_the_checker_imports_nothing_of_ours():

@@ -14,8 +14,9 @@ from typing import Any, NamedTuple
 import numpy as np
 import pytest
 
-import limitsets.jit
-from limitsets.jit import generic, kernel, proof_kernel
+import limitsets
+from limitsets.jit import cache as jit_cache
+from limitsets.jit import compiling, generic, kernel, proof_kernel
 from limitsets.maps import drivers
 
 FUSED = re.compile(r"\bv?fn?m(?:add|sub|la|ls)\w*")
@@ -231,13 +232,12 @@ class Place:
         self.maps = self.copy / "limitsets" / "maps"
 
     def fill(self) -> None:
-        source = Path(limitsets.jit.__file__).parent
-        for room in ("interval", "maps"):  # the box kernels of the maps stand on the room below
+        source = Path(limitsets.__file__).parent
+        for room in ("jit", "interval", "maps"):  # the box kernels of the maps stand on the rooms below
             shutil.copytree(
                 source / room, self.maps.parent / room, ignore=shutil.ignore_patterns("__pycache__")
             )
-        for file in ("errors.py", "jit.py"):
-            shutil.copy(source / file, self.maps.parent / file)
+        shutil.copy(source / "errors.py", self.maps.parent / "errors.py")
         (self.maps.parent / "__init__.py").write_text("from limitsets.maps import register\n")
         (self.maps / "probe.py").write_text(PROBE)
         self.user.mkdir()
@@ -347,7 +347,7 @@ def test_each_signature_has_its_own_files_and_old_digests_go(place: Place) -> No
     newest = max((place.cache / "limitsets").iterdir(), key=lambda path: path.stat().st_mtime)
     assert len(list(newest.glob("*.nbi"))) == len(list(newest.glob("*.nbc"))) == 2
     kept = {path.name for path in (place.cache / "limitsets").iterdir()}
-    assert len(kept) == limitsets.jit.KEPT_DIGESTS
+    assert len(kept) == jit_cache.KEPT_DIGESTS
     assert "digest11" in kept
     assert "digest0" not in kept
 
@@ -433,10 +433,10 @@ def _calls_a_plain_one(params: Weight, x: float, y: float) -> float:
 def test_a_plain_helper_is_compiled_as_its_kernel_is() -> None:
     # As above: one rounding keeps what two lose.
     e = 2.0**-30
-    exact, estimate = (limitsets.jit._helper(_plain_sum, proof) for proof in (True, False))
+    exact, estimate = (compiling._helper(_plain_sum, proof) for proof in (True, False))
     assert exact is not estimate
-    assert limitsets.jit._helper(_plain_sum, True) is exact
-    assert limitsets.jit._compiled_helpers(_calls_a_plain_one, True) == {"_plain_sum": exact}
+    assert compiling._helper(_plain_sum, True) is exact
+    assert compiling._compiled_helpers(_calls_a_plain_one, True) == {"_plain_sum": exact}
     assert exact(1.0 + e, 1.0 - e, -1.0) == 0.0
     assert estimate(2.0, 3.0, 4.0) == 10.0
 
@@ -453,9 +453,9 @@ def test_only_entries_of_the_package_are_kept() -> None:
     compiled: list[Any] = [kernel(entry=True)(multiply_add), drivers.step, drivers._images]
     caches = [type(one._cache) for one in compiled]
     assert [cache.__name__ for cache in caches[:2]] == ["NullCache", "NullCache"]
-    if limitsets.jit._CACHE is not None:
-        assert caches[2] is limitsets.jit._CACHE
+    if jit_cache.CACHE is not None:
+        assert caches[2] is jit_cache.CACHE
 
 
 def test_numba_still_has_the_internals_the_cache_overrides() -> None:
-    assert limitsets.jit._source_cache(Path("anywhere")) is not None
+    assert jit_cache._source_cache(Path("anywhere")) is not None

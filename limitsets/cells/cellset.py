@@ -98,6 +98,20 @@ class CellSet:
         """Length, area or volume of the set."""
         return float(self.grid.measure[self.mask].sum())
 
+    def holds(self, x: ArrayLike, side: int) -> NDArray[np.bool_]:
+        """Whether the cell of each state (`Grid.index`) is in the set; x of shape (n,) or (n, dimension)."""
+        if self.grid.dimension > 1:
+            cell = self.grid.index(x, side)
+            return self.mask[cell] & (cell >= 0)
+        # The borders of the set are fewer than those of the cells.
+        states, edges = np.asarray(x, dtype=np.float64).ravel(), self.grid.edges[side][0]
+        met = self.mask[self.grid.of_side(side)].astype(np.int8)
+        border = edges[np.flatnonzero(np.diff(np.concatenate([[0], met, [0]])))]
+        inside: NDArray[np.bool_] = np.searchsorted(border, states, side="right") % 2 == 1
+        if met[-1]:
+            inside |= states == edges[-1]  # of the last cell, whose upper border is nobody else's
+        return inside
+
     def extents(self) -> dict[int, list[tuple[float, float]]]:
         """Per side the intervals that the cells make up; in more dimensions their ranges along the first axis.
 

@@ -26,7 +26,7 @@ class Boxes:
     second_pass: float
 
 
-@kernel(entry=True)
+@kernel(entry=True, counting=False)
 def _place_hulls(
     target: Target, side: Any, lo: Any, hi: Any, pad: int, first: Any, last: Any, exits: Any, met: Any
 ) -> None:

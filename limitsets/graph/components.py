@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from limitsets.graph import wide
-from limitsets.graph.ranges import Ranges, box_rows, row_start
+from limitsets.graph.ranges import ROWS, RUN, SIDE, START, Ranges, box_rows, boxes_of, row_start
 from limitsets.jit import kernel
 
 __all__ = ["Components", "descend", "ranks", "reach", "strong_components"]
@@ -47,7 +47,7 @@ class Components:
         return int(self.size.size)
 
 
-@kernel(entry=True)
+@kernel(entry=True, counting=False)
 def _strong(
     r: Ranges, rank: Any, label: Any, order: Any, path: Any, boxes: Any, rows: Any, waiting: Any, loops: Any
 ) -> Any:
@@ -62,7 +62,7 @@ def _strong(
         if rank[root] != 0:
             continue
         depth = 0
-        path[0], boxes[0], rows[0] = root, r.first[root], 0
+        path[0], boxes[0], rows[0] = root, boxes_of(r, root)[0], 0
         rank[root] = clock
         label[root] = clock  # its own number, to see later whether it reached an older one
         clock += 1
@@ -72,11 +72,13 @@ def _strong(
             child = -1
             box: Any = np.int64(boxes[depth])
             row: Any = np.int64(rows[depth])
-            last = r.first[cell + 1]
+            _, last = boxes_of(r, cell)
             while box < last and child < 0:
-                count, run = box_rows(r, box), np.int64(r.run[box])
+                count, run = box_rows(r, box), np.int64(r.box[box, RUN])
+                start, stride = np.int64(r.box[box, START]), r.row_stride[r.box[box, SIDE]]
+                flat = np.int64(r.box[box, ROWS])
                 while row < count:
-                    begin = row_start(r, box, row)
+                    begin = start + row * stride if row < flat else row_start(r, box, row)
                     if begin <= cell < begin + run:
                         loops[cell] = True
                     for target in range(begin, begin + run):
@@ -95,7 +97,7 @@ def _strong(
             if child >= 0:
                 boxes[depth], rows[depth] = box, row
                 depth += 1
-                path[depth], boxes[depth], rows[depth] = child, r.first[child], 0
+                path[depth], boxes[depth], rows[depth] = child, boxes_of(r, child)[0], 0
                 rank[child] = clock
                 label[child] = clock
                 clock += 1
@@ -122,37 +124,38 @@ def _strong(
     return n - closed
 
 
-@kernel(entry=True)
-def _reach(r: Ranges, label: Any, order: Any, marks: Any) -> None:
+@kernel(entry=True, counting=False)
+def _reach(r: Ranges, size: Any, order: Any, marks: Any) -> None:
     i = 0
-    while i < order.size:
-        c, j, found = label[order[i]], i, marks[order[i]]
-        while j < order.size and label[order[j]] == c:
-            cell = order[j]
+    for c in range(size.size):
+        j, found = i + size[c], marks[order[i]]
+        for k in range(i, j):
+            cell = order[k]
             found |= marks[cell]
-            for box in range(r.first[cell], r.first[cell + 1]):
-                run = np.int64(r.run[box])
+            begin_box, end_box = boxes_of(r, cell)
+            for box in range(begin_box, end_box):
+                run = np.int64(r.box[box, RUN])
                 for row in range(box_rows(r, box)):
                     begin = row_start(r, box, row)
                     for target in range(begin, begin + run):
                         found |= marks[target]
-            j += 1
         for k in range(i, j):
             marks[order[k]] = found
         i = j
 
 
-@kernel(entry=True)
+@kernel(entry=True, counting=False)
 def _ranks(r: Ranges, label: Any, order: Any, settled: Any, rank: Any) -> None:
     i = 0
     while i < order.size:
         c, j, highest = label[order[i]], i, -1
         while j < order.size and label[order[j]] == c:
             cell = order[j]
-            for box in range(r.first[cell], r.first[cell + 1]):
+            begin_box, end_box = boxes_of(r, cell)
+            for box in range(begin_box, end_box):
                 for row in range(box_rows(r, box)):
                     begin = row_start(r, box, row)
-                    for target in range(begin, begin + r.run[box]):
+                    for target in range(begin, begin + r.box[box, RUN]):
                         if label[target] != c:
                             highest = max(highest, rank[target])
             j += 1
@@ -161,15 +164,16 @@ def _ranks(r: Ranges, label: Any, order: Any, settled: Any, rank: Any) -> None:
         i = j
 
 
-@kernel(entry=True)
+@kernel(entry=True, counting=False)
 def _descend(r: Ranges, seen: Any, stack: Any, held: int) -> None:
     while held > 0:
         held -= 1
         cell = stack[held]
-        for box in range(r.first[cell], r.first[cell + 1]):
+        begin_box, end_box = boxes_of(r, cell)
+        for box in range(begin_box, end_box):
             for row in range(box_rows(r, box)):
                 begin = row_start(r, box, row)
-                for target in range(begin, begin + r.run[box]):
+                for target in range(begin, begin + r.box[box, RUN]):
                     if not seen[target]:
                         seen[target] = True
                         stack[held] = target
@@ -184,7 +188,7 @@ def strong_components(r: Ranges) -> Components:
     n = r.first.size - 1
     label, order = np.empty(n, np.int32), np.empty(n, np.int32)
     path, waiting, rows = np.empty(n, np.int32), np.empty(n, np.int32), np.empty(n, np.int32)
-    boxes = np.empty(n, np.int64 if r.start.size >= 2**31 else np.int32)
+    boxes = np.empty(n, np.int64 if len(r.box) >= 2**31 else np.int32)
     loops = np.zeros(n, dtype=np.bool_)
     count = _strong(r, np.zeros(n, np.int32), label, order, path, boxes, rows, waiting, loops)
     return _components(label, order, loops, count)
@@ -219,7 +223,7 @@ def reach(r: Ranges, components: Components, marks: NDArray[Any]) -> NDArray[Any
     if wide.is_wide(r):
         return wide.reach(r, components.label, components.order, marks)
     spread = marks.copy()
-    _reach(r, components.label, components.order, spread)
+    _reach(r, components.size, components.order, spread)
     return spread
 
 

@@ -115,11 +115,10 @@ class TransitionGraph:
             return np.array([node])
         r = self.ranges
         parts = []
-        for box in range(int(r.first[node]), int(r.first[node + 1])):
-            rows = np.arange(r.rows[box], dtype=np.int64) * r.row_stride[r.side[box]]
-            planes = np.arange(r.planes[box], dtype=np.int64) * r.plane_stride[r.side[box]]
-            corner = int(r.start[box]) + np.add.outer(planes, rows)
-            parts.append(np.add.outer(corner, np.arange(r.run[box])).ravel())
+        for start, run, rows, planes, side in r.box[r.first[node] : r.first[node + 1]].tolist():
+            in_plane = np.arange(rows) * r.row_stride[side]
+            corner = start + np.add.outer(np.arange(planes) * r.plane_stride[side], in_plane)
+            parts.append(np.add.outer(corner, np.arange(run)).ravel())
         sinks = [self.n_cells + e for e in range(len(self.exits)) if r.exits[node] >> e & 1]
         return np.unique(np.concatenate([*parts, np.array(sinks, dtype=np.int64)]))
 

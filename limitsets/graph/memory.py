@@ -14,6 +14,9 @@ __all__ = ["require_memory"]
 BYTES = {"random": (41, 96, 136), "boxes": (125, 151, 197)}
 BYTES_SAMPLED = (104, 95, 155)
 
+# Below this the system is not asked, which takes longer than a small graph.
+SMALL = 64 * 2**20
+
 # cgroup versions 2 and 1: limit, and what is in use.
 LIMITS = (
     ("/sys/fs/cgroup/memory.max", "/sys/fs/cgroup/memory.current"),
@@ -43,7 +46,10 @@ def _free_bytes() -> int | None:
 def require_memory(grid: Grid, method: str, samples: int) -> None:
     """Refuse a grid whose graph takes more memory than there is."""
     per_cell = BYTES.get(method, BYTES_SAMPLED)[grid.dimension - 1] * (samples if method == "random" else 1)
-    wanted, free = per_cell * grid.n_cells, _free_bytes()
+    wanted = per_cell * grid.n_cells
+    if wanted <= SMALL:
+        return
+    free = _free_bytes()
     if free is None or wanted <= free:
         return
     share = (free / wanted) ** (1.0 / grid.dimension)

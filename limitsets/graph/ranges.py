@@ -3,6 +3,9 @@
 A box is a block of cells of one side, kept as the number of its first cell, the length of its runs of consecutive
 cells and the numbers of such runs (rows, and planes of rows in three dimensions).  Cell k's boxes are
 ``first[k]:first[k + 1]``.  Edges are never written out: a box of a thousand cells costs as much as one of four.
+
+The five numbers of a box stand side by side: an algorithm that jumps from cell to cell then waits for memory once a
+box, not five times (components of a million cells of the Leslie map: 29 ms against 42).
 """
 
 from __future__ import annotations
@@ -15,7 +18,24 @@ from numpy.typing import NDArray
 from limitsets.cells import Grid
 from limitsets.jit import kernel
 
-__all__ = ["Ranges", "box_rows", "build", "count_edges", "expand", "row_start"]
+__all__ = [
+    "PLANES",
+    "ROWS",
+    "RUN",
+    "SIDE",
+    "START",
+    "Ranges",
+    "box_rows",
+    "boxes_of",
+    "build",
+    "count_edges",
+    "expand",
+    "one_run",
+    "row_start",
+]
+
+# Columns of `Ranges.box`.
+START, RUN, ROWS, PLANES, SIDE = range(5)
 
 
 class Ranges(NamedTuple):
@@ -25,10 +45,10 @@ class Ranges(NamedTuple):
     ----------
     first : ndarray of int64, shape (n_cells + 1,)
         Where each cell's boxes begin.
-    start, run, rows, planes : ndarray of int32, shape (n_boxes,)
-        First cell, cells per run, runs per plane, planes.
-    side : ndarray of int32, shape (n_boxes,)
-        Side the box lies on.
+    box : ndarray of int32, shape (n_boxes, 5)
+        First cell, cells per run, runs per plane, planes, side the box lies on.
+    single : bool
+        Each cell has one box, and its number: to look it up would cost a third of the time of the components.
     row_stride, plane_stride : ndarray of int64, shape (n_sides,)
         Steps in cell number from run to run and from plane to plane.
     exits : ndarray of uint8, shape (n_cells,)
@@ -36,11 +56,8 @@ class Ranges(NamedTuple):
     """
 
     first: NDArray[np.int64]
-    start: NDArray[np.int32]
-    run: NDArray[np.int32]
-    rows: NDArray[np.int32]
-    planes: NDArray[np.int32]
-    side: NDArray[np.int32]
+    box: NDArray[np.int32]
+    single: bool
     row_stride: NDArray[np.int64]
     plane_stride: NDArray[np.int64]
     exits: NDArray[np.uint8]
@@ -55,62 +72,77 @@ def build(
     exits: NDArray[np.uint8],
 ) -> Ranges:
     """Make ranges of boxes given by their first and last position along each axis, shape (n_boxes, dimension)."""
-    shape, dimension = grid.shape, grid.dimension
-    row_stride = shape[:, -1].copy()
-    plane_stride = shape[:, -2:].prod(axis=1)
-    start = lo[:, 0].astype(np.int64)
-    for axis in range(1, dimension):
-        start *= shape[side, axis] if grid.sides > 1 else shape[0, axis]
-        start += lo[:, axis]
-    if grid.sides > 1:
-        start += grid.offset[side]
-    extent = hi - lo + 1
-    one = np.ones(len(side), dtype=np.int32)
-    return Ranges(
-        first,
-        start.astype(np.int32),
-        np.ascontiguousarray(extent[:, -1]),
-        np.ascontiguousarray(extent[:, -2]) if dimension > 1 else one,
-        np.ascontiguousarray(extent[:, -3]) if dimension > 2 else one,
-        side,
-        row_stride,
-        plane_stride,
-        exits,
-    )
+    shape = grid.shape
+    box = np.empty((len(side), 5), dtype=np.int32)
+    _build(shape, grid.offset, side, lo, hi, box)
+    single = len(box) == first.size - 1 and bool((np.diff(first) == 1).all())
+    return Ranges(first, box, single, shape[:, -1].copy(), shape[:, -2:].prod(axis=1), exits)
 
 
-@kernel
+@kernel(entry=True, counting=False)
+def _build(shape: Any, offset: Any, side: Any, lo: Any, hi: Any, box: Any) -> None:
+    dimension = shape.shape[1]
+    for k in range(side.size):
+        start = np.int64(lo[k, 0])
+        for axis in range(1, dimension):
+            start = start * shape[side[k], axis] + lo[k, axis]
+        box[k, START] = start + offset[side[k]]
+        for column in range(RUN, SIDE):
+            axis = dimension - column
+            box[k, column] = hi[k, axis] - lo[k, axis] + 1 if axis >= 0 else 1
+        box[k, SIDE] = side[k]
+
+
+def one_run(side: NDArray[Any], start: NDArray[Any], run: NDArray[Any]) -> NDArray[np.int32]:
+    """Return the column `Ranges.box` of boxes of one run each."""
+    one = np.ones_like(start)
+    return np.stack([start, run, one, one, side], axis=1).astype(np.int32)
+
+
+@kernel(counting=False)
+def boxes_of(r: Ranges, cell: Any) -> tuple[Any, Any]:
+    """Return the number of a cell's first box, and of the first that is not its own."""
+    if r.single:
+        return np.int64(cell), np.int64(cell) + 1
+    return r.first[cell], r.first[cell + 1]
+
+
+@kernel(counting=False)
 def box_rows(r: Ranges, box: Any) -> Any:
     """Count the runs of a box."""
-    return np.int64(r.rows[box]) * np.int64(r.planes[box])
+    return np.int64(r.box[box, ROWS]) * np.int64(r.box[box, PLANES])
 
 
-@kernel
+@kernel(counting=False)
 def row_start(r: Ranges, box: Any, row: Any) -> Any:
     """First cell of a run."""
-    rows = np.int64(r.rows[box])
+    start, rows, side = np.int64(r.box[box, START]), np.int64(r.box[box, ROWS]), r.box[box, SIDE]
     if row < rows:
-        return r.start[box] + row * r.row_stride[r.side[box]]
-    return (
-        r.start[box] + (row % rows) * r.row_stride[r.side[box]] + (row // rows) * r.plane_stride[r.side[box]]
-    )
+        return start + row * r.row_stride[side]
+    return start + (row % rows) * r.row_stride[side] + (row // rows) * r.plane_stride[side]
 
 
-@kernel(entry=True)
+@kernel(entry=True, counting=False)
 def _expand(r: Ranges, pointer: Any, targets: Any) -> None:
     for cell in range(r.first.size - 1):
         at = pointer[cell]
-        for box in range(r.first[cell], r.first[cell + 1]):
+        begin_box, end_box = boxes_of(r, cell)
+        for box in range(begin_box, end_box):
             for row in range(box_rows(r, box)):
                 begin = row_start(r, box, row)
-                for target in range(begin, begin + r.run[box]):
+                for target in range(begin, begin + r.box[box, RUN]):
                     targets[at] = target
                     at += 1
 
 
+def _sizes(r: Ranges) -> NDArray[np.int64]:
+    """Cells per box."""
+    return r.box[:, RUN].astype(np.int64) * r.box[:, ROWS] * r.box[:, PLANES]
+
+
 def expand(r: Ranges) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Write every edge between cells out: ``(pointer, targets)`` as in a CSR matrix, ascending, none twice."""
-    sizes = r.run.astype(np.int64) * r.rows * r.planes
+    sizes = _sizes(r)
     filled = np.concatenate([[0], np.cumsum(sizes)])
     pointer = filled[r.first]
     targets = np.empty(int(pointer[-1]), dtype=np.int64)
@@ -128,7 +160,7 @@ def expand(r: Ranges) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
 
 def count_edges(r: Ranges) -> int:
     """Count the edges between cells, those that two boxes of a cell share once."""
-    sizes = r.run.astype(np.int64) * r.rows * r.planes
+    sizes = _sizes(r)
     several = np.flatnonzero(np.diff(r.first) > 1)
     total = int(sizes.sum())
     for cell in several.tolist():
@@ -139,10 +171,10 @@ def count_edges(r: Ranges) -> int:
 
 def _cells_of(r: Ranges, boxes: slice) -> set[int]:
     found: set[int] = set()
-    for box in range(boxes.start, boxes.stop):
-        stride, plane = int(r.row_stride[r.side[box]]), int(r.plane_stride[r.side[box]])
-        for p in range(int(r.planes[box])):
-            for row in range(int(r.rows[box])):
-                begin = int(r.start[box]) + row * stride + p * plane
-                found.update(range(begin, begin + int(r.run[box])))
+    for start, run, rows, planes, side in r.box[boxes].tolist():
+        stride, plane = int(r.row_stride[side]), int(r.plane_stride[side])
+        for p in range(planes):
+            for row in range(rows):
+                begin = start + row * stride + p * plane
+                found.update(range(begin, begin + run))
     return found

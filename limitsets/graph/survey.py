@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from limitsets.graph import wide
 from limitsets.graph.components import Components, reach
-from limitsets.graph.ranges import Ranges, box_rows, row_start
+from limitsets.graph.ranges import RUN, Ranges, box_rows, boxes_of, row_start
 from limitsets.jit import kernel
 from limitsets.maps import codes
 
@@ -45,16 +45,17 @@ class Survey:
     destination: NDArray[np.int32]
 
 
-@kernel(entry=True)
+@kernel(entry=True, counting=False)
 def _leaves(r: Ranges, label: Any, cells: Any) -> bool:
     """Whether an edge leads out of the component that the given cells make up."""
     for cell in cells:
         if r.exits[cell]:
             return True
-        for box in range(r.first[cell], r.first[cell + 1]):
+        begin_box, end_box = boxes_of(r, cell)
+        for box in range(begin_box, end_box):
             for row in range(box_rows(r, box)):
                 begin = row_start(r, box, row)
-                for target in range(begin, begin + r.run[box]):
+                for target in range(begin, begin + r.box[box, RUN]):
                     if label[target] != label[cell]:
                         return True
     return False

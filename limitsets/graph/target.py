@@ -50,19 +50,18 @@ class Target(NamedTuple):
         )
 
 
-@kernel
+@kernel(counting=False)
 def holding(target: Target, side: Any, axis: Any, x: Any, hint: Any) -> Any:
-    """Position of a cell that holds x, 0 or the last one where x lies outside.
+    """Position of a cell that holds x, 0 or the last one where x lies outside; on a uniform axis to rounding.
 
-    Bisection between bounds that are found in steps of doubling size from the hint: images of neighbouring cells are
-    neighbours, so the hint is nearly always right.
+    On a graded axis by bisection between bounds that are found in steps of doubling size from the hint: images of
+    neighbouring cells are neighbours, so the hint is nearly always right.
     """
     begin, n = target.begin[side, axis], target.cells[side, axis]
     rate = target.per_length[side, axis]
-    k: Any = np.int64(hint)
     if rate > 0.0:
-        k = np.int64(min(max((x - target.edges[begin]) * rate, 0.0), n - 1.0))
-    k = min(max(k, 0), n - 1)
+        return np.int64(min(max((x - target.edges[begin]) * rate, 0.0), n - 1.0))
+    k: Any = min(max(np.int64(hint), 0), n - 1)
     low, high, stride = k, k, 1
     while low > 0 and target.edges[begin + low] > x:
         low, stride = max(low - stride, 0), 2 * stride
@@ -78,7 +77,7 @@ def holding(target: Target, side: Any, axis: Any, x: Any, hint: Any) -> Any:
     return low
 
 
-@kernel
+@kernel(counting=False)
 def place(
     target: Target, side: Any, axis: Any, lo: Any, hi: Any, pad: int, hint: Any
 ) -> tuple[Any, Any, Any]:

@@ -86,5 +86,6 @@ def transitions(map: Any, grid: Grid, method: str | None = None, **options: Any)
         first = np.arange(grid.n_cells + 1)
     else:
         first = np.concatenate([[0], np.cumsum(np.bincount(cell, minlength=grid.n_cells))])
-    share = float(np.average([part.second_pass for part in parts], weights=grid.shape.prod(axis=1)))
+    weights = grid.shape.prod(axis=1)
+    share = float((np.array([part.second_pass for part in parts]) * weights).sum() / weights.sum())
     return TransitionGraph(map, grid, build(grid, first, side, lo, hi, exits), chosen, share)

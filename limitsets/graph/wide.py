@@ -6,6 +6,11 @@ are 2 v and 2 v + 1, the cells are the leaves.  A range of cells is at most 2 lo
 points to those, and an inner node points to its two children: paths between cells are the same as before.  The
 strong components of that graph are those of the cells (with some inner nodes among them), and a fold over the tree
 (or, largest) answers for a whole range at once.
+
+Why `components` has a walk beside it: a tree taught rows of ranges gave the same components of the Leslie map in 1.46
+times the time at 65 536 cells (3.2 ms against 2.2) and 1.16 times at a million, where both wait for memory, and the
+same reach in 1.0.  Its runs of four cells are as many nodes of the tree as cells, and the tree has twice as many
+entries.
 """
 
 from __future__ import annotations
@@ -15,7 +20,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from limitsets.graph.ranges import Ranges
+from limitsets.graph.ranges import PLANES, ROWS, RUN, START, Ranges, boxes_of
 from limitsets.jit import kernel
 
 __all__ = ["descend", "is_wide", "leaves", "ranks", "reach", "strong"]
@@ -26,8 +31,8 @@ WIDE = 48
 
 def is_wide(r: Ranges) -> bool:
     """Whether the images are runs of cells (one dimension), and wide enough for the tree."""
-    flat = bool((r.rows == 1).all() and (r.planes == 1).all())
-    return flat and r.run.size > 0 and float(r.run.mean()) > WIDE
+    flat = bool((r.box[:, ROWS : PLANES + 1] == 1).all())
+    return flat and len(r.box) > 0 and float(r.box[:, RUN].mean()) > WIDE
 
 
 def leaves_of(n: int) -> int:
@@ -35,7 +40,7 @@ def leaves_of(n: int) -> int:
     return 1 << max(int(n - 1).bit_length(), 0)
 
 
-@kernel(entry=True)
+@kernel(entry=True, counting=False)
 def _strong(
     r: Ranges,
     leaf: int,
@@ -60,7 +65,7 @@ def _strong(
             continue
         depth = 0
         path[0] = root
-        at[0, 0], at[0, 1], at[0, 2] = r.first[root - leaf], 0, 0
+        at[0, 0], at[0, 1], at[0, 2] = boxes_of(r, root - leaf)[0], 0, 0
         rank[root] = own[root] = clock
         clock += 1
         while depth >= 0:
@@ -84,15 +89,15 @@ def _strong(
             else:
                 cell = node - leaf
                 box, left, right = np.int64(at[depth, 0]), np.int64(at[depth, 1]), np.int64(at[depth, 2])
-                last = r.first[cell + 1]
+                _, last = boxes_of(r, cell)
                 while child < 0:
                     if left >= right:  # the next box
                         if box >= last:
                             break
-                        begin = np.int64(r.start[box])
-                        if begin <= cell < begin + r.run[box]:
+                        begin = np.int64(r.box[box, START])
+                        if begin <= cell < begin + r.box[box, RUN]:
                             loops[cell] = True
-                        left, right = leaf + begin, leaf + begin + np.int64(r.run[box])
+                        left, right = leaf + begin, leaf + begin + np.int64(r.box[box, RUN])
                         box += 1
                         continue
                     # nodes of the cover on this level, each looked at before the level is left
@@ -117,7 +122,7 @@ def _strong(
             if child >= 0:
                 depth += 1
                 path[depth] = child
-                at[depth, 0] = r.first[child - leaf] if child >= leaf else 0
+                at[depth, 0] = boxes_of(r, child - leaf)[0] if child >= leaf else 0
                 at[depth, 1], at[depth, 2] = 0, 0
                 rank[child] = own[child] = clock
                 clock += 1
@@ -162,7 +167,7 @@ def strong(r: Ranges) -> tuple[NDArray[np.int32], NDArray[np.int32], NDArray[np.
     return label, order, loops, count
 
 
-@kernel
+@kernel(counting=False)
 def any_bits(tree: Any, leaf: int, begin: Any, end: Any) -> Any:
     """Bits of all cells from `begin` up to before `end`."""
     left, right = leaf + begin, leaf + end
@@ -179,7 +184,7 @@ def any_bits(tree: Any, leaf: int, begin: Any, end: Any) -> Any:
     return found
 
 
-@kernel(entry=True)
+@kernel(entry=True, counting=False)
 def _reach(r: Ranges, leaf: int, label: Any, order: Any, tree: Any) -> None:
     for node in range(leaf - 1, 0, -1):
         tree[node] = tree[2 * node] | tree[2 * node + 1]
@@ -189,9 +194,10 @@ def _reach(r: Ranges, leaf: int, label: Any, order: Any, tree: Any) -> None:
         while j < order.size and label[order[j]] == c:
             cell = order[j]
             found |= tree[leaf + cell]
-            for box in range(r.first[cell], r.first[cell + 1]):
-                begin = np.int64(r.start[box])
-                found |= any_bits(tree, leaf, begin, begin + np.int64(r.run[box]))
+            begin_box, end_box = boxes_of(r, cell)
+            for box in range(begin_box, end_box):
+                begin = np.int64(r.box[box, START])
+                found |= any_bits(tree, leaf, begin, begin + np.int64(r.box[box, RUN]))
             j += 1
         for k in range(i, j):
             at: Any = leaf + np.int64(order[k])
@@ -211,7 +217,7 @@ def reach(r: Ranges, label: NDArray[np.int32], order: NDArray[np.int32], marks: 
     return tree[leaf : leaf + n].copy()
 
 
-@kernel(entry=True)
+@kernel(entry=True, counting=False)
 def _ranks(r: Ranges, leaf: int, label: Any, order: Any, settled: Any, tree: Any) -> None:
     """Fill the leaves of `tree`, whose nodes have the highest rank below them; -1 where none is known yet."""
     i = 0
@@ -219,9 +225,10 @@ def _ranks(r: Ranges, leaf: int, label: Any, order: Any, settled: Any, tree: Any
         c, j, highest = label[order[i]], i, np.int32(-1)
         while j < order.size and label[order[j]] == c:  # own cells are not known yet, and count for nothing
             cell = order[j]
-            for box in range(r.first[cell], r.first[cell + 1]):
-                left = leaf + np.int64(r.start[box])
-                right = left + np.int64(r.run[box])
+            begin_box, end_box = boxes_of(r, cell)
+            for box in range(begin_box, end_box):
+                left = leaf + np.int64(r.box[box, START])
+                right = left + np.int64(r.box[box, RUN])
                 while left < right:
                     if left & 1:
                         highest = max(highest, tree[left])
@@ -252,15 +259,16 @@ def ranks(
     return tree[leaf : leaf + n].copy()
 
 
-@kernel(entry=True)
+@kernel(entry=True, counting=False)
 def _descend(r: Ranges, following: Any, seen: Any, stack: Any, held: int) -> None:
     """Each cell is visited once: `following` leads to the next cell not yet seen, with paths halved on the way."""
     while held > 0:
         held -= 1
         cell = stack[held]
-        for box in range(r.first[cell], r.first[cell + 1]):
-            at = np.int64(r.start[box])
-            end = at + np.int64(r.run[box])
+        begin_box, end_box = boxes_of(r, cell)
+        for box in range(begin_box, end_box):
+            at = np.int64(r.box[box, START])
+            end = at + np.int64(r.box[box, RUN])
             while True:
                 while following[at] != at:
                     following[at] = following[following[at]]
@@ -282,20 +290,21 @@ def descend(r: Ranges, cells: NDArray[np.int64]) -> NDArray[np.bool_]:
     return seen
 
 
-@kernel(entry=True)
+@kernel(entry=True, counting=False)
 def _leaves(r: Ranges, leaf: int, cells: Any, tree: Any) -> bool:
     """Whether an image of the given cells meets one that is not among them (`tree` marks those)."""
     for cell in cells:
         if r.exits[cell]:
             return True
-        for box in range(r.first[cell], r.first[cell + 1]):
-            begin = np.int64(r.start[box])
-            if any_bits(tree, leaf, begin, begin + np.int64(r.run[box])):
+        begin_box, end_box = boxes_of(r, cell)
+        for box in range(begin_box, end_box):
+            begin = np.int64(r.box[box, START])
+            if any_bits(tree, leaf, begin, begin + np.int64(r.box[box, RUN])):
                 return True
     return False
 
 
-@kernel(entry=True)
+@kernel(entry=True, counting=False)
 def _fold(leaf: int, tree: Any) -> None:
     for node in range(leaf - 1, 0, -1):
         tree[node] = tree[2 * node] | tree[2 * node + 1]

@@ -5,8 +5,8 @@ written once, here and in the rooms above, and know maps only through these func
 
 ======================================  =============================================================================
 ``image(params, x, side)``              ``(x', side', code)``: one step (required)
-``image_on(params, x, side, branch)``   ``(x', side', slope)``: one step on a forced branch, for one-sided limits,
-                                        slopes and Newton's method
+``image_on(params, x, side, branch)``   ``(x', side', slope)``, or ``(x', side')``: one step on a forced branch, for
+                                        one-sided limits, slopes and Newton's method
 ``image_box(lo, hi, x_lo, x_hi, side)`` ``(count, slot, slot, witness)``: one or two boxes, each ``(lo', hi', side',
                                         branch)``, that hold the image of a box of states for all parameters between
                                         two; count -1 where nothing could be proved
@@ -21,9 +21,12 @@ written once, here and in the rooms above, and know maps only through these func
                                         they differ at every step; asked by orbits, not by the images of cells
 ======================================  =============================================================================
 
-`image_box` is written with `limitsets.interval`.  A cell counts as one of which nothing is proved where its image is
-nan or unbounded, and where a function was asked beyond where it is defined (the contract of that room), whatever count
-the kernel gives.
+Without an `image_box` boxes are derived (`limitsets.maps.derived`): of a map of one branch from `image_on` or `image`,
+of a map of two from `image_on` and `margin`.  `image_on` may leave the slope out, which is derived then.  A box by
+hand, written with `limitsets.interval`, pays where a tighter one is known, or where an image ends on the border of the
+domain, which no rounding may pass.  A cell counts as one of which nothing is proved where its image is nan or
+unbounded, and where a function was asked beyond where it is defined (the contract of that room), whatever count the
+kernel gives.
 
 In two and three dimensions x is a tuple and the slope a tuple of rows.
 """

@@ -268,13 +268,23 @@ def orbit(params: Any, x: Any, side: int, count: int) -> Orbit:
     start = start_of(params, x, side)
     if count < 0:
         raise MapError("the number of steps", count, "an integer from 0", "pass count=100")
-    kind = kind_of(params)
+    xs, sides, code = empty_orbit(start, side, count)
+    return as_orbit(params, xs, sides, code, _orbit(params, 0, xs, sides, code))
+
+
+def empty_orbit(start: tuple[float, ...], side: int, count: int) -> tuple[Any, Any, Any]:
+    """Arrays for an orbit of `count` steps, the first state in its place: states, sides, codes."""
     xs = tuple(np.empty(count + 1) for _ in start)
     for values, value in zip(xs, start, strict=True):
         values[0] = value
-    sides, code = np.empty(count + 1, np.int64), np.empty(count, np.int64)
+    sides = np.empty(count + 1, np.int64)
     sides[0] = side
-    made = _orbit(params, 0, xs, sides, code)
+    return xs, sides, np.empty(count, np.int64)
+
+
+def as_orbit(params: Any, xs: Any, sides: Any, code: Any, made: int) -> Orbit:
+    """Cut an orbit off where it left or stalled, and say why."""
+    kind = kind_of(params)
     require_codes(params, code[:made])
     stopped = None
     if made and code[made - 1] < 0:

@@ -11,10 +11,10 @@ import numpy as np
 from limitsets.errors import MapError
 from limitsets.jit import generic, kernel
 from limitsets.maps.contract import has_slope, kind_of
-from limitsets.maps.drivers import start_of, step
-from limitsets.maps.kernels import image_on, pick
+from limitsets.maps.drivers import Orbit, as_orbit, empty_orbit, start_of, step
+from limitsets.maps.kernels import image_on, pick, put
 
-__all__ = ["Lyapunov", "lyapunov"]
+__all__ = ["Lyapunov", "lyapunov", "orbit_with_exponent"]
 
 # The tangent vector is scaled back only when its size leaves this range: with a root, a logarithm and a division at
 # every step the Henon map took 39 ns a step, not 4.
@@ -49,28 +49,41 @@ for _n, _method in ((1, _carry1), (2, _carry2), (3, _carry3)):
     carry.on(_n, _method)
 
 
+# Steps recorded at a time, where the orbit is not asked for.
+CHUNK = 16_384
+
+
 @kernel(entry=True)
-def _growth(params: Any, xs: Any, tangents: Any, side: int, skip: int, count: int) -> tuple[float, int, int]:
-    """Logarithm of the tangent vector's growth after `skip` steps, over how many steps, and the last code."""
-    x, tangent, code = pick(xs, 0), pick(tangents, 0), 0
-    total, size, scale, made = 0.0, 1.0, 1.0, 0
-    for k in range(skip + count):
-        if k == skip:
-            total = -math.log(size)
+def _growth(params: Any, xs: Any, sides: Any, code_after: Any, tangents: Any, sums: Any) -> int:
+    """Fill an orbit from its first state and carry a tangent vector along; the number of steps before an exit.
+
+    `sums`: logarithm of the growth so far, size of the vector since it was scaled back last, the scale to come, and
+    steps carried: no more once the vector is 0.
+    The slope is not waited for by the next step, so that the vector costs next to nothing beside the orbit.
+    """
+    tangent = pick(tangents, 0)
+    total, size, scale, carried = sums[0], sums[1], sums[2], sums[3]
+    made: int = code_after.size
+    for k in range(code_after.size):
+        x, side = pick(xs, k), sides[k]
         after, side_after, code = step(params, x, side)
+        put(xs, k + 1, after)
+        sides[k + 1], code_after[k] = side_after, code
         if code < 0:
+            made = k + 1
             break
+        if size == 0.0:  # and stays 0
+            continue
         _, _, slope = image_on(params, x, side, code)
         tangent, size = carry(xs, slope, tangent, scale)
-        x, side, made = after, side_after, k + 1 - skip
-        scale = 1.0
+        scale, carried = 1.0, carried + 1.0
         if size < SMALL or size > LARGE:
             total += math.log(size)
-            if size == 0.0:  # and stays 0
-                break
-            scale = 1.0 / size
-            size = 1.0
-    return total + math.log(size), made, code
+            if size > 0.0:
+                scale, size = 1.0 / size, 1.0
+    put(tangents, 0, tangent)
+    sums[0], sums[1], sums[2], sums[3] = total, size, scale, carried
+    return made  # type: ignore[no-any-return]  # kernels take arrays as Any
 
 
 @dataclass(frozen=True)
@@ -131,19 +144,74 @@ def lyapunov(params: Any, x: Any, side: int, count: int, skip: int = 1000) -> Ly
     >>> round(maps.lyapunov(maps.Logistic(4.0), 0.3, 0, 100_000).exponent, 2)  # ln 2
     0.69
     """
-    kind = kind_of(params)
-    start = start_of(params, x, side)
-    if not has_slope(params):
-        raise MapError("the map", kind.name, "a map with image_on", "register its slope with image_on=...")
-    for name, value in (("the number of steps", count), ("the number of steps to skip", skip)):
-        if value < 0:
-            raise MapError(name, value, "an integer from 0", "count from 0")
-    xs = tuple(np.array([value]) for value in start)
-    tangents = tuple(np.array([1.0 / len(xs)]) for _ in xs)
-    total, made, code = _growth(params, xs, tangents, side, skip, count)
-    stopped = next((name for name, exit_code in kind.exits.items() if exit_code == code), None)
-    if total == -math.inf:
-        return Lyapunov(-math.inf, max(made, 0), stopped)
-    if made <= 0 or math.isnan(total):
-        return Lyapunov(None, max(made, 0), stopped)
-    return Lyapunov(total / made, made, stopped)
+    tangent = _Tangent(params, x, side, count, skip)
+    xs, sides, code = empty_orbit(tangent.start, side, min(max(skip, count), CHUNK))
+    for steps in (skip, count):
+        tangent.begin()
+        while steps > 0 and not tangent.left:
+            most = min(steps, code.size)
+            made = tangent.follow(xs, sides, code[:most])
+            for values in (*xs, sides):
+                values[0] = values[made]
+            steps -= most
+    return tangent.answer(skip)
+
+
+def orbit_with_exponent(params: Any, x: Any, side: int, skip: int, count: int) -> tuple[Orbit, Lyapunov]:
+    """`orbit` of skip + count steps and `lyapunov` of the same start, in one pass, for a map that does not scatter."""
+    tangent = _Tangent(params, x, side, count, skip)
+    xs, sides, code = empty_orbit(tangent.start, side, skip + count)
+    made = 0
+    for begin, end in ((0, skip), (skip, skip + count)):
+        tangent.begin()
+        if not tangent.left:
+            made = begin + tangent.follow(
+                tuple(v[begin : end + 1] for v in xs), sides[begin:], code[begin:end]
+            )
+    return as_orbit(params, xs, sides, code, made), tangent.answer(skip)
+
+
+class _Tangent:
+    """A tangent vector on its way along an orbit, beginning where `start` is."""
+
+    def __init__(self, params: Any, x: Any, side: int, count: int, skip: int) -> None:
+        self.params, self.kind = params, kind_of(params)
+        self.start = start_of(params, x, side)
+        if not has_slope(params):
+            raise MapError(
+                "the map", self.kind.name, "a map with image_on", "register its slope with image_on=..."
+            )
+        for name, value in (("the number of steps", count), ("the number of steps to skip", skip)):
+            if value < 0:
+                raise MapError(name, value, "an integer from 0", "count from 0")
+        dimension = len(self.start)
+        self.tangents = tuple(np.array([1.0 / dimension]) for _ in self.start)
+        self.sums = np.array([0.0, 1.0, 1.0, 0.0])
+        self.left = False
+        self.stopped: str | None = None
+
+    def begin(self) -> None:
+        """Measure growth from here."""
+        if self.sums[1] > 0.0:
+            self.sums[0] = -math.log(self.sums[1])
+
+    def follow(self, xs: Any, sides: Any, code: Any) -> int:
+        """Fill an orbit; steps made before an exit."""
+        made = int(_growth(self.params, xs, sides, code, self.tangents, self.sums))
+        if made and code[made - 1] < 0:
+            self.left = True
+            self.stopped = next(
+                (name for name, number in self.kind.exits.items() if number == code[made - 1]), None
+            )
+        return made
+
+    def answer(self, skip: int) -> Lyapunov:
+        """Mean of the growth."""
+        total, size, _, carried = self.sums.tolist()
+        steps = max(int(carried) - skip, 0)
+        if size == 0.0:
+            return Lyapunov(-math.inf, steps, self.stopped)
+        grown = total + math.log(size)
+        if steps == 0 or math.isnan(grown):
+            return Lyapunov(None, steps, self.stopped)
+        return Lyapunov(grown / steps, steps, self.stopped)

@@ -18,6 +18,7 @@ from limitsets.jit import proof_kernel
 from limitsets.proofs.intervals import Intervals
 from limitsets.proofs.mean_value import Slope, root
 from limitsets.thrower import Energy, Exact, SmallAngle2
+from limitsets.thrower.impact import pose
 from limitsets.thrower.turn_box import turn_box
 
 __all__ = ["FLIP", "JOG", "Angle", "Formulas", "Numbers", "OneSide", "angle", "variable"]
@@ -118,8 +119,7 @@ class Formulas:
         a, d = part.a, part.d
         ell = root(a * a + d * d)
         if isinstance(self.flight, Exact):
-            c = 1.0 - at.v
-            right, above = a * c - d * at.s, a * at.s + d * c
+            right, above = pose(part, at)
             spin = n.rho * n.rho + right * (x - n.kappa * at.p) + above * (n.h + d)
             barrier = n.kappa * (_signed_square(right) / (ell + above))
         else:

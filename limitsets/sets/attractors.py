@@ -12,7 +12,8 @@ from limitsets.cells import CellSet
 from limitsets.errors import AnswerError
 from limitsets.graph import TransitionGraph
 from limitsets.maps import has_slope, orbit
-from limitsets.maps.lyapunov import lyapunov
+from limitsets.maps.kernels import scattered
+from limitsets.maps.lyapunov import lyapunov, orbit_with_exponent
 
 __all__ = ["Attractor", "attractors"]
 
@@ -67,14 +68,13 @@ def _visits(side: NDArray[np.int64]) -> tuple[tuple[int, ...] | None, dict[int, 
     change = np.flatnonzero(np.diff(side)) + 1
     if change.size == 0:
         return (int(side[0]),), {}
-    visited, jogs = side[change[:-1]], np.diff(change) - 1
-    per_side = {
-        int(s): (int(jogs[visited == s].min()), int(jogs[visited == s].max())) for s in np.unique(visited)
-    }
-    sides = side[change]
+    sides, jogs = side[change], np.diff(change) - 1
+    visited = sides[:-1]
+    met, most = np.flatnonzero(np.bincount(visited)).tolist(), int(sides.max()) + 1
+    per_side = {s: (int(jogs[visited == s].min()), int(jogs[visited == s].max())) for s in met}
     after: dict[int, set[int]] = {}
-    for one, two in zip(sides[:-1].tolist(), sides[1:].tolist(), strict=True):
-        after.setdefault(one, set()).add(two)
+    for pair in np.flatnonzero(np.bincount(visited * most + sides[1:])).tolist():
+        after.setdefault(pair // most, set()).add(pair % most)
     if not after or any(len(options) > 1 for options in after.values()):
         return None, per_side
     cycle = [min(after)]
@@ -97,16 +97,19 @@ def _start(cells: CellSet) -> tuple[Any, int]:
 
 def _attractor(graph: TransitionGraph, cells: CellSet, throws: int) -> Attractor:
     x, side = _start(cells)
-    path = orbit(graph.map, x, side, TRANSIENT + throws)
+    exponent = None
+    if has_slope(graph.map) and type(graph.map) not in scattered.methods:
+        path, growth = orbit_with_exponent(graph.map, x, side, TRANSIENT, throws)
+        exponent = growth.exponent
+    else:
+        path = orbit(graph.map, x, side, TRANSIENT + throws)
+        if has_slope(graph.map):  # of the map without its scatter
+            exponent = lyapunov(graph.map, x, side, throws, skip=TRANSIENT).exponent
     skip = min(TRANSIENT, path.code.size)
     sides, states = path.side[skip:], path.x[skip:]
-    here = np.full(sides.size, -1)
-    for s in np.unique(sides).tolist():
-        if s < graph.grid.sides:
-            here[sides == s] = graph.grid.index(states[sides == s], s)
-    inside = float((cells.mask[here] & (here >= 0)).mean())
+    met = sum(int(cells.holds(states[sides == s], s).sum()) for s in range(graph.grid.sides))
+    inside = met / sides.size
     order, jogs = _visits(sides)
-    exponent = lyapunov(graph.map, x, side, throws, skip=TRANSIENT).exponent if has_slope(graph.map) else None
     flips = float((np.diff(sides) != 0).mean()) if sides.size > 1 else 0.0
     return Attractor(
         cells, cells.extents(), order, jogs, flips, exponent, max(sides.size - 1, 0), inside, path.stopped

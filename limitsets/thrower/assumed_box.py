@@ -19,7 +19,7 @@ from limitsets.interval.number import larger, smaller, square_root
 from limitsets.jit import generic, proof_kernel
 from limitsets.maps import codes
 from limitsets.thrower.hinge_box import hinge_force, peak
-from limitsets.thrower.impact import strike
+from limitsets.thrower.impact import pose, strike
 from limitsets.thrower.params import Exact, SmallAngle, SmallAngle2, Throw
 from limitsets.thrower.side_box import SideBox, gather_box
 from limitsets.thrower.throw_box import NOTHING, sure_throw_box, throw_box
@@ -77,9 +77,7 @@ def pose_box(flight: Any, b: SideBox, x: Interval, at: Turned) -> Pose:
 
 @proof_kernel
 def _exact(flight: Any, b: SideBox, x: Interval, at: Turned) -> Pose:
-    c = 1.0 - at.v
-    above = b.a * at.s + b.d * c
-    right = b.a * c - b.d * at.s
+    right, above = pose(b, at)
     return Pose(right, above, x - b.kappa * at.phi, above)
 
 

@@ -20,7 +20,7 @@ from limitsets.interval.number import signed_square, where_positive, with_sign_o
 from limitsets.jit import formula, generic
 from limitsets.thrower.params import Energy, Exact, Signed, SmallAngle, SmallAngle2, per_inertia
 
-__all__ = ["jog_displacement", "margin", "strike", "swing"]
+__all__ = ["jog_displacement", "margin", "pose", "strike", "swing"]
 
 
 # ---------------------------------------------------------------- impact
@@ -34,6 +34,13 @@ def strike(flight: Any, part: Any, x: Any, at: Any) -> tuple[Any, Any]:
 @generic
 def margin(flip: Any, inertia: Any, omega: Any, barrier: Any) -> Any:
     """Return the number that is positive where the part flips."""
+
+
+@formula
+def pose(part: Any, at: Any) -> tuple[Any, Any]:
+    """Return X and H: where the centre of mass is from the left vertex, along the arm and above it, turned by phi."""
+    c = 1.0 - at.v
+    return part.a * c - part.d * at.s, part.a * at.s + part.d * c
 
 
 @formula
@@ -51,8 +58,7 @@ def swing(part: Any, right: Any, above: Any, falling: Any, lever: Any) -> tuple[
 
 
 def _exact(flight: Any, part: Any, x: Any, at: Any) -> tuple[Any, Any]:
-    c = 1.0 - at.v
-    right, above = part.a * c - part.d * at.s, part.a * at.s + part.d * c
+    right, above = pose(part, at)
     return swing(part, right, above, x - part.kappa * at.phi, part.h + part.d)
 
 

@@ -33,6 +33,15 @@ def test_extents_hold_the_cells_and_nothing_else(a):
             assert a.mask[COVER.of_side(side)][inside].all()
 
 
+@given(subsets, st.sampled_from([0, 1]), st.lists(st.integers(-3, 35), min_size=1))
+def test_a_set_holds_the_states_of_its_cells(a, side, quarters):
+    """Quarters of cells: inside, on borders, beyond the domain."""
+    width = 0.125 if side == 0 else 0.25
+    x = COVER.edges[side][0][0] + width * np.array(quarters) / 4.0
+    cell = COVER.index(x, side)
+    assert np.array_equal(a.holds(x, side), a.mask[cell] & (cell >= 0))
+
+
 def test_neighbouring_cells_make_one_interval():
     assert CellSet.of(COVER, [0, 1, 3, 8]).extents() == {0: [(0.0, 0.25), (0.375, 0.5)], 1: [(10.0, 10.25)]}
 

@@ -9,7 +9,7 @@ import limitsets as ls
 from limitsets.graph import components as walk
 from limitsets.graph import survey as surveys
 from limitsets.graph import wide
-from limitsets.graph.ranges import build
+from limitsets.graph.ranges import RUN, START, build
 
 
 @st.composite
@@ -43,7 +43,7 @@ def test_components_are_those_of_the_walk(r):
     assert (np.diff(label[order]) >= 0).all()
     for cell in range(label.size):
         for box in range(r.first[cell], r.first[cell + 1]):
-            targets = np.arange(r.start[box], r.start[box] + r.run[box])
+            targets = r.box[box, START] + np.arange(r.box[box, RUN])
             assert (label[targets] <= label[cell]).all()
             assert not (cell in targets and not loops[cell])
     recurrent = np.bincount(label, minlength=count) > 1
@@ -64,7 +64,7 @@ def test_sweeps_are_those_of_the_walk(r, seed):
     assert (rank[settled[plain.label]] == 0).all()
     for cell in np.flatnonzero(~settled[plain.label]):
         for box in range(r.first[cell], r.first[cell + 1]):
-            targets = np.arange(r.start[box], r.start[box] + r.run[box])
+            targets = r.box[box, START] + np.arange(r.box[box, RUN])
             same = plain.label[targets] == plain.label[cell]
             assert (rank[targets[same]] == rank[cell]).all()
             assert (rank[targets[~same]] < rank[cell]).all()

@@ -212,6 +212,7 @@ def test_the_plane():
 def test_a_graph_that_does_not_fit_is_refused_and_the_one_proposed_is_not(monkeypatch, domain, cells, method):
     map_ = ls.maps.Henon() if len(domain) == 2 else ls.maps.Logistic(3.5)
     monkeypatch.setattr(memory, "_free_bytes", lambda: 2_000_000 if len(domain) == 2 else 100_000)
+    monkeypatch.setattr(memory, "SMALL", 0)
     with pytest.raises(AnswerError, match=r"about .* GB.*that are free here.*ask for fewer cells") as caught:
         ls.transitions(map_, ls.grid(domain, cells=cells), method)
     fits = int(caught.value.remedy.split(": ")[1].split()[0])

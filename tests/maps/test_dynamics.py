@@ -11,6 +11,7 @@ import pytest
 
 from limitsets import maps
 from limitsets.errors import MapError
+from limitsets.maps.lyapunov import CHUNK, orbit_with_exponent
 from tests.maps_of_tests import Baker, Contraction, Linear2, Product, ThreeState, TwoState
 
 
@@ -68,6 +69,28 @@ def test_lyapunov_exponent(name: str) -> None:
     found = maps.lyapunov(params, x, 0, count)
     assert found.exponent == pytest.approx(expected, abs=within)
     assert (found.steps, found.stopped) == (count, None)
+
+
+@pytest.mark.parametrize("name", EXPONENTS)
+def test_an_orbit_with_its_exponent_is_the_orbit_and_the_exponent(name: str) -> None:
+    """To the bit: the one is recorded whole, the other goes on in parts of `CHUNK` steps."""
+    params, x, count, _, _ = EXPONENTS[name]
+    count = max(count, 2 * CHUNK + 7)
+    path, growth = orbit_with_exponent(params, x, 0, 1000, count)
+    alone = maps.orbit(params, x, 0, 1000 + count)
+    assert np.array_equal(path.x, alone.x)
+    assert np.array_equal(path.code, alone.code)
+    assert path.stopped == alone.stopped
+    assert growth == maps.lyapunov(params, x, 0, count, skip=1000)
+
+
+def test_an_orbit_that_leaves_early_ends_both() -> None:
+    path, growth = orbit_with_exponent(maps.Linear2(2.0, 0.0, 0.0, 3.0), (1.0, 1.0), 0, 10, 5000)
+    alone = maps.orbit(maps.Linear2(2.0, 0.0, 0.0, 3.0), (1.0, 1.0), 0, 5010)
+    assert (path.stopped, growth.stopped) == (alone.stopped, alone.stopped)
+    assert np.array_equal(path.x, alone.x)
+    assert growth.steps == alone.code.size - 11  # the step that leaves has no slope
+    assert growth.exponent == pytest.approx(math.log(3.0), rel=1e-4)
 
 
 class Rotor(NamedTuple):

@@ -1,4 +1,7 @@
-"""The formulas of the throw are written once and called on floats and on intervals: what the compiler fuses of them."""
+"""What the compiler makes of kernels: operations fused, vectors as wide as the processor's, references counted.
+
+The formulas of the throw are written once and called on floats and on intervals: a bound must not be fused.
+"""
 
 import json
 import os
@@ -11,9 +14,11 @@ from llvmlite.binding import get_host_cpu_features
 # In a process of its own with an empty cache: code that comes from the cache cannot be read.
 READ = r"""
 import json, re
+import numba
 import numpy as np
 import limitsets as ls
 from limitsets.graph.images import hulls
+from limitsets.graph.images.sampled import _hulls
 from limitsets.graph.images.enclosed import enclosures
 from limitsets.maps import drivers, images
 
@@ -23,14 +28,23 @@ for flight, flip in (("exact", "signed"), ("exact", "energy"), ("small-angle", "
     scene = ls.load({**ls.load("paper-designed").as_dict(), "model": {"flight": flight, "flip": flip}})
     enclosures(scene.map, scene.map, x, 0)
     images(scene.map, x, 0)
+ls.transitions(scene.map, ls.grid(scene.domain, cells=8))
 codes = {"boxes": hulls._enclose.inspect_asm(), "floats": drivers._images.inspect_asm()}
-print(json.dumps({key: [len(fused.findall(code)) for code in found.values()] for key, found in codes.items()}))
+found = {key: [len(fused.findall(code)) for code in found.values()] for key, found in codes.items()}
+found["widest"] = [code.count("zmm") for code in codes["floats"].values()]
+found["counted"] = [code.count("NRT_") for code in _hulls.inspect_asm().values()]
+found["target"] = numba.core.registry.cpu_target.target_context.codegen().magic_tuple()
+print(json.dumps(found))
 """
+
+WIDE = bool(get_host_cpu_features().get("avx512vl"))
 
 
 @pytest.fixture(scope="module")
 def fused(tmp_path_factory):
-    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path_factory.mktemp("cache"))}
+    # One of the processors for which LLVM by itself prefers vectors of 256 bits to those of 512 that it has.
+    processor = {"NUMBA_CPU_NAME": "skylake-avx512"} if WIDE else {}
+    environment = {**os.environ, **processor, "NUMBA_CACHE_DIR": str(tmp_path_factory.mktemp("cache"))}
     command = [sys.executable, "-c", READ]
     return json.loads(subprocess.run(command, env=environment, check=True, capture_output=True).stdout)
 
@@ -43,3 +57,16 @@ def test_floats_are_fused_where_the_processor_can(fused):
     """So the test above can fail."""
     assert len(fused["floats"]) == 4
     assert all(fused["floats"]) == bool(get_host_cpu_features().get("fma"))
+
+
+def test_vectors_are_the_widest_of_the_processor(fused):
+    assert all(count > 0 for count in fused["widest"]) == WIDE
+
+
+def test_the_key_of_compiled_code_covers_the_width(fused):
+    """Numba's own key has the features of the target, and `jit` puts it into the name of each file."""
+    assert ("-prefer-256-bit" in fused["target"][2]) == WIDE
+
+
+def test_images_are_placed_without_counting_references(fused):
+    assert fused["counted"] == [0]

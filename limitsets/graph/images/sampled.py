@@ -15,7 +15,7 @@ from limitsets.cells import Grid
 from limitsets.errors import AnswerError
 from limitsets.graph.boxes import Boxes, merged
 from limitsets.graph.images.samples import Samples
-from limitsets.graph.images.undecided import bent, every_branch, split
+from limitsets.graph.images.undecided import every_branch, mark_bends, split
 from limitsets.graph.target import Target, place
 from limitsets.jit import kernel
 from limitsets.maps import codes, images
@@ -61,7 +61,7 @@ def _images_of_product(
     return again
 
 
-@kernel(entry=True)
+@kernel(entry=True, counting=False)
 def _hulls(
     target: Target,
     shape: Any,
@@ -77,39 +77,44 @@ def _hulls(
     hi_out: Any,
     exits: Any,
 ) -> None:
-    """Box of every cell whose points agree; the state of the others."""
+    """Box of every cell whose points agree; the state of the others.
+
+    A run of cells along the last axis at a time: to take one coordinate out of a tuple of arrays costs more than to
+    place a cell.
+    """
     dimension = len(after)
-    inner = shape[dimension - 1]
-    hint = np.int64(0)
-    for cell in range(state.size):
-        rest, base = cell // inner, (cell % inner) * strides[dimension - 1]
+    inner, along = shape[dimension - 1], strides[dimension - 1]
+    for run in range(state.size // inner):
+        rest, base, begin = run, np.int64(0), run * inner
         for axis in range(dimension - 2, -1, -1):
             base += (rest % shape[axis]) * strides[axis]
             rest //= shape[axis]
-        # One integer type for all: another would compile what `place` calls once more.
-        code, to = np.int64(code_after[base + offsets[0]]), np.int64(side_after[base + offsets[0]])
-        agree = True
-        for s in range(1, offsets.size):
-            k = base + offsets[s]
-            agree &= (code_after[k] == code) & (side_after[k] == to)
-        if not agree or code < 0:
-            state[cell] = MIXED
-            continue
-        side_out[cell] = to
-        state[cell] = DECIDED
-        out = 0
-        for axis in range(dimension):
-            lo = hi = after[axis][base + offsets[0]]
+        for cell in range(inner):
+            k = base + cell * along
+            # One integer type for all: another would compile what `place` calls once more.
+            code, to = np.int64(code_after[k + offsets[0]]), np.int64(side_after[k + offsets[0]])
+            agree = code >= 0
             for s in range(1, offsets.size):
-                value = after[axis][base + offsets[s]]
-                lo, hi = min(lo, value), max(hi, value)
-            k, m, leaves = place(target, to, axis, lo, hi, pad, hint)
-            out |= leaves
-            if m < k:
-                state[cell] = EMPTY
-            lo_out[cell, axis], hi_out[cell, axis] = k, m
-            hint = k
-        exits[cell] = out
+                agree &= (code_after[k + offsets[s]] == code) & (side_after[k + offsets[s]] == to)
+            state[begin + cell] = DECIDED if agree else MIXED
+            side_out[begin + cell] = to if agree else 0
+            exits[begin + cell] = 0
+        for axis in range(dimension):
+            values, hint = after[axis], np.int64(0)
+            for cell in range(inner):
+                if state[begin + cell] == MIXED:
+                    continue
+                k = base + cell * along
+                lo = hi = values[k + offsets[0]]
+                for s in range(1, offsets.size):
+                    value = values[k + offsets[s]]
+                    lo, hi = min(lo, value), max(hi, value)
+                first, last, leaves = place(target, np.int64(side_out[begin + cell]), axis, lo, hi, pad, hint)
+                exits[begin + cell] |= leaves
+                if last < first:
+                    state[begin + cell] = EMPTY
+                lo_out[begin + cell, axis], hi_out[begin + cell, axis] = first, last
+                hint = first
 
 
 def sampled(method: Callable[..., Samples]) -> Callable[..., Boxes]:
@@ -151,15 +156,14 @@ def _boxes_of_side(params: Any, grid: Grid, side: int, target: Target, samples: 
         run = tuple(np.empty(samples.axes[-1].size) for _ in range(dimension))
         second = _images_of_product(params, side, samples.axes, run, after, to, code) / count
     _require_sides(grid, to, code)
-    state, side_out = np.empty(n, np.int8), np.zeros(n, np.int32)
+    state, side_out, exits = np.empty(n, np.int8), np.empty(n, np.int32), np.empty(n, np.uint8)
     lo, hi = np.empty((n, dimension), np.int32), np.empty((n, dimension), np.int32)
-    exits = np.zeros(n, np.uint8)
     strides = np.array(samples.strides)
     _hulls(
         target, shape, strides, samples.offsets, samples.pad, after, to, code, state, side_out, lo, hi, exits
     )
     if samples.split:
-        state[bent(after[0], to, code)] = MIXED
+        mark_bends(after[0], to, code, MIXED, state)
     mixed = np.flatnonzero(state == MIXED)
     if not mixed.size and (state == DECIDED).all():
         return Boxes(np.arange(n), side_out, lo, hi, exits, second)
@@ -167,7 +171,7 @@ def _boxes_of_side(params: Any, grid: Grid, side: int, target: Target, samples: 
     exits[mixed] = 0
     parts = [Boxes(decided, side_out[decided], lo[decided], hi[decided], exits, second)]
     if mixed.size and samples.split:
-        parts += split(params, side, target, samples, mixed)
+        parts.append(split(params, side, target, samples, mixed))
     elif mixed.size:
         positions = np.unravel_index(mixed, tuple(shape))
         numbers = (np.stack(positions, axis=1) @ strides)[:, None] + samples.offsets

@@ -10,6 +10,7 @@ whole cell under a forced branch is clipped to the domain.
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -18,13 +19,13 @@ from numpy.typing import NDArray
 from limitsets.errors import AnswerError
 from limitsets.graph.boxes import Boxes, leaving, placed
 from limitsets.graph.images.samples import Samples
-from limitsets.graph.target import Target
+from limitsets.graph.target import Target, place
 from limitsets.jit import kernel
 from limitsets.maps import codes, images, images_on, kind_of
 from limitsets.maps.drivers import step
 from limitsets.maps.kernels import on_side
 
-__all__ = ["bent", "every_branch", "split"]
+__all__ = ["every_branch", "mark_bends", "split"]
 
 # Pieces that one cell may be cut into, at first and at last: more than six are rare, more than the last an error.
 FEW_PIECES, MOST_PIECES = 6, 1536
@@ -77,50 +78,103 @@ def _pieces(
     return more
 
 
+@kernel
+def _widened(here: Any, side: int, a: float, b: float, one: float, two: float, code: int) -> Any:
+    """Widen the images of the ends of [a, b] to the extreme values in between: lo, hi, code of an exit met there."""
+    lo, hi = one, two
+    for sign in (-1.0, 1.0):
+        bottom, top = a, b
+        for _ in range(NARROWINGS):
+            left, right = bottom + (top - bottom) / 3.0, top - (top - bottom) / 3.0
+            at_left, _, code_left = step(here, left, side)
+            at_right, _, code_right = step(here, right, side)
+            code = min(code, code_left, code_right)
+            if code_left >= 0:
+                lo, hi = min(lo, at_left), max(hi, at_left)
+            if code_right >= 0:
+                lo, hi = min(lo, at_right), max(hi, at_right)
+            if sign * at_left > sign * at_right:
+                top = right
+            else:
+                bottom = left
+    return lo, hi, code
+
+
+@kernel
+def _trend(one: float, two: float) -> float:
+    """Sign of a difference; nan, which is other than any, where it has none."""
+    way = two - one
+    return way if way != way else float((way > 0.0) - (way < 0.0))
+
+
 @kernel(entry=True)
-def _widen(params: Any, side: int, ends: Any, x: Any, code_after: Any) -> None:
-    """Widen the images of the ends of pieces to the extreme values in between: [lo, hi], codes of exits met there."""
+def _place_pieces(
+    params: Any,
+    side: int,
+    target: Target,
+    pad: int,
+    parts: int,
+    cells: Any,
+    pieces: Any,
+    found: Any,
+    exits: Any,
+) -> int:
+    """Target cells of pieces, widened where the map may turn in them; how many meet the grid.
+
+    A piece is looked at between its neighbours: where it does something else than one of them, it may turn.
+    """
     here = on_side(params, side)
-    for k in range(code_after.size):
-        lo, hi = x[k, 0], x[k, 1]
-        for sign in (-1.0, 1.0):
-            a, b = ends[k, 0], ends[k, 1]
-            for _ in range(NARROWINGS):
-                left, right = a + (b - a) / 3.0, b - (b - a) / 3.0
-                one, _, code_one = step(here, left, side)
-                two, _, code_two = step(here, right, side)
-                code_after[k] = min(code_after[k], code_one, code_two)
-                if code_one >= 0:
-                    lo, hi = min(lo, one), max(hi, one)
-                if code_two >= 0:
-                    lo, hi = min(lo, two), max(hi, two)
-                if sign * one > sign * two:
-                    b = right
-                else:
-                    a = left
-        x[k, 0], x[k, 1] = lo, hi
+    ends, x, to, code = pieces
+    owner, side_out, first, last = found
+    kept = 0  # pieces that there are, moved to the front
+    for k in range(code.size):
+        if code[k] != codes.UNSETTLED:
+            ends[kept, 0], ends[kept, 1] = ends[k, 0], ends[k, 1]
+            x[kept, 0], x[kept, 1] = x[k, 0], x[k, 1]
+            to[kept], code[kept], owner[kept] = to[k], code[k], cells[k // parts]
+            kept += 1
+    made, changes, hint = 0, True, np.int64(0)
+    for k in range(kept):
+        turns, changes = changes, True
+        if k + 1 < kept:
+            trend, after = _trend(x[k, 0], x[k, 1]), _trend(x[k + 1, 0], x[k + 1, 1])
+            changes = (trend != after) | (code[k] != code[k + 1]) | (to[k] != to[k + 1])
+        cell = owner[k]
+        if code[k] < 0:
+            exits[cell] |= 1 << target.sink_of_code[-code[k]]
+            continue
+        lo, hi = min(x[k, 0], x[k, 1]), max(x[k, 0], x[k, 1])
+        if turns | changes:
+            lo, hi, met = _widened(here, side, ends[k, 0], ends[k, 1], lo, hi, code[k])
+            if met < 0:
+                exits[cell] |= 1 << target.sink_of_code[-met]
+        begin, end, leaves = place(target, to[k], 0, lo, hi, pad, hint)
+        exits[cell] |= leaves
+        if end >= begin:
+            owner[made], side_out[made], first[made, 0], last[made, 0] = cell, to[k], begin, end
+            made += 1
+        hint = begin
+    return made
 
 
-def bent(after: NDArray[np.float64], to: NDArray[Any], code: NDArray[Any]) -> NDArray[np.bool_]:
-    """Cells between the points of one axis in which the image may turn, by its differences; the first and the last.
+@kernel(entry=True, counting=False)
+def mark_bends(after: Any, to: Any, code: Any, mark: int, state: Any) -> None:
+    """Mark the cells between the points of one axis in which the image may turn, the first and the last.
 
     Where the difference has another sign than next door the map turns, or has a pole, in one of the two cells.
     """
-    same = (code[1:] == code[:-1]) & (to[1:] == to[:-1]) & (code[1:] >= 0)
-    with np.errstate(invalid="ignore"):  # infinity less infinity has no sign, which is other than any
-        trend = np.where(same, np.sign(np.diff(after)), np.nan)
-    return _beside_change(trend)
+    before = math.nan
+    for k in range(state.size):
+        same = (code[k + 1] == code[k]) & (to[k + 1] == to[k]) & (code[k + 1] >= 0)
+        trend = _trend(after[k], after[k + 1]) if same else math.nan
+        if trend != before:
+            state[k] = mark
+            state[max(k - 1, 0)] = mark
+        before = trend
+    state[state.size - 1] = mark
 
 
-def _beside_change(*rows: NDArray[Any]) -> NDArray[np.bool_]:
-    """Entries that differ from one next to them in any of the rows; the first and the last; nan differs from nan."""
-    differ = np.any([row[1:] != row[:-1] for row in rows], axis=0)
-    change = np.concatenate([[True], differ, [True]])
-    found: NDArray[np.bool_] = change[1:] | change[:-1]
-    return found
-
-
-def split(params: Any, side: int, target: Target, samples: Samples, cells: NDArray[np.int64]) -> list[Boxes]:
+def split(params: Any, side: int, target: Target, samples: Samples, cells: NDArray[np.int64]) -> Boxes:
     """Images of the pieces of some cells in one dimension."""
     borders = samples.axes[0]
     part = np.arange(PARTS + 1) / PARTS
@@ -138,26 +192,16 @@ def split(params: Any, side: int, target: Target, samples: Samples, cells: NDArr
                 "ask for more cells",
             )
         shape = (lo.size, pieces)
-        ends, x = np.full((*shape, 2), np.nan), np.full((*shape, 2), np.nan)
-        to: NDArray[np.int64] = np.zeros(shape, np.int64)
-        code: NDArray[np.int64] = np.full(shape, codes.UNSETTLED, np.int64)
+        ends, x, to = np.empty((*shape, 2)), np.empty((*shape, 2)), np.empty(shape, np.int64)
+        code = np.full(shape, codes.UNSETTLED, np.int64)
         more = _pieces(params, side, lo, hi, pieces, ends, x, to, code)
-    owner = np.repeat(cells, PARTS * pieces)
-    there = (code != codes.UNSETTLED).reshape(-1)
-    owner, code, to = owner[there], code.reshape(-1)[there], to.reshape(-1)[there]
-    image = x.reshape(-1, 2)[there]
-    with np.errstate(invalid="ignore"):  # as in `bent`
-        turns = (code >= 0) & _beside_change(np.sign(image[:, 1] - image[:, 0]), code, to)
-    image.sort(axis=1)
-    turning, met = image[turns], code[turns]
-    _widen(params, side, ends.reshape(-1, 2)[there][turns], turning, met)
-    image[turns] = turning
-    real, gone, holed = code >= 0, code < 0, met < 0
-    return [
-        placed(target, owner[real], to[real], image[real, :1], image[real, 1:], samples.pad, inside=False),
-        leaving(target, owner[gone], code[gone], 1),
-        leaving(target, owner[turns][holed], met[holed], 1),
-    ]
+    flat = ends.reshape(-1, 2), x.reshape(-1, 2), to.reshape(-1), code.reshape(-1)
+    owner, side_out = np.empty(code.size, np.int64), np.empty(code.size, np.int32)
+    first, last = np.empty((code.size, 1), np.int32), np.empty((code.size, 1), np.int32)
+    exits = np.zeros(int(cells[-1]) + 1, np.uint8)
+    found = owner, side_out, first, last
+    n = _place_pieces(params, side, target, samples.pad, PARTS * pieces, cells, flat, found, exits)
+    return Boxes(owner[:n], side_out[:n], first[:n], last[:n], exits, 0.0)
 
 
 def every_branch(

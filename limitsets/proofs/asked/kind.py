@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from limitsets.graph.components import ranks, reach, strong_components
-from limitsets.graph.ranges import Ranges, build
+from limitsets.graph.ranges import RUN, Ranges, build
 from limitsets.proofs.asked.recurring import Refutation
 from limitsets.proofs.asked.search import State
 from limitsets.proofs.attraction import BELOW, Attraction
@@ -168,9 +168,8 @@ def peeled(
     """
     ranges = found.cover.graph.ranges if branch is None else _of_branch(found, branch)
     owner = np.repeat(np.arange(cells.size), np.diff(ranges.first))
-    ranges = ranges._replace(
-        run=np.where(wanted[owner], np.int32(0), ranges.run)
-    )  # what has arrived goes no farther
+    ranges = ranges._replace(box=ranges.box.copy())
+    ranges.box[wanted[owner], RUN] = 0  # what has arrived goes no farther
     parts = strong_components(ranges)
     stay = (parts.recurrent[parts.label] | (ranges.exits > 0)) & ~wanted
     late = reach(ranges, parts, stay.astype(np.uint8)) > 0

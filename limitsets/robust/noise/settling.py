@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from limitsets.cells import CellSet
 from limitsets.files import as_table, picked
 from limitsets.graph.components import Components, strong_components
-from limitsets.graph.ranges import Ranges
+from limitsets.graph.ranges import RUN, START, Ranges, one_run
 from limitsets.maps import kind_of
 from limitsets.robust.noise.sheets import Array, Sheets, cells_met
 from limitsets.robust.noise.ulam import Part, Transfer
@@ -119,15 +119,11 @@ def _cells_hit(chain: Transfer, sheet: Any, stage: Sheets) -> tuple[Cells, Cells
 
 def _ranges(chain: Transfer, source: Cells, start: Cells, run: Cells) -> Ranges:
     counts = np.bincount(source, minlength=chain.n_cells)
-    one = np.ones(start.size, dtype=np.int32)
     bits = (chain.sinks > 0.0) @ (1 << np.arange(chain.sinks.shape[1]))
     return Ranges(
         np.cumulative_sum(counts, include_initial=True),
-        start.astype(np.int32),
-        run.astype(np.int32),
-        one,
-        one.copy(),
-        chain.grid.side_of(start).astype(np.int32),
+        one_run(chain.grid.side_of(start), start, run),
+        False,
         np.ones(chain.grid.sides, dtype=np.int64),
         np.ones(chain.grid.sides, dtype=np.int64),
         bits.astype(np.uint8),
@@ -144,8 +140,8 @@ def _without(r: Ranges, cells: NDArray[np.bool_]) -> Ranges:
     """Return the graph in which the marked cells lead nowhere."""
     counts = np.where(cells, 0, np.diff(r.first))
     kept = np.repeat(~cells, np.diff(r.first))
-    boxes = {name: getattr(r, name)[kept] for name in ("start", "run", "rows", "planes", "side")}
-    return r._replace(first=np.cumulative_sum(counts, include_initial=True), **boxes)
+    first = np.cumulative_sum(counts, include_initial=True)
+    return r._replace(first=first, box=r.box[kept], single=False)
 
 
 def closed_sets(
@@ -161,7 +157,8 @@ def closed_sets(
     # How many cells from the first on carry each label: a run stays inside if all its cells do.
     change = np.cumulative_sum(np.diff(label) != 0, include_initial=True)
     leaves = graph.exits != 0
-    begin, last = graph.start.astype(np.int64), graph.start.astype(np.int64) + graph.run - 1
+    begin = graph.box[:, START].astype(np.int64)
+    last = begin + graph.box[:, RUN] - 1
     stays = (label[begin] == label[source]) & (change[begin] == change[last])
     leaves[source[~stays]] = True
     sets.sort(key=lambda cells: int(cells[0]))

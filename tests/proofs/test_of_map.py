@@ -1,0 +1,164 @@
+"""Claims about any map, proved from its plain kernels: against answers on paper, and against sampled orbits."""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+
+import limitsets as ls
+from limitsets import maps
+from limitsets.errors import AnswerError
+
+CLAIMS = ["invariant", "trapping", "attracts-all", "expanding", "cycles"]
+
+
+class Ricker(NamedTuple):
+    r: float
+
+
+def _ricker(p, x, side):
+    return x * math.exp(p.r * (1.0 - x)), side, 0
+
+
+class Slanted(NamedTuple):
+    s: float
+
+
+def _tent(p, x, side):
+    return (p.s * (1.0 - x), side, 1) if x > 0.5 else (p.s * x, side, 0)
+
+
+def _tent_on(p, x, side, branch):
+    if branch == 1:
+        return p.s * (1.0 - x), side
+    return p.s * x, side
+
+
+def _tent_margin(p, x, side):
+    return x - 0.5
+
+
+class Spiral(NamedTuple):
+    """Linear, with eigenvalues factor exp(+-i angle), around (0.1, 0.2)."""
+
+    c: float
+    s: float
+
+
+def _spiral(p, x, side):
+    u, v = x[0] - 0.1, x[1] - 0.2
+    return (0.1 + p.c * u - p.s * v, 0.2 + p.s * u + p.c * v), side, 0
+
+
+ls.register(Ricker, image=_ricker)
+ls.register(Slanted, image=_tent, image_on=_tent_on, margin=_tent_margin, branches=("up", "down"))
+ls.register(Spiral, image=_spiral, dimension=2)
+
+
+def verdicts(proof):
+    return {claim.claim: claim.verdict for claim in proof.claims}
+
+
+def test_a_fixed_point_attracts_all():
+    # x exp(r (1 - x)) has the fixed point 1 with slope 1 - r, and its top exp(r - 1)/r at 1/r.
+    r = 1.8
+    top = math.exp(r - 1.0) / r
+    grid = ls.grid([(0.3, top + 1e-3)], cells=512)
+    proof = ls.certify(Ricker(r), grid, CLAIMS)
+    found = verdicts(proof)
+    assert found == {
+        "invariant": "proved",
+        "trapping": "proved",
+        "attracts-all": "proved",
+        "expanding": "undecided",
+        "cycles": "proved",
+    }
+    (cycle,) = proof.cycles
+    assert cycle.period == 1
+    assert cycle.attracts
+    assert cycle.lo[0, 0] < 1.0 < cycle.hi[0, 0]
+    assert cycle.slope_lo[0, 0] <= 1.0 - r <= cycle.slope_hi[0, 0]
+    assert proof.cells.mask[grid.index(np.array([[1.0]]), 0)].all()
+    most = proof.claims[2].section["max_rank"]
+    starts = np.linspace(0.3, top, 2001)
+    x, _, _, _ = maps.advance(Ricker(r), starts, np.zeros(starts.size, int), most)
+    assert proof.cells.mask[grid.index(x[:, None], 0)].all()
+
+
+def test_a_period_two_orbit_and_the_fixed_point_that_keeps_all_from_being_attracted():
+    proof = ls.certify(Ricker(2.3), ls.grid([(0.2, 1.7)], cells=4096), ["attracts-all", "cycles"])
+    assert verdicts(proof) == {"attracts-all": "undecided", "cycles": "proved"}
+    assert "recurrent cells do not attract: first x in [0.99" in proof.claims[0].reason
+    (cycle,) = proof.cycles
+    a, b = cycle.lo[:, 0], cycle.hi[:, 0]
+    # on an orbit of period 2, x + y = 2: the logarithms of y / x = exp(r (1 - x)) add up to 0
+    assert a.sum() <= 2.0 <= b.sum()
+    assert cycle.attracts
+
+
+def test_a_user_map_of_two_branches_expands_for_a_box_of_parameters():
+    grid = ls.grid([(0.15, 0.93)], cells=2048)
+    proof = ls.certify(Slanted(1.80), grid, ["invariant", "expanding"], upper=Slanted(1.81))
+    assert verdicts(proof) == {"invariant": "proved", "expanding": "proved"}
+    assert 1.79 < float.fromhex(proof.claims[1].section["least_slope"]) <= 1.80
+    lo, hi = proof.cells.extents()[0][0][0], proof.cells.extents()[0][-1][1]
+    for s in (1.80, 1.805, 1.81):  # the core of a tent: from s (1 - s/2) to s/2
+        assert lo <= s * (1.0 - s / 2.0)
+        assert s / 2.0 <= hi
+    cycles = ls.certify(Slanted(1.80), grid, ["cycles"])
+    fixed = next(cycle for cycle in cycles.cycles if cycle.period == 1)
+    assert fixed.lo[0, 0] < 1.8 / 2.8 < fixed.hi[0, 0]
+    assert fixed.attracts is False
+    assert len(cycles.cycles) > 10
+
+
+@pytest.mark.parametrize(("factor", "attracts"), [(0.9, True), (0.5, True)])
+def test_a_spiral_in_the_plane(factor, attracts):
+    params = Spiral(factor * 0.6, factor * 0.8)
+    proof = ls.certify(params, ls.grid([(-1.0, 1.0)] * 2, cells=(96, 96)), ["cycles", "expanding"])
+    (cycle,) = proof.cycles
+    assert (cycle.lo[0] < (0.1, 0.2)).all()
+    assert (cycle.hi[0] > (0.1, 0.2)).all()
+    assert cycle.attracts is attracts
+    assert "one dimension only" in proof.claims[1].reason
+
+
+def test_henon_has_the_orbit_of_period_two_that_attracts():
+    # a = 0.9, b = 0.3: beyond the doubling at a = 3 (1 - b)^2 / 4 = 0.3675, before the next at 0.9125
+    a, b = 0.9, 0.3
+    proof = ls.certify(maps.Henon(a, b), ls.grid([(-1.5, 1.5), (-0.5, 0.5)], cells=(256, 256)), ["cycles"])
+    (cycle,) = proof.cycles
+    assert cycle.period == 2
+    assert cycle.attracts
+    # x and x' are the roots of a^2 x^2 - a (1 - b) x + (1 - b)^2 - a = 0
+    roots = np.sort(np.roots([a * a, -a * (1 - b), (1 - b) ** 2 - a]))
+    order = np.argsort(cycle.lo[:, 0])
+    assert (cycle.lo[order, 0] < roots).all()
+    assert (roots < cycle.hi[order, 0]).all()
+
+
+def test_words_and_maps_that_cannot_be_proved():
+    grid = ls.grid([(0.1, 0.9)], cells=64)
+    with pytest.raises(AnswerError, match="the claim about a map"):
+        ls.certify(Ricker(2.0), grid, ["goal"])
+    answer = ls.certify(maps.Logistic(3.2), grid, ["cycles"]).claims[0]  # two branches without a margin
+    assert answer.verdict == "undecided"
+    assert "margin" in answer.reason
+
+
+class Rooted(NamedTuple):
+    r: float
+
+
+def _root(p, x, side):
+    return p.r * np.sqrt(x), side, 0
+
+
+ls.register(Rooted, image=_root)
+
+
+def test_nothing_is_proved_where_a_function_is_not_defined():
+    proof = ls.certify(Rooted(0.5), ls.grid([(-1.0, 1.0)], cells=64), ["attracts-all"])
+    assert proof.claims[0].verdict == "undecided"
+    assert "may leave the domain, or is not enclosed" in proof.claims[0].reason
