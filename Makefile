@@ -6,6 +6,10 @@
 PY := .venv/bin/python
 SCENE ?= paper-designed
 
+# A worker of the tests for each core, each of up to 1 GB; one that is done takes tests from the others.
+WORKERS ?= logical
+PYTEST := $(PY) -m pytest -n $(WORKERS) --maxprocesses 8 --dist worksteal
+
 # For pip inside `python -m build` too, where the build backend is installed; newer pip reads the second name there.
 export PIP_CONSTRAINT := constraints.txt
 export PIP_BUILD_CONSTRAINT := constraints.txt
@@ -16,13 +20,16 @@ unexport PYTHONPATH PYTHONHOME
 $(shell test "$$(cat .venv/checkout 2>/dev/null)" = "$(CURDIR)" || rm -f .venv/*.stamp)
 
 help:  ## this list
-	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' Makefile
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' Makefile
 
 analyse: .venv/run.stamp  ## report and pictures of the paper's designed feeder (SCENE=... for another)
 	$(PY) -m limitsets analyse $(SCENE)
 
 test: .venv/dev.stamp  ## the tests, with the examples in the docstrings, the studies and the notebooks
-	$(PY) -m pytest
+	$(PYTEST) -m "not sweep"
+
+test-all: .venv/dev.stamp  ## these and the long ones: many random examples, searches
+	$(PYTEST)
 
 lint: .venv/dev.stamp  ## ruff: rules and format
 	$(PY) -m ruff check .
@@ -49,7 +56,7 @@ studies: .venv/dev.stamp  ## run every study again, writing its figures and numb
 notebooks: .venv/dev.stamp  ## run every notebook again, in place
 	set -e; for notebook in notebooks/*.ipynb; do .venv/bin/jupyter-execute --inplace $$notebook; done
 
-check: lint types contracts test docs  ## all that has to pass
+check: lint types contracts test-all docs  ## all that has to pass
 
 clean:  ## remove .venv, caches and what was built
 	rm -rf .venv build dist docs/api .benchmarks .hypothesis .import_linter_cache .mypy_cache .pytest_cache .ruff_cache
@@ -75,4 +82,4 @@ $(PY):
 	echo "or name it: make PYTHON=/path/to/python3.12" >&2; \
 	exit 1
 
-.PHONY: help analyse test lint types contracts bench docs checker studies notebooks check clean
+.PHONY: help analyse test test-all lint types contracts bench docs checker studies notebooks check clean

@@ -10,13 +10,17 @@ from tests.cli.command import run
 
 
 def test_a_search_writes_scene_answer_and_figure(here, capfd):
+    tree = ls.load("paper-designed").as_dict() | {"tolerance": {"throw.speed": "1 %"}}
+    ls.dump(ls.load(tree), "given.toml")
     code, out, _ = run(
         capfd,
         "design",
-        "paper-designed",
+        "given.toml",
         "--robust",
         "--evaluations",
-        "20",
+        "4",
+        "--vary",
+        "part.mass.center.along,throw.kappa",
         "--seconds",
         "0",
         "--out",
@@ -35,6 +39,7 @@ def test_a_search_writes_scene_answer_and_figure(here, capfd):
     assert again.value("throw.kappa") == record["values"]["throw.kappa"]
 
 
+@pytest.mark.sweep
 def test_the_scene_alone(capfd):
     words = ("--robust", "--evaluations", "20", "--seconds", "0", "-o", "found.toml")
     code, out, _ = run(capfd, "design", "paper-designed", *words)

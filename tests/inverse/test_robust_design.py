@@ -160,6 +160,7 @@ def test_no_part_rests_in_a_box_larger_than_plane_geometry_allows():
     assert rests == [True, False]
 
 
+@pytest.mark.sweep
 def test_a_small_search_finds_scenes_that_hold_throughout_their_box(small):
     """Thrown: scenes drawn from 0.9 of the box, landings off at random; nothing rests wrongly, and all get there."""
     rng, scene = np.random.default_rng(1), small.scene
@@ -181,6 +182,7 @@ def test_a_small_search_finds_scenes_that_hold_throughout_their_box(small):
         assert arrived.all()
 
 
+@pytest.mark.sweep
 def test_the_margin_of_the_design_is_that_of_its_worst_corner(small):
     """By `failing`, which tries corner after corner at one factor: none at the margin, one a little beyond."""
     box = Tolerance.of(small.scene, small.tolerance)
@@ -191,6 +193,7 @@ def test_the_margin_of_the_design_is_that_of_its_worst_corner(small):
     assert fails[1]
 
 
+@pytest.mark.sweep
 def test_what_stands_on_the_front_holds_on_all_corners(small):
     box = Tolerance.of(small.scene, small.tolerance)
     for option in small.front[:3]:
@@ -211,6 +214,7 @@ def test_polishing_never_ends_below_its_start():
     assert 20.0 <= made.kappa <= 30.0
 
 
+@pytest.mark.sweep
 def test_a_small_search_says_how_it_was_found(small):
     record = small.to_json()
     json.dumps(record, allow_nan=False)
@@ -239,6 +243,7 @@ def test_the_same_seed_gives_the_same_designs():
     assert (found[0] == found[1]).all()
 
 
+@pytest.mark.sweep
 def test_the_figure_of_the_front(small, tmp_path):
     path = tmp_path / "front.png"
     ls.plot.robust_design(small, wanted=18.4, bound=14.7).savefig(path)

@@ -12,7 +12,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from mpmath import mpf
+from mpmath import mp, mpf
 
 import limitsets as ls
 from limitsets.maps import images
@@ -160,11 +160,10 @@ def test_a_periodic_orbit_comes_back_at_50_digits(files, name, kappa):
     slope = (ends[1][-1][1] - ends[0][-1][1]) / (hi - lo)
     least, most = (float.fromhex(end) for end in said["multiplier"])
     assert least <= slope <= most
-    for _ in range(80):
-        middle = (lo + hi) / 2
-        lo, hi = (middle, hi) if (orbit(middle)[-1][1] - middle) * off[0] > 0 else (lo, middle)
-    path = orbit(lo)
-    assert abs(path[-1][1] - lo) < mpf(10) ** -20
+    x = mp.findroot(lambda x: orbit(x)[-1][1] - x, (lo, hi), solver="anderson", tol=mpf(10) ** -45)
+    assert lo < x < hi
+    path = orbit(x)
+    assert abs(path[-1][1] - x) < mpf(10) ** -20
     if name == "cycle":
         assert max(x for s, x in path if s != 2) > 20
     elif name == "never":

@@ -147,6 +147,7 @@ def highest_scattered(throw, landing):
     return float(found)
 
 
+@pytest.mark.sweep
 def test_nine_quantities_and_the_landing_place(tmp_path):
     found = joint_margin(scene(NINE), GOALS[:1], width=0.01, seconds=15.0)
     # 0.47 is refuted; the parts' feet differ by more than the landings scatter, and below some x nothing is proved of

@@ -72,6 +72,7 @@ def density_in_bins(found, side, bins):
     return np.diff(below) / np.diff(bins)
 
 
+@pytest.mark.sweep
 def test_bounded_noise_against_throws_on_a_short_arm():
     """The arm ends just beyond the limit set: throws are lost, and the class is left at a small rate."""
     scene = ls.load("paper-designed").with_values({"arm.length": 23.6})
@@ -115,6 +116,7 @@ def test_no_noise_against_the_limit_set_and_a_long_orbit():
     assert part.cells.extents()[2][-1][1] == pytest.approx(23.383, abs=0.03)
 
 
+@pytest.mark.sweep
 def test_slopes_are_those_of_secants(gaussian):
     """The slope times the logarithm of two levels, against the difference of the numbers there on other cells."""
     for name in ("speed", "landing"):

@@ -297,12 +297,12 @@ def test_clockwise_vertices_are_named_so(plate: dict[str, Any]) -> None:
 def test_refuses_files(content: bytes, words: str, tmp_path: Path) -> None:
     file = tmp_path / "bad.toml"
     file.write_bytes(content)
-    began = time.perf_counter()
+    began = time.process_time()
     with pytest.raises(SceneError) as caught:
         load(file)
     assert words in str(caught.value)
     assert caught.value.file == str(file)
-    assert time.perf_counter() - began < 5.0
+    assert time.process_time() - began < 5.0
 
 
 def test_refuses_places_without_a_scene(tmp_path: Path) -> None:

@@ -7,6 +7,8 @@ import pytest
 
 from tests.studies.test_studies import STUDIES, load_study
 
+pytestmark = pytest.mark.sweep  # each case by 100 000 throws
+
 
 @pytest.fixture(scope="module")
 def ran(tmp_path_factory):

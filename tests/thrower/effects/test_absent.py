@@ -4,6 +4,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 from tests.thrower.effects.copies import environment_of_copy
 
 # Prints a digest of the machine code of one compiled loop over throws; symbols carry counters, so they are left out.
@@ -36,6 +38,7 @@ def machine_code(folder: Path, word: str) -> str:
     return done.stdout
 
 
+@pytest.mark.sweep
 def test_the_bare_map_has_the_same_machine_code_without_the_effects(tmp_path: Path) -> None:
     whole, bare = machine_code(tmp_path, "with"), machine_code(tmp_path, "without")
     assert whole == bare

@@ -25,6 +25,7 @@ from limitsets.thrower.effects.slip import Slip
 from limitsets.thrower.free_flight import fly_on
 from limitsets.thrower.full import gather_full
 from limitsets.thrower.motion import DOWN, LOST, above, right_of
+from tests.kept import kept
 from tests.thrower.effects.simulation import Law, OutsideError, Simulation
 from tests.thrower.effects.throws import Case, cases, same_end
 
@@ -114,6 +115,7 @@ def _note(book: Any, line: int, column: int, one: float, two: float, three: floa
     book[line, column + 3] = four
 
 
+@kept
 @kernel(entry=True)
 def ledger(params: Any, x: float, side: int, book: Any) -> int:
     """Fill a book with the steps of a throw: kind, X and H, then height, velocities and rate before and after."""

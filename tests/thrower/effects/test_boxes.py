@@ -13,6 +13,7 @@ import pytest
 import limitsets as ls
 from limitsets.errors import SceneError
 from limitsets.graph.images.enclosed import enclosures
+from limitsets.jit import cover_foreign_class
 from limitsets.maps import codes, images
 from limitsets.proofs.parameters import parameter_box
 from limitsets.proofs.replay import replay
@@ -160,6 +161,13 @@ class Wind(NamedTuple):
     """An effect that has not said that boxes follow it."""
 
     strength: float
+
+
+def blown(wind):
+    return wind.strength
+
+
+cover_foreign_class(Wind, [blown])  # so that what is compiled for it is kept on disk
 
 
 def test_without_any_effect_everything_is_enclosed():

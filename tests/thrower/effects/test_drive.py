@@ -15,6 +15,7 @@ from limitsets.thrower.effects.drive import all_the_way
 from limitsets.thrower.effects.landing import Landing, first_arrival
 from limitsets.thrower.full import gather_full
 from limitsets.thrower.motion import above, right_of
+from tests.kept import kept
 
 DESIGNED = ls.load("paper-designed")
 
@@ -34,25 +35,27 @@ def in_the_room(case: Scene, stroke: float, x: float, side: int) -> tuple[float,
     a, d = case.sides.a[side], case.sides.d[side]
     h, kappa, rho2 = case.surface_height, case.kappa, case.radius_of_gyration**2
 
-    def turn(vector: tuple[float, float], angle: float) -> np.ndarray:
-        c, s = math.cos(angle), math.sin(angle)
+    def turn(vector: tuple[float, float], angle: Any) -> np.ndarray:
+        c, s = np.cos(angle), np.sin(angle)
         return np.array([c * vector[0] - s * vector[1], s * vector[0] + c * vector[1]])
 
     along, across = turn((1.0, 0.0), stroke), turn((0.0, 1.0), stroke)
     start = turn((x, h + d), stroke)
     velocity = turn((-(h + d), x), stroke)  # omega = 1 about the joint
 
-    def centre(phi: float) -> np.ndarray:
-        return start + velocity * phi + np.array([0.0, -0.5 * kappa * phi * phi])
+    def centre(phi: Any) -> np.ndarray:
+        return np.array(
+            [start[0] + velocity[0] * phi, start[1] + velocity[1] * phi - 0.5 * kappa * phi * phi]
+        )
 
-    def vertex(phi: float) -> np.ndarray:
+    def vertex(phi: Any) -> np.ndarray:
         return centre(phi) + turn((-a, -d), stroke + phi)
 
     # the left vertex over the arm's surface, which is h from the joint
     grid = np.linspace(1e-3, 2 * math.pi, 20001)
-    height = np.array([vertex(t) @ across - h for t in grid])
+    height = across @ vertex(grid) - h
     first = int(np.flatnonzero((height[:-1] > 0) & (height[1:] <= 0))[0])
-    phi = brentq(lambda t: vertex(t) @ across - h, grid[first], grid[first + 1], xtol=1e-15)
+    phi = brentq(lambda t: across @ vertex(t) - h, grid[first], grid[first + 1], xtol=1e-15)
 
     v = velocity + np.array([0.0, -kappa * phi])
     arm = centre(phi) - vertex(phi)  # from the vertex to the centre of mass
@@ -146,6 +149,7 @@ def test_the_least_value_is_found_inside_the_stroke() -> None:
     assert seen == {True, False}
 
 
+@kept
 @kernel(entry=True)
 def arrivals(params: Any, x: np.ndarray, side: int, out: np.ndarray) -> None:
     part = gather_full(params, side)

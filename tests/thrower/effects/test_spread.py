@@ -10,6 +10,7 @@ from limitsets.maps import advance, codes, images, orbit
 from limitsets.maps.counting_random import normal_pair, philox, uniform_pair
 from limitsets.scene import Scene
 from limitsets.thrower import trace
+from tests.kept import kept
 
 DESIGNED = ls.load("paper-designed")
 
@@ -21,11 +22,13 @@ def scene(word: str, speed: str | None = None, landing: str | None = None) -> Sc
     return ls.load(tree)
 
 
+@kept
 @kernel(entry=True)
 def words(seed: np.uint64, a: np.uint64, b: np.uint64) -> tuple[int, int, int, int]:
     return philox(seed, a, b)
 
 
+@kept
 @kernel(entry=True)
 def pairs(normal: bool, n: int, out: np.ndarray) -> None:
     for k in range(n):
