@@ -2,6 +2,7 @@
 
 import ast
 import importlib
+import re
 import subprocess
 import sys
 import textwrap
@@ -132,6 +133,15 @@ def python_blocks(page: Path) -> str:
     """Join a page's python blocks into one program."""
     blocks = page.read_text(encoding="utf-8").split("```python\n")[1:]
     return "\n".join(block.split("```")[0] for block in blocks)
+
+
+def test_files_that_the_glossary_names_are_there():
+    """docs/words.md says for each word where in the package it stands."""
+    named = re.findall(
+        r"`([a-z_]+/[a-z_/]+(?:\.py)?)`", (ROOT / "docs" / "words.md").read_text(encoding="utf-8")
+    )
+    assert len(named) > 40
+    assert [name for name in named if not (PACKAGE / name).exists()] == []
 
 
 def test_code_in_the_readme_runs(tmp_path):

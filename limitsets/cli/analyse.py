@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from limitsets.cli.output import Json, Scene, answer, opened, progress, table
+from limitsets.cli.output import Json, Scene, answer, opened, option, progress, table
 
 if TYPE_CHECKING:
     from limitsets.analysis import Analysis, Plan
@@ -21,21 +21,19 @@ MOST_CELLS = 10_000_000
 def analyse(
     scene: Scene,
     cells: Annotated[
-        int | None,
-        typer.Option("--cells", min=1, max=MOST_CELLS, metavar="N", help="Cells per side, 4096 by default."),
+        int | None, option("--cells", "N", "Cells per side, 4096 by default.", min=1, max=MOST_CELLS)
     ] = None,
     error: Annotated[
         float | None,
-        typer.Option(
+        option(
             "--error",
-            metavar="X",
-            help="Instead of cells: largest error of the limit sets' ends, in the scene's unit of length. "
+            "X",
+            "Instead of cells: largest error of the limit sets' ends, in the scene's unit of length. "
             "What is picked for it, and what it will cost, is told before it starts.",
         ),
     ] = None,
     out: Annotated[
-        Path | None,
-        typer.Option("--out", "-o", metavar="DIR", help="Folder of the report, ./NAME-analysis by default."),
+        Path | None, option("--out -o", "DIR", "Folder of the report, ./NAME-analysis by default.")
     ] = None,
     json: Json = False,
 ) -> None:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from limitsets.cli.output import Json, Scene, answer, opened, progress, table
+from limitsets.cli.output import Json, Scene, answer, opened, option, progress, table
 
 if TYPE_CHECKING:
     from limitsets.auditing import Audit
@@ -18,8 +18,7 @@ __all__ = ["audit"]
 def audit(
     scene: Scene,
     out: Annotated[
-        Path | None,
-        typer.Option("--out", "-o", metavar="DIR", help="Write audit.md, audit.json and audit.png there."),
+        Path | None, option("--out -o", "DIR", "Write audit.md, audit.json and audit.png there.")
     ] = None,
     json: Json = False,
 ) -> None:

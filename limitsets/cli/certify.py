@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from limitsets.cli.arguments import HELP_NO_RECHECK, deviations
-from limitsets.cli.output import Json, Scene, answer, progress, saved, table
+from limitsets.cli.output import Json, Scene, Words, answer, option, progress, saved, table
 
 if TYPE_CHECKING:
     from limitsets.proofs import Claim, Proof
@@ -37,14 +37,11 @@ HELP_NOISE = (
 
 def certify(
     scene: Scene,
-    claim: Annotated[list[str] | None, typer.Option("--claim", metavar="C", help=HELP_CLAIM)] = None,
-    tolerance: Annotated[
-        list[str] | None, typer.Option("--tolerance", metavar="Q=DEV", help=HELP_TOLERANCE)
-    ] = None,
-    noise: Annotated[list[str] | None, typer.Option("--noise", metavar="Q=DEV", help=HELP_NOISE)] = None,
+    claim: Annotated[Words, option("--claim", "C", HELP_CLAIM)] = None,
+    tolerance: Annotated[Words, option("--tolerance", "Q=DEV", HELP_TOLERANCE)] = None,
+    noise: Annotated[Words, option("--noise", "Q=DEV", HELP_NOISE)] = None,
     out: Annotated[
-        Path | None,
-        typer.Option("--out", "-o", metavar="FILE", help="The certificate, ./NAME.proof.zip by default."),
+        Path | None, option("--out -o", "FILE", "The certificate, ./NAME.proof.zip by default.")
     ] = None,
     json: Json = False,
     no_recheck: Annotated[bool, typer.Option("--no-recheck", help=HELP_NO_RECHECK)] = False,

@@ -8,7 +8,18 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from limitsets.cli.arguments import HELP_NO_RECHECK, ends_of, number
-from limitsets.cli.output import Json, Scene, answer, opened, progress, save_scene, show_scene, table
+from limitsets.cli.output import (
+    Json,
+    Scene,
+    Words,
+    answer,
+    opened,
+    option,
+    progress,
+    save_scene,
+    show_scene,
+    table,
+)
 from limitsets.errors import LimitsetsError
 from limitsets.files import as_json
 
@@ -36,31 +47,19 @@ HELP_BOUNDS = (
 
 def design(
     scene: Scene,
-    critical_points: Annotated[
-        str | None, typer.Option("--critical-points", metavar="R,R,R", help=HELP_POINTS)
-    ] = None,
+    critical_points: Annotated[str | None, option("--critical-points", "R,R,R", HELP_POINTS)] = None,
     robust: Annotated[bool, typer.Option("--robust", help=HELP_ROBUST)] = False,
-    vary: Annotated[list[str] | None, typer.Option("--vary", metavar="Q,Q", help=HELP_VARY)] = None,
-    bounds: Annotated[list[str] | None, typer.Option("--bounds", metavar="Q=LO:HI", help=HELP_BOUNDS)] = None,
-    evaluations: Annotated[
-        int, typer.Option("--evaluations", min=1, max=1_000_000, metavar="N", help=HELP_EVALUATIONS)
-    ] = 1200,
+    vary: Annotated[Words, option("--vary", "Q,Q", HELP_VARY)] = None,
+    bounds: Annotated[Words, option("--bounds", "Q=LO:HI", HELP_BOUNDS)] = None,
+    evaluations: Annotated[int, option("--evaluations", "N", HELP_EVALUATIONS, min=1, max=1_000_000)] = 1200,
     seconds: Annotated[
-        float,
-        typer.Option("--seconds", min=0.0, metavar="S", help="With --robust: for the proof of each margin."),
+        float, option("--seconds", "S", "With --robust: for the proof of each margin.", min=0.0)
     ] = 240.0,
-    starts: Annotated[int, typer.Option("--starts", min=0, max=10_000, metavar="N", help=HELP_STARTS)] = 8,
-    stages: Annotated[
-        int | None, typer.Option("--stages", min=1, max=1000, metavar="N", help=HELP_STAGES)
-    ] = None,
+    starts: Annotated[int, option("--starts", "N", HELP_STARTS, min=0, max=10_000)] = 8,
+    stages: Annotated[int | None, option("--stages", "N", HELP_STAGES, min=1, max=1000)] = None,
     out: Annotated[
         Path | None,
-        typer.Option(
-            "--out",
-            "-o",
-            metavar="FILE",
-            help="NAME.toml for the scene; else a folder: scene, JSON and figure.",
-        ),
+        option("--out -o", "FILE", "NAME.toml for the scene; else a folder: scene, JSON and figure."),
     ] = None,
     json: Json = False,
     no_recheck: Annotated[

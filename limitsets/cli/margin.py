@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from limitsets.cli.arguments import HELP_NO_RECHECK, place
-from limitsets.cli.output import Json, Scene, answer, opened, progress, table
+from limitsets.cli.output import Json, Scene, answer, opened, option, progress, table
 from limitsets.errors import LimitsetsError
 from limitsets.files import as_json
 
@@ -26,20 +26,11 @@ def margin(
         list[str] | None,
         typer.Argument(metavar="QUANTITY", help='Like throw.speed, or "joint"; default: all there are.'),
     ] = None,
-    reading: Annotated[
-        str | None, typer.Option("--reading", metavar="R", help="fixed (but unknown) or per-throw.")
-    ] = None,
-    x: Annotated[
-        str | None, typer.Option("--x", metavar="X", help="Ask the goal at another X: 20, or '50 cm'.")
-    ] = None,
-    width: Annotated[
-        float, typer.Option("--width", metavar="W", help="How close the two ends have to be, as a share.")
-    ] = 0.01,
+    reading: Annotated[str | None, option("--reading", "R", "fixed (but unknown) or per-throw.")] = None,
+    x: Annotated[str | None, option("--x", "X", "Ask the goal at another X: 20, or '50 cm'.")] = None,
+    width: Annotated[float, option("--width", "W", "How close the two ends have to be, as a share.")] = 0.01,
     out: Annotated[
-        Path | None,
-        typer.Option(
-            "--out", "-o", metavar="DIR", help="Write margins.json, certificates, orbits, a figure."
-        ),
+        Path | None, option("--out -o", "DIR", "Write margins.json, certificates, orbits, a figure.")
     ] = None,
     json: Json = False,
     no_recheck: Annotated[bool, typer.Option("--no-recheck", help=HELP_NO_RECHECK)] = False,

@@ -9,7 +9,7 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
 
 import typer
 
@@ -23,8 +23,10 @@ __all__ = [
     "Json",
     "Out",
     "Scene",
+    "Words",
     "answer",
     "opened",
+    "option",
     "progress",
     "save_scene",
     "saved",
@@ -32,13 +34,19 @@ __all__ = [
     "table",
 ]
 
+Words: TypeAlias = list[str] | None
+
+
+def option(flags: str, metavar: str, help: str, **limits: Any) -> Any:  # noqa: A002 - typer's word
+    """Declare an option that takes a value."""
+    return typer.Option(*flags.split(), metavar=metavar, help=help, **limits)
+
+
 Scene = Annotated[
     str, typer.Argument(metavar="SCENE", help="A built-in name (see: limitsets scenes) or a TOML file.")
 ]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON, and nothing else, on stdout.")]
-Out = Annotated[
-    Path | None, typer.Option("--out", "-o", metavar="FILE", help="Write the JSON to this file as well.")
-]
+Out = Annotated[Path | None, option("--out -o", "FILE", "Write the JSON to this file as well.")]
 
 # What takes longer than this says what it is doing.
 PATIENCE = 2.0

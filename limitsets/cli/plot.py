@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from limitsets.cli.arguments import position
-from limitsets.cli.output import Json, Scene, answer, progress, saved
+from limitsets.cli.output import Json, Scene, answer, option, progress, saved
 from limitsets.errors import LimitsetsError
 
 if TYPE_CHECKING:
@@ -34,20 +34,11 @@ def plot(
     scene: Scene,
     kind: Annotated[Kind, typer.Argument(metavar="KIND", help="What to draw.")],
     out: Annotated[
-        Path | None,
-        typer.Option(
-            "--out", "-o", metavar="FILE", help=f"File ({', '.join(FORMATS)}), ./NAME-KIND.png by default."
-        ),
+        Path | None, option("--out -o", "FILE", f"File ({', '.join(FORMATS)}), ./NAME-KIND.png by default.")
     ] = None,
-    cells: Annotated[
-        int, typer.Option("--cells", min=1, max=10_000_000, metavar="N", help="Cells per side.")
-    ] = 4096,
-    x: Annotated[
-        str | None, typer.Option("--x", metavar="X", help="For flight: where the part rests.")
-    ] = None,
-    side: Annotated[
-        int | None, typer.Option("--side", metavar="I", help="For flight: on which side.")
-    ] = None,
+    cells: Annotated[int, option("--cells", "N", "Cells per side.", min=1, max=10_000_000)] = 4096,
+    x: Annotated[str | None, option("--x", "X", "For flight: where the part rests.")] = None,
+    side: Annotated[int | None, option("--side", "I", "For flight: on which side.")] = None,
     json: Json = False,
 ) -> None:
     """Draw one figure of a scene."""

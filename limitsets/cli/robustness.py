@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from limitsets.cli.arguments import HELP_NO_RECHECK, deviations
-from limitsets.cli.output import Json, Scene, answer, opened, progress, table
+from limitsets.cli.output import Json, Scene, Words, answer, opened, option, progress, table
 
 if TYPE_CHECKING:
     from limitsets.robust.sheet.summary import Robustness
@@ -25,33 +25,22 @@ HELP_WITHOUT = "What not to do: margins, joint, curve, noise or audit; repeatabl
 
 def robustness(
     scene: Scene,
-    quantity: Annotated[list[str] | None, typer.Option("--quantity", metavar="Q", help=HELP_QUANTITY)] = None,
+    quantity: Annotated[Words, option("--quantity", "Q", HELP_QUANTITY)] = None,
     reading: Annotated[
-        str | None,
-        typer.Option("--reading", metavar="R", help="fixed (but unknown) or per-throw; default both."),
+        str | None, option("--reading", "R", "fixed (but unknown) or per-throw; default both.")
     ] = None,
-    tolerance: Annotated[
-        list[str] | None, typer.Option("--tolerance", metavar="Q=DEV", help=HELP_TOLERANCE)
-    ] = None,
-    scatter: Annotated[
-        list[str] | None, typer.Option("--scatter", metavar="Q=DEV", help=HELP_SCATTER)
-    ] = None,
+    tolerance: Annotated[Words, option("--tolerance", "Q=DEV", HELP_TOLERANCE)] = None,
+    scatter: Annotated[Words, option("--scatter", "Q=DEV", HELP_SCATTER)] = None,
     law: Annotated[
-        str,
-        typer.Option("--law", metavar="LAW", help="Of --scatter: gaussian (standard deviations) or bounded."),
+        str, option("--law", "LAW", "Of --scatter: gaussian (standard deviations) or bounded.")
     ] = "gaussian",
-    width: Annotated[
-        float, typer.Option("--width", metavar="W", help="How close brackets have to be, as a share.")
-    ] = 0.01,
+    width: Annotated[float, option("--width", "W", "How close brackets have to be, as a share.")] = 0.01,
     cells: Annotated[
-        int, typer.Option("--cells", min=8, max=100_000, metavar="N", help="Cells per side, for the noise.")
+        int, option("--cells", "N", "Cells per side, for the noise.", min=8, max=100_000)
     ] = 1024,
-    without: Annotated[list[str] | None, typer.Option("--without", metavar="PART", help=HELP_WITHOUT)] = None,
+    without: Annotated[Words, option("--without", "PART", HELP_WITHOUT)] = None,
     out: Annotated[
-        Path | None,
-        typer.Option(
-            "--out", "-o", metavar="DIR", help="Folder of the report, ./NAME-robustness by default."
-        ),
+        Path | None, option("--out -o", "DIR", "Folder of the report, ./NAME-robustness by default.")
     ] = None,
     json: Json = False,
     no_recheck: Annotated[bool, typer.Option("--no-recheck", help=HELP_NO_RECHECK)] = False,

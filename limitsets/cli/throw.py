@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from limitsets.cli.arguments import position
-from limitsets.cli.output import Json, Out, Scene, answer, table
+from limitsets.cli.output import Json, Out, Scene, answer, option, table
 from limitsets.files import as_table
 
 if TYPE_CHECKING:
@@ -21,11 +21,9 @@ MOST_THROWS = 1_000_000
 
 def throw(
     scene: Scene,
-    x: Annotated[str, typer.Option("--x", metavar="X", help="Where the part rests: 8, or '20 cm'.")],
-    side: Annotated[int, typer.Option("--side", metavar="I", help="On which side.")],
-    count: Annotated[
-        int, typer.Option("--count", min=1, max=MOST_THROWS, metavar="N", help="How many throws.")
-    ] = 1,
+    x: Annotated[str, option("--x", "X", "Where the part rests: 8, or '20 cm'.")],
+    side: Annotated[int, option("--side", "I", "On which side.")],
+    count: Annotated[int, option("--count", "N", "How many throws.", min=1, max=MOST_THROWS)] = 1,
     out: Out = None,
     json: Json = False,
 ) -> None:

@@ -155,20 +155,14 @@ def throw(
 def _check_asked(contact: str, friction: float | None, threshold: float, rolls: bool, stroke: float) -> None:
     """Refuse words that say nothing of this contact."""
     if contact == "hinge" and friction is not None and stroke == 0.0:
-        raise AnswerError(
-            "the contact", contact, "'unilateral' with a friction", "a hinge has none: leave it out"
-        )
+        remedy = "a hinge has none: leave it out"
+        raise AnswerError("the contact", contact, "'unilateral' with a friction", remedy)
     if contact != "hinge" and (rolls or threshold):
-        raise AnswerError(
-            "the contact",
-            contact,
-            "'hinge' with rolls or a threshold",
-            "the engine's own contact rolls anyway",
-        )
+        remedy = "the engine's own contact rolls anyway"
+        raise AnswerError("the contact", contact, "'hinge' with rolls or a threshold", remedy)
     if not (0.0 <= stroke < 0.5 * math.pi and 0.0 <= threshold < math.inf):
-        raise AnswerError(
-            "the stroke and the threshold", (stroke, threshold), "0 to pi/2 rad; from 0", "pass stroke=0.2"
-        )
+        thing, allowed = "the stroke and the threshold", "0 to pi/2 rad; from 0"
+        raise AnswerError(thing, (stroke, threshold), allowed, "pass stroke=0.2")
 
 
 def _check(
@@ -176,22 +170,19 @@ def _check(
 ) -> tuple[float, float]:
     """Friction and restitution of the contact; of a hinge only what is asked for."""
     if not 0 <= side < len(scene.sides):
-        raise MapError(
-            "the side", side, f"an integer from 0 to {len(scene.sides) - 1}", "name a side of the part"
-        )
+        allowed = f"an integer from 0 to {len(scene.sides) - 1}"
+        raise MapError("the side", side, allowed, "name a side of the part")
     if not 0.0 < step <= 0.1:
         raise AnswerError("the engine's step", step, "above 0 and at most 0.1 rad", "pass step=1e-3")
     if contact not in ("hinge", "unilateral"):
         raise AnswerError("the contact", contact, "'hinge' or 'unilateral'", "choose one")
     held = contact == "hinge"
     mu = scene.world.friction if friction is None else friction
+    mu = 0.0 if mu is None and held else mu
     e = scene.world.restitution if restitution is None and not held else restitution
-    if mu is None and held:
-        mu = 0.0
     if mu is None or not 0.0 <= mu < math.inf:
-        raise AnswerError(
-            "the friction", mu, "a number from 0", "pass friction=0.5, or give world.friction in the scene"
-        )
+        remedy = "pass friction=0.5, or give world.friction in the scene"
+        raise AnswerError("the friction", mu, "a number from 0", remedy)
     if e is not None and not 0.0 <= e <= 1.0:
         raise AnswerError("the restitution", e, "0 to 1", "pass restitution=0 for a plastic contact")
     return mu, e or 0.0

@@ -6,6 +6,11 @@ are 2 v and 2 v + 1, the cells are the leaves.  A range of cells is at most 2 lo
 points to those, and an inner node points to its two children: paths between cells are the same as before.  The
 strong components of that graph are those of the cells (with some inner nodes among them), and a fold over the tree
 (or, largest) answers for a whole range at once.
+
+Why `components` has a walk beside it: a tree taught rows of ranges gave the same components of the Leslie map in 1.46
+times the time at 65 536 cells (3.2 ms against 2.2) and 1.16 times at a million, where both wait for memory, and the
+same reach in 1.0.  Its runs of four cells are as many nodes of the tree as cells, and the tree has twice as many
+entries.
 """
 
 from __future__ import annotations

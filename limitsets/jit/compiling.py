@@ -215,8 +215,8 @@ def kernel(function: Any = None, *, entry: bool = False, counting: bool = True) 
 @overload
 def proof_kernel(function: F) -> F: ...
 @overload
-def proof_kernel(*, entry: bool) -> Callable[[F], F]: ...
-def proof_kernel(function: Any = None, *, entry: bool = False) -> Any:
+def proof_kernel(*, entry: bool = False, counting: bool = True) -> Callable[[F], F]: ...
+def proof_kernel(function: Any = None, *, entry: bool = False, counting: bool = True) -> Any:
     """Compile without contraction: every operation rounds as written.  Arguments as for `kernel`.
 
     Examples
@@ -229,5 +229,5 @@ def proof_kernel(function: Any = None, *, entry: bool = False) -> Any:
     0.0
     """
     if function is None:
-        return lambda f: compiled(f, PROOF, entry)
-    return compiled(function, PROOF, entry)
+        return lambda f: compiled(f, PROOF, entry, counting)
+    return compiled(function, PROOF, entry, counting)

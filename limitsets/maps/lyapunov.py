@@ -63,7 +63,7 @@ def _growth(params: Any, xs: Any, sides: Any, code_after: Any, tangents: Any, su
     """
     tangent = pick(tangents, 0)
     total, size, scale, carried = sums[0], sums[1], sums[2], sums[3]
-    made = code_after.size
+    made: int = code_after.size
     for k in range(code_after.size):
         x, side = pick(xs, k), sides[k]
         after, side_after, code = step(params, x, side)
@@ -83,7 +83,7 @@ def _growth(params: Any, xs: Any, sides: Any, code_after: Any, tangents: Any, su
                 scale, size = 1.0 / size, 1.0
     put(tangents, 0, tangent)
     sums[0], sums[1], sums[2], sums[3] = total, size, scale, carried
-    return made  # type: ignore[no-any-return]  # kernels take arrays as Any
+    return made
 
 
 @dataclass(frozen=True)

@@ -66,9 +66,8 @@ def basins(source: Scene | Grid, shares: Basins, found: Any = None) -> Figure:
     """
     grid = shares.grid
     if grid.dimension > 2:
-        raise AnswerError(
-            "the dimension of the basins", grid.dimension, "1 or 2", "draw a section of them yourself"
-        )
+        remedy = "draw a section of them yourself"
+        raise AnswerError("the dimension of the basins", grid.dimension, "1 or 2", remedy)
     name = "" if isinstance(source, Grid) else f" of {source.name}"
     unit = "" if isinstance(source, Grid) else f" [{source.unit}]"
     if grid.dimension == 1:

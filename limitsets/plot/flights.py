@@ -70,9 +70,9 @@ def flight(scene: Scene, x: float, side: int) -> Figure:
         least = float(scene.sides.a[side])
         allowed = f"more than {least:.6g} on side {side}"
         raise AnswerError("x of the throw", x, allowed, "start where a throw lifts the part")
-    after, side_after = float(seen.x[1]), int(seen.side[1])
+    after, side_after, code = float(seen.x[1]), int(seen.side[1]), int(seen.code[0])
     air = [_in_air(scene, x, side, angle) for angle in np.linspace(0.0, phi, SHOWN + 2)]
-    rolled = _to_rest(scene, air[-1], (side, side_after), after, phi, int(seen.code[0]))
+    rolled = _to_rest(scene, air[-1], (side, side_after), after, phi, code)
     everything = np.concatenate([*air, *rolled])
     lo, hi = float(everything[:, 0].min()), float(everything[:, 0].max())
     height = float(everything[:, 1].max() - min(0.0, scene.surface_height))
@@ -86,8 +86,7 @@ def flight(scene: Scene, x: float, side: int) -> Figure:
         axes.set_ylabel(f"height over the joint [{scene.unit}]")
         axes.label_outer()  # last: it takes the inner labels away
     _flight(above, scene, x, side, phi, air)
-    _landing(below, scene, rolled, after, side_after)
-    _titles(above, below, scene, (x, side), (after, side_after), phi, int(seen.code[0]))
+    _landing(below, scene, rolled, (x, side), (after, side_after), code)
     caveat = " (small-angle formulas: the vertex need not be on the arm at the impact)"
     style.title(figure, f"One throw of {scene.name}{'' if scene.flight == 'exact' else caveat}")
     style.legend(figure, _legend(len(rolled) > 2), 3)
@@ -184,34 +183,25 @@ def _flight(axes: Axes, scene: Scene, x: float, side: int, phi: float, air: list
     axes.plot(path[:, 0], path[:, 1], color=style.INK, lw=1.1, ls="-.", zorder=5, gid="path")
     stops = np.array([_centre(scene, x, side, angle) for angle in np.linspace(0.0, phi, len(air))])
     axes.plot(stops[:, 0], stops[:, 1], ls="", zorder=6, gid="centre of mass", **CENTRE)
+    text = f"In the air: from x = {x:.2f} {scene.unit} on side {side}, turning by {math.degrees(phi):.1f}°"
+    axes.set_title(text, fontsize=style.TEXT, loc="left")
 
 
-def _landing(axes: Axes, scene: Scene, rolled: list[Array], after: float, side: int) -> None:
+def _landing(
+    axes: Axes, scene: Scene, rolled: list[Array], start: tuple[float, int], end: tuple[float, int], code: int
+) -> None:
+    (x, before), (after, side) = start, end
     _part(axes, rolled[-1], facecolor=(0.86, 0.86, 0.86, 0.85), zorder=2, gid="rest", **REST)
     _impact(axes, scene, rolled[0], zorder=1.5)
     for corners in rolled[1:-1]:
         _part(axes, corners, facecolor="none", edgecolor=LANDED, lw=1.0, ls=":", zorder=3, gid="turning")
     height = scene.surface_height + float(scene.sides.d[side])
     axes.plot(after, height, ls="", zorder=6, gid="centre at rest", **CENTRE)
-
-
-def _titles(
-    above: Axes,
-    below: Axes,
-    scene: Scene,
-    start: tuple[float, int],
-    end: tuple[float, int],
-    phi: float,
-    code: int,
-) -> None:
-    (x, side), (after, side_after) = start, end
-    text = f"In the air: from x = {x:.2f} {scene.unit} on side {side}, turning by {math.degrees(phi):.1f}°"
-    above.set_title(text, fontsize=style.TEXT, loc="left")
-    how = "roll" if code == codes.ROLL else ("flip" if side_after != side else "jog")
-    where = f"onto side {side_after}" if side_after != side else f"still on side {side}"
+    how = "roll" if code == codes.ROLL else ("flip" if side != before else "jog")
+    where = f"onto side {side}" if side != before else f"still on side {side}"
     note = {codes.OUTWARD: "; off the arm's end", codes.INWARD: "; into the joint"}.get(code, "")
     text = f"After the impact: a {how}, {x:.2f} to {after:.2f} {scene.unit}, {where}{note}"
-    below.set_title(text, fontsize=style.TEXT, loc="left")
+    axes.set_title(text, fontsize=style.TEXT, loc="left")
 
 
 def _legend(turns: bool) -> list[Any]:

@@ -84,27 +84,22 @@ def _condensed(whole: nx.DiGraph[int]) -> nx.DiGraph[Any]:
 
 def _places(drawn: nx.DiGraph[Any]) -> dict[Any, Place]:
     """Height: the longest way down; across: side by side, in the middle of what they lead to."""
-    height: dict[Any, int] = {}
-    for node in reversed(list(nx.topological_sort(drawn))):
-        height[node] = max((height[other] + 1 for other in drawn.successors(node)), default=0)
     place: dict[Any, Place] = {}
-    for layer in range(max(height.values(), default=0) + 1):
-        row = [node for node in drawn if height[node] == layer]
+    order = {node: number for number, node in enumerate(drawn)}
 
-        def pull(node: Any) -> float:
-            below = [place[other][0] for other in drawn.successors(node)]
-            return sum(below) / len(below) if below else 0.0
+    def pull(node: Any) -> tuple[float, int]:
+        below = [place[other][0] for other in drawn.successors(node)]
+        return sum(below) / len(below) if below else 0.0, order[node]
 
-        row.sort(key=pull)
-        for k, node in enumerate(row):
-            place[node] = (k - 0.5 * (len(row) - 1), float(layer))
+    for layer, nodes in enumerate(nx.topological_generations(drawn.reverse(copy=False))):
+        for k, node in enumerate(sorted(nodes, key=pull)):
+            place[node] = (k - 0.5 * (len(nodes) - 1), float(layer))
     return place
 
 
-def _radius(cells: int, largest: int = 200_000) -> float:
+def _radius(cells: int) -> float:
     """Radius in points: the area grows with the root of the number of cells, so that small sets stay visible."""
-    share = min(cells, largest) / largest
-    return 7.0 + 17.0 * math.sqrt(math.sqrt(share))
+    return 7.0 + 17.0 * math.sqrt(math.sqrt(min(cells / 200_000, 1.0)))
 
 
 def _node(axes: Axes, node: Any, data: dict[str, Any], x: float, y: float, *, few: bool) -> None:

@@ -41,9 +41,8 @@ WORDS = {
 
 def _main(found: NoiseStatistics) -> NoisyClass:
     if not found.classes:
-        raise AnswerError(
-            "the classes of the noisy scene", "none", "one at least", "nothing stays: nothing to draw"
-        )
+        remedy = "nothing stays: nothing to draw"
+        raise AnswerError("the classes of the noisy scene", "none", "one at least", remedy)
     return max(found.classes, key=lambda part: len(part.cells))
 
 

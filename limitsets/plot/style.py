@@ -37,7 +37,6 @@ __all__ = [
     "note",
     "of_set",
     "open_frame",
-    "orbit_on",
     "panels",
     "stretch",
     "title",
@@ -67,6 +66,8 @@ SMALL, TEXT = 8.5, 10.0
 
 # Steps before an orbit is taken to be on its attractor.
 TRANSIENT = 2000
+# Throws of an orbit that are drawn.
+MOST = 90
 
 
 def canvas(
@@ -107,9 +108,8 @@ def extents_of(found: Any) -> list[Extents]:
         known = [part for part in parts if isinstance(part, Mapping)]
         if len(known) == len(parts):
             return known
-    raise AnswerError(
-        "what to draw", type(found).__name__, "attractors, limit sets or an analysis", "pass one of these"
-    )
+    allowed = "attractors, limit sets or an analysis"
+    raise AnswerError("what to draw", type(found).__name__, allowed, "pass one of these")
 
 
 def ends_of(sets: Iterable[Extents]) -> list[float]:
@@ -117,21 +117,7 @@ def ends_of(sets: Iterable[Extents]) -> list[float]:
     return [x for extents in sets for parts in extents.values() for pair in parts for x in pair]
 
 
-def orbit_on(scene: Scene, extents: Extents, count: int) -> Orbit | None:
-    """Follow an orbit on an attractor; None where there is none to follow."""
-    widest = max(
-        ((hi - lo, side, 0.5 * (lo + hi)) for side, parts in extents.items() for lo, hi in parts),
-        default=None,
-    )
-    if widest is None:
-        return None
-    before = orbit(scene.map, widest[2], widest[1], TRANSIENT)
-    if before.stopped:
-        return None
-    return orbit(scene.map, float(before.x[-1]), int(before.side[-1]), count)
-
-
-def stretch(scene: Scene, extents: Extents, throws: int = 12, most: int = 90) -> Orbit | None:
+def stretch(scene: Scene, extents: Extents, throws: int = 12) -> Orbit | None:
     """Cut whole rounds out of an orbit: from an arrival on its first side to a later one, `throws` of them or more.
 
     Parameters
@@ -141,23 +127,28 @@ def stretch(scene: Scene, extents: Extents, throws: int = 12, most: int = 90) ->
     extents : mapping
         Intervals of the attractor.
     throws : int
-        Least number of throws.
-    most : int
-        Largest number, whether or not a round is complete then.
+        Least number of throws; there are at most 90, whether or not a round is complete then.
 
     Returns
     -------
     Orbit or None
         None where no orbit stays.
     """
-    path = orbit_on(scene, extents, 6 * most)
-    if path is None or path.code.size == 0:
+    starts = [(hi - lo, side, 0.5 * (lo + hi)) for side, parts in extents.items() for lo, hi in parts]
+    if not starts:
+        return None
+    _, side, x = max(starts)
+    before = orbit(scene.map, x, side, TRANSIENT)
+    if before.stopped:
+        return None
+    path = orbit(scene.map, float(before.x[-1]), int(before.side[-1]), 6 * MOST)
+    if path.code.size == 0:
         return None
     first = min(extents)
     arrivals = 1 + np.flatnonzero((path.side[1:] == first) & (path.side[:-1] != first))
     begin = int(arrivals[0]) if arrivals.size else 0
     later = arrivals[arrivals >= begin + throws]
-    end = min(int(later[0]) if later.size else begin + throws, begin + most, path.code.size)
+    end = min(int(later[0]) if later.size else begin + throws, begin + MOST, path.code.size)
     return Orbit(path.x[begin : end + 1], path.side[begin : end + 1], path.code[begin:end], None)
 
 
@@ -242,9 +233,9 @@ def keep_apart(axes: Axes, share: float) -> None:
             row, last = y, x
 
 
-def interval_text(parts: Sequence[tuple[float, float]], most: int = 2) -> str:
-    """Intervals as text, one per line."""
-    lines = [f"{lo:.2f} to {hi:.2f}" for lo, hi in parts[:most]]
-    if len(parts) > most:
+def interval_text(parts: Sequence[tuple[float, float]]) -> str:
+    """Intervals as text, one per line, two lines at most."""
+    lines = [f"{lo:.2f} to {hi:.2f}" for lo, hi in parts[:2]]
+    if len(parts) > 2:
         lines[-1] = f"... {len(parts)} intervals"
     return "\n".join(lines)

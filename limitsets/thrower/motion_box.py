@@ -91,11 +91,14 @@ def encloses(effect: Any) -> bool:
     """Whether the box kernels follow an effect; nothing is proved of throws with one whose file has not said so."""
 
 
+encloses.on(type(None), enclosed)
+
+
 @proof_kernel
 def all_enclosed(effects: Any) -> bool:
     """Whether the box kernels follow every effect that is there."""
     every = True
-    for effect in entries_of(effects):
+    for effect in entries_of((None,) + effects):  # noqa: RUF005 - there may be none, and numba has no unpacking
         every = every & encloses(effect)
     return every
 

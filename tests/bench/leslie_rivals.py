@@ -137,7 +137,8 @@ def by_scipy(depth: int) -> Answer:
     ends = np.flatnonzero(attracting)
     count = reaches[ends, :n_cells].sum(axis=0) + reaches[-1, :n_cells]
     one = np.where(reaches[-1, :n_cells], len(sets), ends[np.argmax(reaches[ends, :n_cells], axis=0)])
-    destination = np.where(count == 1, one, -1)
+    lasting = reaches[:-1][~attracting, :n_cells].any(axis=0)  # a recurrent set that is not closed: undecided
+    destination = np.where((count == 1) & ~lasting, one, -1)
     names = {-1: UNDECIDED, len(sets): OUTSIDE, **dict(enumerate(sizes))}
     numbers, cells = np.unique(destination, return_counts=True)
     basins = {names[int(k)]: int(c) for k, c in zip(numbers, cells, strict=True)}

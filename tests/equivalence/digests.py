@@ -22,6 +22,7 @@ import numpy as np
 import limitsets as ls
 from limitsets.cli import main
 from limitsets.graph.images.enclosed import enclosures
+from limitsets.graph.ranges import RUN
 from limitsets.maps import images
 from limitsets.proofs.parameters import parameter_box
 from limitsets.proofs.tolerance import whole
@@ -161,7 +162,7 @@ def leslie() -> Pairs:
         for method in ("corners-padded", "boxes"):
             graph = ls.transitions(ls.maps.Leslie(), cells, method=method)
             ranges = graph.ranges
-            yield f"{depth}, {method}, graph", digest(ranges.first, ranges.run, ranges.exits)
+            yield f"{depth}, {method}, graph", digest(ranges.first, ranges.box[:, RUN], ranges.exits)
             found = ls.attractors(graph)
             yield f"{depth}, {method}, attractors", digest([sorted(each.extents.items()) for each in found])
 

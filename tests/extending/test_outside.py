@@ -6,7 +6,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from limitsets.report.background import trust
 from typer.testing import CliRunner
 
 import limitsets as ls
@@ -18,10 +17,10 @@ from limitsets.graph.images import METHODS
 from limitsets.graph.images.sampled import sampled
 from limitsets.maps import contract, images
 from limitsets.proofs.asked import KINDS, sentence
+from limitsets.proofs.query import Query
 from limitsets.report.audits import summary
 from limitsets.report.pages import page
 from limitsets.report.questions import question_of, verdict_of
-from limitsets.robust.margins.finding import asked_of
 from limitsets.scene.facts import FACTS
 from limitsets.thrower import effects, impact_angles
 from limitsets.thrower.effects import EFFECTS
@@ -129,7 +128,7 @@ def test_audit_and_report_name_the_effect_and_not_another():
     found = ls.audit(scene)
     assert "Simulated: wear." in " ".join(summary(found))
     assert not any(each.simulated for each in found.findings)
-    text = trust(replace(ls.analyse("paper-designed", cells=256), scene=scene))
+    text = page(replace(ls.analyse("paper-designed", cells=256), scene=scene), {})
     assert "**Simulated** beyond the minimal model: wear." in text
     assert "the arm is as new" not in text
     assert "the left bottom vertex lands first" in text
@@ -171,7 +170,7 @@ def test_the_goal_is_proved_and_refuted_and_no_certificate_is_written(tmp_path):
     (refuted,) = ls.certify(asking("22 in"), claims=["goal"]).claims
     assert refuted.verdict == "refuted"
     assert refuted.counterexample[-1].lo > 22.0
-    assert asked_of(asking("24 in"), (outside.KeepsBelow(24.0),)).prove().verdict == "proved"
+    assert Query.of(asking("24 in"), (outside.KeepsBelow(24.0),)).prove().verdict == "proved"
 
 
 @pytest.mark.usefixtures("added")

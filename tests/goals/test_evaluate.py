@@ -13,7 +13,9 @@ from limitsets.goals import (
     Predicate,
     Reaches,
     StaysOnArm,
+    as_written,
     evaluate,
+    words_of,
 )
 from limitsets.report.questions import question_of
 from limitsets.robust.margins.finding import goals_of
@@ -92,18 +94,21 @@ def test_what_is_no_goal_of_these_has_no_verdict_and_no_words():
             ask(Upright())
 
 
-@pytest.mark.parametrize("kind", [*GOALS.values(), Predicate])
+def some(kind):
+    """A goal of a kind, with any numbers."""
+    numbers = {"place": 20.0, "side": 2, "sides": (0, 1), "flag": False}
+    return kind(**{name: numbers[word] for name, word in words_of(kind).items()})
+
+
+@pytest.mark.parametrize("kind", GOALS.values())
 def test_every_goal_has_words_of_its_own(kind):
-    goals = {
-        OrientedBeyond: OrientedBeyond(20.0, 2),
-        Reaches: Reaches(20.0, 2),
-        FlipOrder: FlipOrder((0, 1)),
-        Predicate: Predicate(lambda lo, hi, side: lo < 9.0, "below 9 in"),
-    }
-    words = {
-        each: question_of(goals.get(each, each), "in")
-        for each in (*GOALS.values(), Predicate)
-        if each in goals
-    }
-    words |= {each: question_of(each(), "in") for each in (AttractsAll, StaysOnArm)}
-    assert [each for each, text in words.items() if text == words[kind]] == [kind]
+    goals = [Predicate(lambda lo, hi, side: lo < 9.0, "below 9 in"), *map(some, GOALS.values())]
+    told = question_of(some(kind), "in")
+    assert [type(each) for each in goals if question_of(each, "in") == told] == [kind]
+
+
+@pytest.mark.parametrize("kind", GOALS.values())
+def test_a_goal_is_written_as_a_scene_reads_it(kind):
+    goal = some(kind)
+    tree = load("paper-designed").as_dict() | {"goal": as_written(goal, "in")}
+    assert load(tree).goal == goal

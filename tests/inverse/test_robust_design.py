@@ -5,6 +5,7 @@ import math
 
 import numpy as np
 import pytest
+from mpmath import mp
 
 import limitsets as ls
 from limitsets.errors import LimitsetsError
@@ -13,11 +14,13 @@ from limitsets.inverse.margin.front import unbeaten
 from limitsets.inverse.margin.lead import lead_of, lead_weight
 from limitsets.inverse.margin.polishing import polished
 from limitsets.inverse.margin.search import Search, bounds_of
+from limitsets.inverse.margin.sound import assumptions_kept
 from limitsets.maps import advance
 from limitsets.robust.margins.estimate import estimated, failing
 from limitsets.robust.margins.trap import trap
 from limitsets.robust.margins.vector import Tolerance
 from tests.studies.test_studies import load_study
+from tests.thrower import reference
 
 SPEED = {"throw.speed": "1 %"}
 
@@ -82,6 +85,23 @@ def test_the_best_margin_of_the_speed_is_where_both_ends_meet():
         kept = trap(box.scene_at(scene, 1.03 * found.margin, (sign,)).map, 12.0, 2)
         ends.append((kept.threshold(2), float(kept.hi[2])))
     assert max(end[0] for end in ends) > min(end[1] for end in ends)
+
+
+@pytest.mark.parametrize("name", ["initial", "designed"])
+def test_what_a_design_must_keep_is_what_the_model_assumes(name):
+    """At 50 digits by the formulas of docs/model.md: the angle, the throw's impulse, the landing's impulse."""
+    scene, facts = ls.load(f"paper-{name}"), reference.paper(name)
+    found, spare = trap(scene.map, 12.0, 2), []
+    for side in range(3):
+        a, d, h = facts.a[side], facts.d[side], facts.surface_height
+        for x in (float(found.lo[side]), float(found.hi[side])):
+            thrown = reference.throw(facts, side, x)
+            right = a * mp.cos(thrown.phi) - d * mp.sin(thrown.phi)
+            foot = (facts.radius_of_gyration**2 + d * (h + d)) / x
+            inside = min(facts.length[side] - a - foot, a + foot) / facts.length[side]
+            pressed = (thrown.omega * right - (x - facts.kappa * thrown.phi)) / x
+            spare += [1 - thrown.phi / scene.sides.corner[side], inside, pressed]
+    assert assumptions_kept(scene, found) == pytest.approx(float(min(spare)), rel=1e-9)
 
 
 @pytest.mark.parametrize(("name", "rho"), [("paper-initial", 1.14), ("paper-designed", 1.01)])

@@ -48,7 +48,7 @@ def test_the_table_has_the_keys_that_there_are():
 
 def test_the_model_s_table_has_every_effect_and_the_facts_that_it_needs():
     page = (Path(__file__).resolve().parents[2] / "docs" / "model.md").read_text(encoding="utf-8")
-    rows = re.findall(r"^\| `(\w+)` \| ([^|]*) \|", page.split("## Effects", 1)[1], re.M)
+    rows = re.findall(r"^\| `(\w+)` \|([^|]*)\|", page.split("## Effects", 1)[1], re.M)
     told = {name: tuple(re.findall(r"`(\w+)`", facts)) for name, facts in rows}
     assert told == {name: effect.needs for name, effect in EFFECTS.items()}
 

@@ -52,7 +52,7 @@ def fused(request, tmp_path_factory):
     environment = {**os.environ, **processor, "NUMBA_CACHE_DIR": str(tmp_path_factory.mktemp("cache"))}
     command = [sys.executable, "-c", READ, json.dumps(request.param)]
     found = json.loads(subprocess.run(command, env=environment, check=True, capture_output=True).stdout)
-    assert [len(found[kind]) for kind in ("boxes", "floats")] == [len(request.param)] * 2
+    assert [len(found[key]) for key in ("boxes", "floats")] == [len(request.param)] * 2
     return found
 
 

@@ -36,7 +36,7 @@ def _store(answer: Any, k: int, count: Any, first: Any, second: Any, to: Any, wi
     witness[0, k], witness[1, k] = w
 
 
-@proof_kernel(entry=True)
+@proof_kernel(entry=True, counting=False)
 def _enclose(lo_map: Any, hi_map: Any, side: int, lo: Any, hi: Any, kept: Any) -> bool:
     """Images of boxes; whether a function was asked beyond where it is defined, for any of them."""
     take_mark()
@@ -46,7 +46,7 @@ def _enclose(lo_map: Any, hi_map: Any, side: int, lo: Any, hi: Any, kept: Any) -
     return bool(take_mark())
 
 
-@proof_kernel(entry=True)
+@proof_kernel(entry=True, counting=False)
 def _find_undefined(lo_map: Any, hi_map: Any, side: int, lo: Any, hi: Any, count: Any) -> None:
     """Give up the boxes on which one was: apart from the loop above, which it would keep from vectorising."""
     for k in range(count.size):
@@ -56,7 +56,7 @@ def _find_undefined(lo_map: Any, hi_map: Any, side: int, lo: Any, hi: Any, count
         count[k] = NOTHING if take_mark() else found[0]
 
 
-@proof_kernel(entry=True)
+@proof_kernel(entry=True, counting=False)
 def _enclose_surely(lo_map: Any, hi_map: Any, side: int, lo: Any, hi: Any, again: Any, kept: Any) -> None:
     """Images of some of them, the slow and sure way."""
     one, two = on_side_box(lo_map, hi_map, side)

@@ -15,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from limitsets.errors import AnswerError
+from limitsets.files import as_table, picked
 from limitsets.inverse.critical.decision import Decision, Part, decided
 from limitsets.inverse.critical.dual import Dual
 from limitsets.inverse.critical.first import first_points, nearest_miss
@@ -92,15 +93,13 @@ class CriticalJacobian:
 
     def to_json(self) -> dict[str, Any]:
         """Give it as plain tables for JSON, null where there is no number."""
-        return {
-            "quantities": list(self.names),
-            "critical_points": [None if np.isnan(x) else x for x in self.x.tolist()],
-            "kinds": list(self.kinds),
-            "matrix": [[None if np.isnan(x) else x for x in row] for row in self.matrix.tolist()],
-            "no_derivative": list(self.reasons),
-            "determinant": self.determinant,
-            "condition": self.condition,
-        }
+        return as_table(
+            quantities=self.names,
+            critical_points=self.x,
+            **picked(self, "kinds", "matrix"),
+            no_derivative=self.reasons,
+            **picked(self, "determinant", "condition"),
+        )
 
 
 def condition_of(matrix: Array) -> float | None:

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from limitsets.errors import AnswerError
+from limitsets.files import as_table, picked
 from limitsets.inverse.critical.derivatives import CriticalJacobian, condition_of, require_minimal
 from limitsets.inverse.critical.nearest import KEPT, nearest_to_start, nearest_to_targets
 from limitsets.inverse.critical.seeded import present, with_present
@@ -86,23 +87,18 @@ class Design:
 
     def to_json(self) -> dict[str, Any]:
         """Give it as plain tables for JSON."""
-        return {
-            "scene": self.scene.as_dict(),
-            "reached": self.reached,
-            "message": self.message,
-            "how": self.how,
-            "evaluations": self.evaluations,
-            "targets": list(self.targets),
-            "residual": list(self.residual),
-            "quantities": [
+        return as_table(
+            scene=self.scene.as_dict(),
+            **picked(self, "reached", "message", "how", "evaluations", "targets", "residual"),
+            quantities=[
                 {"quantity": name, "before": before, "after": after, "unit": unit}
                 for name, (before, after, unit) in self.quantities().items()
             ],
-            "before": self.before.to_json(),
-            "after": self.jacobian.to_json(),
-            "condition": self.condition,
-            "path": [scene.as_dict() for scene in self.path],
-        }
+            before=self.before,
+            after=self.jacobian,
+            condition=self.condition,
+            path=[scene.as_dict() for scene in self.path],
+        )
 
 
 def design(

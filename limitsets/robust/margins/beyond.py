@@ -10,11 +10,13 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from limitsets.errors import AnswerError
+from limitsets.files import as_table, picked
 from limitsets.goals import Goal, OrientedBeyond, Reaches
 from limitsets.proofs.query import Query
 from limitsets.robust.margins.finding import Margin, margin
@@ -56,6 +58,11 @@ class MarginsBeyond:
     proved: NDArray[np.float64]
     refuted: NDArray[np.float64]
     margins: tuple[tuple[Margin, ...], ...]
+
+    def to_json(self) -> dict[str, Any]:
+        """Give them as a plain table for JSON, without the proofs; null where nothing is refuted."""
+        places = picked(self, "side", "x")
+        return as_table(**places, quantities=self.names, **picked(self, "units", "proved", "refuted"))
 
     def best(self, name: str | None = None) -> tuple[float, float]:
         """Return the place with the largest proved margin, and that margin; of the first quantity by default."""

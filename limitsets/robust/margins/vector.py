@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from limitsets.errors import AnswerError, SceneError
+from limitsets.proofs.rational import Span
 from limitsets.proofs.tolerance import Piece
 from limitsets.robust.margins.deviations import Measure, measure, short
 from limitsets.scene import Scene
@@ -128,23 +129,19 @@ class Tolerance:
 
     def corner(self, factor: Fraction, signs: Sequence[int]) -> Piece | None:
         """Return the scene at a corner of the box stretched by a factor, exactly; None where nothing is fixed."""
-        if not self.measures:
-            return None
-        spans = {
-            one.key: one.at(factor * size * sign)
-            for one, size, sign in zip(self.measures, self.sizes, signs, strict=True)
-        }
-        return Piece(self.measures[0].scene, spans)
+        ends = zip(self.measures, self.sizes, signs, strict=True)
+        return self._piece([one.at(factor * size * sign) for one, size, sign in ends])
 
     def piece(self, low: Parts, high: Parts, factor: Fraction) -> Piece | None:
         """Return the scenes between two corners, given as parts of the whole deviation."""
-        if not self.measures:
-            return None
-        spans = {
-            one.key: one.between(factor * size * lo, factor * size * hi)
-            for one, size, lo, hi in zip(self.measures, self.sizes, low, high, strict=True)
-        }
-        return Piece(self.measures[0].scene, spans)
+        ends = zip(self.measures, self.sizes, low, high, strict=True)
+        return self._piece(
+            [one.between(factor * size * lo, factor * size * hi) for one, size, lo, hi in ends]
+        )
+
+    def _piece(self, spans: Sequence[Span]) -> Piece | None:
+        keys = [one.key for one in self.measures]
+        return Piece(self.measures[0].scene, dict(zip(keys, spans, strict=True))) if keys else None
 
     def scene_at(self, scene: Scene, factor: float, signs: Sequence[float]) -> Scene | None:
         """Give another scene, in floats, at a corner of the same box about it; None where there is no such part."""
@@ -157,7 +154,8 @@ class Tolerance:
                 values["throw.kappa"] = scene.kappa / (1.0 + share) ** 2
             else:
                 value = scene.value(name)
-                values[name] = value + factor * sign * size.of(value)
+                # a share of a negative value is negative, here as in a proof
+                values[name] = value + factor * sign * (size.value * value if size.relative else size.value)
         try:
             return scene.with_values(values)
         except SceneError:

@@ -18,6 +18,7 @@ from limitsets.cells import Grid
 from limitsets.maps import along, has_slope, images, kind_of
 from limitsets.robust.noise.cutting import Pieces
 from limitsets.robust.noise.sheets import Boxes
+from limitsets.sets.chain import sample_points
 
 __all__ = ["boxes_of_pieces", "rows_of_points", "uses_pieces"]
 
@@ -97,11 +98,7 @@ def rows_of_points(
     dimension = grid.dimension
     samples = SAMPLES[dimension]
     cells = np.arange(grid.offset[side], grid.offset[side + 1])
-    lo, hi = grid.boxes(cells, side)
-    place = (np.indices((samples,) * dimension).reshape(dimension, -1).T + 0.5) / samples
-    points = (lo[:, None, :] + place * (hi - lo)[:, None, :]).reshape(-1, dimension)
-    if dimension == 1:
-        points = points[:, 0]
+    points = sample_points(grid, cells, side, samples)
     found = images(map_of(mean), points, side)
     width = np.zeros(found.code.size)
     if dimension == 1:

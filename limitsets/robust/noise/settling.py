@@ -194,7 +194,7 @@ def _arnoldi(part: _Counted) -> Array | None:
     return vector / total if total > 0.0 else None
 
 
-def distribution(chain: Transfer, cells: Cells, *, tolerance: float = TOLERANCE) -> tuple[Array, float, int]:
+def distribution(chain: Transfer, cells: Cells) -> tuple[Array, float, int]:
     """Stationary or quasi-stationary distribution of one component: weights of its cells, residual, products.
 
     Arnoldi's method finds it; steps that stay with probability 1/2, which no period survives, finish it.
@@ -204,7 +204,7 @@ def distribution(chain: Transfer, cells: Cells, *, tolerance: float = TOLERANCE)
     found = _arnoldi(part)
     weight = even if found is None else found
     residual, steps = np.inf, 0
-    while residual > tolerance and steps < MOST_STEPS:
+    while residual > TOLERANCE and steps < MOST_STEPS:
         after = part.adjoint(weight)
         total = float(after.sum())
         if total <= 0.0:
@@ -212,7 +212,7 @@ def distribution(chain: Transfer, cells: Cells, *, tolerance: float = TOLERANCE)
         last, residual = residual, float(np.abs(after / total - weight).sum())
         weight = 0.5 * (weight + after / total)
         steps += 1
-        if residual < 100.0 * tolerance and residual > 0.9 * last:
+        if residual < 100.0 * TOLERANCE and residual > 0.9 * last:
             break  # rounding
     return weight, residual, part.products
 

@@ -9,27 +9,17 @@ from typing import Any
 
 import numpy as np
 
-from limitsets.files import as_table, picked
 from limitsets.robust.margins.beyond import MarginsBeyond, margins_beyond, places_beyond
 from limitsets.scene import Scene
 
-__all__ = ["SECONDS", "curve", "curve_read", "curve_table"]
+__all__ = ["SECONDS", "curve", "curve_read"]
 
 # Places; how close their brackets are; seconds for the proof of one joint margin, and after which no place is begun.
 PLACES, COARSE, EACH, SECONDS = 7, 0.1, 15.0, 150.0
 
 
-def curve_table(found: MarginsBeyond) -> dict[str, Any]:
-    """Give margins against X as a plain table; null where nothing is refuted."""
-    return as_table(
-        **picked(found, "side", "x"),
-        quantities=found.names,
-        **picked(found, "units", "proved", "refuted"),
-    )
-
-
 def curve_read(table: Mapping[str, Any], scene: Scene) -> MarginsBeyond:
-    """Read what `curve_table` wrote, without the proofs."""
+    """Read what `MarginsBeyond.to_json` wrote, without the proofs."""
     names, units = tuple(table["quantities"]), tuple(table["units"])
     # null becomes nan
     x, proved, refuted = (np.array(table[key], dtype=np.float64) for key in ("x", "proved", "refuted"))
@@ -101,6 +91,6 @@ def curve(
         tell(f"margin beyond x = {x:.4g}", number / PLACES)
         one = margins_beyond(scene, side, names, x=[x], tolerance=tolerance, width=COARSE, seconds=EACH)
         found = _joined(found, one)
-        keep(curve_table(found))
+        keep(found.to_json())
     assert found is not None
     return found, 0

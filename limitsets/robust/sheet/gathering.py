@@ -32,9 +32,6 @@ if TYPE_CHECKING:
 
 __all__ = ["robustness"]
 
-# Levels of the noise that the figure shows.
-FACTORS = (0.0, 0.5, 1.0, 1.5, 2.0)
-
 NO_TOLERANCE = (
     "the scene has no [tolerance]; give it one, a deviation for each quantity that deviates together with others: "
     '"throw.speed" = "1 %"'
@@ -134,7 +131,7 @@ class _Gathering:
         with self.step("noise"):
             found = noise_statistics(scene, noise, goal=place, cells=cells, progress=told)
         with self.step("noise at other levels"):
-            levels = noise_levels(scene, noise, factors=FACTORS, goal=place, cells=max(cells // 2, 1))
+            levels = noise_levels(scene, noise, goal=place, cells=max(cells // 2, 1))
         return found, levels
 
 

@@ -11,7 +11,6 @@ from limitsets.robust.margins.beyond import MarginsBeyond
 from limitsets.robust.margins.finding import Margin
 from limitsets.robust.margins.words import void_of
 from limitsets.robust.noise.statistics import Levels, NoiseStatistics
-from limitsets.robust.sheet.against_x import curve_table
 from limitsets.robust.sheet.entries import Entry, percent_of
 from limitsets.scene import Scene
 
@@ -129,7 +128,7 @@ class Robustness:
             vacuous=bool(void_of(self.goals, self.reach, self.scene.unit)),
             margins=self.entries,
             tolerance=self.tolerance or None,
-            curve=None if self.curve is None else curve_table(self.curve),
+            curve=self.curve,
             noise=None if self.noise is None else self.noise.to_json() | {"law": self.law},
             noise_levels=self.levels,
             assumptions=self.audit,

@@ -17,6 +17,7 @@ from limitsets.jit import cover_foreign_class
 from limitsets.maps import codes, images
 from limitsets.proofs.parameters import parameter_box
 from limitsets.proofs.replay import replay
+from limitsets.thrower.motion_box import all_enclosed
 
 EFFECTS = {"landing": True, "roll": True}
 
@@ -167,6 +168,10 @@ def blown(wind):
 
 
 cover_foreign_class(Wind, [blown])  # so that what is compiled for it is kept on disk
+
+
+def test_without_any_effect_everything_is_enclosed():
+    assert all_enclosed(()) is True
 
 
 @pytest.mark.parametrize("k", [0, 1, 2])
