@@ -30,7 +30,7 @@ if TYPE_CHECKING:  # each from the file that holds it: most rooms have a file of
     from limitsets.proofs.confirm import recheck
     from limitsets.robust.margins.finding import margin
     from limitsets.robust.noise.statistics import noise_statistics
-    from limitsets.robust.sheet.gathering import robustness
+    from limitsets.robust.sheet.sheet_run import robustness
     from limitsets.scene import dump, load, scenes
     from limitsets.sets.attractors import attractors
     from limitsets.sets.basins import basins
@@ -65,7 +65,7 @@ _ROOMS = {
     "recheck": "proofs.confirm",
     "register": "maps",
     "robust_design": "inverse",
-    "robustness": "robust.sheet.gathering",
+    "robustness": "robust.sheet.sheet_run",
     "scenes": "scene",
     "transitions": "graph.transitions",
 }

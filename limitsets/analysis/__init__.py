@@ -1,19 +1,19 @@
-"""From a scene to all answers at once: what `limitsets analyse` shows.
+"""All answers about a scene at once, as `limitsets analyse` shows them.
 
-The answers themselves are made in `limitsets.sets` and below; here they are asked for in turn, timed, held against the
-scene's goal and written as JSON.
+The answers are computed in `limitsets.sets` and below; this room calls for them in turn, times them, evaluates the
+scene's goal and writes JSON.
 """
 
 from limitsets.analysis.accuracy import Accuracy, Plan, plan_for
-from limitsets.analysis.asked import Answered
 from limitsets.analysis.flags import other_vertex_first, overlap
+from limitsets.analysis.goal import GoalOutcome
 from limitsets.analysis.run import Analysis, analyse
 from limitsets.analysis.starts import Starts
 
 __all__ = [
     "Accuracy",
     "Analysis",
-    "Answered",
+    "GoalOutcome",
     "Plan",
     "Starts",
     "analyse",

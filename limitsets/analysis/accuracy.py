@@ -1,10 +1,10 @@
-"""The cheapest way to the ends of the limit sets for an error asked for: what is planned before.
+"""Choice of the cheapest method for a given error of the ends of the limit sets, before the computation.
 
-`limitsets.analysis.verifying` says what was reached.
+`limitsets.analysis.verifying` determines the error reached.
 
-Two methods give the extents of an attractor.  Borders of attracting cells are off by about the width of a cell, times
-what the throws after a critical point do to it: halving the error doubles the cells and the time.  Images of critical
-points (`limitsets.sets.limit_set`) are off by rounding alone, once cells have shown where the attractor is.
+Two methods give the extents of an attractor.  The error of the borders of attracting cells is about the width of a
+cell times the slope of the throws after a critical point: half the error costs twice the cells and the time.  Images of
+critical points (`limitsets.sets.limit_set`) have rounding errors only, but need cells to locate the attractor.
 Source of the exponents: studies/03_accuracy.
 """
 
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "Accuracy",
-    "Choice",
+    "MethodChoice",
     "Plan",
     "best_extents",
     "left_to_cells",
@@ -54,7 +54,7 @@ MANY, TIMES = 32768, 2
 
 
 @dataclass(frozen=True)
-class Choice:
+class MethodChoice:
     """One way to the ends, and what it is expected to give and to cost.
 
     Attributes
@@ -64,7 +64,7 @@ class Choice:
     cells : int
         Cells per side.
     error : float
-        Expected error of the ends [scene's unit].
+        Expected error of the ends [length].
     seconds : float
         Expected time of the steps that lead to the ends: transitions, attractors, limit sets.
     """
@@ -81,35 +81,35 @@ class Plan:
 
     Attributes
     ----------
-    asked : float
-        The error asked for [unit].
+    error_wanted : float
+        The error asked for [length].
     unit : str
         The scene's unit.
-    chosen : Choice
+    chosen : MethodChoice
         The cheapest way that is expected to meet it; the most accurate one where none is.
-    other : Choice or None
+    other : MethodChoice or None
         The next best.
     expected : bool
         Whether `chosen` is expected to meet it.
     """
 
-    asked: float
+    error_wanted: float
     unit: str
-    chosen: Choice
-    other: Choice | None
+    chosen: MethodChoice
+    other: MethodChoice | None
     expected: bool
 
     def __str__(self) -> str:
         words = {CELLS: "borders of cells", END_POINTS: "end points by critical orbits"}
 
-        def told(way: Choice) -> str:
+        def told(way: MethodChoice) -> str:
             return (
                 f"{words[way.method]}, {way.cells} cells a side, error about {way.error:.1g} {self.unit}, "
                 f"about {way.seconds:.2g} s"
             )
 
         so = "asked:" if self.expected else "asked cannot be met; the best there is:"
-        text = f"error {self.asked:g} {self.unit} {so} {told(self.chosen)}"
+        text = f"error {self.error_wanted:g} {self.unit} {so} {told(self.chosen)}"
         return text if self.other is None else f"{text} (instead of {told(self.other)})"
 
 
@@ -124,7 +124,7 @@ class Accuracy:
     seconds : float
         What the planned steps took.
     reached : float or None
-        Largest error of an end, as verified [scene's unit]; None where there are no ends.
+        Largest error of an end, as verified [length]; None where there are no ends.
     how : str
         "proved": between two proved numbers; "rounding": estimated from slopes and rounding of each step; "orbit":
         how far a point of the cells may be from a long orbit, given that sampled cells hold all of it; "nothing
@@ -132,7 +132,7 @@ class Accuracy:
     advice : str or None
         Why the error was not met, and what to do.
     proved : float or None
-        Error of the end points that is proved, where they were the method and a proof was found [scene's unit].
+        Error of the end points that is proved, where they were the method and a proof was found [length].
     """
 
     plan: Plan
@@ -145,13 +145,13 @@ class Accuracy:
     @property
     def met(self) -> bool:
         """Whether the error reached is the one asked for, or less."""
-        return self.reached is not None and self.reached <= self.plan.asked
+        return self.reached is not None and self.reached <= self.plan.error_wanted
 
     def to_json(self) -> dict[str, Any]:
         """Give it as a table for JSON."""
         chosen = self.plan.chosen
         return as_table(
-            asked=self.plan.asked,
+            asked=self.plan.error_wanted,
             **picked(chosen, "method", "cells"),
             estimated_error=chosen.error,
             estimated_seconds=round(chosen.seconds, 6),
@@ -188,7 +188,7 @@ def _trial(scene: Scene, cells: int, throws: int) -> _Trial:
 
     stops = [time.perf_counter()]
     graph = transitions(scene.map, grid(scene.domain, cells=cells))
-    graph.survey()
+    graph.condensation()
     stops.append(time.perf_counter())
     found = attractors(graph, throws)
     stops.append(time.perf_counter())
@@ -206,7 +206,7 @@ def _seconds_of_graph(scene: Scene, cells: int) -> float:
     best = math.inf
     for _ in range(TIMES):
         begin = time.perf_counter()
-        transitions(scene.map, grid(scene.domain, cells=MANY)).survey()
+        transitions(scene.map, grid(scene.domain, cells=MANY)).condensation()
         best = min(best, time.perf_counter() - begin)
     return float(best * (cells / MANY) ** EXPONENT_OF_SECONDS)
 
@@ -228,7 +228,7 @@ def _one_way(some: Sequence[tuple[float, float]], others: Sequence[tuple[float, 
     return max(min(max(lo - x, x - hi, 0.0) for lo, hi in others) for x in points)
 
 
-def _by_cells(scene: Scene, coarse: _Trial, fine: _Trial, asked: float) -> Choice:
+def _by_cells(scene: Scene, coarse: _Trial, fine: _Trial, asked: float) -> MethodChoice:
     """Cells alone: the error of the fine trial is known from its end points, or from what the coarse one had more."""
     exact = best_extents(fine.attractors, fine.limits)
     known = all(limit.converged for limit in fine.limits)
@@ -243,13 +243,15 @@ def _by_cells(scene: Scene, coarse: _Trial, fine: _Trial, asked: float) -> Choic
     needed = at * (SCATTER * error / asked) ** (1.0 / EXPONENT_OF_ERROR)
     cells = int(2.0 ** math.ceil(math.log2(min(max(needed, FEWEST), MOST))))
     left = error * SCATTER * (at / cells) ** EXPONENT_OF_ERROR
-    return Choice(CELLS, cells, left, fine.orbits + max(fine.graph, _seconds_of_graph(scene, cells)))
+    return MethodChoice(CELLS, cells, left, fine.orbits + max(fine.graph, _seconds_of_graph(scene, cells)))
 
 
-def _by_end_points(fine: _Trial) -> Choice:
+def _by_end_points(fine: _Trial) -> MethodChoice:
     rounding = max((end.error for limit in fine.limits for end in limit.ends), default=0.0)
     sure = all(limit.converged and all(end.origin.branches for end in limit.ends) for limit in fine.limits)
-    return Choice(END_POINTS, FEWEST, rounding if sure else math.inf, fine.graph + fine.orbits + fine.ends)
+    return MethodChoice(
+        END_POINTS, FEWEST, rounding if sure else math.inf, fine.graph + fine.orbits + fine.ends
+    )
 
 
 def plan_for(scene: Scene, error: float, throws: int = 200_000) -> Plan:
@@ -260,7 +262,7 @@ def plan_for(scene: Scene, error: float, throws: int = 200_000) -> Plan:
     scene : Scene
         The scene.
     error : float
-        Largest error of an end that is asked for [scene's unit].
+        Largest error of an end that is asked for [length].
     throws : int
         Length of the orbit on which jogs are counted: part of what is timed.
 

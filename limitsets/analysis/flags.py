@@ -1,4 +1,4 @@
-"""Where an assumption of the model is broken: a flag beside the answers, never a state of the map."""
+"""Places at which an assumption of the model is broken: a flag beside the answers, never a state of the map."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def other_vertex_first(scene: Scene) -> dict[int, list[tuple[float, float]]]:
     Returns
     -------
     dict of int to list of (lo, hi)
-        Per side of the part the intervals of `scene.domain`, ascending [scene's unit]; an empty list where it never
+        Per side of the part the intervals of `scene.domain`, ascending [length]; an empty list where it never
         happens, or where the scene simulates the effect `landing`.  Between 4096 samples a narrower interval may be
         missed.
 

@@ -19,8 +19,8 @@ from limitsets.analysis.accuracy import (
     plan_for,
     require_error,
 )
-from limitsets.analysis.asked import Answered, answer
 from limitsets.analysis.flags import other_vertex_first
+from limitsets.analysis.goal import GoalOutcome, goal_outcome
 from limitsets.analysis.starts import Starts, against_starts
 from limitsets.analysis.verifying import verified
 from limitsets.errors import AnswerError
@@ -29,7 +29,7 @@ from limitsets.files import as_table, picked
 if TYPE_CHECKING:
     import networkx as nx
 
-    from limitsets.auditing import Choice
+    from limitsets.auditing import EffectChoice
     from limitsets.cells import CellSet, Grid
     from limitsets.graph import TransitionGraph
     from limitsets.maps.critical import CriticalPoint
@@ -56,7 +56,7 @@ class Analysis:
     ----------
     scene : Scene
         The scene that was analysed: where it asks for effects by `auto`, with those chosen.
-    choice : Choice
+    choice : EffectChoice
         How it came to its effects.
     grid : Grid
         The cells.
@@ -76,10 +76,10 @@ class Analysis:
         Periodic orbits, as many as were asked for.
     morse : networkx.DiGraph
         Recurrent components and their order.
-    goal : Answered or None
+    goal : GoalOutcome or None
         The scene's goal and whether it holds.
     other_vertex_first : dict of int to list of (lo, hi)
-        Per side the starts at which an assumption of the model is broken [scene's unit].
+        Per side the starts at which an assumption of the model is broken [length].
     spurious : tuple of CellSet
         Recurrent cells that vanish on refinement.
     timings : dict of str to float
@@ -89,7 +89,7 @@ class Analysis:
     """
 
     scene: Scene
-    choice: Choice
+    choice: EffectChoice
     grid: Grid
     graph: TransitionGraph
     attractors: tuple[Attractor, ...]
@@ -99,7 +99,7 @@ class Analysis:
     critical_points: dict[int, tuple[CriticalPoint, ...]]
     cycles: tuple[Cycle, ...]
     morse: nx.DiGraph[int]
-    goal: Answered | None
+    goal: GoalOutcome | None
     other_vertex_first: Extents
     spurious: tuple[CellSet, ...]
     timings: dict[str, float]
@@ -257,7 +257,7 @@ def analyse(
         Cells per side, which shrink towards the inner end of each side.  By default 4096, and up to 65 536 where a
         thousand random starts show that these miss something.
     error : float, optional
-        Instead of `cells`: the largest error of the limit sets' ends [scene's unit].  The cheapest method that meets
+        Instead of `cells`: the largest error of the limit sets' ends [length].  The cheapest method that meets
         it is picked, and the error reached is verified (`Analysis.accuracy`); one that cannot be met is told there.
     throws : int
         Length of the orbit on which jogs, flips and the Lyapunov exponent are counted.
@@ -290,7 +290,7 @@ def analyse(
     >>> found.goal.holds, round(found.goal.threshold, 3)  # beyond 20 in every part lies on side 2
     (True, 19.753)
     """
-    from limitsets.auditing import choose
+    from limitsets.auditing import choose_effects
     from limitsets.graph import morse_graph
     from limitsets.maps import critical_points
     from limitsets.scene import Scene, load
@@ -304,7 +304,7 @@ def analyse(
     asked_error = None if error is None else require_error(error)
     steps = _Steps(10 + (cycles > 0) + 2 * (asked_error is not None), progress)
     with steps.step("scene"):
-        choice = choose(scene if isinstance(scene, Scene) else load(scene))
+        choice = choose_effects(scene if isinstance(scene, Scene) else load(scene))
         chosen = choice.scene
     plan = None
     if asked_error is not None:
@@ -334,9 +334,9 @@ def analyse(
         false_sets = spurious(graph)
     with steps.step("goal"):
         extents = best_extents(found, limits)
-        asked = None if chosen.goal is None else answer(chosen.goal, graph, found, shares, extents)
-        if asked is not None and asked.holds and starts is not None and starts.elsewhere:
-            asked = replace(asked, holds=None)  # some starts stay where nothing is known
+        outcome = None if chosen.goal is None else goal_outcome(chosen.goal, graph, found, shares, extents)
+        if outcome is not None and outcome.holds and starts is not None and starts.elsewhere:
+            outcome = replace(outcome, holds=None)  # some starts stay where nothing is known
     with steps.step("assumptions"):
         flags = other_vertex_first(chosen)
     accuracy = None
@@ -356,7 +356,7 @@ def analyse(
         critical,
         orbits,
         morse,
-        asked,
+        outcome,
         flags,
         false_sets,
         steps.timings,

@@ -1,7 +1,7 @@
-"""The answer held against random starts: what cells may have missed, a thousand orbits show.
+"""Comparison of the answer with a thousand orbits from random starts, which reveal attractors that cells missed.
 
-An attractor in cells too coarse for it has an edge out, and is none; orbits that stay where no attractor was found, or
-end elsewhere than their cell's label says, show it.
+In cells that are too coarse an attractor has an edge out and is not recognised.  Orbits that stay where no attractor
+was found, or do not end where the label of their cell says, reveal it.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
-"""What error of the ends was reached, by means that the method itself did not use.
+"""The error of the ends reached, determined independently of the method.
 
-End points are held against proved brackets (`limitsets.proofs.end_points`); borders of cells, which hold all of the
-limit set as far as sampled images can tell, against an orbit, which is all inside.
+End points are compared with proved brackets (`limitsets.proofs.end_points`); borders of cells, which contain the limit
+set as far as sampled images show, with an orbit, which lies inside.
 """
 
 from __future__ import annotations
@@ -123,14 +123,14 @@ def verified(
     if not attractors:
         return Accuracy(plan, seconds, None, "nothing stays", "there are no ends: no limit set was found")
     if plan.chosen.method == CELLS or not all(limit.converged for limit in limits):
-        reached = max(_from_inside(scene, each, plan.asked) for each in attractors)
-        enough = reached <= plan.asked
+        reached = max(_from_inside(scene, each, plan.error_wanted) for each in attractors)
+        enough = reached <= plan.error_wanted
         advice = (
             None if enough else f"more cells, or an error from {reached:.1g} {plan.unit}, can be asked for"
         )
         return Accuracy(plan, seconds, reached, "orbit", advice)
     proved = _proved(scene, limits)
     rounding = max(end.error for limit in limits for end in limit.ends)
-    reached, how = (proved, "proved") if proved <= plan.asked else (rounding, "rounding")
-    advice = None if reached <= plan.asked else f"rounding leaves about {reached:.1g} {plan.unit}"
+    reached, how = (proved, "proved") if proved <= plan.error_wanted else (rounding, "rounding")
+    advice = None if reached <= plan.error_wanted else f"rounding leaves about {reached:.1g} {plan.unit}"
     return Accuracy(plan, seconds, reached, how, advice, proved if math.isfinite(proved) else None)

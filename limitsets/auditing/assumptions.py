@@ -1,6 +1,6 @@
-"""The table of assumptions: what decides each, against which limit, and which fact of the world that takes.
+"""The table of assumptions: the deciding number of each, its limit, and the fact of the world that it needs.
 
-To audit another assumption: a column in `thrower/assumed_box.py`, and a row here.
+A further assumption needs a column in `thrower/assumed_box.py` and a row here.
 """
 
 from __future__ import annotations

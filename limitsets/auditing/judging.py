@@ -1,4 +1,4 @@
-"""Whether an assumption is proved to be broken, or to hold, from enclosures of its number."""
+"""Decide by enclosures of its number whether an assumption is broken or holds."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from limitsets.auditing.places import Cells
     from limitsets.proofs.parameters import ParameterBox
 
-__all__ = ["Row", "all_kept", "ask"]
+__all__ = ["Row", "all_hold", "enclosed_at"]
 
 Array: TypeAlias = NDArray[np.float64]
 Flags: TypeAlias = NDArray[np.bool_]
@@ -69,12 +69,12 @@ class Row:
         return inside
 
 
-def ask(box: ParameterBox, side: int, x: Array) -> Array:
+def enclosed_at(box: ParameterBox, side: int, x: Array) -> Array:
     """Enclose everything at single throws."""
     return assumed(*box.bare, side, x, x)
 
 
-def all_kept(box: ParameterBox, cells: Cells, rows: list[Row]) -> list[bool]:
+def all_hold(box: ParameterBox, cells: Cells, rows: list[Row]) -> list[bool]:
     """Whether each assumption is proved to hold on all cells, halving those on which it is not."""
     open_rows = np.ones(len(rows), dtype=bool)
     for side, (lo, hi) in cells.items() if rows else ():

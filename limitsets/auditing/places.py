@@ -1,4 +1,4 @@
-"""Where the assumptions are asked about: cells that hold the limit set, orbits on it, and the whole domain."""
+"""States at which assumptions are evaluated: cells that hold the limit set, orbits on it, and the whole domain."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class Sample:
     Attributes
     ----------
     x : ndarray, shape (n,)
-        Where they start, ascending on the domain [scene's unit].
+        Where they start, ascending on the domain [length].
     code : ndarray of int, shape (n,)
         What they do (`limitsets.maps.codes`); empty where nobody asks.
     """

@@ -1,6 +1,6 @@
 """Which cells come to the cells wanted: all orbits (backward reachability), or almost all (thinning).
 
-docs/certificates.md, "Goals, end points, orbits", numbers 7 (peeling) and 8 (thinning).
+docs/certificates.md, "Goals, end points, orbits", numbers 7 (backward reachability) and 8 (thinning).
 """
 
 import itertools

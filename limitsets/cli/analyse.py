@@ -53,7 +53,7 @@ def _announce(plan: Plan) -> None:
 
 
 def _text(analysis: Analysis, page: Path) -> None:
-    from limitsets.report.questions import verdict_of, void_of
+    from limitsets.report.goals import verdict_of, void_of
     from limitsets.report.tables import count, intervals, percent
 
     unit = analysis.scene.unit
@@ -80,5 +80,5 @@ def _text(analysis: Analysis, page: Path) -> None:
     if found is not None and found.reached is not None:
         typer.echo(f"error of the ends: {found.reached:.2g} {unit} ({found.how})")
     if found is not None and not found.met:
-        typer.echo(f"the error of {found.plan.asked:g} {unit} was not met: {found.advice}")
+        typer.echo(f"the error of {found.plan.error_wanted:g} {unit} was not met: {found.advice}")
     typer.echo(f"report: {page}")

@@ -1,4 +1,4 @@
-"""What people write after options: numbers, places on the arm, deviations and bounds of quantities."""
+"""Values of options: numbers, places on the arm, deviations and bounds of quantities."""
 
 from __future__ import annotations
 

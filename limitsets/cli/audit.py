@@ -39,7 +39,7 @@ def audit(
 
 
 def _text(found: Audit, files: list[Path]) -> None:
-    from limitsets.report.audits import HEADS, lines_of, summary
+    from limitsets.report.audit_pages import HEADS, lines_of, summary
 
     table(HEADS, lines_of(found))
     for line in summary(found):

@@ -14,7 +14,7 @@ from limitsets.cli.output import Json, Scene, Words, answer, option, progress, s
 
 if TYPE_CHECKING:
     from limitsets.proofs import Claim, Proof
-    from limitsets.proofs.asked import State
+    from limitsets.proofs.goals import State
 
 __all__ = ["certify"]
 
@@ -151,7 +151,7 @@ def _words(proof: Proof, claim: Claim) -> list[str]:
 
 def _goal(proof: Proof, claim: Claim) -> list[str]:
     """Say a goal that is proved, for which starts, and what becomes of the others."""
-    from limitsets.proofs.asked import sentence
+    from limitsets.proofs.goals import sentence
 
     shares = claim.shares
     lines = [sentence(claim.section)]

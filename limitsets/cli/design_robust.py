@@ -75,7 +75,7 @@ def _written(found: RobustDesign, out: Path, *, recheck: bool) -> tuple[RobustDe
     if out.suffix == ".toml":
         return found, save_scene(found.scene, out)
     from limitsets import plot
-    from limitsets.inverse.margin.answer import save
+    from limitsets.inverse.margin.design_result import save
     from limitsets.report.writing import DPI, filled
 
     with filled(out) as folder:

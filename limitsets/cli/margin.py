@@ -78,7 +78,7 @@ def _write(
     from limitsets.errors import AnswerError
     from limitsets.plot.margins import tolerance_box, tornado
     from limitsets.report.writing import laid
-    from limitsets.robust.margins.answer import settled
+    from limitsets.robust.margins.margin_result import settled
 
     found, records = [], []
     for each in given:
@@ -96,9 +96,9 @@ def _write(
 
 
 def _text(found: tuple[Margin, ...], out: Path | None, *, no_recheck: bool) -> None:
-    from limitsets.report.questions import question_of
+    from limitsets.report.goals import goal_sentence
     from limitsets.report.robust_pages import READINGS
-    from limitsets.robust.margins.words import bound, reach_of, void_of
+    from limitsets.robust.margins.margin_texts import bound, reach_of, void_of
 
     rows = []
     for each in found:
@@ -106,7 +106,7 @@ def _text(found: tuple[Margin, ...], out: Path | None, *, no_recheck: bool) -> N
         low, high = bound(each.proved, unit), bound(each.refuted, unit, up=True)
         rows.append([each.quantity, READINGS[each.reading], low, high])
     scene = found[0].scene
-    typer.echo(f"{scene.name}: {' and '.join(question_of(goal, scene.unit) for goal in found[0].goals)}")
+    typer.echo(f"{scene.name}: {' and '.join(goal_sentence(goal, scene.unit) for goal in found[0].goals)}")
     table(HEADS, rows)
     for each in found:
         void = void_of(each.goals, reach_of(each.pieces), scene.unit)

@@ -1,4 +1,4 @@
-"""What commands write: JSON or tables on stdout, files that are replaced whole, progress on stderr."""
+"""Output of commands: JSON or tables on stdout, files that are replaced whole, progress on stderr."""
 
 from __future__ import annotations
 

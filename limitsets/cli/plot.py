@@ -20,7 +20,7 @@ __all__ = ["plot"]
 FORMATS = (".png", ".svg", ".pdf")
 
 
-class Kind(StrEnum):
+class Picture(StrEnum):
     """What to draw."""
 
     LIMIT_SET = "limit-set"
@@ -32,7 +32,7 @@ class Kind(StrEnum):
 
 def plot(
     scene: Scene,
-    kind: Annotated[Kind, typer.Argument(metavar="KIND", help="What to draw.")],
+    kind: Annotated[Picture, typer.Argument(metavar="KIND", help="What to draw.")],
     out: Annotated[
         Path | None, option("--out -o", "FILE", f"File ({', '.join(FORMATS)}), ./NAME-KIND.png by default.")
     ] = None,
@@ -46,8 +46,8 @@ def plot(
         raise LimitsetsError(
             "the figure's file", str(out), f"a name that ends in {', '.join(FORMATS)}", "rename it"
         )
-    if (x is None) != (side is None) or (x is not None and kind is not Kind.FLIGHT):
-        value = "half given" if kind is Kind.FLIGHT else "given"
+    if (x is None) != (side is None) or (x is not None and kind is not Picture.FLIGHT):
+        value = "half given" if kind is Picture.FLIGHT else "given"
         raise LimitsetsError("the throw to draw", value, "--x and --side, for a flight", "give both or none")
     with progress() as tell:
         from limitsets.analysis import analyse as run
@@ -58,7 +58,7 @@ def plot(
     answer({"figure": str(file)}, json, lambda: typer.echo(f"figure: {file}"))
 
 
-def _draw(analysis: Analysis, kind: Kind, file: Path, x: str | None, side: int | None) -> None:
+def _draw(analysis: Analysis, kind: Picture, file: Path, x: str | None, side: int | None) -> None:
     from limitsets.report.writing import DPI, figure
 
     throw = None if x is None or side is None else (position(analysis.scene, x), side)

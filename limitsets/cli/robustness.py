@@ -52,8 +52,8 @@ def robustness(
     with progress() as tell:
         chosen, folder = opened(scene, out, "robustness")
         from limitsets.report import write_robustness
-        from limitsets.robust.sheet.chance import scattering_from
-        from limitsets.robust.sheet.gathering import robustness as run
+        from limitsets.robust.sheet.noise_input import scattering_from
+        from limitsets.robust.sheet.sheet_run import robustness as run
 
         noise = deviations("--scatter", scatter)
         vector = deviations("--tolerance", tolerance)

@@ -1,4 +1,4 @@
-"""Around every command: whatever goes wrong ends in one line on stderr and an exit code, never in a traceback."""
+"""Around every command: every error ends in one line on stderr and an exit code, never in a traceback."""
 
 from __future__ import annotations
 

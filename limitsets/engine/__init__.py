@@ -1,11 +1,11 @@
-"""The same throw in a rigid-body engine kept by others (pymunk, on Chipmunk2D), to compare the throw map with.
+"""The same throw in an independent rigid-body engine (pymunk, on Chipmunk2D), for comparison with the throw map.
 
-Nothing of the map is used: shape, mass, gravity and the rotation at release go into the engine, and where the part
-comes to rest is read off its body.  This room is the only one that imports pymunk, an extra of its own:
+The engine uses no formula of the map: its inputs are shape, mass, gravity and the rotation at release, its output is
+the place of rest of the body.  This room is the only one that imports pymunk, an optional dependency:
 ``pip install 'limitsets[engine]'``.
 """
 
 from limitsets.engine.comparing import Comparison, compare
-from limitsets.engine.throwing import Landing, throw
+from limitsets.engine.throwing import EngineThrow, throw
 
-__all__ = ["Comparison", "Landing", "compare", "throw"]
+__all__ = ["Comparison", "EngineThrow", "compare", "throw"]

@@ -1,4 +1,4 @@
-"""Throws by the map and in the engine side by side."""
+"""Comparison of throws by the map and in the engine."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class Comparison:
     Attributes
     ----------
     x, side : ndarray, shape (n,)
-        Where the part rested before the throw [scene's unit], and on which side.
+        Where the part rested before the throw [length], and on which side.
     x_map, side_map, code_map : ndarray, shape (n,)
         Where it rests after it by the map, and what the throw was (`limitsets.maps`).
     x_engine, side_engine : ndarray, shape (n,)
@@ -63,7 +63,7 @@ class Comparison:
 
     @property
     def error(self) -> NDArray[np.float64]:
-        """x' in the engine less x' by the map [scene's unit]; nan where the sides differ."""
+        """x' in the engine less x' by the map [length]; nan where the sides differ."""
         return np.where(self.agree, self.x_engine - self.x_map, np.nan)
 
     @property
@@ -91,7 +91,7 @@ def compare(scene: Scene, x: ArrayLike, side: ArrayLike, **how: Any) -> Comparis
     scene : Scene
         The scene.
     x : array_like, shape (n,)
-        Where the parts rest before the throw [scene's unit].
+        Where the parts rest before the throw [length].
     side : int or array_like, shape (n,)
         On which side.
     **how

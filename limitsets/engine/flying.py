@@ -1,4 +1,4 @@
-"""A flight in the engine, exact whatever its step, up to the moment at which a vertex meets the arm."""
+"""A flight in the engine, exact for every step size, until a vertex meets the arm."""
 
 from __future__ import annotations
 

@@ -19,7 +19,7 @@ IDLE = 0.5
 LEANING = 0.02
 # A change of velocity in one step beyond this share of a fall by the part's size is an impact.
 SUDDEN = 0.02
-# Of a part of mass 1 with less energy than this nothing is worth watching [scene's unit squared].
+# Of a part of mass 1 with less energy than this nothing is worth watching [length squared].
 STILL = 1e-9
 # Vertices lower than this fraction of the part's size touch the arm.
 TOUCHING = 1e-3

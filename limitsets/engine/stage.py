@@ -1,10 +1,10 @@
-"""A part over the arm in the engine: what is put there, and how time goes on.
+"""A part over the arm in the engine: bodies, units and time steps.
 
 Lengths are those of the scene; the unit of time is 1/w, so that the arm turns at rate 1, gravity is kappa, and a time
 in flight is the angle by which the part has turned.  Mass 1; the joint is the origin.
 
-The engine's step moves the part with the velocity it has and then changes the velocity (symplectic Euler, first order).
-Taken with the velocity of the middle of the step, as `Stage.drift` does, it is exact for a parabola and a steady turn.
+The engine's step moves the part with its present velocity and then changes the velocity (symplectic Euler, first
+order). With the velocity at the middle of the step, as in `Stage.drift`, it is exact for a parabola and a steady turn.
 """
 
 from __future__ import annotations
@@ -61,13 +61,13 @@ class Stage:
     space, body, part : pymunk.Space, pymunk.Body, pymunk.Poly
         The engine's objects.
     corners : tuple of pairs
-        Vertices about the centre of mass, in the scene's order [scene's unit].
+        Vertices about the centre of mass, in the scene's order [length].
     flat : tuple of float
         The body's angle when it rests on each side [rad].
     height, kappa : float
-        Of the arm's surface over the joint, and gravity [scene's unit].
+        Of the arm's surface over the joint, and gravity [length].
     size : float
-        Length of the longest side [scene's unit].
+        Length of the longest side [length].
     """
 
     space: Space

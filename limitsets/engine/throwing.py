@@ -1,4 +1,4 @@
-"""One throw in the engine: flight, the first contact, and the way to rest by a hinge or by the engine's own contact."""
+"""One throw in the engine: flight, first contact, and motion to rest by a hinge or by the engine's own contact."""
 
 from __future__ import annotations
 
@@ -16,17 +16,17 @@ from limitsets.errors import AnswerError, MapError
 if TYPE_CHECKING:
     from limitsets.scene import Scene
 
-__all__ = ["Landing", "throw"]
+__all__ = ["EngineThrow", "throw"]
 
 
 @dataclass(frozen=True)
-class Landing:
+class EngineThrow:
     """Where one throw ended in the engine.
 
     Attributes
     ----------
     x : float
-        Distance of the centre of mass along the arm [scene's unit].
+        Distance of the centre of mass along the arm [length].
     side : int
         On which side; -1 where it did not come to rest.
     status : str
@@ -72,7 +72,7 @@ def throw(
     stroke: float = 0.0,
     step: float = 1e-3,
     patience: float = 60.0,
-) -> Landing:
+) -> EngineThrow:
     """Throw a part once in the engine.
 
     It is released at rest on its side with the velocity of a rigid turn about the joint and flies by gravity alone.
@@ -83,7 +83,7 @@ def throw(
     scene : Scene
         The scene; of its flight and flip nothing is used.
     x : float
-        Where the part rests before the throw [scene's unit].
+        Where the part rests before the throw [length].
     side : int
         On which side.
     contact : str
@@ -94,7 +94,7 @@ def throw(
         With a hinge, friction is that of the stroke, and a restitution throws the struck vertex off again: Poisson's
         law, a joint keeping the vertex from sliding.
     threshold : float
-        With a hinge: height below which a bounce is none [scene's unit].
+        With a hinge: height below which a bounce is none [length].
     rolls : bool
         With a hinge: whether the part may roll on over the other end of the face that came down.
     stroke : float
@@ -106,7 +106,7 @@ def throw(
 
     Returns
     -------
-    Landing
+    EngineThrow
 
     Raises
     ------
@@ -137,9 +137,9 @@ def throw(
         accelerate(stage, stroke, mu, step)
     flown = fly(stage, patience)
     if flown <= 0.0:
-        return Landing(x, side, "no flight", -1, math.nan, 0.0)
+        return EngineThrow(x, side, "no flight", -1, math.nan, 0.0)
     if flown > patience:
-        return Landing(stage.body.position.x, -1, "unfinished", -1, math.nan, flown)
+        return EngineThrow(stage.body.position.x, -1, "unfinished", -1, math.nan, flown)
     struck, left, seen = stage.lowest(), patience - flown, Seen()
     if contact == "unilateral":
         turned, on, seen = settle(stage, scene, mu, e, step, left)
@@ -149,7 +149,7 @@ def throw(
         turned, on = turn_on_hinge(stage, struck, step, left)
     status = "rest" if on >= 0 else "unfinished"
     end, time = stage.body.position.x, flown + turned
-    return Landing(end, on, status, struck, flown, time, seen.residual, seen.reverses, seen.rocks)
+    return EngineThrow(end, on, status, struck, flown, time, seen.residual, seen.reverses, seen.rocks)
 
 
 def _check_asked(contact: str, friction: float | None, threshold: float, rolls: bool, stroke: float) -> None:

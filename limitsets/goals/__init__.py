@@ -1,10 +1,9 @@
-"""What may be asked of an answer: the goals a scene can name, as data, and how extents decide them.
+"""The goals that a scene can name, as data, and their evaluation on extents.
 
-A goal is a frozen dataclass with its units resolved.  `evaluate` reads it off extents that were sampled or proved
-elsewhere; it knows no map and no graph.
+A goal is a frozen dataclass with resolved units.  `evaluate` decides it on extents that were sampled or proved
+elsewhere, without a map or a graph.
 """
 
-from limitsets.goals.ask import evaluate
 from limitsets.goals.goal import (
     GOALS,
     Found,
@@ -27,6 +26,7 @@ from limitsets.goals.kinds import (
     order_of,
     unknown_goal,
 )
+from limitsets.goals.verdicts import evaluate
 
 __all__ = [
     "GOALS",

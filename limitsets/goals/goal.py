@@ -1,7 +1,7 @@
 """What a goal says of itself, and the table of those that a scene can name.
 
 A goal is a frozen dataclass with a `kind`, its word in ``[goal]``, and one field per number that is asked for; all who
-read, answer, print or draw goals ask the class.  What proves it stands in `limitsets/proofs/asked/`.
+read, answer, print or draw goals ask the class.  What proves it stands in `limitsets/proofs/goals/`.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ __all__ = [
 ]
 
 Place: TypeAlias = Annotated[float, "place"]
-"""A field that a scene writes as a length, where parts can come to rest [scene's length unit]."""
+"""A field that a scene writes as a length, where parts can come to rest [length]."""
 
 Side: TypeAlias = Annotated[int, "side"]
 """A field that is the number of a side."""
@@ -48,7 +48,7 @@ class Verdict(NamedTuple):
     threshold : float or None
         oriented_beyond: the smallest X for which "x > X implies the side" holds, -inf where the part is never on
         another side.  reaches: the largest x reached on the side, -inf where it is never on it.  None for the
-        others [scene's length unit].
+        others [length].
     """
 
     holds: bool | None

@@ -50,7 +50,7 @@ class OrientedBeyond(Goal):
     Parameters
     ----------
     x : float
-        Distance from the joint [scene's length unit].
+        Distance from the joint [length].
     side : int
         The side wanted.
     from_anywhere : bool
@@ -94,7 +94,7 @@ class Reaches(Goal):
     Parameters
     ----------
     x : float
-        Distance from the joint [scene's length unit].
+        Distance from the joint [length].
     side : int
         The side wanted.
     every_orbit : bool
@@ -199,7 +199,7 @@ class Predicate(Goal):
     name : str
         What it says, for people: "below 21 in on side 0".
     cuts : tuple of float
-        Places at which it changes, borders of cells [scene's length unit].
+        Places at which it changes, borders of cells [length].
     from_anywhere : bool
         Ask it of every landing from every start, not only of the limit set.
     """

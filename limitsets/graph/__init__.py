@@ -1,9 +1,9 @@
-"""The transition graph and what is read off it: components, their order, reachability; all on ranges of cells."""
+"""The transition graph and its algorithms: components, their order, reachability, all on ranges of cells."""
 
 from limitsets.graph.components import Components
+from limitsets.graph.condensation import Condensation
 from limitsets.graph.graph import TransitionGraph
 from limitsets.graph.morse import morse_graph
-from limitsets.graph.survey import Survey
 from limitsets.graph.transitions import transitions
 
-__all__ = ["Components", "Survey", "TransitionGraph", "morse_graph", "transitions"]
+__all__ = ["Components", "Condensation", "TransitionGraph", "morse_graph", "transitions"]

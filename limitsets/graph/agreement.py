@@ -1,8 +1,9 @@
-"""Whether the kernels of a map from outside say the same.
+"""Consistency of the kernels of a user's map.
 
-Each is asked at a few hundred points of the grid when the first graph of a class is built: a code that is no branch, a
-forced image that is not the image on the branch taken, a proved box that does not hold the image of a point of it.
-A wrong forced image would leave cycles and end points empty without a word, a wrong box would prove what is false.
+When the first graph of a class is built, each kernel is evaluated at a few hundred points of the grid.  Errors are a
+code that is no branch, a forced image that is not the image on the branch taken, and a proved box that does not hold
+the image of one of its points.  A wrong forced image would silently leave cycles and end points empty; a wrong box
+would prove false statements.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from numpy.typing import NDArray
 
 from limitsets.cells import Grid
 from limitsets.errors import MapError
-from limitsets.graph.images.hulls import BOTH, NOTHING, Images
+from limitsets.graph.images.hulls import BOTH, NOTHING, BoxImages
 from limitsets.interval import rounding_is_sound
 from limitsets.maps import images, images_on, kind_of
 from limitsets.maps.contract import require_codes
@@ -107,7 +108,7 @@ def _ask_boxes(params: Any, grid: Grid, starts: Any, side: int, seen: Any, usabl
     """Compare the boxes of single points."""
     after, to, code = seen
     points = columns(starts, starts.shape[1])
-    found = Images(params, params, side, points, points)
+    found = BoxImages(params, params, side, points, points)
     inside = np.zeros(code.size, dtype=bool)
     for slot in range(2):
         lo, hi = (np.stack(corner, axis=1) for corner in found.slots[slot])
@@ -130,7 +131,7 @@ def _ask_boxes(params: Any, grid: Grid, starts: Any, side: int, seen: Any, usabl
 
 
 def _ask_exits(
-    params: Any, grid: Grid, starts: Any, side: int, code: Any, found: Images, gone: NDArray[np.bool_]
+    params: Any, grid: Grid, starts: Any, side: int, code: Any, found: BoxImages, gone: NDArray[np.bool_]
 ) -> None:
     """Refuse boxes in the domain, of points that have left the map: only `image` knows of that exit."""
     lo, hi = (np.stack(corner, axis=1) for corner in found.slots[0])

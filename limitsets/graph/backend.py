@@ -4,7 +4,7 @@ networkx finds this module by the entry point ``networkx.backends`` of the insta
 graph says ``__networkx_backend__ = "limitsets"``; importing networkx alone does not.  Functions that are not here
 work on ``graph.to_networkx()``, or on their own after ``networkx.config.fallback_to_nx = True``.
 
-Nodes are cells and, last, the ways out.  networkx counts those sinks among the attracting components, as they are.
+Nodes are cells and, last, the exits.  The exits are sinks, and networkx counts them as attracting components.
 """
 
 from __future__ import annotations
@@ -63,14 +63,14 @@ class Backend:
     def attracting_components(graph: TransitionGraph) -> Iterator[set[int]]:
         """Yield the components that nothing leaves, the sinks first."""
         yield from _sinks(graph)
-        for cells, ends in zip(graph.recurrent_components(), graph.survey().attracting, strict=True):
+        for cells, ends in zip(graph.recurrent_components(), graph.condensation().attracting, strict=True):
             if ends:
                 yield set(cells.tolist())
 
     @staticmethod
     def number_attracting_components(graph: TransitionGraph) -> int:
         """Count them."""
-        return int(graph.survey().attracting.sum()) + len(graph.exits)
+        return int(graph.condensation().attracting.sum()) + len(graph.exits)
 
     @staticmethod
     def is_attracting_component(graph: TransitionGraph) -> bool:

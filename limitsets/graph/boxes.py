@@ -1,4 +1,4 @@
-"""Boxes of target cells on their way to becoming ranges."""
+"""Boxes of target cells, before they become ranges."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 from limitsets.graph.target import Target, place
 from limitsets.jit import kernel
 
-__all__ = ["Boxes", "leaving", "merged", "placed"]
+__all__ = ["TargetBoxes", "leaving", "merged", "placed"]
 
 
 @dataclass(frozen=True, eq=False)
-class Boxes:
+class TargetBoxes:
     """Boxes of cells of one side: `cell` (local, ascending), `side`, `lo`, `hi` of shape (n, dimension), `exits`."""
 
     cell: NDArray[np.int64]
@@ -44,14 +44,14 @@ def _place_hulls(
 
 def placed(
     target: Target, cell: NDArray[np.int64], side: NDArray[np.int64], lo: Any, hi: Any, pad: int, inside: bool
-) -> Boxes:
+) -> TargetBoxes:
     """Boxes of the given hulls; `inside`: they are forced images, which do not count as leaving."""
     count, dimension = lo.shape
     k, m = np.empty((count, dimension), np.int32), np.empty((count, dimension), np.int32)
     exits, met = np.empty(count, np.uint8), np.empty(count, np.bool_)
     _place_hulls(target, side, np.ascontiguousarray(lo), np.ascontiguousarray(hi), pad, k, m, exits, met)
     leaves = np.zeros(count, np.uint8) if inside else exits
-    return Boxes(cell[met], side[met].astype(np.int32), k[met], m[met], _per_cell(cell, leaves), 0.0)
+    return TargetBoxes(cell[met], side[met].astype(np.int32), k[met], m[met], _per_cell(cell, leaves), 0.0)
 
 
 def _per_cell(cell: NDArray[np.int64], exits: NDArray[np.uint8]) -> NDArray[np.uint8]:
@@ -60,21 +60,21 @@ def _per_cell(cell: NDArray[np.int64], exits: NDArray[np.uint8]) -> NDArray[np.u
     return found
 
 
-def leaving(target: Target, cell: NDArray[np.int64], code: NDArray[np.int64], dimension: int) -> Boxes:
+def leaving(target: Target, cell: NDArray[np.int64], code: NDArray[np.int64], dimension: int) -> TargetBoxes:
     """Mark the exits that codes name, without boxes."""
     bits = (1 << target.sink_of_code[-code]).astype(np.uint8)
     nothing, none = np.empty(0, np.int64), np.empty((0, dimension), np.int32)
-    return Boxes(nothing, nothing.astype(np.int32), none, none, _per_cell(cell, bits), 0.0)
+    return TargetBoxes(nothing, nothing.astype(np.int32), none, none, _per_cell(cell, bits), 0.0)
 
 
-def merged(parts: list[Boxes], n: int, second: float) -> Boxes:
+def merged(parts: list[TargetBoxes], n: int, second: float) -> TargetBoxes:
     """Boxes of all parts, by cell."""
     cell = np.concatenate([part.cell for part in parts])
     order = np.argsort(cell, kind="stable")
     exits = np.zeros(n, np.uint8)
     for part in parts:
         exits[: part.exits.size] |= part.exits
-    return Boxes(
+    return TargetBoxes(
         cell[order],
         np.concatenate([part.side for part in parts])[order],
         np.concatenate([part.lo for part in parts])[order],

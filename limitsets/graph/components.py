@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from limitsets.graph import wide
+from limitsets.graph import segment_tree
 from limitsets.graph.ranges import ROWS, RUN, SIDE, START, Ranges, box_rows, boxes_of, row_start
 from limitsets.jit import kernel
 
@@ -182,8 +182,8 @@ def _descend(r: Ranges, seen: Any, stack: Any, held: int) -> None:
 
 def strong_components(r: Ranges) -> Components:
     """Strongly connected components of the cells; recurrent are those of several cells or with a loop."""
-    if wide.is_wide(r):
-        label, order, loops, count = wide.strong(r)
+    if segment_tree.is_wide(r):
+        label, order, loops, count = segment_tree.strong(r)
         return _components(label, order, loops, count)
     n = r.first.size - 1
     label, order = np.empty(n, np.int32), np.empty(n, np.int32)
@@ -220,8 +220,8 @@ def reach(r: Ranges, components: Components, marks: NDArray[Any]) -> NDArray[Any
     ndarray, shape (n_cells,)
         The bits it carries or can reach, in any number of steps.
     """
-    if wide.is_wide(r):
-        return wide.reach(r, components.label, components.order, marks)
+    if segment_tree.is_wide(r):
+        return segment_tree.reach(r, components.label, components.order, marks)
     spread = marks.copy()
     _reach(r, components.size, components.order, spread)
     return spread
@@ -246,8 +246,8 @@ def ranks(r: Ranges, components: Components, settled: NDArray[np.bool_]) -> NDAr
         those that are settled.  Where every recurrent component is settled the rank bounds the steps until an orbit is
         in one.
     """
-    if wide.is_wide(r):
-        return wide.ranks(r, components.label, components.order, settled)
+    if segment_tree.is_wide(r):
+        return segment_tree.ranks(r, components.label, components.order, settled)
     rank = np.zeros(r.first.size - 1, dtype=np.int32)
     _ranks(r, components.label, components.order, settled, rank)
     return rank
@@ -255,8 +255,8 @@ def ranks(r: Ranges, components: Components, settled: NDArray[np.bool_]) -> NDAr
 
 def descend(r: Ranges, cells: NDArray[np.int64]) -> NDArray[np.bool_]:
     """Cells that can be reached from the given ones in one step or more."""
-    if wide.is_wide(r):
-        return wide.descend(r, cells)
+    if segment_tree.is_wide(r):
+        return segment_tree.descend(r, cells)
     n = r.first.size - 1
     seen, stack = np.zeros(n, dtype=np.bool_), np.empty(n + cells.size, np.int64)
     stack[: cells.size] = cells

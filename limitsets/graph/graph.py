@@ -1,6 +1,6 @@
-"""The transition graph: who can go where in one step, cells as nodes, ways out as the last nodes.
+"""The transition graph: cells and, last, exits as nodes; an edge where the image of a cell meets another.
 
-To networkx it is a directed graph of its own backend (`backend.py`); it keeps its map and its grid.
+For networkx it is a directed graph with its own backend (`backend.py`); it carries its map and its grid.
 """
 
 from __future__ import annotations
@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from limitsets.cells import CellSet, Grid
 from limitsets.errors import AnswerError
 from limitsets.graph.components import Components, strong_components
+from limitsets.graph.condensation import Condensation, condense
 from limitsets.graph.ranges import Ranges, count_edges, expand
-from limitsets.graph.survey import Survey, survey
 from limitsets.maps import kind_of
 
 if TYPE_CHECKING:
@@ -137,12 +137,12 @@ class TransitionGraph:
         return [np.sort(parts.order[ends[c] : ends[c + 1]]) for c in np.flatnonzero(parts.recurrent)]
 
     @cached_property
-    def _survey(self) -> Survey:
-        return survey(self.ranges, self.components(), self.exits, self.recurrent_components())
+    def _condensation(self) -> Condensation:
+        return condense(self.ranges, self.components(), self.exits, self.recurrent_components())
 
-    def survey(self) -> Survey:
+    def condensation(self) -> Condensation:
         """Order of the recurrent components, and where each cell leads."""
-        return self._survey
+        return self._condensation
 
     def recurrent_set(self) -> CellSet:
         """All cells in which an orbit of cells can stay."""

@@ -1,4 +1,4 @@
-"""Whether the graph of a grid fits in memory: said before it is built, for a process that takes more is killed."""
+"""Test whether the graph of a grid fits in memory, before it is built: a process that needs more is killed."""
 
 from __future__ import annotations
 

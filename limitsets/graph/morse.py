@@ -40,7 +40,7 @@ def morse_graph(graph: TransitionGraph) -> nx.DiGraph[int]:
     import networkx as nx
 
     sets = graph.recurrent_components()
-    found = graph.survey()
+    found = graph.condensation()
     proper = found.order & ~np.eye(len(sets), dtype=bool)
     between = (proper.astype(np.float32) @ proper.astype(np.float32)) > 0
     morse: nx.DiGraph[int] = nx.DiGraph()

@@ -1,4 +1,4 @@
-"""The grid that images land on, and which of its closed cells an interval meets."""
+"""The grid of the images, and the closed cells that an interval meets."""
 
 from __future__ import annotations
 

@@ -1,14 +1,14 @@
-"""From the answer wanted to the scene: critical points with their derivatives, design, and design for a margin.
+"""Inverse problems: critical points with their derivatives, design for critical points, and design for a margin.
 
 `critical` differentiates critical points by the implicit function theorem, on dual numbers, and finds roots with that
 (`design`); `margin` looks for a large margin by the floats of `limitsets.robust`, counts throws to feed, and has what
 it ends with proved there (`robust_design`).  Nothing here is compiled or proved.
 """
 
-from limitsets.inverse.critical.along import limit_sets_along
 from limitsets.inverse.critical.derivatives import CriticalJacobian, critical_jacobian
+from limitsets.inverse.critical.design_path import limit_sets_along
 from limitsets.inverse.critical.designing import Design, design
-from limitsets.inverse.margin.answer import RobustDesign
+from limitsets.inverse.margin.design_result import RobustDesign
 from limitsets.inverse.margin.for_margin import robust_design
 
 __all__ = [

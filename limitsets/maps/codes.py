@@ -1,4 +1,4 @@
-"""What a throw, or one step of any map, can end in.
+"""Codes for the result of a throw, or of one step of any map.
 
 A code of zero or more is the branch of the map that was taken (for the throw: jog or flip); a negative code is a
 state of its own, never folded into a neighbour.

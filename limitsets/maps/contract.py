@@ -1,4 +1,4 @@
-"""The map contract: what a discrete-time map on (x, side) has to offer, and how one is registered.
+"""The map contract: the functions of a discrete-time map on (x, side), and its registration.
 
 A map is a NamedTuple of parameters; its class decides which kernels run (`limitsets.jit.generic`).  Drivers are
 written once, here and in the rooms above, and know maps only through these functions:

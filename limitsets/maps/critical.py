@@ -1,8 +1,8 @@
-"""Where a one-dimensional map changes its branch: for the throw the critical points r_i of the paper, all of them.
+"""Switching points of a one-dimensional map; for the throw all critical points of the paper, r_i and further ones.
 
 A side is sampled, densely towards its anchor.  Every change between two samples is bisected down to adjacent floats,
 and every extremum of the deciding number towards zero is followed to its top, so that two changes between a pair of
-samples do not hide (docs/model.md, decision).
+samples are found (docs/model.md, decision).
 """
 
 from __future__ import annotations
@@ -15,10 +15,10 @@ from numpy.typing import ArrayLike
 
 from limitsets.errors import AnswerError
 from limitsets.jit import kernel
+from limitsets.maps.bisection import Array, Codes, hidden, inserted, located, sign_code
 from limitsets.maps.contract import kind_of, require_sides
 from limitsets.maps.drivers import images
 from limitsets.maps.kernels import margin, on_side
-from limitsets.maps.search import Array, Codes, hidden, inserted, located, sign_code
 
 __all__ = [
     "CriticalPoint",

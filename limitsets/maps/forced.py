@@ -1,4 +1,4 @@
-"""Steps along forced branches: where a state would go, and with what slope, whatever branch the map would take.
+"""Steps along forced branches: image and slope of a state on a given branch, whatever branch the map takes.
 
 The one-sided limit at a change of branch is a step on a forced branch, and so is a composed map whose itinerary is
 given: end points of limit sets and cycles are built on nothing else.

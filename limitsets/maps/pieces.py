@@ -1,4 +1,4 @@
-"""Monotone pieces: a one-dimensional map cut where its branch changes, where a branch turns, where its image jumps.
+"""Monotone pieces: a one-dimensional map cut at switching points, turning points and jumps.
 
 On a piece the map is a monotone function of x.  The image of an interval of it is then known from the two ends, and
 one symbol names what an orbit does there: limit sets by end points and cycles by itinerary stand on these cuts.
@@ -12,10 +12,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from limitsets.errors import AnswerError
+from limitsets.maps.bisection import Array, Flags, bisected, hidden, inserted, located, sign_code
 from limitsets.maps.contract import has_slope, kind_of
 from limitsets.maps.critical import SAMPLES, Sides, branches_of_side, require_one_dimension
 from limitsets.maps.forced import along
-from limitsets.maps.search import Array, Flags, bisected, hidden, inserted, located, sign_code
 
 __all__ = ["Piece", "TurningPoint", "monotone_pieces", "turning_points"]
 

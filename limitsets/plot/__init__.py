@@ -3,13 +3,13 @@
     figure = limitsets.plot.limit_set(scene, found)
     figure.savefig("limit-set.png")
 
-One file per family; `style.py` holds what they share.  Colours can be told apart by colour-blind readers, and nothing
-is told by colour alone: lines have styles, areas hatches, points markers.  No window and no pyplot: figures are made
-with the object interface.  A file never bears the name of a function of the room: `plot.map` would be a module to
-whoever imports that file last.
+One file per family; `style.py` holds what they share.  Colours are safe for colour-blind readers, and no information
+is in colour alone: lines have styles, areas hatches, points markers.  No window and no pyplot: figures are made
+with the object interface.  A file never has the name of a function of the room: after an
+import of that file `plot.map` would be a module.
 """
 
-from limitsets.plot.audits import audit
+from limitsets.plot.audit_strips import audit
 from limitsets.plot.basin import basins
 from limitsets.plot.counterexamples import counterexample
 from limitsets.plot.designs import design

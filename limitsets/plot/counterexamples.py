@@ -1,4 +1,4 @@
-"""An orbit that violates a goal, throw by throw: where the part comes to rest, on which side, and where it must not."""
+"""An orbit that violates a goal, throw by throw: places of rest, sides, and the forbidden places."""
 
 from __future__ import annotations
 

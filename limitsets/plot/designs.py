@@ -1,4 +1,4 @@
-"""A design as it moves: limit sets and critical points of the scenes on its path (Fig. 6 of the paper)."""
+"""The path of a design: limit sets and critical points of its scenes (Fig. 6 of the paper)."""
 
 from __future__ import annotations
 

@@ -42,7 +42,7 @@ def flight(scene: Scene, x: float, side: int) -> Figure:
     scene : Scene
         The scene.
     x : float
-        Where the part rests before the throw [scene's unit].
+        Where the part rests before the throw [length].
     side : int
         On which side.
 

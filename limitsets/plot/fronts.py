@@ -1,4 +1,4 @@
-"""A robust design: what its margin costs in throws to feed, and what each quantity of the tolerance costs."""
+"""A robust design: margin against throws to feed, and the share of each quantity of the tolerance."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from matplotlib.ticker import LogLocator, NullFormatter, ScalarFormatter
 
 from limitsets.errors import AnswerError
 from limitsets.plot import style
-from limitsets.robust.margins.words import bound
+from limitsets.robust.margins.margin_texts import bound
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

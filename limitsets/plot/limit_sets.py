@@ -1,4 +1,4 @@
-"""The limit set side by side, with throws as arrows (Figs. 4 and 6 of the paper)."""
+"""The limit set, one lane per side, with throws as arrows (Figs. 4 and 6 of the paper)."""
 
 from __future__ import annotations
 

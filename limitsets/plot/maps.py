@@ -1,4 +1,4 @@
-"""The map: where a throw leads from each x, side by side, with an orbit as cobweb."""
+"""The map: x' against x, one panel per side, with an orbit as cobweb."""
 
 from __future__ import annotations
 

@@ -10,7 +10,7 @@ from matplotlib.patches import Patch
 
 from limitsets.errors import AnswerError
 from limitsets.plot import style
-from limitsets.robust.margins.words import bound
+from limitsets.robust.margins.margin_texts import bound
 from limitsets.scene.quantities import parsed_deviation
 
 if TYPE_CHECKING:

@@ -1,4 +1,4 @@
-"""The Morse graph: recurrent sets in layers, each above those it leads to."""
+"""The Morse graph: recurrent sets in layers, each above its successors."""
 
 from __future__ import annotations
 

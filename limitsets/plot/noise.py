@@ -1,4 +1,4 @@
-"""Noise in pictures: where the part rests, how many throws it takes, and what more noise does."""
+"""Figures of noise: density of the places of rest, number of throws, and the effect of the noise level."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from limitsets.robust import NoiseStatistics
-    from limitsets.robust.noise.sampling import Thrown
-    from limitsets.robust.noise.settling import NoisyClass
+    from limitsets.robust.noise.communicating_classes import NoisyClass
+    from limitsets.robust.noise.sampling import SampledStatistics
     from limitsets.robust.noise.statistics import Levels
 
 __all__ = ["noise_arrivals", "noise_density", "noise_levels"]
@@ -51,14 +51,14 @@ def _plain(axes: Axes) -> None:
     axes.tick_params(labelsize=style.SMALL)
 
 
-def noise_density(found: NoiseStatistics, thrown: Thrown | None = None) -> Figure:
+def noise_density(found: NoiseStatistics, thrown: SampledStatistics | None = None) -> Figure:
     """Draw how often the part rests where, side by side, and beside it what many throws did.
 
     Parameters
     ----------
     found : NoiseStatistics
         From `limitsets.robust.noise_statistics`.
-    thrown : Thrown, optional
+    thrown : SampledStatistics, optional
         From `limitsets.robust.noise.sampling.throw_many`.
 
     Returns
@@ -96,14 +96,14 @@ def _widened(lo: float, hi: float) -> tuple[float, float]:
     return lo - 0.04 * (hi - lo), hi + 0.04 * (hi - lo)
 
 
-def noise_arrivals(found: NoiseStatistics, thrown: Thrown | None = None) -> Figure:
+def noise_arrivals(found: NoiseStatistics, thrown: SampledStatistics | None = None) -> Figure:
     """Draw how many throws it takes from random starts to the goal: shares, and what is still under way.
 
     Parameters
     ----------
     found : NoiseStatistics
         From `limitsets.robust.noise_statistics`.
-    thrown : Thrown, optional
+    thrown : SampledStatistics, optional
         From `limitsets.robust.noise.sampling.throw_many`.
 
     Returns

@@ -1,4 +1,4 @@
-"""What all figures share: colours, line styles, hatches, an empty figure, and a stretch of an orbit to draw."""
+"""Shared by all figures: colours, line styles, hatches, an empty figure, and a piece of an orbit."""
 
 from __future__ import annotations
 

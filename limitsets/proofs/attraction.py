@@ -14,10 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from limitsets.cells import CellSet
-from limitsets.graph.survey import attracting_of
+from limitsets.graph.condensation import attracting_of
 from limitsets.proofs.basin import ROUNDING, Basin, basin
 from limitsets.proofs.cover import Cover
-from limitsets.proofs.joint import NearJoint, near_joint
+from limitsets.proofs.near_hinge import NearHinge, near_hinge
 
 __all__ = ["BELOW", "Attraction", "attraction", "near_section"]
 
@@ -35,7 +35,7 @@ class Attraction:
         Cells and images.
     component : ndarray of int32, shape (n_cells,)
         Number of the attracting component of each cell, -1 off them.
-    joint : tuple of NearJoint
+    joint : tuple of NearHinge
         The starts below the cells.
     proved : bool
         Whether every start on (a_i, arm.length] of every side enters the attracting cells.
@@ -47,7 +47,7 @@ class Attraction:
 
     cover: Cover
     component: NDArray[np.int32]
-    joint: tuple[NearJoint, ...]
+    joint: tuple[NearHinge, ...]
     proved: bool
     reason: str
     unresolved: CellSet
@@ -104,7 +104,7 @@ def attraction(found: Cover) -> Attraction:
         component[cells] = number
     lost = [cells for cells, attracts in zip(sets, good, strict=True) if not attracts]
     unresolved = CellSet.of(found.grid, np.concatenate([np.zeros(0, np.int64), *lost]))
-    joint = near_joint(found)
+    joint = near_hinge(found)
     return Attraction(
         found,
         component,
@@ -115,7 +115,7 @@ def attraction(found: Cover) -> Attraction:
 
 
 def _verdict(
-    found: Cover, component: NDArray[np.int32], unresolved: CellSet, joint: tuple[NearJoint, ...]
+    found: Cover, component: NDArray[np.int32], unresolved: CellSet, joint: tuple[NearHinge, ...]
 ) -> tuple[bool, str]:
     """Whether attraction is proved, and the first thing that is missing."""
     lost = np.concatenate([images.lost for images in found.images])

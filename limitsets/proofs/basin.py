@@ -1,4 +1,4 @@
-"""The proved basin: starts of which it is proved that they come to the attracting cells and stay there.
+"""The proved basin: starts that are proved to come to the attracting cells and stay there.
 
 Every start in a cell of the basin either comes to the attracting cells, by ranks that fall, or belongs to a set of
 length zero.  Off the attracting cells a cell of the basin is of one of three kinds:
@@ -6,7 +6,7 @@ length zero.  Off the attracting cells a cell of the basin is of one of three ki
 * *falling*: every image lies in cells of smaller rank;
 * *passing*: besides in such cells it may lie in the cell itself again, and jogs from the cell are proved to go one way,
   all outward or all inward, by more than the noise of the landing place: an orbit leaves the cell after finitely many;
-* *thin*: the rank does not rise, and almost every start leaves the cells of that rank (`thinning.py`).
+* *thin*: the rank does not rise, and almost every start leaves the cells of that rank (`perron_frobenius.py`).
 
 Ranks do not rise along any image, so an orbit that does not come to the attracting cells stays in thin cells of one
 rank from some throw on.  Such starts have length zero, and so have all that are thrown there, where the slope is proved
@@ -30,8 +30,8 @@ from limitsets.interval import Interval
 from limitsets.jit import proof_kernel
 from limitsets.proofs.cover import Cover
 from limitsets.proofs.expansion import slopes
-from limitsets.proofs.joint import SCATTERED, NearJoint
-from limitsets.proofs.thinning import thinned
+from limitsets.proofs.near_hinge import SCATTERED, NearHinge
+from limitsets.proofs.perron_frobenius import perron_frobenius_bound
 from limitsets.thrower.impact import jog_displacement
 from limitsets.thrower.side_box import gather_box, with_kappa
 from limitsets.thrower.throw_box import throw_box
@@ -155,7 +155,7 @@ def _displacements(found: Cover) -> list[Floats]:
 # ---------------------------------------------------------------- the basin
 
 
-def basin(found: Cover, component: NDArray[np.int32], joint: Sequence[NearJoint]) -> Basin:
+def basin(found: Cover, component: NDArray[np.int32], joint: Sequence[NearHinge]) -> Basin:
     """Prove which starts come to the attracting cells.
 
     Parameters
@@ -164,7 +164,7 @@ def basin(found: Cover, component: NDArray[np.int32], joint: Sequence[NearJoint]
         Cells and images.
     component : ndarray of int32, shape (n_cells,)
         Number of the attracting component of each cell, -1 off them.
-    joint : sequence of NearJoint
+    joint : sequence of NearHinge
         What is proved of the starts below the cells.
 
     Returns
@@ -185,7 +185,7 @@ def basin(found: Cover, component: NDArray[np.int32], joint: Sequence[NearJoint]
     thin, throws = again & ~shut, 0
     thick = flat = np.zeros_like(inside)
     if thin.any():
-        result = thinned(found, thin, rank)
+        result = perron_frobenius_bound(found, thin, rank)
         throws, thick = result.throws, result.thick
         shut |= _reaching(found, thick)
         thin &= ~shut
@@ -240,7 +240,7 @@ def _passing(found: Cover, displaced: Sequence[Floats]) -> Mask:
     return passing
 
 
-def _near(found: Cover, joint: Sequence[NearJoint], shut: Mask, *, thin: bool) -> bool:
+def _near(found: Cover, joint: Sequence[NearHinge], shut: Mask, *, thin: bool) -> bool:
     """Whether the starts below the cells, beyond a fixed point of the jog, come to cells that are not shut."""
     for side, (each, (edges,)) in enumerate(zip(joint, found.grid.edges, strict=True)):
         own = shut[found.grid.of_side(side)]
@@ -251,7 +251,7 @@ def _near(found: Cover, joint: Sequence[NearJoint], shut: Mask, *, thin: bool) -
 
 
 def _start(
-    found: Cover, joint: Sequence[NearJoint], shut: Mask, near: bool, displaced: Sequence[Floats]
+    found: Cover, joint: Sequence[NearHinge], shut: Mask, near: bool, displaced: Sequence[Floats]
 ) -> tuple[Floats, Floats]:
     """On each side, from where on every start is claimed, and up to where the starts are lost or creep."""
     (lo, hi), start, explained = found.box.bare, [], []
@@ -269,7 +269,7 @@ def _start(
 
 
 def _shares(
-    found: Cover, joint: Sequence[NearJoint], shut: Mask, near: bool, start: Floats, explained: Floats
+    found: Cover, joint: Sequence[NearHinge], shut: Mask, near: bool, start: Floats, explained: Floats
 ) -> tuple[float, float, float, float, bool]:
     """Shares of the arm that are claimed, leave, creep and are open; whether all beyond `start` is claimed."""
     lo, hi = found.box.bare

@@ -1,9 +1,9 @@
-"""Throws told by their impact angle p instead of their start x: then nothing has to be solved.
+"""Throws parametrised by their impact angle p instead of their start x: no equation has to be solved.
 
     x = P(p) = kappa p / 2 + (a sin p - d (1 - cos p)) / p,    x' = P(p) + D(p), less the shift of a flip,
 
 with the displacement D of a jog: docs/model.md.  The formulas take numbers of any arithmetic with ``+ - * /``, here
-arrays of intervals, bare or with their derivatives by some variables (`mean_value.Slope`).
+arrays of intervals, bare or with their derivatives by some variables (`mean_value.Jet`).
 """
 
 from __future__ import annotations
@@ -16,12 +16,12 @@ import numpy as np
 from limitsets.interval import Interval
 from limitsets.jit import proof_kernel
 from limitsets.proofs.intervals import Intervals
-from limitsets.proofs.mean_value import Slope, root
+from limitsets.proofs.mean_value import Jet, root
 from limitsets.thrower import Energy, Exact, SmallAngle2
 from limitsets.thrower.impact import pose
 from limitsets.thrower.turn_box import turn_box
 
-__all__ = ["FLIP", "JOG", "Angle", "Formulas", "Numbers", "OneSide", "angle", "variable"]
+__all__ = ["FLIP", "JOG", "Angle", "Formulas", "OneSide", "ThrowNumbers", "angle", "variable"]
 
 JOG, FLIP = 0, 1
 
@@ -34,7 +34,7 @@ class OneSide(NamedTuple):
     shift: Any
 
 
-class Numbers(NamedTuple):
+class ThrowNumbers(NamedTuple):
     """What throws depend on: their sides, the radius of gyration, kappa, height of the arm's surface."""
 
     sides: list[OneSide]
@@ -47,44 +47,44 @@ class Angle(NamedTuple):
     """An angle p, sin p, 1 - cos p and p - sin p."""
 
     p: Any
-    s: Any
-    v: Any
-    w: Any
+    sin: Any
+    versin: Any
+    phi_minus_sin: Any
 
 
 @proof_kernel(entry=True)
 def _turns(lo: Any, hi: Any, out: Any) -> None:
     for k in range(lo.size):
         at = turn_box(Interval(lo[k], hi[k]))
-        out[0, k], out[1, k] = at.s.lo, at.s.hi
-        out[2, k], out[3, k] = at.v.lo, at.v.hi
-        out[4, k], out[5, k] = at.w.lo, at.w.hi
+        out[0, k], out[1, k] = at.sin.lo, at.sin.hi
+        out[2, k], out[3, k] = at.versin.lo, at.versin.hi
+        out[4, k], out[5, k] = at.phi_minus_sin.lo, at.phi_minus_sin.hi
 
 
-def variable(value: Intervals, number: int, count: int) -> Slope:
+def variable(value: Intervals, number: int, count: int) -> Jet:
     """Return the variable of a number, among so many."""
     one, none = Intervals.of(1.0), Intervals.of(0.0)
-    return Slope(value, tuple(one if k == number else none for k in range(count)))
+    return Jet(value, tuple(one if k == number else none for k in range(count)))
 
 
 def angle(p: Any) -> Angle:
     """Evaluate what depends on an angle alone, with derivatives if it has any."""
-    bare = p.value if isinstance(p, Slope) else p
+    bare = p.value if isinstance(p, Jet) else p
     out = np.empty((6, bare.lo.size))
     _turns(np.ascontiguousarray(bare.lo), np.ascontiguousarray(bare.hi), out)
     s, v, w = (Intervals(out[2 * k], out[2 * k + 1]) for k in range(3))
-    if not isinstance(p, Slope):
+    if not isinstance(p, Jet):
         return Angle(p, s, v, w)
     c = 1.0 - v
-    return Angle(p, *(Slope(f, tuple(of * by for by in p.by)) for f, of in ((s, c), (v, s), (w, v))))
+    return Angle(p, *(Jet(f, tuple(of * by for by in p.derivatives)) for f, of in ((s, c), (v, s), (w, v))))
 
 
 def _signed_square(x: Any) -> Any:
     """x |x|."""
-    if not isinstance(x, Slope):
+    if not isinstance(x, Jet):
         return x * x.absolute()
     size = x.value.absolute()
-    return Slope(x.value * size, tuple(2.0 * (size * rise) for rise in x.by))
+    return Jet(x.value * size, tuple(2.0 * (size * rise) for rise in x.derivatives))
 
 
 @dataclass(frozen=True)
@@ -100,21 +100,21 @@ class Formulas:
     flight: Any
     flip: Any
 
-    def start(self, n: Numbers, part: OneSide, at: Angle) -> Any:
+    def start(self, n: ThrowNumbers, part: OneSide, at: Angle) -> Any:
         """Where the throw begins."""
         if isinstance(self.flight, Exact):
-            return n.kappa * at.p * 0.5 + (part.a * at.s - part.d * at.v) / at.p
+            return n.kappa * at.p * 0.5 + (part.a * at.sin - part.d * at.versin) / at.p
         pull = n.kappa - part.d if isinstance(self.flight, SmallAngle2) else n.kappa
         return part.a + pull * at.p * 0.5
 
-    def end(self, n: Numbers, part: OneSide, at: Angle, x: Any, branch: int) -> Any:
+    def end(self, n: ThrowNumbers, part: OneSide, at: Angle, x: Any, branch: int) -> Any:
         """Where it ends, on a branch."""
         jog = x - n.h * at.p
         if isinstance(self.flight, Exact):
-            jog = jog + (part.a * at.v - part.d * at.w)
+            jog = jog + (part.a * at.versin - part.d * at.phi_minus_sin)
         return jog - part.shift if branch == FLIP else jog
 
-    def margin(self, n: Numbers, part: OneSide, at: Angle, x: Any) -> Any:
+    def margin(self, n: ThrowNumbers, part: OneSide, at: Angle, x: Any) -> Any:
         """Evaluate what decides: above 0 where it flips."""
         a, d = part.a, part.d
         ell = root(a * a + d * d)

@@ -1,4 +1,4 @@
-"""Writing a certificate: all that a recheck needs, and nothing it would have to trust.
+"""Writing a certificate: all data that a recheck needs, none that it has to trust.
 
 One zip, stored: `header.json` (claims, the map's formulas for people, the scene as written, hashes) and `arrays.npz`
 (per box of parameters: cell borders, target cells per branch, branch, rank, component, brackets of the impact angle).

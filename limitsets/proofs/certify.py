@@ -1,4 +1,4 @@
-"""Prove what is claimed of a scene, refining the cells until it is proved, refuted, or out of reach."""
+"""Prove claims about a scene: refine the cells until each claim is proved, refuted, or out of reach."""
 
 from __future__ import annotations
 
@@ -12,18 +12,18 @@ from pathlib import Path
 from typing import Any, cast
 
 from limitsets.errors import AnswerError
-from limitsets.proofs.asked import ask, borders, prove
-from limitsets.proofs.asked.starts import leaving
 from limitsets.proofs.attraction import Attraction, attraction, near_section
 from limitsets.proofs.cover import cover
 from limitsets.proofs.end_points import proved_ends
 from limitsets.proofs.expansion import least_slope
+from limitsets.proofs.goals import borders, prove, prove_or_refute
+from limitsets.proofs.goals.violating_starts import start_that_leaves
 from limitsets.proofs.of_map import certify_map
 from limitsets.proofs.orbits import proved_cycles
 from limitsets.proofs.parameters import ParameterBox, parameter_box
 from limitsets.proofs.proof import Claim, Proof
 from limitsets.proofs.simulated import joined, scattered
-from limitsets.proofs.tolerance import Piece, whole
+from limitsets.proofs.tolerance import SceneBox, whole
 from limitsets.proofs.trapping import trapping
 from limitsets.scene import Scene, load
 from limitsets.scene.quantities import deviation, find
@@ -49,7 +49,7 @@ Progress = Callable[[str, int, int], None]
 def _attracts_all(found: Attraction, scene: Scene) -> Claim:
     if not found.proved:
         noisy = found.cover.box.landing > 0.0 and not found.cover.points
-        orbit = leaving(found) if noisy or found.cover.graph.ranges.exits.any() else ()
+        orbit = start_that_leaves(found) if noisy or found.cover.graph.ranges.exits.any() else ()
         if orbit:
             once = {"once": True}
             return Claim("attracts-all", "refuted", found.reason, {}, orbit, final=True, recurs=once)
@@ -107,7 +107,7 @@ def _goal(found: Attraction, scene: Scene, *, search: bool = True) -> Claim:
         raise AnswerError(
             "the goal", None, "a scene with [goal]", "give the scene one, or leave this claim out"
         )
-    answer = (ask if search else prove)(found, scene, goal)
+    answer = (prove_or_refute if search else prove)(found, scene, goal)
     return Claim(
         "goal",
         answer.verdict,
@@ -249,18 +249,18 @@ def certify(
     >>> proof.claims[0].verdict
     'proved'
     """
-    asked = scene if isinstance(scene, Scene) else load(scene)
-    wanted = _chosen(asked, claims)
-    noise = joined(_deviations(asked, noise), _deviations(asked, scattered(asked)))
-    tolerance = _deviations(asked, tolerance)
+    loaded = scene if isinstance(scene, Scene) else load(scene)
+    wanted = _chosen(loaded, claims)
+    noise = joined(_deviations(loaded, noise), _deviations(loaded, scattered(loaded)))
+    tolerance = _deviations(loaded, tolerance)
     begin = time.perf_counter()
     if tolerance:
-        found, answers = _pieces(asked, wanted, whole(asked, tolerance), noise, progress)
+        found, answers = _pieces(loaded, wanted, whole(loaded, tolerance), noise, progress)
     else:
-        one, answers = _attempt(asked, wanted, parameter_box(asked, noise=noise), LADDER, progress)
+        one, answers = _attempt(loaded, wanted, parameter_box(loaded, noise=noise), LADDER, progress)
         found = (one,)
     seconds = time.perf_counter() - begin
-    return Proof(asked, noise, tolerance, found, answers, seconds)
+    return Proof(loaded, noise, tolerance, found, answers, seconds)
 
 
 certify.register(tuple, cast(Any, certify_map))  # a map is a NamedTuple; its answer is another class
@@ -297,7 +297,7 @@ def _attempt(
 def _pieces(
     scene: Scene,
     wanted: tuple[str, ...],
-    piece: Piece,
+    piece: SceneBox,
     noise: Mapping[str, str] | None,
     progress: Progress | None,
 ) -> tuple[tuple[Attraction, ...], tuple[Claim, ...]]:
@@ -322,7 +322,7 @@ def _pieces(
 def _halved(
     scene: Scene,
     wanted: tuple[str, ...],
-    piece: Piece,
+    piece: SceneBox,
     noise: Mapping[str, str] | None,
     progress: Progress | None,
 ) -> tuple[tuple[Attraction, ...], tuple[Claim, ...]]:

@@ -1,7 +1,7 @@
 """Cells for a proof, and the enclosures of their images.
 
-The cells of side i run from just beyond a_i to the arm's end, graded towards a_i; what lies nearer to a_i is the
-business of `joint.py`.  Where the arm's surface is above the joint they begin just beyond the unstable fixed point of
+The cells of side i run from just beyond a_i to the arm's end, graded towards a_i; starts nearer to a_i are treated
+in `near_hinge.py`.  Where the arm's surface is above the joint they begin just beyond the unstable fixed point of
 the jog instead, if one is found.  Wanted borders (the x of a goal) are cut in.
 """
 

@@ -14,14 +14,14 @@ F(F(B)), ... and, B being part of N, in every F^n(N): **B lies in L.**
 This takes the place of an argument by expansion ("every interval grows until it covers the critical point").  An end is
 the image, along the itinerary given with it, of a one-sided limit at a critical point c.  It is reached because B holds
 the proper side of c up to its bracket, and every point of B, on both sides of c and around every other critical point
-that is kept, is again the image of a point of B.  So nothing is left to show about orbits that return, or about one
-critical point reaching another, and no slope is used.  All preimages are decided starts: what the map does at a
-critical point itself does not matter.  Not claimed is that one orbit is dense in L.
+that is kept, is again the image of a point of B.  So the proof needs no statement about recurrent orbits or about one
+critical point reaching another, and no slope.  All preimages are decided starts: the value of the map at a critical
+point itself does not matter.  The proof does not claim that one orbit is dense in L.
 
-Where the map contracts, rounding inward eats B up: the inner ends are then None, and what L is there is a matter of
-`orbits.py`.  With noise, both sets hold for every sequence of throws.
+Where the map contracts, inward rounding makes B empty: the inner ends are then None, and `orbits.py` describes L there.
+ With noise, both sets hold for every sequence of throws.
 
-Checked by machine: branches and signs of slopes on tiles of N, images of tile ends (`tiles.py`), and the exact
+Checked by machine: branches and signs of slopes on tiles of N, images of tile ends (`proved_pieces.py`), and the exact
 comparison of B with its image.  Source: docs/model.md, limit sets.
 """
 
@@ -35,7 +35,16 @@ import numpy as np
 from limitsets.maps import codes
 from limitsets.proofs.attraction import Attraction
 from limitsets.proofs.orbits import follow
-from limitsets.proofs.tiles import Intervals, Pair, Part, Tile, UnionImages, at_rest, joined, tiles_of
+from limitsets.proofs.proved_pieces import (
+    Intervals,
+    Pair,
+    PieceImage,
+    ProvedPiece,
+    UnionImages,
+    at_rest,
+    proved_pieces_of,
+    union_of,
+)
 from limitsets.thrower.throw_box import BOTH
 
 __all__ = ["CriticalBracket", "ProvedEnd", "ProvedEnds", "proved_ends"]
@@ -89,7 +98,7 @@ class ProvedEnds:
         The critical points in the outer set.
     images : (int, int)
         Images taken for the outer and the inner set.
-    tiles : dict of int to list of Tile
+    tiles : dict of int to list of ProvedPiece
         By side, what was proved of the throws from the attracting cells.
     reason : str
         Why inner ends are missing; empty if none is.
@@ -98,7 +107,7 @@ class ProvedEnds:
     ends: tuple[ProvedEnd, ...]
     critical: tuple[CriticalBracket, ...]
     images: tuple[int, int]
-    tiles: dict[int, list[Tile]]
+    tiles: dict[int, list[ProvedPiece]]
     reason: str
 
     @property
@@ -125,20 +134,20 @@ class ProvedEnds:
                 for end in self.ends
             ],
             "pieces": [
-                [side, tile.lo.hex(), tile.hi.hex(), tile.branch if tile.branch >= 0 else BOTH, tile.sign]
+                [side, piece.lo.hex(), piece.hi.hex(), piece.branch if piece.branch >= 0 else BOTH, piece.sign]
                 for side, row in sorted(self.tiles.items())
-                for tile in row
+                for piece in row
             ],
         }  # fmt: skip
 
 
-def _critical(tiles: dict[int, list[Tile]]) -> tuple[CriticalBracket, ...]:
+def _critical(tiles: dict[int, list[ProvedPiece]]) -> tuple[CriticalBracket, ...]:
     """Undecided tiles between decided ones of different branches."""
     found = []
     for side, row in tiles.items():
-        groups = joined((tile.lo, tile.hi) for tile in row if tile.branch == BOTH)
-        before = {tile.hi: tile.branch for tile in row if tile.branch in (codes.JOG, codes.FLIP)}
-        after = {tile.lo: tile.branch for tile in row if tile.branch in (codes.JOG, codes.FLIP)}
+        groups = union_of((piece.lo, piece.hi) for piece in row if piece.branch == BOTH)
+        before = {piece.hi: piece.branch for piece in row if piece.branch in (codes.JOG, codes.FLIP)}
+        after = {piece.lo: piece.branch for piece in row if piece.branch in (codes.JOG, codes.FLIP)}
         found += [
             CriticalBracket(side, lo, hi, before[lo], after[hi])
             for lo, hi in groups
@@ -157,12 +166,12 @@ class _Step(NamedTuple):
     which: str
 
 
-def _source(parts: list[Part], outer: Intervals, side: int, x: float) -> _Step:
+def _source(parts: list[PieceImage], outer: Intervals, side: int, x: float) -> _Step:
     """Of the ends of all images on a side, find where the one nearest to x comes from."""
     distance = np.inf
     best = _Step(side, x, -1, -1, "")
     for part in parts:
-        if part.to != side or part.tile.branch not in (codes.JOG, codes.FLIP):
+        if part.to != side or part.piece.branch not in (codes.JOG, codes.FLIP):
             continue
         interval = outer[part.side][part.owner]
         for start, image, end, which in (
@@ -244,12 +253,12 @@ def proved_ends(found: Attraction) -> ProvedEnds:
     ([(15.205338826, 19.752688015)], True)
     """
     grid, box = found.cover.grid, found.cover.box
-    tiles: dict[int, list[Tile]] = {}
+    tiles: dict[int, list[ProvedPiece]] = {}
     for side, (edges,) in enumerate(grid.edges):
         mine = np.flatnonzero(found.component[grid.of_side(side)] >= 0)
-        tiles[side] = tiles_of(box, side, edges[mine], edges[mine + 1])
+        tiles[side] = proved_pieces_of(box, side, edges[mine], edges[mine + 1])
     images = UnionImages(box, tiles)
-    cells = {side: joined((tile.lo, tile.hi) for tile in row) for side, row in tiles.items() if row}
+    cells = {side: union_of((piece.lo, piece.hi) for piece in row) for side, row in tiles.items() if row}
     if not cells:
         return ProvedEnds((), (), (0, 0), {}, "there are no attracting cells")
     outer, taken = at_rest(images.outward, cells)

@@ -1,6 +1,6 @@
 """Expansion: |dx'/dx| > 1 on every attracting cell.
 
-Then no periodic orbit in the limit set attracts, so the limit set is no repeating trajectory; and every interval in it
+Then no periodic orbit in the limit set attracts, so the limit set is no attracting cycle; and every interval in it
 grows until it meets a critical point, so the topological entropy is at least the logarithm of the least slope.
 """
 

@@ -94,7 +94,7 @@ def _ratios(phi: float) -> tuple[Interval, Interval]:
         return Interval(0.5, 0.5), Interval(1.0, 1.0) / 6.0
     at = turn_point(phi)
     square = at.phi**2
-    return at.v / square, at.w / (square * at.phi)
+    return at.versin / square, at.phi_minus_sin / (square * at.phi)
 
 
 @proof_kernel

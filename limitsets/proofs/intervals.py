@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from limitsets.proofs.rational import Span
+from limitsets.proofs.rational import RationalInterval
 
 __all__ = ["Intervals"]
 
@@ -63,7 +63,7 @@ class Intervals:
     def __neg__(self) -> Intervals:
         return Intervals(-self.hi, -self.lo)
 
-    def __add__(self, other: Intervals | Span | float) -> Intervals:
+    def __add__(self, other: Intervals | RationalInterval | float) -> Intervals:
         b = _as(other)
         if b is None:
             return NotImplemented
@@ -71,16 +71,16 @@ class Intervals:
 
     __radd__ = __add__
 
-    def __sub__(self, other: Intervals | Span | float) -> Intervals:
+    def __sub__(self, other: Intervals | RationalInterval | float) -> Intervals:
         b = _as(other)
         if b is None:
             return NotImplemented
         return _outward(self.lo - b.hi, self.hi - b.lo)
 
-    def __rsub__(self, other: Span | float) -> Intervals:
+    def __rsub__(self, other: RationalInterval | float) -> Intervals:
         return -self + other
 
-    def __mul__(self, other: Intervals | Span | float) -> Intervals:
+    def __mul__(self, other: Intervals | RationalInterval | float) -> Intervals:
         b = _as(other)
         if b is None:
             return NotImplemented
@@ -92,7 +92,7 @@ class Intervals:
 
     __rmul__ = __mul__
 
-    def __truediv__(self, other: Intervals | Span | float) -> Intervals:
+    def __truediv__(self, other: Intervals | RationalInterval | float) -> Intervals:
         b = _as(other)
         if b is None:
             return NotImplemented
@@ -100,7 +100,7 @@ class Intervals:
         lo, hi = np.where(sure, b.lo, np.nan), np.where(sure, b.hi, np.nan)
         return self * _outward(1.0 / hi, 1.0 / lo)
 
-    def __rtruediv__(self, other: Span | float) -> Intervals:
+    def __rtruediv__(self, other: RationalInterval | float) -> Intervals:
         b = _as(other)
         return NotImplemented if b is None else b / self
 
@@ -124,6 +124,6 @@ def _as(value: object) -> Intervals | None:
     """Make intervals of a number; None of anything else, which may know what to do with intervals."""
     if isinstance(value, Intervals):
         return value
-    if isinstance(value, Span):
+    if isinstance(value, RationalInterval):
         return Intervals.of(*value.outward())
     return Intervals.of(float(value)) if isinstance(value, (int, float)) else None

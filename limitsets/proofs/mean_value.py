@@ -1,7 +1,8 @@
-"""Spans that carry how they change with some quantities: narrow enclosures of functions over boxes.
+"""Intervals with their derivatives (forward mode): narrow enclosures of functions over boxes.
 
-A formula in which a quantity stands several times is enclosed too widely, where that quantity is known to a tolerance
-only: each place counts as another one.  The mean value theorem mends it.  With c in the box and f' enclosed over it,
+If a formula contains an uncertain quantity several times, its natural interval extension is too wide, because the
+places vary independently (dependency problem).  The mean-value form reduces the excess.  With c in the box and f'
+enclosed over it,
 
     f(q)  lies in  f(c) + sum of f'_j (q_j - c_j),
 
@@ -17,74 +18,77 @@ from fractions import Fraction
 from typing import Any, TypeAlias
 
 from limitsets.proofs.intervals import Intervals
-from limitsets.proofs.rational import Span, square_root
+from limitsets.proofs.rational import RationalInterval, square_root
 
-__all__ = ["Slope", "about", "middle", "root"]
+__all__ = ["Jet", "about", "middle", "root"]
 
 Number: TypeAlias = Any
-"""A `Span`, or `Intervals` of many boxes."""
+"""A `RationalInterval`, or `Intervals` of many boxes."""
 
 
 @dataclass(frozen=True)
-class Slope:
+class Jet:
     """A span, and the spans of its derivatives; or arrays of intervals.
 
     Examples
     --------
-    >>> x = Slope(Span.of(1, 2), (Span.of(1),))
-    >>> (x * x).by[0]
-    Span(lo=Fraction(2, 1), hi=Fraction(4, 1))
+    >>> x = Jet(RationalInterval.of(1, 2), (RationalInterval.of(1),))
+    >>> (x * x).derivatives[0]
+    RationalInterval(lo=Fraction(2, 1), hi=Fraction(4, 1))
     """
 
     value: Number
-    by: tuple[Number, ...]
+    derivatives: tuple[Number, ...]
 
     def __float__(self) -> float:
         return float(self.value)
 
-    def __neg__(self) -> Slope:
-        return Slope(-self.value, tuple(-d for d in self.by))
+    def __neg__(self) -> Jet:
+        return Jet(-self.value, tuple(-d for d in self.derivatives))
 
-    def __add__(self, other: Slope | Number) -> Slope:
-        if isinstance(other, Slope):
-            return Slope(self.value + other.value, _each(self.by, other.by))
-        return Slope(self.value + other, self.by)
+    def __add__(self, other: Jet | Number) -> Jet:
+        if isinstance(other, Jet):
+            return Jet(self.value + other.value, _each(self.derivatives, other.derivatives))
+        return Jet(self.value + other, self.derivatives)
 
     __radd__ = __add__
 
-    def __sub__(self, other: Slope | Number) -> Slope:
+    def __sub__(self, other: Jet | Number) -> Jet:
         return self + (-other)
 
-    def __rsub__(self, other: Number) -> Slope:
-        return Slope(other - self.value, tuple(-d for d in self.by))
+    def __rsub__(self, other: Number) -> Jet:
+        return Jet(other - self.value, tuple(-d for d in self.derivatives))
 
-    def __mul__(self, other: Slope | Number) -> Slope:
+    def __mul__(self, other: Jet | Number) -> Jet:
         if other is self:
-            return Slope(self.value * self.value, tuple(2 * (self.value * d) for d in self.by))
-        if isinstance(other, Slope):
-            one, two = tuple(d * other.value for d in self.by), tuple(self.value * d for d in other.by)
-            return Slope(self.value * other.value, _each(one, two))
-        return Slope(self.value * other, tuple(d * other for d in self.by))
+            return Jet(self.value * self.value, tuple(2 * (self.value * d) for d in self.derivatives))
+        if isinstance(other, Jet):
+            one, two = (
+                tuple(d * other.value for d in self.derivatives),
+                tuple(self.value * d for d in other.derivatives),
+            )
+            return Jet(self.value * other.value, _each(one, two))
+        return Jet(self.value * other, tuple(d * other for d in self.derivatives))
 
     __rmul__ = __mul__
 
-    def __truediv__(self, other: Slope | Number) -> Slope:
-        if not isinstance(other, Slope):
-            return Slope(self.value / other, tuple(d / other for d in self.by))
+    def __truediv__(self, other: Jet | Number) -> Jet:
+        if not isinstance(other, Jet):
+            return Jet(self.value / other, tuple(d / other for d in self.derivatives))
         ratio = self.value / other.value
-        by = (one - ratio * two for one, two in zip(self.by, other.by, strict=True))
-        return Slope(ratio, tuple(d / other.value for d in by))
+        by = (one - ratio * two for one, two in zip(self.derivatives, other.derivatives, strict=True))
+        return Jet(ratio, tuple(d / other.value for d in by))
 
-    def __rtruediv__(self, other: Number) -> Slope:
+    def __rtruediv__(self, other: Number) -> Jet:
         ratio = other / self.value
-        return Slope(ratio, tuple(-(ratio * d) / self.value for d in self.by))
+        return Jet(ratio, tuple(-(ratio * d) / self.value for d in self.derivatives))
 
 
 def _each(one: Sequence[Number], two: Sequence[Number]) -> tuple[Number, ...]:
     return tuple(a + b for a, b in zip(one, two, strict=True))
 
 
-def root(x: Slope | Number) -> Any:
+def root(x: Jet | Number) -> Any:
     """Square root.
 
     Raises
@@ -94,34 +98,39 @@ def root(x: Slope | Number) -> Any:
     """
     if isinstance(x, Intervals):
         return x.square_root()
-    if isinstance(x, Span):
+    if isinstance(x, RationalInterval):
         return square_root(x)
     found = root(x.value)
-    return Slope(found, tuple(d / (2 * found) for d in x.by))
+    return Jet(found, tuple(d / (2 * found) for d in x.derivatives))
 
 
-def about(centre: Span, steep: Slope | Span, offsets: Sequence[Span], plain: Span) -> Span:
+def about(
+    centre: RationalInterval,
+    steep: Jet | RationalInterval,
+    offsets: Sequence[RationalInterval],
+    plain: RationalInterval,
+) -> RationalInterval:
     """Enclose a function over a box by the mean value theorem, if that is narrower than the plain enclosure.
 
     Parameters
     ----------
-    centre : Span
+    centre : RationalInterval
         The function at the middle of the box.
-    steep : Slope or Span
+    steep : Jet or RationalInterval
         Over the box, with its derivatives; a span where it depends on none.
-    offsets : sequence of Span
+    offsets : sequence of RationalInterval
         The box less its middle.
-    plain : Span
+    plain : RationalInterval
         Another enclosure.
     """
-    if isinstance(steep, Span):
+    if isinstance(steep, RationalInterval):
         return plain
     total = centre
-    for slope, offset in zip(steep.by, offsets, strict=True):
+    for slope, offset in zip(steep.derivatives, offsets, strict=True):
         total = total + slope * offset
-    return Span(max(total.lo, plain.lo), min(total.hi, plain.hi))
+    return RationalInterval(max(total.lo, plain.lo), min(total.hi, plain.hi))
 
 
-def middle(span: Span) -> Span:
+def middle(span: RationalInterval) -> RationalInterval:
     """Return its middle."""
-    return Span.of(Fraction(span.lo + span.hi) / 2)
+    return RationalInterval.of(Fraction(span.lo + span.hi) / 2)

@@ -30,7 +30,7 @@ from limitsets.cells import CellSet, Grid
 from limitsets.errors import AnswerError
 from limitsets.graph import TransitionGraph, transitions
 from limitsets.graph.components import ranks
-from limitsets.graph.survey import attracting_of
+from limitsets.graph.condensation import attracting_of
 from limitsets.interval import guard
 from limitsets.maps import coerce, has_slope, kind_of
 from limitsets.maps.derived import NEVER, SURE, UNKNOWN, BranchBoxes, branch_boxes
@@ -121,7 +121,7 @@ class ProofOfMap:
     @property
     def enters(self) -> CellSet:
         """The cells all of whose points are proved to enter the attracting cells."""
-        destination = self.graph.survey().destination
+        destination = self.graph.condensation().destination
         return CellSet(self.graph.grid, destination >= 0)
 
 

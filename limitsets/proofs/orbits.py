@@ -1,4 +1,4 @@
-"""Periodic orbits: that they exist, that there is one only nearby, and whether it attracts or repels.
+"""Periodic orbits: proof of existence, of local uniqueness, and of stability or instability.
 
 G is the throw composed along an itinerary, x a number near one of its fixed points, I a small interval around x.
 
@@ -7,8 +7,7 @@ itself there, and continuous; G(x) - x has proved and opposite signs at the two 
 *Its period is no smaller*: after every proper divisor of the period the orbit of I is elsewhere.
 *It is alone in I*, and repels or attracts: |dG/dx| > 1, or < 1, is proved on all of I; either way G(x) - x is monotone.
 
-Numbers come from the search in floats of `limitsets.sets`, which only proposes.  That it found every orbit is not
-claimed.
+A search in floats (`limitsets.sets`) proposes the numbers.  The proof does not claim that the search found every orbit.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The box of map parameters that a scene's decimals, tolerances and noise stand for.
+"""The box of map parameters given by a scene's decimals, tolerances and noise.
 
 From the text of the scene, in exact rational spans (`rational.py`), through the same formulas of `geometry` that floats
 go through; only the last step rounds to doubles, outward.
@@ -17,8 +17,8 @@ import numpy as np
 from limitsets.errors import AnswerError
 from limitsets.geometry import side_ends
 from limitsets.geometry.polygon import above_side
-from limitsets.proofs.mean_value import Slope, about, middle, root
-from limitsets.proofs.rational import Span, angle, pi, sine, square_root
+from limitsets.proofs.mean_value import Jet, about, middle, root
+from limitsets.proofs.rational import RationalInterval, angle, pi, sine, square_root
 from limitsets.proofs.simulated import simulated
 from limitsets.scene import Scene
 from limitsets.scene.numbers import Numbers
@@ -95,7 +95,7 @@ class _Spans(Numbers):
         Its text, quantities with a tolerance as pairs of texts.
     noise : mapping of str to str, optional
         What differs at every throw.
-    instead : mapping of str to Span or Slope, optional
+    instead : mapping of str to RationalInterval or Jet, optional
         What stands in for quantities.
     """
 
@@ -104,7 +104,7 @@ class _Spans(Numbers):
         unit: str,
         tree: Mapping[str, Any],
         noise: Mapping[str, str] | None = None,
-        instead: Mapping[str, Span | Slope] | None = None,
+        instead: Mapping[str, RationalInterval | Jet] | None = None,
     ) -> None:
         super().__init__(tree, root, sine)
         self.unit, self.noise, self.instead = unit, noise or {}, instead or {}
@@ -118,13 +118,13 @@ class _Spans(Numbers):
                 raise AnswerError(
                     "the noise", self.noise, "percent, for a scene given by kappa", "give it in percent"
                 )
-            speed = Span(1 - share.hi, 1 + share.hi)
+            speed = RationalInterval(1 - share.hi, 1 + share.hi)
             return found * self.share_of_gravity() / (speed * speed)
         if name == "gravity.acceleration":
             found = found * self.share_of_gravity()
         elif name in VARYING:
             share, more = self.deviation(name)
-            found = Span((found * (1 - share) - more).lo, (found * (1 + share) + more).hi)
+            found = RationalInterval((found * (1 - share) - more).lo, (found * (1 + share) + more).hi)
         return self._possible(name, found)
 
     def _possible(self, name: str, found: Any) -> Any:
@@ -146,33 +146,33 @@ class _Spans(Numbers):
         found = text_at(self.tree, name)
         pair = found if isinstance(found, list) else [found, found]
         lo, hi = (self.constant(text, find(name).dimension) for text in pair)
-        return Span(lo.lo, hi.hi)
+        return RationalInterval(lo.lo, hi.hi)
 
-    def constant(self, text: str, dimension: str, key: str = "") -> Span:
+    def constant(self, text: str, dimension: str, key: str = "") -> RationalInterval:
         """Return a text of a dimension."""
         quantity = parse(text, dimension)
         number = Fraction(quantity.number)
         share = share_of_pi(quantity.unit)
         if share is not None:
-            return pi() * Span.of(share * number)
-        return Span.of(number * exact_factor(quantity.unit, base_unit(dimension, self.unit)))
+            return pi() * RationalInterval.of(share * number)
+        return RationalInterval.of(number * exact_factor(quantity.unit, base_unit(dimension, self.unit)))
 
-    def deviation(self, name: str) -> tuple[Span, Span]:
+    def deviation(self, name: str) -> tuple[RationalInterval, RationalInterval]:
         """Return the noise of a quantity as a share of it, and in its own dimension; one of the two is 0."""
         text = self.noise.get(name)
         if text is None:
-            return Span.of(0), Span.of(0)
+            return RationalInterval.of(0), RationalInterval.of(0)
         if text.rstrip().endswith("%"):
-            return Span.of(Fraction(parse(text, "share").number) / 100), Span.of(0)
-        return Span.of(0), self.constant(text, find(name).dimension)
+            return RationalInterval.of(Fraction(parse(text, "share").number) / 100), RationalInterval.of(0)
+        return RationalInterval.of(0), self.constant(text, find(name).dimension)
 
-    def share_of_gravity(self) -> Span:
+    def share_of_gravity(self) -> RationalInterval:
         """Return what the noise of the tilt multiplies g by: sin(tilt +- dev) / sin(tilt).
 
         Both ends are farthest from 1 at the smallest tilt: (1 +- p) cot((1 +- p) t) against cot(t), and cot(t) alone.
         """
         if "gravity.tilt" not in self.noise:
-            return Span.of(1)
+            return RationalInterval.of(1)
         if "tilt" not in self.tree.get("gravity", {}):
             raise AnswerError(
                 "the noise of gravity.tilt",
@@ -185,14 +185,14 @@ class _Spans(Numbers):
         found = text_at(self.tree, "gravity.tilt")
         least = self.constant(found[0] if isinstance(found, list) else found, "angle")
         flat, steep = sine(least * (1 - share) - more), sine(least * (1 + share) + more)
-        return Span((flat / sine(least)).lo, (steep / sine(least)).hi)
+        return RationalInterval((flat / sine(least)).lo, (steep / sine(least)).hi)
 
     def body(self) -> tuple[list[tuple[Any, ...]], Any]:
         """Return (a, d, length) of every side, and the radius of gyration."""
-        corner = Span.of(0, 4)  # of no use to a proof about the minimal map
+        corner = RationalInterval.of(0, 4)  # of no use to a proof about the minimal map
         return [side[:3] for side in self.sides(lambda _y, _x: corner)], self.shape.radius_of_gyration
 
-    def narrow_body(self) -> tuple[list[tuple[Any, ...]], Span]:
+    def narrow_body(self) -> tuple[list[tuple[Any, ...]], RationalInterval]:
         """As `body`, but narrower where several of its numbers are known to a tolerance only."""
         plain, radius = self.body()
         # pairs of texts are what has a tolerance
@@ -201,8 +201,8 @@ class _Spans(Numbers):
             return plain, radius
         box = [self.span(name) for name in names]
         middles = [middle(span) for span in box]
-        unit = [[Span.of(int(j == k)) for j in range(len(names))] for k in range(len(names))]
-        rising = [Slope(span, tuple(row)) for span, row in zip(box, unit, strict=True)]
+        unit = [[RationalInterval.of(int(j == k)) for j in range(len(names))] for k in range(len(names))]
+        rising = [Jet(span, tuple(row)) for span, row in zip(box, unit, strict=True)]
         centre, steep = (
             _Spans(self.unit, self.tree, instead=dict(zip(names, values, strict=True))).body()
             for values in (middles, rising)
@@ -214,7 +214,9 @@ class _Spans(Numbers):
         ]
         return sides, about(centre[1], steep[1], offsets, radius)
 
-    def outline(self) -> tuple[list[Span], list[list[Span]], list[list[Span]]]:
+    def outline(
+        self,
+    ) -> tuple[list[RationalInterval], list[list[RationalInterval]], list[list[RationalInterval]]]:
         """Return the exterior angles, and where the vertices are: p and q of `thrower.motion.Outline`."""
         vertices, sides = self.shape.vertices, self.sides(angle)
         ends = [side_ends(len(vertices), side) for side in range(len(vertices))]
@@ -226,7 +228,7 @@ class _Spans(Numbers):
         return [side[4] for side in sides], p, q
 
 
-def lengths_of(scene: Scene, tree: Mapping[str, Any]) -> dict[str, Span]:
+def lengths_of(scene: Scene, tree: Mapping[str, Any]) -> dict[str, RationalInterval]:
     """Name the lengths of the part, and say what is known of each, in the scene's unit."""
     reader = _Spans(scene.unit, tree)
     names = [name for name, _ in texts(tree["part"], "part") if find(name).dimension == "length"]
@@ -240,7 +242,9 @@ def body_at(
     return _Spans(scene.unit, tree, instead=lengths).body()
 
 
-def _require_rest(sides: Sequence[tuple[Any, ...]], kappa: Span, radius: Span) -> None:
+def _require_rest(
+    sides: Sequence[tuple[Any, ...]], kappa: RationalInterval, radius: RationalInterval
+) -> None:
     """Refuse parameters some of which are those of no part, or of one that falls over at rest."""
     for side, (a, d, length) in enumerate(sides):
         if not (a.lo > 0 and d.lo > 0 and a.hi < length.lo):

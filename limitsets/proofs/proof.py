@@ -13,10 +13,10 @@ import numpy as np
 
 from limitsets.errors import AnswerError
 from limitsets.files import as_table, picked
-from limitsets.proofs.asked import State, rechecked
 from limitsets.proofs.attraction import Attraction
 from limitsets.proofs.certificate import write
-from limitsets.proofs.tiles import joined
+from limitsets.proofs.goals import State, rechecked
+from limitsets.proofs.proved_pieces import union_of
 from limitsets.proofs.tolerance import whole
 from limitsets.scene import Scene
 from limitsets.scene.quantities import texts
@@ -56,7 +56,8 @@ class Claim:
     note : str
         What a reader of a proved goal should know, empty if nothing.
     recurs : dict
-        Why the orbit that refutes comes back, or that it need not: as in `limitsets.proofs.asked.recurring.Refutation`.
+        Why the orbit that refutes comes back, or that it need not: as in
+        `limitsets.proofs.goals.recurrent_orbits.Refutation`.
     """
 
     claim: str
@@ -202,7 +203,7 @@ class Proof:
     def outer_extents(self) -> dict[int, list[tuple[float, float]]]:
         """Per side the intervals of attracting cells, of all pieces of a tolerance together."""
         together = _by_side(found.cells.extents() for found in self.attractions)
-        return {side: joined(together[side]) for side in sorted(together)}
+        return {side: union_of(together[side]) for side in sorted(together)}
 
     def _extents(self, claim: Claim) -> dict[int, Any]:
         """Per side `[[lo_outer, lo_inner], [hi_inner, hi_outer]]`: inner ends where the claim proves them."""

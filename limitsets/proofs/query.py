@@ -1,6 +1,6 @@
 """One query: whether goals hold for all of a box of scenes, and every sequence of throws with some noise.
 
-Cells are made fine where it pays: first some hundreds of them a side, then borders spread evenly over what attracts.
+Cells are refined where needed: first some hundreds a side, then borders spread evenly over the attracting cells.
 """
 
 from __future__ import annotations
@@ -14,13 +14,13 @@ import numpy as np
 
 from limitsets.errors import AnswerError
 from limitsets.goals import Goal, Reaches
-from limitsets.proofs.asked import Answer, ask, borders, prove
-from limitsets.proofs.asked.kind import against
 from limitsets.proofs.attraction import Attraction, attraction
 from limitsets.proofs.cover import cover
+from limitsets.proofs.goals import Answer, borders, prove, prove_or_refute
+from limitsets.proofs.goals.kind import against
 from limitsets.proofs.parameters import ParameterBox, parameter_box
 from limitsets.proofs.simulated import scattered
-from limitsets.proofs.tolerance import Piece
+from limitsets.proofs.tolerance import SceneBox
 from limitsets.proofs.worst import worst_orbit
 from limitsets.scene import Scene, load
 
@@ -53,7 +53,7 @@ class Outcome:
         The goal that is refuted.
     counterexample : tuple of State
         The orbit that does it.
-    piece : Piece or None
+    piece : SceneBox or None
         The scenes it was asked of; None for the scene as it is.
     noise : dict of str to str
         The noise.
@@ -67,7 +67,7 @@ class Outcome:
     answers: tuple[Answer, ...] = ()
     refuted: Goal | None = None
     counterexample: tuple[Any, ...] = ()
-    piece: Piece | None = None
+    piece: SceneBox | None = None
     noise: Mapping[str, str] = field(default_factory=dict)
     within: Mapping[str, str] = field(default_factory=dict)
 
@@ -112,13 +112,13 @@ class Query:
         """Whether some goal is about every start on the arm."""
         return any(goal.from_anywhere or goal.of_every_start for goal in self.goals)
 
-    def box(self, piece: Piece | None, noise: Mapping[str, str]) -> ParameterBox:
+    def box(self, piece: SceneBox | None, noise: Mapping[str, str]) -> ParameterBox:
         """Enclose the parameters."""
         return parameter_box(self.scene, tree=None if piece is None else piece.tree(), noise=dict(noise))
 
     def prove(
         self,
-        piece: Piece | None = None,
+        piece: SceneBox | None = None,
         noise: Mapping[str, str] | None = None,
         finest: int = 3,
         bases: int = len(BASES),
@@ -127,7 +127,7 @@ class Query:
 
         Parameters
         ----------
-        piece : Piece, optional
+        piece : SceneBox, optional
             Scenes, all at once: cells as if the quantities differed at every throw.
         noise : mapping of str to str, optional
             What differs at every throw.
@@ -170,7 +170,7 @@ class Query:
                 break
         return tuple(answers)
 
-    def cells(self, piece: Piece | None, step: int) -> Attraction:
+    def cells(self, piece: SceneBox | None, step: int) -> Attraction:
         """Return the cells of one refinement, whatever they prove."""
         box = self.box(piece, {})
         return self._finer(self._coarse(box), box, step)
@@ -199,12 +199,12 @@ class Query:
                 cuts[side] = [*cuts[side], *np.linspace(lo, hi, count).tolist()]
         return attraction(cover(box, BASE, cuts, PIECES[step]))
 
-    def refute(self, piece: Piece | None = None, noise: Mapping[str, str] | None = None) -> Outcome:
+    def refute(self, piece: SceneBox | None = None, noise: Mapping[str, str] | None = None) -> Outcome:
         """Search for an orbit of one scene that violates one of the goals.
 
         Parameters
         ----------
-        piece : Piece, optional
+        piece : SceneBox, optional
             The scene, each quantity known but for the last digits.
         noise : mapping of str to str, optional
             What differs at every throw, chosen by the search.
@@ -232,7 +232,7 @@ class Query:
             # refuted by where attracting cells end; a periodic orbit that attracts is not looked for each time
             return prove(self._finer(found, found.cover.box, 2), self.scene, goal)
         if wrong is None or not found.cover.box.noise or goal.from_anywhere:
-            return ask(found, self.scene, goal)
+            return prove_or_refute(found, self.scene, goal)
         answer = prove(found, self.scene, goal)
         if not (found.component >= 0).any():
             return answer

@@ -1,4 +1,4 @@
-"""Writing an orbit that refutes a goal, so that a stranger can throw it again.
+"""Writing an orbit that refutes a goal, so that it can be checked independently.
 
 A certificate with the one claim "refuted": the goal; an orbit that comes back, or that refutes by one passage; and
 within which deviations of which nominal values the scene lies.  The scene's cells are in the file as in every other.
@@ -13,9 +13,9 @@ from typing import Any
 
 from limitsets.errors import AnswerError
 from limitsets.goals import Goal
-from limitsets.proofs.asked import State, rechecked
 from limitsets.proofs.attraction import Attraction
 from limitsets.proofs.certificate import write
+from limitsets.proofs.goals import State, rechecked
 from limitsets.scene import Scene
 from limitsets.scene.quantities import text_at
 
@@ -81,7 +81,7 @@ def write_refutation(
     states : sequence of State
         The orbit.
     recurs : mapping
-        Why it refutes: `limitsets.proofs.asked.recurring.Refutation`.
+        Why it refutes: `limitsets.proofs.goals.recurrent_orbits.Refutation`.
     within : mapping of str to str
         Deviations from the nominal scene that its own do not exceed, by quantity.
     scene : Scene

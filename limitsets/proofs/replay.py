@@ -1,6 +1,6 @@
 """Orbits replayed in interval arithmetic: every decision proved, every state enclosed.
 
-Every start of an interval, and every kappa, goes one and the same way: where the impact is the one root of a concave
+Every start of an interval, and every kappa, has the same itinerary: where the impact is the one root of a concave
 function, kappa > sqrt(a^2 + d^2), the last state is a continuous function of both.
 """
 

@@ -1,4 +1,4 @@
-"""What a scene's effects mean to a proof: which maps can be enclosed, and which effects are noise.
+"""Effects in proofs: the maps that can be enclosed, and the effects that count as noise.
 
 Landing and roll make another map, which has an `image_box` of its own.  A bounded spread is noise: the minimal map, or
 that with the other effects, thrown with anything in its bounds at every throw.

@@ -1,8 +1,8 @@
-"""Tolerances: quantities that are fixed but unknown.
+"""Tolerances: quantities that are fixed but unknown (time-invariant uncertainty).
 
-A box of quantities is proved piece by piece: where a piece cannot be proved as a whole it is halved along the quantity
-that is widest against its tolerance.  That is allowed because the quantity is the same at every throw; for noise, which
-is not, it would be wrong.
+A box of quantities is proved piece by piece: a piece that cannot be proved as a whole is halved along the quantity that
+is widest relative to its tolerance.  Subdivision is sound because the quantity is the same at every throw; for noise,
+which differs at every throw, it would be unsound.
 """
 
 from __future__ import annotations
@@ -16,12 +16,12 @@ from itertools import product
 from typing import Any
 
 from limitsets.errors import AnswerError
-from limitsets.proofs.rational import Span
+from limitsets.proofs.rational import RationalInterval
 from limitsets.scene import Scene
 from limitsets.scene.quantities import find, text_at
 from limitsets.scene.units import exact_factor, parse, share_of_pi
 
-__all__ = ["Piece", "whole"]
+__all__ = ["SceneBox", "whole"]
 
 # Digits to which a bound that is no short decimal is written, outward.
 DIGITS = 25
@@ -37,19 +37,19 @@ def _decimal(value: Fraction, up: bool) -> str:
 
 
 @dataclass(frozen=True)
-class Piece:
+class SceneBox:
     """A box of quantities of a scene.
 
     Attributes
     ----------
     scene : Scene
         The scene they belong to.
-    spans : dict of str to Span
+    spans : dict of str to RationalInterval
         Per quantity, in the unit in which the scene gives it.
     """
 
     scene: Scene
-    spans: dict[str, Span]
+    spans: dict[str, RationalInterval]
 
     def texts(self) -> dict[str, list[str]]:
         """Both ends of each quantity, as text with the unit in which the scene gives it."""
@@ -70,22 +70,24 @@ class Piece:
             node[last] = pair
         return tree
 
-    def halves(self, scales: Mapping[str, Fraction]) -> tuple[Piece, Piece]:
+    def halves(self, scales: Mapping[str, Fraction]) -> tuple[SceneBox, SceneBox]:
         """Cut along the quantity that is widest against its scale."""
         name = max(self.spans, key=lambda key: (self.spans[key].hi - self.spans[key].lo) / scales[key])
         span = self.spans[name]
         middle = (span.lo + span.hi) / 2
-        lower, upper = Span(span.lo, middle), Span(middle, span.hi)
-        return Piece(self.scene, {**self.spans, name: lower}), Piece(self.scene, {**self.spans, name: upper})
+        lower, upper = RationalInterval(span.lo, middle), RationalInterval(middle, span.hi)
+        return SceneBox(self.scene, {**self.spans, name: lower}), SceneBox(
+            self.scene, {**self.spans, name: upper}
+        )
 
-    def corners(self) -> Iterator[Piece]:
+    def corners(self) -> Iterator[SceneBox]:
         """Yield the scenes at the corners, the first 16 of them."""
-        ends = [(Span(s.lo, s.lo), Span(s.hi, s.hi)) for s in self.spans.values()]
+        ends = [(RationalInterval(s.lo, s.lo), RationalInterval(s.hi, s.hi)) for s in self.spans.values()]
         for _, chosen in zip(range(16), product(*ends), strict=False):
-            yield Piece(self.scene, dict(zip(self.spans, chosen, strict=True)))
+            yield SceneBox(self.scene, dict(zip(self.spans, chosen, strict=True)))
 
 
-def whole(scene: Scene, tolerance: Mapping[str, str]) -> Piece:
+def whole(scene: Scene, tolerance: Mapping[str, str]) -> SceneBox:
     """Build the box that a tolerance stands for.
 
     Parameters
@@ -116,7 +118,7 @@ def whole(scene: Scene, tolerance: Mapping[str, str]) -> Piece:
                     "the tolerance", name, "of throw.speed or of throw.kappa", "leave one of them out"
                 )
             kappa = Fraction(parse(scene.text["throw"]["kappa"], "length").number)
-            spans["throw.kappa"] = Span(kappa / (1 + share) ** 2, kappa / (1 - share) ** 2)
+            spans["throw.kappa"] = RationalInterval(kappa / (1 + share) ** 2, kappa / (1 - share) ** 2)
             continue
         node = text_at(scene.text, name)
         if node is None:
@@ -127,5 +129,5 @@ def whole(scene: Scene, tolerance: Mapping[str, str]) -> Piece:
             raise AnswerError("the tolerance", text, f"percent, or the scene's {given.unit}", "convert it")
         factor = Fraction(1) if relative else exact_factor(quantity.unit, given.unit)
         half = abs(nominal) * share if relative else Fraction(quantity.number) * factor
-        spans[name] = Span(nominal - half, nominal + half)
-    return Piece(scene, spans)
+        spans[name] = RationalInterval(nominal - half, nominal + half)
+    return SceneBox(scene, spans)

@@ -1,8 +1,8 @@
 """Trapping: every attracting component is mapped into its own interior.
 
-Then the component is an isolating neighbourhood of an attractor, which stays when the map is changed a little: what is
-proved here is stable.  The interior is that relative to what a part can stand on, (a_i, arm.length]: a component that
-reaches the arm's end need not stay away from it, but no image may lie beyond.
+Then the component is an isolating neighbourhood of an attractor that persists under small changes of the map.  The
+interior is relative to (a_i, arm.length], where a part can rest: a component may reach the arm's end, but no image may
+lie beyond it.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
-"""The worst that noise can do: orbits that violate a goal by the best choice at every throw.
+"""Worst-case orbits: a goal is violated by choosing the disturbance at every throw.
 
-Random throws miss them, and so does a search forward that keeps one state per cell once the violation is small.  So
-go backward: places from which one throw can violate the goal, from which two can, and so on, on a fine raster; then
-forward from a long orbit without noise, which comes to such places by itself, with every throw computed anew.
+Random throws miss them, and a forward search with one state per cell misses small violations.  The search is therefore
+backward reachability on a fine raster: places from which one throw can violate the goal, from which two can, and so on;
+then forward from a long orbit without noise that meets such a place, with every throw computed anew.
 """
 
 from __future__ import annotations
@@ -11,18 +11,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from limitsets.maps import Orbit, orbit
-from limitsets.proofs.asked.recurring import Refutation, closed
-from limitsets.proofs.asked.search import (
-    Choice,
+from limitsets.proofs.attraction import Attraction
+from limitsets.proofs.goals.recurrent_orbits import Refutation, closed
+from limitsets.proofs.goals.violating_orbits import (
     Path,
-    Reached,
+    ReachedStates,
+    ThrowChoice,
     Wrong,
-    choices,
-    settled,
+    on_limit_set,
+    throw_choices,
     throws,
     violation,
 )
-from limitsets.proofs.attraction import Attraction
 
 __all__ = ["worst_orbit"]
 
@@ -90,9 +90,9 @@ def worst_orbit(found: Attraction, wrong: Wrong) -> Refutation:
     Refutation
         Empty if none is found.
     """
-    box, options = found.cover.box, choices(found.cover.box, KAPPAS)
+    box, options = found.cover.box, throw_choices(found.cover.box, KAPPAS)
     raster = _Raster(found)
-    start, on = settled(found)
+    start, on = on_limit_set(found)
     path = orbit(box.at_kappa(box.middle_kappa), start, on, LENGTH)
     here = raster.nearest(path.x, path.side)
     levels = [_beside(wrong(raster.x, raster.side))]
@@ -121,12 +121,12 @@ def _followed(
     levels: list[NDArray[np.bool_]],
     path: Orbit,
     begin: Sides,
-    options: list[Choice],
+    options: list[ThrowChoice],
 ) -> Refutation:
     """Throw on from states of the long orbit along the levels, and close and prove what then violates the goal."""
     if not begin.size:
         return Refutation()
-    reached = Reached.of(path.x[begin], path.side[begin].astype(np.int64))
+    reached = ReachedStates.of(path.x[begin], path.side[begin].astype(np.int64))
     for back, level in reversed(list(enumerate(levels[:-1]))):
         thrown = throws(found.cover.box, reached.x[-1], reached.side[-1], options)
         if back == 0:
@@ -142,7 +142,7 @@ def _followed(
     same = (path.x[begin] == tail.x[0]) & (path.side[begin] == tail.side[0])
     first = int(begin[np.flatnonzero(same)[0]])
     before = slice(first - BEFORE, first)
-    usual = Choice(found.cover.box.middle_kappa, 0.0)
+    usual = ThrowChoice(found.cover.box.middle_kappa, 0.0)
     whole = Path(
         [*path.x[before].tolist(), *tail.x],
         [*path.side[before].tolist(), *tail.side],

@@ -1,10 +1,10 @@
 """An analysis as files: a page of Markdown, JSON, and pictures.
 
-The page is for someone who builds a feeder: what comes to rest where, how far the answer can be trusted, and what was
-assumed.  Numbers are read from the analysis, never computed anew here.
+The reader of the page builds a feeder: places and sides of rest, reliability of the answer, and
+assumptions.  Numbers are read from the analysis, never computed anew here.
 """
 
-from limitsets.report.audits import audit_page, write_audit
+from limitsets.report.audit_pages import audit_page, write_audit
 from limitsets.report.pages import page
 from limitsets.report.robust_files import write_robustness
 from limitsets.report.robust_pages import robustness_page

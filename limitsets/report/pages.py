@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 from limitsets.analysis import overlap
 from limitsets.goals import order_of
-from limitsets.report.questions import question_of, verdict_of, void_of
+from limitsets.report.goals import goal_sentence, verdict_of, void_of
 from limitsets.report.tables import bands, count, intervals, percent, table
 
 if TYPE_CHECKING:
@@ -49,7 +49,7 @@ def _environment() -> Environment:
     }
     found.globals |= {
         "order_of": order_of,
-        "question_of": question_of,
+        "question_of": goal_sentence,
         "table": table,
         "verdict_of": verdict_of,
         "void_of": void_of,

@@ -1,4 +1,4 @@
-"""Write the sheet of tolerances: page, JSON and pictures, all of them or none; certificates are there already."""
+"""Write the tolerance sheet: page, JSON and pictures, all or none; certificates exist already."""
 
 from __future__ import annotations
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from limitsets.goals import Goal, OrientedBeyond, Reaches
 from limitsets.report.pages import words
-from limitsets.robust.margins.words import bound, void_of
+from limitsets.robust.margins.margin_texts import bound, void_of
 from limitsets.robust.noise.laws import Gaussian, Law, Uniform
 from limitsets.robust.sheet.entries import Entry, in_unit_of, percent_of
 from limitsets.scene.quantities import parsed_deviation

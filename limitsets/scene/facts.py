@@ -1,4 +1,4 @@
-"""What a scene says beside part, arm and throw: facts about the world, effects switched on, deviations."""
+"""Further contents of a scene beside part, arm and throw: facts about the world, effects, deviations."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ class Scatter:
     speed : Deviation or None
         Of the throw's angular speed [fraction or rad/s].
     landing : Deviation or None
-        Of where the part lands [scene's length unit].
+        Of where the part lands [length].
     """
 
     speed: Deviation | None = None
@@ -94,7 +94,7 @@ class World:
     restitution : float or None
         Coefficient of restitution of the normal impulse, 0 to 1.
     bounce_threshold : float or None
-        Height of the bounce below which the impact is plastic [scene's length unit].
+        Height of the bounce below which the impact is plastic [length].
     stroke : float or None
         Angle over which the arm accelerates [rad].
     scatter : Scatter or None

@@ -170,7 +170,7 @@ class Floats(Numbers):
 
     @cached_property
     def kappa(self) -> float:
-        """Gravity over the squared angular speed of the throw [unit]."""
+        """Gravity over the squared angular speed of the throw [length]."""
         throw = self.tree["throw"]
         self._require_one("throw", "the throw", "kappa", "speed")
         if "speed" in throw and self.gravity is None:

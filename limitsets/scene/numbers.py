@@ -25,13 +25,13 @@ class Shape(NamedTuple):
     Parameters
     ----------
     vertices : list of pairs of scalars
-        Counterclockwise [scene's unit].
+        Counterclockwise [length].
     centre : pair of scalars or OnSide
-        Centre of mass [scene's unit].
+        Centre of mass [length].
     lengths : list of scalars or None
-        Of the sides, where they are given [scene's unit].
+        Of the sides, where they are given [length].
     radius_of_gyration : scalar
-        About the centre of mass [scene's unit].
+        About the centre of mass [length].
     """
 
     vertices: Sequence[Vector]
@@ -122,7 +122,7 @@ class Numbers(ABC):
 
     @cached_property
     def kappa(self) -> Scalar:
-        """Gravity over the squared angular speed of the throw [unit]."""
+        """Gravity over the squared angular speed of the throw [length]."""
         if "kappa" in self.tree["throw"]:
             return self.number("throw.kappa")
         speed = self.number("throw.speed")

@@ -1,4 +1,4 @@
-"""The names of quantities: the one list that scenes, calls, the command line and JSON share."""
+"""Names of quantities: one list for scenes, calls, the command line and JSON."""
 
 from __future__ import annotations
 

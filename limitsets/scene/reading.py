@@ -1,4 +1,4 @@
-"""Read scenes: built-in ones by name, TOML files, TOML text, and structures."""
+"""Read scenes: built-in scenes by name, TOML files, TOML text, and structures."""
 
 from __future__ import annotations
 

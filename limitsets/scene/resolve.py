@@ -1,4 +1,4 @@
-"""Text to numbers in a scene's unit, with the place of every refusal."""
+"""Convert text to numbers in the scene's unit; every error names its place in the file."""
 
 from __future__ import annotations
 

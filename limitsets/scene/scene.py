@@ -1,4 +1,4 @@
-"""A scene with its units resolved: what every later room reads."""
+"""A scene with resolved units, the input of all later rooms."""
 
 from __future__ import annotations
 
@@ -39,19 +39,19 @@ class Scene:
     unit : str
         Unit of all lengths here, that of the arm's length in the file: ``"in"``.
     vertices : ndarray, shape (n, 2)
-        The part, counterclockwise [unit]; a triangle given by its sides lies on side 0, from the origin.
+        The part, counterclockwise [length]; a triangle given by its sides lies on side 0, from the origin.
     centre : tuple of float
-        Centre of mass in the frame of `vertices` [unit].
+        Centre of mass in the frame of `vertices` [length].
     radius_of_gyration : float
-        About the centre of mass [unit].
+        About the centre of mass [length].
     sides : RestingSides
         Where the centre of mass stands over each side [unit, rad].
     surface_height : float
-        Signed height of the arm's surface over the joint [unit].
+        Signed height of the arm's surface over the joint [length].
     arm_length : float
-        The largest x at which a part can rest [unit].
+        The largest x at which a part can rest [length].
     kappa : float
-        Gravity over the squared angular speed of the throw [unit].
+        Gravity over the squared angular speed of the throw [length].
     gravity : float or None
         Gravity in the plane of the motion, where it is given [unit/s^2].
     flight, flip : str

@@ -1,7 +1,7 @@
-"""The words of a scene, as pydantic models: which keys there are and what may stand under each.
+"""The schema of a scene as pydantic models: all keys and their allowed values.
 
-Values stay the text they were written as; `build` gives them units.  Each leaf type carries what is allowed and what
-to do, so that a refusal reads the same whether a type, a range or a unit is wrong.  Goals, facts and effects are those
+Values remain text; `build` gives them units.  Each leaf type carries the allowed values and the remedy, so that errors
+about types, ranges and units read alike.  Goals, facts and effects are those
 that are declared.  Only `validation` imports this file, lazily: pydantic takes 0.1 s.
 """
 

@@ -2,7 +2,7 @@
 
 The number is read by a regular expression and only the unit is handed to pint, which would read "5,75 in" as 575 in,
 never come back from "9**9**9 in" and let 1/s pass as rad/s.  Conversions are exact fractions up to one last rounding;
-a value in the unit asked for is the float of its text.
+a value already in the target unit is the float of its text.
 """
 
 from __future__ import annotations

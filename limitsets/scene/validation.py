@@ -1,4 +1,4 @@
-"""From a TOML structure to the checked tables of the schema, with every refusal as one `SceneError`."""
+"""Validate a TOML structure against the schema; every error is a `SceneError`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Attractors of a transition graph: where they lie (from cells) and what goes on in them (from one long orbit)."""
+"""Attractors of a transition graph: their extents (from cells) and their dynamics (from one long orbit)."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class Attractor:
     cells : CellSet
         Its cells.
     extents : dict of int to list of (lo, hi)
-        Per side the intervals they make up [scene's unit].
+        Per side the intervals they make up [length].
     flip_order : tuple of int, or None
         The sides in the cyclic order in which they are visited, beginning with the smallest; None where the order
         changes along the orbit.
@@ -148,5 +148,5 @@ def attractors(graph: TransitionGraph, throws: int = 200_000) -> tuple[Attractor
     if throws < 1:
         raise AnswerError("the number of throws", throws, "an integer from 1", "pass throws=200_000")
     sets = graph.recurrent_components()
-    chosen = [cells for cells, ends in zip(sets, graph.survey().attracting, strict=True) if ends]
+    chosen = [cells for cells, ends in zip(sets, graph.condensation().attracting, strict=True) if ends]
     return tuple(_attractor(graph, CellSet.of(graph.grid, cells), throws) for cells in chosen)

@@ -1,4 +1,4 @@
-"""Basins: where each cell's paths end."""
+"""Basins: the ends of the paths from each cell."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from limitsets.cells import Grid
 from limitsets.errors import AnswerError
 from limitsets.graph import TransitionGraph
 from limitsets.graph.components import reach
-from limitsets.graph.survey import survey
+from limitsets.graph.condensation import condense
 from limitsets.maps import codes
 from limitsets.sets.attractors import Attractor
 from limitsets.sets.passing import passing
@@ -76,7 +76,7 @@ def basins(graph: TransitionGraph, found: tuple[Attractor, ...]) -> Basins:
     >>> ls.basins(graph, ls.attractors(graph)).attractors
     (0.49, 0.49)
     """
-    attracting = graph.survey().attracting
+    attracting = graph.condensation().attracting
     if any(a.cells.grid is not graph.grid for a in found) or len(found) != int(attracting.sum()):
         raise AnswerError(
             "the attractors",
@@ -87,7 +87,7 @@ def basins(graph: TransitionGraph, found: tuple[Attractor, ...]) -> Basins:
     weight = graph.grid.measure
     total = float(weight.sum())
     sets, through = graph.recurrent_components(), passing(graph)
-    labels = survey(graph.ranges, graph.components(), graph.exits, sets, through).destination
+    labels = condense(graph.ranges, graph.components(), graph.exits, sets, through).destination
     lowest = min(codes.UNDECIDED, *graph.exits.values())
     share = np.bincount(labels - lowest, weights=weight, minlength=len(found) - lowest) / total
     by_code = {code: float(share[code - lowest]) for code in range(lowest, len(found))}

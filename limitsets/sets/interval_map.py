@@ -1,4 +1,4 @@
-"""The image of a union of intervals under a one-dimensional map, from end points alone.
+"""The image of a union of intervals under a one-dimensional map, computed from end points.
 
 On a monotone piece J the image of an interval I is the interval between the images of the two ends of I & J; F(I) is
 the union of these over all pieces.  An end of I & J that is not an end of I is born there, at a critical point, a
@@ -16,7 +16,7 @@ from limitsets.maps.contract import kind_of
 from limitsets.maps.critical import Sides, margins
 from limitsets.maps.forced import along
 from limitsets.maps.pieces import monotone_pieces
-from limitsets.sets.intervals import BORDER, EPS, Interval, Track, Union, cut, merged
+from limitsets.sets.unions import BORDER, EPS, Track, TrackedInterval, Union, cut, merged
 
 __all__ = ["IntervalMap"]
 
@@ -46,12 +46,12 @@ class _Borders(NamedTuple):
     top: Track
 
 
-class _Part(NamedTuple):
+class _IntervalOnPiece(NamedTuple):
     """What of an interval lies on one piece."""
 
     side: int
     branch: int
-    interval: Interval
+    interval: TrackedInterval
 
 
 def _stepped(end: Track, branch: int, x: float, slope: float) -> Track:
@@ -103,22 +103,22 @@ class IntervalMap:
             if hi.x >= bottom and lo.x <= top:
                 lo = lo if lo.x >= bottom else Track.born(bottom, "domain", side, 0.0)
                 hi = hi if hi.x <= top else Track.born(top, "domain", side, 0.0)
-                images.setdefault(side, []).append(Interval(lo, hi))
+                images.setdefault(side, []).append(TrackedInterval(lo, hi))
         return {side: merged(intervals) for side, intervals in sorted(images.items())}, leaves
 
-    def _parts(self, union: Union) -> tuple[list[_Part], bool]:
+    def _parts(self, union: Union) -> tuple[list[_IntervalOnPiece], bool]:
         """Cut a union at the pieces, and tell whether some of it lies beyond the last of them."""
-        parts: list[_Part] = []
+        parts: list[_IntervalOnPiece] = []
         leaves = not union
         for side, intervals in union.items():
             for interval in intervals:
                 cuts = [(branch, cut(interval, bottom, top)) for branch, bottom, top in self.pieces[side]]
-                kept = [_Part(side, branch, part) for branch, part in cuts if part is not None]
+                kept = [_IntervalOnPiece(side, branch, part) for branch, part in cuts if part is not None]
                 leaves |= not kept or any(end.kind == "exit" for part in kept for end in part.interval)
                 parts += kept
         return parts, leaves
 
-    def _forward(self, parts: list[_Part]) -> list[tuple[int, Interval]]:
+    def _forward(self, parts: list[_IntervalOnPiece]) -> list[tuple[int, TrackedInterval]]:
         """Image of each part: the side, and the interval between the images of its ends."""
         if not parts:
             return []
@@ -131,5 +131,5 @@ class IntervalMap:
             ends = [
                 _stepped(end, part.branch, x[j], slope[j]) for j, end in enumerate(part.interval, start=2 * k)
             ]
-            images.append((side[2 * k], Interval(*sorted(ends, key=lambda end: end.x))))
+            images.append((side[2 * k], TrackedInterval(*sorted(ends, key=lambda end: end.x))))
         return images

@@ -16,12 +16,12 @@ from typing import Any
 
 import numpy as np
 
+from limitsets.maps.bisection import Flags
 from limitsets.maps.critical import Sides
 from limitsets.maps.forced import along
 from limitsets.maps.pieces import monotone_pieces
-from limitsets.maps.search import Flags
 from limitsets.sets.cycle import NEAR, Array, Ints
-from limitsets.sets.intervals import EPS, Extents
+from limitsets.sets.unions import EPS, Extents
 
 __all__ = ["Alphabet", "Words", "alphabet_of", "grown", "letters_alone", "solved"]
 

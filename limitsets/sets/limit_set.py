@@ -22,9 +22,9 @@ from limitsets.graph.graph import TransitionGraph
 from limitsets.graph.morse import morse_graph
 from limitsets.maps.contract import kind_of
 from limitsets.maps.critical import Sides
-from limitsets.sets.creeping import creeps
+from limitsets.sets.bottleneck import in_bottleneck
 from limitsets.sets.interval_map import IntervalMap
-from limitsets.sets.intervals import Extents, Track, Union, read, same
+from limitsets.sets.unions import Extents, Track, Union, read, same
 
 __all__ = ["End", "LimitSet", "Origin", "limit_set", "limit_set_of"]
 
@@ -206,7 +206,7 @@ def limit_set_of(
         image, out = forward.image(union)
         rested = rested + 1 if same(union, image, tolerance, scale) else 0
         union, count, leaves = image, count + 1, leaves or out
-    crept = rested == 2 and creeps(params, union, tolerance, scale)
+    crept = rested == 2 and in_bottleneck(params, union, tolerance, scale)
     converged = rested == 2 and not crept
     return LimitSet(
         {side: [(lo.x, hi.x) for lo, hi in intervals] for side, intervals in union.items()},

@@ -12,13 +12,13 @@ from typing import Any
 
 import numpy as np
 
+from limitsets.maps.bisection import Flags, bisected
 from limitsets.maps.critical import Sides
 from limitsets.maps.drivers import images
 from limitsets.maps.forced import along
-from limitsets.maps.search import Flags, bisected
 from limitsets.sets.cycle import NEAR, Array, Cycle, Cycles, Ints, distinct, require_period
-from limitsets.sets.intervals import EPS, Extents
 from limitsets.sets.itineraries import Alphabet, Words, alphabet_of, grown, letters_alone, solved
+from limitsets.sets.unions import EPS, Extents
 
 __all__ = ["cycles_of"]
 

@@ -1,6 +1,6 @@
-"""Where the throws spend their time: Ulam's method, the stationary distribution of a chain between cells.
+"""Invariant measures by Ulam's method: the stationary distribution of a chain on cells.
 
-Which share of a cell goes to which cell (`limitsets.sets.chain`) is a Markov chain on finitely many states.  Its
+Which share of a cell goes to which cell (`limitsets.sets.markov_chain`) is a Markov chain on finitely many states.  Its
 stationary distributions are the mixtures of one for each closed class, and each of those is found by repeated steps.
 A cell of no closed class carries nothing.
 Source: Ulam, "A Collection of Mathematical Problems", 1960, ch. VI; Li, J. Approximation Theory 17, 1976, shows that
@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from limitsets.cells import CellSet
 from limitsets.graph import TransitionGraph
-from limitsets.sets.chain import shares_of
+from limitsets.sets.markov_chain import ulam_matrix
 
 __all__ = ["Measure", "invariant_measures"]
 
@@ -58,7 +58,7 @@ def _chain(graph: TransitionGraph, cells: NDArray[np.int64]) -> tuple[Any, NDArr
     """Shares that go from cell to cell, each row adding up to 1 or 0, and what each cell has lost before that."""
     from scipy.sparse import coo_array
 
-    shares = shares_of(graph, cells)
+    shares = ulam_matrix(graph, cells)
     number = np.full(graph.n_cells, -1)
     number[cells] = np.arange(cells.size)
     source, target = number[shares.source], number[shares.target]
@@ -129,7 +129,7 @@ def invariant_measures(
     array([1., 1., 1., 1., 1., 1., 1., 1.])
     """
     sets = graph.recurrent_components()
-    attracting = [part for part, ends in zip(sets, graph.survey().attracting, strict=True) if ends]
+    attracting = [part for part, ends in zip(sets, graph.condensation().attracting, strict=True) if ends]
     cells = np.sort(np.concatenate([*attracting, np.empty(0, np.int64)]).astype(np.int64))
     if not cells.size:
         return ()

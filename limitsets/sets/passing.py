@@ -1,8 +1,7 @@
 """Recurrent sets of cells in which no orbit stays: cells that meet their own image because they are coarse.
 
-Such a set is cut finer, by itself, with images that in more than one dimension are enlarged by a fine cell on every
-side.  Where nothing recurs then, an orbit passes through, and what is said of the cells that lead there need not wait
-for more cells.
+Such a set is refined by itself; in more than one dimension the images are enlarged by a fine cell on every side.  If no
+fine cell is recurrent, every orbit passes through, and the cells that lead there can be decided without a finer grid.
 """
 
 from __future__ import annotations
@@ -32,7 +31,7 @@ def passing(graph: TransitionGraph) -> NDArray[np.bool_]:
     ndarray of bool, shape (k,)
         For each of `graph.recurrent_components()`; an attracting one is none.
     """
-    sets, attracting = graph.recurrent_components(), graph.survey().attracting
+    sets, attracting = graph.recurrent_components(), graph.condensation().attracting
     found = np.zeros(len(sets), dtype=bool)
     chosen = np.flatnonzero(~attracting)
     cells = np.sort(np.concatenate([np.empty(0, np.int64), *(sets[k] for k in chosen)]))

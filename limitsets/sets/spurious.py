@@ -1,4 +1,4 @@
-"""Recurrent cells that are recurrent only because cells are coarse."""
+"""Cells that are recurrent only because they are coarse."""
 
 from __future__ import annotations
 

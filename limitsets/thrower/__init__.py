@@ -1,9 +1,9 @@
-"""The throw map: from where and on which side a part rests before a throw to the same after it.
+"""The throw map: from the place and side of rest before a throw to those after it.
 
 The steps of one throw stand in `throw.py` in the order in which nature applies them: flight, impact, decision,
 landing.  Each has a file; each model of flight (exact, small angle in two orders) and each criterion of the flip
 (signed, energy) is a class, and kernels pick their method by it at compile time, so that a scene's machine code
-holds only what the scene asks for.
+contains only its own models.
 
 Notation (all lengths in the scene's unit; rates divided by the throw's w, energies by m w^2): a part on side i has
 its centre of mass a above the arm's axis direction from the left bottom vertex and d above the side; R = x is the

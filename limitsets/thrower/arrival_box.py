@@ -1,4 +1,4 @@
-"""The box twin of `effects/landing.py` and `effects/pivot.py`: what may land first, and the sides that come down then.
+"""The box twin of `effects/landing.py` and `effects/pivot.py`: possible first vertices, and the sides that come down.
 
 As long as the bracket of the left vertex's own landing stays at or below the exterior angle there nothing changes.  A
 start still in the air at that angle has the next vertex at the same height, which is a concave function of the angle
@@ -44,7 +44,7 @@ def _height(part: FullSideBox, k: int, x: float, phi: float) -> Interval:
     p, q = vertex_box(part, k)
     at = turn_point(phi)
     fall = x + p - part.own.kappa * (0.5 * phi)
-    rest: Interval = phi * fall - (p * at.w + q * at.v)
+    rest: Interval = phi * fall - (p * at.phi_minus_sin + q * at.versin)
     return part.own.d + q + rest
 
 
@@ -82,8 +82,8 @@ def _x_and_h(part: FullSideBox, k: int, phi: Interval) -> tuple[Interval, Interv
     """X and H: how far the centre of mass is right of vertex k and above it, the part turned by phi in all."""
     p, q = vertex_box(part, k)
     at = turn_box(phi)
-    c = 1.0 - at.v
-    return q * at.s - p * c, -(p * at.s + q * c)
+    c = 1.0 - at.versin
+    return q * at.sin - p * c, -(p * at.sin + q * c)
 
 
 @proof_kernel

@@ -1,4 +1,4 @@
-"""What a throw would need beyond the minimal model, enclosed: for cells of starts and boxes of parameters.
+"""Enclosures of the numbers behind the model's assumptions, for cells of starts and boxes of parameters.
 
 Proof kernels in the steps of `throw_box.py`.  Where the decision between jog and flip is not proved, the enclosures
 hold for both.  Mass and the throw's w are 1; forces are given in weights, impulses in that of the throw itself.
@@ -218,7 +218,7 @@ def assumed(lo: Throw, hi: Throw, side: int, x_lo: ArrayLike, x_hi: ArrayLike) -
     side : int
         The side that the part rests on.
     x_lo, x_hi : array_like, shape (n,)
-        Cells of starts [scene's unit].
+        Cells of starts [length].
 
     Returns
     -------
@@ -248,7 +248,7 @@ def _beyond(lo: Throw, hi: Throw, side: int, angle: float) -> tuple[float, float
     at = turn_point(angle)
     sine = own.d * after.right + own.a * after.d
     cosine = own.d * after.d - own.a * after.right
-    found = sine * (1.0 - at.v) - cosine * at.s
+    found = sine * (1.0 - at.versin) - cosine * at.sin
     return found.lo, found.hi
 
 

@@ -54,15 +54,15 @@ def _guess(part: Side, reach: float) -> float:
 @kernel
 def _height(part: Side, reach: float, at: Turned) -> tuple[float, float]:
     """f and f' where the part has turned."""
-    f = at.phi * (reach - 0.5 * part.kappa * at.phi) + part.a * at.w + part.d * at.v
-    return f, reach + part.a * at.v + part.d * at.s - part.kappa * at.phi
+    f = at.phi * (reach - 0.5 * part.kappa * at.phi) + part.a * at.phi_minus_sin + part.d * at.versin
+    return f, reach + part.a * at.versin + part.d * at.sin - part.kappa * at.phi
 
 
 @kernel
 def _halley(part: Side, reach: float, at: Turned) -> tuple[float, float]:
     """Return the step of Halley's method, to be taken off, and f'."""
     f, slope = _height(part, reach, at)
-    bend = part.a * at.s + part.d * (1.0 - at.v) - part.kappa
+    bend = part.a * at.sin + part.d * (1.0 - at.versin) - part.kappa
     return f * slope / (slope * slope - 0.5 * f * bend), slope
 
 
@@ -98,7 +98,7 @@ def first_root(part: Side, x: float) -> float:
         f, slope = _height(part, reach, at)
         if f <= 0.0:
             return phi
-        bend = (part.kappa - part.d) + part.d * at.v - part.a * at.s
+        bend = (part.kappa - part.d) + part.d * at.versin - part.a * at.sin
         here = max(bend + phi * (part.a + 2.0 * part.d * phi) / 3.0, LEAST_BEND * most)
         bound = min(here, most)
         root = math.sqrt(slope * slope + 2.0 * bound * f)

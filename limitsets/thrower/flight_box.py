@@ -68,7 +68,10 @@ def _least_height(b: SideBox, reach: Interval, phi: float) -> float:
     at = turn_point(phi)
     a, d = b.a.lo, b.d.lo
     fall = down(reach.lo - up(b.kappa.hi * (0.5 * phi)))
-    turned = down(down(min(a * at.w.lo, a * at.w.hi)) + down(min(d * at.v.lo, d * at.v.hi)))
+    turned = down(
+        down(min(a * at.phi_minus_sin.lo, a * at.phi_minus_sin.hi))
+        + down(min(d * at.versin.lo, d * at.versin.hi))
+    )
     return down(down(phi * fall) + turned)
 
 
@@ -78,7 +81,10 @@ def _most_height(b: SideBox, reach: Interval, phi: float) -> float:
     at = turn_point(phi)
     a, d = b.a.hi, b.d.hi
     fall = up(reach.hi - down(b.kappa.lo * (0.5 * phi)))
-    turned = up(up(max(a * at.w.lo, a * at.w.hi)) + up(max(d * at.v.lo, d * at.v.hi)))
+    turned = up(
+        up(max(a * at.phi_minus_sin.lo, a * at.phi_minus_sin.hi))
+        + up(max(d * at.versin.lo, d * at.versin.hi))
+    )
     return up(up(phi * fall) + turned)
 
 
@@ -115,7 +121,7 @@ def _marched(b: SideBox, x: float) -> tuple[Interval, bool]:
     while going and t < FULL_TURN:
         f = _least_height(b, reach, t)
         at = turn_point(t)
-        slope = reach + (b.a * at.v + b.d * at.s)
+        slope = reach + (b.a * at.versin + b.d * at.sin)
         low = (slope - b.kappa * t).lo
         inside = low * low + 2.0 * bound * f
         step = shrink * (low + math.sqrt(max(inside, 0.0))) / bound
@@ -133,7 +139,7 @@ def _marched(b: SideBox, x: float) -> tuple[Interval, bool]:
 @proof_kernel
 def _exact_slope(flight: Any, b: SideBox, x: Interval, at: Turned) -> Interval:
     reach = x - b.a
-    below = b.kappa * at.phi - (reach + (b.a * at.v + b.d * at.s))
+    below = b.kappa * at.phi - (reach + (b.a * at.versin + b.d * at.sin))
     slope: Interval = at.phi / below
     return slope
 

@@ -57,22 +57,24 @@ def _descent(
     t = begin
     while t < end:
         at = turn(abs(omega) * t)
-        f = height + t * (slope - 0.5 * kappa * t) + sign * right * at.w + high * at.v
+        f = height + t * (slope - 0.5 * kappa * t) + sign * right * at.phi_minus_sin + high * at.versin
         if f <= 0.0:
             return t, f
-        step = sure_step(f, slope - kappa * t + omega * (right * at.v + sign * high * at.s), bound)
+        step = sure_step(f, slope - kappa * t + omega * (right * at.versin + sign * high * at.sin), bound)
         if step <= STILL * t:
             return t, 0.0
         t += step
     at = turn(abs(omega) * end)
-    return end, height + end * (slope - 0.5 * kappa * end) + sign * right * at.w + high * at.v
+    return end, height + end * (
+        slope - 0.5 * kappa * end
+    ) + sign * right * at.phi_minus_sin + high * at.versin
 
 
 @kernel
 def _inward_of(part: FullSide, vertex: int, psi: Turned) -> float:
     """Return how far the centre of mass is left of where it would be on side `vertex`, about the same vertex."""
     k = side_number(part, vertex)
-    return part.a[k] * psi.v + part.d[k] * psi.s  # type: ignore[no-any-return]  # kernels take arrays as Any
+    return part.a[k] * psi.versin + part.d[k] * psi.sin  # type: ignore[no-any-return]  # kernels take arrays as Any
 
 
 @kernel

@@ -1,7 +1,7 @@
 """The box twin of the throw with effects; of one whose file has not said that boxes follow it nothing is proved.
 
-The steps are those of `full.py`, each effect's in its own file.  What is not decided is followed in every way; where it
-comes to rest in more than two, the cell is said to be undecided, and whoever asked asks again for parts of it.
+The steps are those of `full.py`, each effect's in its own file.  Undecided events are followed in all ways; if a cell
+has more than two places of rest, it is undecided, and the caller subdivides it.
 """
 
 from __future__ import annotations

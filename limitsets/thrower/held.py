@@ -1,4 +1,4 @@
-"""A vertex at rest on the arm, about which the part turns: until where friction can hold it.
+"""A vertex at rest on the arm, about which the part turns, as far as friction can hold it.
 
 While it is held, the part is a pendulum of energy E = (1/2) M omega^2 + kappa H, and the force on the vertex,
 
@@ -82,8 +82,8 @@ def _march(
     t = 0.0
     while t < limit:
         at = turn(t)
-        x = right * (1.0 - at.v) - way * high * at.s
-        y = high * (1.0 - at.v) + way * right * at.s
+        x = right * (1.0 - at.versin) - way * high * at.sin
+        y = high * (1.0 - at.versin) + way * right * at.sin
         pull = 3.0 * kappa * y - 2.0 * energy
         off, off_slope = kappa * part.own.rho2 + y * pull, way * x * (pull + 3.0 * kappa * y)
         along, along_slope = x * pull, way * (3.0 * kappa * x * x - y * pull)

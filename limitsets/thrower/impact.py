@@ -39,8 +39,8 @@ def margin(flip: Any, inertia: Any, omega: Any, barrier: Any) -> Any:
 @formula
 def pose(part: Any, at: Any) -> tuple[Any, Any]:
     """Return X and H: where the centre of mass is from the left vertex, along the arm and above it, turned by phi."""
-    c = 1.0 - at.v
-    return part.a * c - part.d * at.s, part.a * at.s + part.d * c
+    c = 1.0 - at.versin
+    return part.a * c - part.d * at.sin, part.a * at.sin + part.d * c
 
 
 @formula
@@ -93,7 +93,10 @@ def jog_displacement(flight: Any, part: Any, at: Any) -> tuple[Any, Any]:
 
 
 def _exact_jog(flight: Any, part: Any, at: Any) -> tuple[Any, Any]:
-    return part.a * at.v - part.d * at.w - part.h * at.phi, part.a * at.s - part.d * at.v - part.h
+    return (
+        part.a * at.versin - part.d * at.phi_minus_sin - part.h * at.phi,
+        part.a * at.sin - part.d * at.versin - part.h,
+    )
 
 
 def _small_jog(flight: Any, part: Any, at: Any) -> tuple[Any, Any]:

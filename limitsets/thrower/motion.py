@@ -1,4 +1,4 @@
-"""The part between two events of a throw, as the kernels of the effects pass it on.
+"""State of the part between two events of a throw, as the kernels of the effects pass it on.
 
 Lengths in the scene's unit, rates divided by the throw's w, velocities by w as well, energies by m w^2.  Sides and
 vertices are counted on without end, counterclockwise: number k means side, or its left vertex, k mod n, so that k less
@@ -237,14 +237,14 @@ def side_number(part: FullSide, k: int) -> int:
 def right_of(part: FullSide, vertex: int, psi: Turned) -> float:
     """X: how far the centre of mass is right of a vertex that touches [length]."""
     k = side_number(part, vertex)
-    return part.a[k] * (1.0 - psi.v) - part.d[k] * psi.s  # type: ignore[no-any-return]  # kernels take arrays as Any
+    return part.a[k] * (1.0 - psi.versin) - part.d[k] * psi.sin  # type: ignore[no-any-return]  # kernels take arrays as Any
 
 
 @kernel
 def above(part: FullSide, vertex: int, psi: Turned) -> float:
     """H: how far the centre of mass is above a vertex that touches [length]."""
     k = side_number(part, vertex)
-    return part.a[k] * psi.s + part.d[k] * (1.0 - psi.v)  # type: ignore[no-any-return]  # kernels take arrays as Any
+    return part.a[k] * psi.sin + part.d[k] * (1.0 - psi.versin)  # type: ignore[no-any-return]  # kernels take arrays as Any
 
 
 @kernel

@@ -1,8 +1,8 @@
-"""The box twin of `motion.py`: what the box kernels with effects know of the part, and what they hand on.
+"""The box twin of `motion.py`: input and results of the box kernels with effects.
 
-Everything is an interval, over a cell of starts and a box of parameters.  Where it is not decided what comes next, all
-that is possible *waits*, a row of `FullSideBox.waiting` each, and is followed in turn; what comes to rest is kept by
-where it rests in `Ways`.
+Everything is an interval, over a cell of starts and a box of parameters.  If the next event is undecided, all
+possible events *wait*, a row of `FullSideBox.waiting` each, and are followed in turn; `Ways` collects the results by
+place of rest.
 """
 
 from __future__ import annotations

@@ -3,7 +3,7 @@
 Only energies matter.  Coming down on side k about one end with kinetic energy E, of which the strike of the other end
 leaves E' = E [rho^2 + d^2 - a (L - a)]^2 / (M M') or nothing, the part rests where E' lifts it over neither end; over
 the other end it comes down on the next side, with E' and the height lost; otherwise it rocks back onto side k, with E'.
-Where that is not decided all that is possible is followed.
+If that is undecided, all possibilities are followed.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The box twin of `params.on_side`: what the box kernels need of one side, for a whole box of parameters."""
+"""The box twin of `params.on_side`: the numbers of one side for the box kernels, over a box of parameters."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A vertex that slides along the arm: integrated until it stops, lets go, or a side comes down.
+"""A vertex that slides along the arm: integrated until it stops, lifts off, or a side comes down.
 
 With the centre of mass X right of the vertex and H above it, way = 1 for sliding to the right and -1 to the left,
 
@@ -66,7 +66,9 @@ def _on(y: State, h: float, weights: Any, rates: Any) -> State:
 def _arms(part: FullSide, k: int, psi: float) -> tuple[float, float]:
     """X and H, of any angle near those at which the vertex is the lowest."""
     at = turn(psi)
-    return part.a[k] * (1.0 - at.v) - part.d[k] * at.s, part.a[k] * at.s + part.d[k] * (1.0 - at.v)
+    return part.a[k] * (1.0 - at.versin) - part.d[k] * at.sin, part.a[k] * at.sin + part.d[k] * (
+        1.0 - at.versin
+    )
 
 
 @kernel

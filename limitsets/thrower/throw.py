@@ -1,7 +1,7 @@
 """One throw, its steps in the order in which nature applies them.
 
-These are the kernels the map contract asks for: `image` (fast, says where it cannot vouch), `fallback` (sure),
-`image_on` (a forced branch, with the slope), `margin` (what decides the flip) and `displacement`.
+The kernels of the map contract: `image` (fast, marks starts that it cannot settle), `fallback` (sure), `image_on` (a
+forced branch, with the slope), `margin` (its sign decides the flip) and `displacement`.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The box twin of the throw: enclosures of where a whole cell of starts goes, for a whole box of parameters.
+"""The box twin of the throw: enclosures of the image of a cell of starts, over a box of parameters.
 
 Proof kernels on intervals, in the same steps as `throw.py`.  Where the displacement is proved to be monotone on the
 cell its image is spanned by its ends; where the decision between jog and flip is not proved the cell has both images.

@@ -1,4 +1,4 @@
-"""Throws with everything worth knowing beside where they end: for the command line, pictures and reports."""
+"""Throws with all details beside their end, for the command line, pictures and reports."""
 
 from __future__ import annotations
 
@@ -71,13 +71,13 @@ class Trace:
     Attributes
     ----------
     x, side : ndarray, shape (m + 1,)
-        Where the part rests before the first throw and after each [scene's unit], and on which side.
+        Where the part rests before the first throw and after each [length], and on which side.
     code : ndarray of int, shape (m,)
         What each throw was (`limitsets.maps.codes`).
     phi : ndarray, shape (m,)
         Angle at the first impact [rad]; nan where the throw is outside the model.
     displacement : ndarray, shape (m,)
-        Shift of the centre of mass [scene's unit], exact where x' - x has rounded away; nan outside the model.
+        Shift of the centre of mass [length], exact where x' - x has rounded away; nan outside the model.
     turned : ndarray of int, shape (m,)
         Sides turned, counterclockwise positive.
     other_vertex_first : ndarray of bool, shape (m,)
@@ -142,7 +142,7 @@ def trace(params: Throw | FullThrow, x: float, side: int, count: int = 1) -> Tra
     params : Throw or FullThrow
         The throw map.
     x : float
-        Where the part rests [scene's unit].
+        Where the part rests [length].
     side : int
         On which side.
     count : int
@@ -197,7 +197,7 @@ def impact_angles(params: Throw | FullThrow, x: ArrayLike, side: int) -> NDArray
     params : Throw or FullThrow
         The throw map.
     x : array_like, shape (n,)
-        Where the part rests [scene's unit].
+        Where the part rests [length].
     side : int
         On which side.
 

@@ -27,9 +27,9 @@ class Turned(NamedTuple):
     """An angle with its sine, 1 - cosine, and what the sine is short of it; of any kind of number."""
 
     phi: Any
-    s: Any
-    v: Any
-    w: Any
+    sin: Any
+    versin: Any
+    phi_minus_sin: Any
 
 
 @kernel
@@ -74,17 +74,23 @@ def turn_back(to: Turned, e: float) -> Turned:
     w = e * q * (W0 + q * (W1 + q * W2))
     v = q * (V0 + q * (V1 + q * V2))
     s = e - w
-    c = 1.0 - to.v
+    c = 1.0 - to.versin
     return Turned(
-        to.phi - e, to.s - to.s * v - c * s, to.v + c * v - to.s * s, to.w - w - to.v * s + to.s * v
+        to.phi - e,
+        to.sin - to.sin * v - c * s,
+        to.versin + c * v - to.sin * s,
+        to.phi_minus_sin - w - to.versin * s + to.sin * v,
     )
 
 
 @kernel
 def turn_back_slightly(to: Turned, e: float) -> Turned:
     """Turn by phi - e, to rounding for abs(e) <= 2^-18 phi."""
-    c = 1.0 - to.v
+    c = 1.0 - to.versin
     h = 0.5 * e
     return Turned(
-        to.phi - e, to.s - e * (c + h * to.s), to.v - e * (to.s - h * c), to.w - e * (to.v - h * to.s)
+        to.phi - e,
+        to.sin - e * (c + h * to.sin),
+        to.versin - e * (to.sin - h * c),
+        to.phi_minus_sin - e * (to.versin - h * to.sin),
     )

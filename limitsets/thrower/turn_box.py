@@ -58,9 +58,14 @@ def turn_box(phi: Interval) -> Turned:
     """Enclosures over an interval of angles in [0, 2 pi]: w grows throughout, v up to pi, s between its extremes."""
     lo, hi = phi.lo, phi.hi
     first, last = turn_point(lo), turn_point(hi)
-    s_lo, s_hi = min(first.s.lo, last.s.lo), max(first.s.hi, last.s.hi)
-    v_lo, v_hi = min(first.v.lo, last.v.lo), max(first.v.hi, last.v.hi)
+    s_lo, s_hi = min(first.sin.lo, last.sin.lo), max(first.sin.hi, last.sin.hi)
+    v_lo, v_hi = min(first.versin.lo, last.versin.lo), max(first.versin.hi, last.versin.hi)
     s_hi = 1.0 if (lo <= HALF_PI_ABOVE) & (hi >= HALF_PI_BELOW) else s_hi
     s_lo = -1.0 if (lo <= THREE_ABOVE) & (hi >= THREE_BELOW) else s_lo
     v_hi = 2.0 if (lo <= PI_ABOVE) & (hi >= PI_BELOW) else v_hi
-    return Turned(phi, Interval(s_lo, s_hi), Interval(v_lo, v_hi), Interval(first.w.lo, last.w.hi))
+    return Turned(
+        phi,
+        Interval(s_lo, s_hi),
+        Interval(v_lo, v_hi),
+        Interval(first.phi_minus_sin.lo, last.phi_minus_sin.hi),
+    )

@@ -109,7 +109,7 @@ def _of_ends(extents: Extents, exact: Any) -> float:
 def _attracting(graph: Any) -> CellSet:
     """All attracting cells."""
     mask = np.zeros(graph.n_cells, dtype=bool)
-    for cells, ends in zip(graph.recurrent_components(), graph.survey().attracting, strict=True):
+    for cells, ends in zip(graph.recurrent_components(), graph.condensation().attracting, strict=True):
         mask[cells] |= ends
     return CellSet(graph.grid, mask)
 

@@ -18,7 +18,7 @@ from accuracy_points import Point, timed
 import limitsets as ls
 from limitsets.maps.lyapunov import lyapunov
 from limitsets.sets import invariant_measures
-from limitsets.sets.chain import sample_points
+from limitsets.sets.markov_chain import sample_points
 
 __all__ = [
     "CELLS",

@@ -16,7 +16,7 @@ import limitsets as ls
 from limitsets.goals import OrientedBeyond
 from limitsets.robust.margins.beyond import margins_beyond
 from limitsets.robust.margins.joint import joint_margin
-from limitsets.robust.margins.words import bound
+from limitsets.robust.margins.margin_texts import bound
 
 HERE = Path(__file__).resolve().parent
 

@@ -12,8 +12,8 @@ from typing import Any
 
 import limitsets as ls
 from limitsets.robust import Gaussian, Scattering, noise_levels
+from limitsets.robust.noise.chain_solution import starts_from
 from limitsets.robust.noise.sampling import throw_many
-from limitsets.robust.noise.solving import starts_from
 
 HERE = Path(__file__).resolve().parent
 SCENE, GOAL = "paper-designed", (20.5, 2)

@@ -16,8 +16,8 @@ from typing import Any
 import numpy as np
 
 from limitsets.cli import main
-from tests.attack.asked import Verdict, ranges
 from tests.attack.generate import Case
+from tests.attack.goals import Verdict, ranges
 from tests.attack.proved import attraction, proved_goal
 from tests.attack.refuted import refuted
 

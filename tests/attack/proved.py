@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from tests.attack import facts as model
-from tests.attack.asked import Range, Verdict
+from tests.attack.goals import Range, Verdict
 from tests.attack.throws import Orbits, changes
 
 

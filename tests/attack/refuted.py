@@ -11,8 +11,8 @@ from mpmath import mp, mpf
 
 from tests.attack import digits
 from tests.attack import facts as model
-from tests.attack.asked import Range, Verdict
 from tests.attack.generate import Case
+from tests.attack.goals import Range, Verdict
 from tests.attack.proved import move, wrong
 from tests.attack.throws import Orbits
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from mpmath import mpf
 
-from tests.attack import asked, digits, judge, proved
+from tests.attack import digits, goals, judge, proved
 from tests.attack import facts as model
 from tests.attack.generate import Case, case
 from tests.attack.throws import Orbits, changes, throw
@@ -135,9 +135,9 @@ def test_floats_agree_with_50_digits(seed):
 
 def test_the_judge_sees_a_goal_that_fails_elsewhere():
     """The scene of the issue: a fixed point on side 3 at 274.729 mm takes 2 % of the starts and never meets it."""
-    found = asked.Verdict(Case(0, ISSUE, ("goal",)))
+    found = goals.Verdict(Case(0, ISSUE, ("goal",)))
     rng = np.random.default_rng(0)
-    (within,) = asked.ranges(found.case, rng)
+    (within,) = goals.ranges(found.case, rng)
     x, i, _ = proved.starts(within.facts, rng, 2000)
     goal = {"reaches": {"x": "69.0806 mm", "side": 1, "every_orbit": True}}
     bad, code, at, side = proved.settle(goal, within, x, i, rng, -1, 1)

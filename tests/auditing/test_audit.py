@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import limitsets as ls
-from limitsets.auditing import ASSUMPTIONS, choose, where
+from limitsets.auditing import ASSUMPTIONS, choose_effects, where
 from limitsets.jit import entry_of
 from limitsets.proofs.parameters import parameter_box
 from limitsets.thrower.assumed_box import Assumed, assumed, corner_bounds
@@ -350,7 +350,7 @@ def test_parts_with_more_sides(name):
 
 
 def test_auto_switches_on_what_is_called_for_and_names_the_rest():
-    chosen = choose(told("paper-initial", {}, auto=True))
+    chosen = choose_effects(told("paper-initial", {}, auto=True))
     assert chosen.switched_on[0] == "roll"
     assert not chosen.scene.effects.auto
     assert chosen.left_out["slip"] == "world.friction is missing: cannot tell"
@@ -362,14 +362,14 @@ def test_auto_switches_on_what_is_called_for_and_names_the_rest():
 
 
 def test_auto_of_a_scene_that_calls_for_nothing_that_can_be_had_is_the_minimal_model():
-    chosen = choose(told("paper-designed", {"restitution": 0.0}, auto=True))
+    chosen = choose_effects(told("paper-designed", {"restitution": 0.0}, auto=True))
     assert "roll" not in chosen.switched_on
     assert "bounce" not in chosen.left_out
     assert "landing" not in chosen.switched_on
 
 
 def test_auto_says_that_effects_need_the_exact_flight():
-    chosen = choose(told("paper-initial-small-angle", {}, auto=True))
+    chosen = choose_effects(told("paper-initial-small-angle", {}, auto=True))
     assert chosen.switched_on == ()
     assert chosen.left_out["roll"] == 'called for, but it needs flight = "exact"'
 
@@ -377,15 +377,15 @@ def test_auto_says_that_effects_need_the_exact_flight():
 def test_auto_leaves_out_what_cannot_be_simulated_beside_what_is_on():
     # without restitution the bounce changes nothing, and the stroke is called for as in the minimal model
     world = {"stroke": "6 deg", "restitution": 0.0, "bounce_threshold": "0.01 in"}
-    assert "drive" in choose(told("paper-initial", world, auto=True)).switched_on
-    chosen = choose(told("paper-initial", world, auto=True, bounce=True))
+    assert "drive" in choose_effects(told("paper-initial", world, auto=True)).switched_on
+    chosen = choose_effects(told("paper-initial", world, auto=True, bounce=True))
     assert "drive" not in chosen.switched_on
     assert chosen.left_out["drive"] == "called for, but it cannot be simulated together with bounce"
 
 
 def test_without_auto_nothing_changes():
     scene = ls.load("paper-initial")
-    assert choose(scene).scene is scene
+    assert choose_effects(scene).scene is scene
 
 
 # ---------------------------------------------------------------- words

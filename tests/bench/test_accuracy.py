@@ -35,7 +35,7 @@ def error_of(extents):
 def attracting(scene, cells, method=None):
     """The graph and the extents of its one attractor, without the orbit on which jogs are counted."""
     graph = ls.transitions(scene.map, ls.grid(scene.domain, cells=cells), method)
-    sets = zip(graph.recurrent_components(), graph.survey().attracting, strict=True)
+    sets = zip(graph.recurrent_components(), graph.condensation().attracting, strict=True)
     ((cells_of_it, _),) = [(part, ends) for part, ends in sets if ends]
     from limitsets.cells import CellSet
 

@@ -27,7 +27,7 @@ def by_us(depth):
         ls.maps.Leslie(), ls.grid(list(zip(LO, HI, strict=True)), depth=depth), method="corners-padded"
     )
     morse = ls.morse_graph(graph)
-    destination = graph.survey().destination
+    destination = graph.condensation().destination
     sizes = [morse.nodes[k]["cells"] for k in morse]
     ends = [size for k, size in enumerate(sizes) if morse.nodes[k]["attracting"]]
     counts = np.bincount(destination + 4)

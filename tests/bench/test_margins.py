@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 import limitsets as ls
 from limitsets.goals import OrientedBeyond
-from limitsets.proofs.asked import oriented_beyond
+from limitsets.proofs.goals import oriented_beyond
 from limitsets.robust.margins.joint import joint_margin
 from tests.bench.measure import Row, limit, take_turns, versus
 

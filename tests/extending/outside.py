@@ -17,11 +17,11 @@ from matplotlib.figure import Figure
 import limitsets as ls
 from limitsets.cells import Grid
 from limitsets.goals import Found, Goal, Place, Verdict
-from limitsets.graph.images.samples import Samples
+from limitsets.graph.images.samples import SamplePoints
 from limitsets.plot import style
-from limitsets.proofs.asked import Answer, Kind
-from limitsets.proofs.asked.kind import against, below, common, place_text, undecided
-from limitsets.proofs.asked.recurring import recurrent_violation
+from limitsets.proofs.goals import Answer, Kind
+from limitsets.proofs.goals.kind import against, below, common, place_text, undecided
+from limitsets.proofs.goals.recurrent_orbits import recurrent_violation
 from limitsets.scene import Scene
 from limitsets.scene.facts import Fact
 from limitsets.thrower.effects import Effect
@@ -134,12 +134,12 @@ def tent(params: Tent, x: float, side: int) -> tuple[float, int, int]:
 # ---------------------------------------------------------------- an image method
 
 
-def thirds(grid: Grid, side: int, **_: Any) -> Samples:
+def thirds(grid: Grid, side: int, **_: Any) -> SamplePoints:
     """Two points per cell, a third from each end."""
     (edges,) = grid.edges[side]
     width = np.diff(edges)
     points = np.stack([edges[:-1] + width / 3, edges[1:] - width / 3], axis=1).ravel()
-    return Samples((points,), (2,), np.arange(2))
+    return SamplePoints((points,), (2,), np.arange(2))
 
 
 # ---------------------------------------------------------------- a figure

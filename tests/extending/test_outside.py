@@ -9,18 +9,18 @@ import pytest
 from typer.testing import CliRunner
 
 import limitsets as ls
-from limitsets.analysis import Answered
+from limitsets.analysis import GoalOutcome
 from limitsets.cli.app import app
 from limitsets.errors import AnswerError, MapError, SceneError
 from limitsets.goals import GOALS, OrientedBeyond, declare, evaluate
 from limitsets.graph.images import METHODS
 from limitsets.graph.images.sampled import sampled
 from limitsets.maps import contract, images
-from limitsets.proofs.asked import KINDS, sentence
+from limitsets.proofs.goals import KINDS, sentence
 from limitsets.proofs.query import Query
-from limitsets.report.audits import summary
+from limitsets.report.audit_pages import summary
+from limitsets.report.goals import goal_sentence, verdict_of
 from limitsets.report.pages import page
-from limitsets.report.questions import question_of, verdict_of
 from limitsets.scene.facts import FACTS
 from limitsets.thrower import effects, impact_angles
 from limitsets.thrower.effects import EFFECTS
@@ -150,7 +150,7 @@ def test_the_goal_is_asked_answered_and_reported():
     text = page(ls.analyse(scene, cells=1024), {})
     assert "Asked: no part rests beyond x = 24 in (asked of the limit set). **It holds**" in text
     assert "The farthest part is at x = 23.3" in text
-    false = Answered(outside.KeepsBelow(20.0), False, 23.38)
+    false = GoalOutcome(outside.KeepsBelow(20.0), False, 23.38)
     assert verdict_of(false) == "does not hold"
     with pytest.raises(SceneError, match=r"goal.keeps_below.*from 0 to below the arm's length"):
         asking("30 in")
@@ -208,5 +208,5 @@ def test_the_command():
 
 def test_afterwards_the_package_is_as_it_was():
     test_without_it_a_scene_knows_nothing_of_it()
-    assert question_of(OrientedBeyond(20.0, 2), "in").startswith("every part at rest beyond")
+    assert goal_sentence(OrientedBeyond(20.0, 2), "in").startswith("every part at rest beyond")
     assert "perimeter" not in [command.callback.__name__ for command in app.registered_commands]

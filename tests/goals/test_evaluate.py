@@ -17,7 +17,7 @@ from limitsets.goals import (
     evaluate,
     words_of,
 )
-from limitsets.report.questions import question_of
+from limitsets.report.goals import goal_sentence
 from limitsets.robust.margins.finding import goals_of
 from limitsets.scene import load
 
@@ -87,7 +87,7 @@ def test_what_is_no_goal_of_these_has_no_verdict_and_no_words():
     """It was answered, and described, as stays_on_arm."""
     for ask in (
         lambda goal: evaluate(goal, DESIGNED),
-        lambda goal: question_of(goal, "in"),
+        lambda goal: goal_sentence(goal, "in"),
         lambda goal: goals_of(load("paper-designed"), goal),
     ):
         with pytest.raises(AnswerError, match=r"'Upright'.*OrientedBeyond, .*Predicate"):
@@ -103,8 +103,8 @@ def some(kind):
 @pytest.mark.parametrize("kind", GOALS.values())
 def test_every_goal_has_words_of_its_own(kind):
     goals = [Predicate(lambda lo, hi, side: lo < 9.0, "below 9 in"), *map(some, GOALS.values())]
-    told = question_of(some(kind), "in")
-    assert [type(each) for each in goals if question_of(each, "in") == told] == [kind]
+    told = goal_sentence(some(kind), "in")
+    assert [type(each) for each in goals if goal_sentence(each, "in") == told] == [kind]
 
 
 @pytest.mark.parametrize("kind", GOALS.values())

@@ -37,4 +37,4 @@ def check_cycle(cells):
     graph = ls.transitions(maps.Rotation(1.0 / cells), ls.grid([(0.0, 1.0)], cells=cells), "centres")
     (component,) = graph.recurrent_components()
     assert np.asarray(component).size == cells
-    assert graph.survey().attracting.tolist() == [True]
+    assert graph.condensation().attracting.tolist() == [True]

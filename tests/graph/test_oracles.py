@@ -109,7 +109,7 @@ def test_reachability_agrees_with_networkx(graph):
 def test_destinations_agree_with_networkx(graph):
     plain = graph.to_networkx()
     ends = [set(part) for part in nx.attracting_components(plain)]
-    found = graph.survey()
+    found = graph.condensation()
     recurrent = graph.recurrent_components()
     attractors = [
         set(cells.tolist()) for cells, good in zip(recurrent, found.attracting, strict=True) if good
@@ -156,7 +156,7 @@ def test_more_components_than_one_sweep_holds(count):
     assert nx.is_directed_acyclic_graph(morse)
     assert nx.dag_longest_path_length(morse) == count - 1
     assert morse.number_of_edges() == count - 1
-    assert (graph.survey().destination[:2] == 0).all()
+    assert (graph.condensation().destination[:2] == 0).all()
     assert (
-        graph.survey().destination[2:] == UNDECIDED
+        graph.condensation().destination[2:] == UNDECIDED
     ).all()  # from there on an unstable cell can be reached

@@ -10,14 +10,14 @@ from mpmath import mp
 import limitsets as ls
 from limitsets.errors import LimitsetsError
 from limitsets.inverse import robust_design
+from limitsets.inverse.margin.counterweight import counterweight_for, counterweight_of
 from limitsets.inverse.margin.front import unbeaten
-from limitsets.inverse.margin.lead import lead_of, lead_weight
+from limitsets.inverse.margin.model_validity import validity_slack
 from limitsets.inverse.margin.polishing import polished
-from limitsets.inverse.margin.search import Search, bounds_of
-from limitsets.inverse.margin.sound import assumptions_kept
+from limitsets.inverse.margin.search import DesignSearch, bounds_of
 from limitsets.maps import advance
 from limitsets.robust.margins.estimate import estimated, failing
-from limitsets.robust.margins.trap import trap
+from limitsets.robust.margins.invariant_set import invariant_intervals
 from limitsets.robust.margins.vector import Tolerance
 from tests.studies.test_studies import load_study
 from tests.thrower import reference
@@ -42,13 +42,13 @@ def small():
 )
 def test_what_keeps_the_part_ends_where_the_limit_set_does(name, hi):
     """Of scenes whose limit sets have no gap."""
-    found = trap(ls.load(name).map, 12.0, 2)
+    found = invariant_intervals(ls.load(name).map, 12.0, 2)
     assert found.hi == pytest.approx(hi, abs=1e-6)
 
 
 def test_landings_off_by_e_are_never_thrown_out_of_what_keeps_the_part():
     scene, e, rng = ls.load("paper-designed"), 0.03, np.random.default_rng(5)
-    found = trap(scene.map, 12.0, 2, landing=e)
+    found = invariant_intervals(scene.map, 12.0, 2, landing=e)
     x, side = rng.uniform(9.5, 20.0, 4000), np.full(4000, 2)
     highest = np.full(3, -np.inf)
     for _ in range(400):
@@ -68,7 +68,7 @@ def test_the_margin_of_the_speed_is_that_of_the_table():
     box = Tolerance.of(scene, SPEED)
     for factor, beyond in ((0.732, False), (0.734, True)):
         corner = box.scene_at(scene, factor, (-1,))
-        assert (trap(corner.map, 12.0, 2).threshold(2) > 20.0) == beyond
+        assert (invariant_intervals(corner.map, 12.0, 2).threshold(2) > 20.0) == beyond
 
 
 def test_the_best_margin_of_the_speed_is_where_both_ends_meet():
@@ -77,12 +77,12 @@ def test_the_best_margin_of_the_speed_is_where_both_ends_meet():
     found = estimated(scene, box, 2, steps=16)
     ends = []
     for sign in (-1, 1):
-        kept = trap(box.scene_at(scene, found.margin, (sign,)).map, 12.0, 2)
+        kept = invariant_intervals(box.scene_at(scene, found.margin, (sign,)).map, 12.0, 2)
         ends.append((kept.threshold(2), float(kept.hi[2])))
     assert max(end[0] for end in ends) <= found.x <= min(end[1] for end in ends)
     ends = []
     for sign in (-1, 1):
-        kept = trap(box.scene_at(scene, 1.03 * found.margin, (sign,)).map, 12.0, 2)
+        kept = invariant_intervals(box.scene_at(scene, 1.03 * found.margin, (sign,)).map, 12.0, 2)
         ends.append((kept.threshold(2), float(kept.hi[2])))
     assert max(end[0] for end in ends) > min(end[1] for end in ends)
 
@@ -91,7 +91,7 @@ def test_the_best_margin_of_the_speed_is_where_both_ends_meet():
 def test_what_a_design_must_keep_is_what_the_model_assumes(name):
     """At 50 digits by the formulas of docs/model.md: the angle, the throw's impulse, the landing's impulse."""
     scene, facts = ls.load(f"paper-{name}"), reference.paper(name)
-    found, spare = trap(scene.map, 12.0, 2), []
+    found, spare = invariant_intervals(scene.map, 12.0, 2), []
     for side in range(3):
         a, d, h = facts.a[side], facts.d[side], facts.surface_height
         for x in (float(found.lo[side]), float(found.hi[side])):
@@ -101,19 +101,19 @@ def test_what_a_design_must_keep_is_what_the_model_assumes(name):
             inside = min(facts.length[side] - a - foot, a + foot) / facts.length[side]
             pressed = (thrown.omega * right - (x - facts.kappa * thrown.phi)) / x
             spare += [1 - thrown.phi / scene.sides.corner[side], inside, pressed]
-    assert assumptions_kept(scene, found) == pytest.approx(float(min(spare)), rel=1e-9)
+    assert validity_slack(scene, found) == pytest.approx(float(min(spare)), rel=1e-9)
 
 
 @pytest.mark.parametrize(("name", "rho"), [("paper-initial", 1.14), ("paper-designed", 1.01)])
 def test_a_lead_weight_of_65_percent_has_the_radius_of_gyration_of_the_table(name, rho):
     scene = ls.load(name)
-    found = lead_weight(scene.vertices, scene.centre, rho)
+    found = counterweight_for(scene.vertices, scene.centre, rho)
     assert found.share == pytest.approx(0.65, abs=0.01)
 
 
 def test_plate_and_lead_weight_are_the_part_again():
     scene = ls.load("paper-designed")
-    found = lead_of(scene)
+    found = counterweight_of(scene)
     corners = scene.vertices
     x, y = corners.T
     cross = x * np.roll(y, -1) - np.roll(x, -1) * y
@@ -205,7 +205,7 @@ def test_polishing_never_ends_below_its_start():
     """The scene itself as the start, its margin from a search for the worst corner that knows nothing of polishing."""
     scene = ls.load("paper-designed")
     box = Tolerance.of(scene, SPEED)
-    search = Search(scene, box, 2, bounds_of(scene, {"throw.kappa": (20.0, 30.0)}))
+    search = DesignSearch(scene, box, 2, bounds_of(scene, {"throw.kappa": (20.0, 30.0)}))
     start = math.log(scene.kappa / 20.0) / math.log(1.5)
     before = estimated(scene, box, 2, steps=20).margin
     made, found = polished(search, [[start]], lambda each: each, 12, lambda *_: None)
@@ -237,7 +237,7 @@ def test_the_same_seed_gives_the_same_designs():
     scene = ls.load("paper-designed")
     found = []
     for _ in range(2):
-        search = Search(scene, Tolerance.of(scene, SPEED), 2, bounds_of(scene, None))
+        search = DesignSearch(scene, Tolerance.of(scene, SPEED), 2, bounds_of(scene, None))
         drawn, _ = search.drawn(np.random.default_rng(8), 5)
         found.append(search.improved(drawn, 1, 3, lambda *_: None)[0])
     assert (found[0] == found[1]).all()

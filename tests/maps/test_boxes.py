@@ -10,7 +10,7 @@ import pytest
 
 import limitsets as ls
 from limitsets import maps
-from limitsets.graph.images.hulls import Images
+from limitsets.graph.images.hulls import BoxImages
 from limitsets.jit import proof_kernel
 from limitsets.maps.kernels import image_box, pick
 from limitsets.maps.textbook.domains import DOMAINS as PUBLIC
@@ -116,7 +116,7 @@ def violations(cls, width, count, seed):
     bad = lost = 0
     for low, high in param_boxes(rng, params, width):
         lo, hi = boxes_in(rng, DOMAINS[cls], count // 20, 0.3)
-        got = Images(low, high, 0, lo, hi)
+        got = BoxImages(low, high, 0, lo, hi)
         lost += int((got.count == -1).sum())
         corners = list(itertools.product((0.0, 1.0), repeat=len(lo)))
         for k in range(lo[0].size):
@@ -186,7 +186,7 @@ def test_boxes_of_small_cells_are_tight(cls, size):
     params = DEFAULTS.get(cls, cls())
     lo = tuple(rng.uniform(a + 0.01 * (b - a), b - 0.01 * (b - a), 400) for a, b in DOMAINS[cls])
     hi = tuple(x + size for x in lo)
-    got = Images(params, params, 0, lo, hi)
+    got = BoxImages(params, params, 0, lo, hi)
     assert (got.count == 1).all()
     for k in range(400):
         corners = itertools.product(*((Fraction(a[k]), Fraction(b[k])) for a, b in zip(lo, hi, strict=True)))
@@ -204,7 +204,7 @@ def test_boxes_of_small_cells_are_tight(cls, size):
 def test_wide_cells_are_exact_where_a_map_turns():
     def one(params, *pairs):
         lo, hi = zip(*pairs, strict=True)
-        got = Images(params, params, 0, *(tuple(np.array([v]) for v in c) for c in (lo, hi)))
+        got = BoxImages(params, params, 0, *(tuple(np.array([v]) for v in c) for c in (lo, hi)))
         assert got.count[0] == 1
         return [(low[0], high[0]) for low, high in zip(*got.slots[0], strict=True)]
 
@@ -244,14 +244,14 @@ def test_nothing_is_claimed_beyond_a_pole_or_off_the_circle():
     ]:
         dimension = maps.kind_of(params).dimension
         lo, hi = (tuple(np.array([end]) for _ in range(dimension)) for end in pair)
-        assert Images(params, params, 0, lo, hi).count[0] == -1
+        assert BoxImages(params, params, 0, lo, hi).count[0] == -1
 
 
 def test_boxes_of_a_circle_map_that_folds_hold_its_images():
     """Beyond a coupling of 1: both turning points inside one cell, and images below 0, which are outside."""
     params = maps.Circle(0.1, 4.0)
     edges = np.linspace(0.0, 1.0, 8)
-    got = Images(params, params, 0, (edges[:-1],), (edges[1:],))
+    got = BoxImages(params, params, 0, (edges[:-1],), (edges[1:],))
     assert (got.count >= 1).all()
     for k, x in enumerate(np.linspace(0.0, 1.0, 1401)[:-1].reshape(7, 200)):
         for point in x:
@@ -269,7 +269,7 @@ def test_parameters_that_are_no_numbers_prove_nothing():
     for bad in (math.nan, math.inf):
         for cls in (maps.Logistic, maps.Cubic, ThreeState):
             params = cls(bad, 1.0) if cls is ThreeState else cls(bad)
-            assert (Images(params, params, 0, lo, hi).count == -1).all()
+            assert (BoxImages(params, params, 0, lo, hi).count == -1).all()
 
 
 @proof_kernel(entry=True)

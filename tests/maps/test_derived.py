@@ -11,7 +11,7 @@ import limitsets as ls
 from limitsets import maps
 from limitsets.errors import MapError
 from limitsets.graph.images.enclosed import enclosures
-from limitsets.graph.images.hulls import Images
+from limitsets.graph.images.hulls import BoxImages
 from limitsets.maps.derived import MAYBE, NEVER, SURE, branch_boxes
 
 
@@ -90,7 +90,7 @@ def test_boxes_and_slopes_hold_the_exact_ones(kernel):
         high = cls(*(v * (1.0 + spread) for v in low))
         lo, hi = boxes(rng, 300)
         got = branch_boxes(low, high, 0, 0, lo[:, None], hi[:, None])
-        found = Images(low, high, 0, (lo,), (hi,))
+        found = BoxImages(low, high, 0, (lo,), (hi,))
         lost += int((found.count != 1).sum())
         assert set(np.unique(got.state)) <= {SURE, -1}
         for k in np.flatnonzero(found.count == 1):
@@ -167,7 +167,7 @@ ls.register(Turned, image=_turned, dimension=3)
 def test_three_dimensions_with_parameters_by_side_in_a_nested_class():
     params = maps.coerce(Turned(At([0.6, 0.0], [0.8, 1.0]), [1.0, 0.0], 0.25))
     lo, hi = (np.array([0.0]),) * 3, (np.array([1.0]),) * 3
-    found = Images(params, params, 0, lo, hi)
+    found = BoxImages(params, params, 0, lo, hi)
     (a, b), to = found.slots[0], int(found.to[0, 0])
     assert found.count[0] == 1
     assert to == 1
@@ -199,7 +199,7 @@ TENT = registered(
 
 def test_a_margin_decides_between_two_branches():
     lo, hi = np.array([0.1, 0.4, 0.6]), np.array([0.2, 0.6, 0.7])
-    found = Images(TENT(2.0), TENT(2.0), 0, (lo,), (hi,))
+    found = BoxImages(TENT(2.0), TENT(2.0), 0, (lo,), (hi,))
     assert found.count.tolist() == [1, 2, 1]
     assert found.to[1].tolist() == [0, 0, 1]
     states = [

@@ -6,8 +6,8 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 import limitsets as ls
 from limitsets.robust import Gaussian, Scattering, noise_statistics
+from limitsets.robust.noise.chain_solution import starts_from
 from limitsets.robust.noise.sampling import throw_many
-from limitsets.robust.noise.solving import starts_from
 from limitsets.robust.noise.statistics import Levels
 
 NOISE = Scattering(speed=Gaussian(0.005), landing=Gaussian(0.02))

@@ -15,13 +15,13 @@ from mpmath import mp, mpf
 
 import limitsets as ls
 from limitsets.maps import images, images_on
-from limitsets.proofs import chains
-from limitsets.proofs.by_angle import FLIP, JOG, Formulas, Numbers, OneSide, angle, variable
-from limitsets.proofs.chains import Two
+from limitsets.proofs import two_throws
+from limitsets.proofs.by_angle import FLIP, JOG, Formulas, OneSide, ThrowNumbers, angle, variable
 from limitsets.proofs.intervals import Intervals
 from limitsets.proofs.mean_value import root
 from limitsets.proofs.parameters import parameter_box
-from limitsets.proofs.rational import Span
+from limitsets.proofs.rational import RationalInterval
+from limitsets.proofs.two_throws import TwoThrows
 from limitsets.thrower import Energy, Exact, Signed, SmallAngle, SmallAngle2, fly, impact_angles
 from tests.thrower import reference
 
@@ -117,7 +117,7 @@ def test_what_is_impossible_is_nan_and_every_comparison_with_it_is_false(ends):
 
 
 def test_spans_are_taken_from_either_side():
-    third = Span(Fraction(1, 3), Fraction(1, 3))
+    third = RationalInterval(Fraction(1, 3), Fraction(1, 3))
     x = Intervals.of(2.0)
     for found, exact in (
         (x + third, Fraction(7, 3)),
@@ -166,7 +166,7 @@ def test_the_formulas_are_those_of_the_throw_at_50_digits(name, flight, flip):
         thrown = reference.throw(facts, side, x)
         shift = Intervals.of(a) + facts.numbers["length"][after] - facts.numbers["a"][after]
         part = OneSide(Intervals.of(a), Intervals.of(d), shift)
-        n = Numbers([part], *(Intervals.of(facts.numbers[key]) for key in KEYS))
+        n = ThrowNumbers([part], *(Intervals.of(facts.numbers[key]) for key in KEYS))
         at = angle(between(thrown.phi))
         assert narrow(of.start(n, part, at), mpf(x), 1e-10)
         for branch in (JOG, FLIP):
@@ -193,7 +193,7 @@ def test_what_starts_by_the_formula_lands_there_by_the_packages_own_throw(name):
         after = (side + 1) % throw.a.size
         shift = throw.a[side] + throw.length[after] - throw.a[after]
         part = OneSide(*(Intervals.of(float(each)) for each in (throw.a[side], throw.d[side], shift)))
-        n = Numbers([part], *(Intervals.of(getattr(throw, key)) for key in KEYS))
+        n = ThrowNumbers([part], *(Intervals.of(getattr(throw, key)) for key in KEYS))
         most = fly(throw, throw.arm_length, side).phi
         p = random.uniform(0.02, 0.98, 40) * most
         at = angle(Intervals(p, p))
@@ -293,14 +293,14 @@ WIDTHS = {name: Fraction(1, 200) for name in DESIGNED}
 @pytest.mark.parametrize("model", MODELS)
 def test_terms_and_their_derivatives_hold_those_at_50_digits(model):
     scene, wide = boxed(written("paper-designed", model), WIDTHS)
-    boxes = chains._Boxes(parameter_box(scene, tree=wide), scene, 20.0)
+    boxes = two_throws._Boxes(parameter_box(scene, tree=wide), scene, 20.0)
     lengths = [f"part.{name}" for name in ("sides[0]", "sides[1]", "sides[2]")]
     lengths += [f"part.mass.{name}" for name in ("center.along", "center.above", "radius_of_gyration")]
     assert sorted(boxes.names) == sorted(lengths)
     names = ["throw.kappa", "arm.surface_height", *boxes.names]
     random = np.random.default_rng(5)
     centre = np.array([0.9, 1.1, 0.0, *(DESIGNED[name] for name in names)])
-    kinds = (Two(*each) for each in product((0, 2), (JOG, FLIP), (JOG, FLIP)))
+    kinds = (TwoThrows(*each) for each in product((0, 2), (JOG, FLIP), (JOG, FLIP)))
     for kind, (size, most) in product(kinds, ((0.004, 100.0), (4e-5, 1.0))):
         half = random.uniform(0.0, size, centre.size)
         lo, hi = centre - half, centre + half
@@ -350,7 +350,7 @@ def an_open_box(model, second, names):
     higher of its ends.
     """
     values = {name: mpf(value) for name, value in DESIGNED.items()}
-    kind, r = Two(2, JOG, second), mpf("0.8")
+    kind, r = TwoThrows(2, JOG, second), mpf("0.8")
 
     def terms(p, r):
         return terms_by_hand(model, kind, values, p, r, mpf(0))
@@ -368,7 +368,7 @@ def an_open_box(model, second, names):
 def test_what_neither_rises_nor_falls_costs_its_derivative(second):
     model = ("exact", "signed")
     scene, wide = boxed(written("paper-designed", model), WIDTHS)
-    boxes = chains._Boxes(parameter_box(scene, tree=wide), scene, 20.0)
+    boxes = two_throws._Boxes(parameter_box(scene, tree=wide), scene, 20.0)
     names = ["throw.kappa", "arm.surface_height", *boxes.names]
     kind, lo, hi, u, middle, top = an_open_box(model, second, names)
     assert middle < top - 1e-3

@@ -11,7 +11,7 @@ pytest.importorskip("flint", reason="the checker needs python-flint")
 import limitsets as ls
 from limitsets.proofs import certificate
 from limitsets.proofs.confirm import DeniedError
-from limitsets.robust.margins.answer import settled
+from limitsets.robust.margins.margin_result import settled
 from tests.cli.command import run
 
 

@@ -19,7 +19,7 @@ from limitsets.maps import images
 from limitsets.proofs.attraction import attraction
 from limitsets.proofs.cover import cover
 from limitsets.proofs.parameters import parameter_box
-from limitsets.proofs.rational import Span, angle
+from limitsets.proofs.rational import RationalInterval, angle
 
 BOTH = {"landing": True, "roll": True}
 SCATTER = {"speed": "0.3 %", "landing": "0.02 in"}
@@ -169,7 +169,7 @@ def test_the_angle_of_a_box_of_vectors_holds_that_of_every_vector():
     for _ in range(40):
         x, y = Fraction(float(random.normal())), Fraction(float(abs(random.normal())) + 1e-9)
         width = Fraction(float(random.choice([0.0, 1e-3]))) * y
-        found = angle(Span(y, y + width), Span(x, x + width))
+        found = angle(RationalInterval(y, y + width), RationalInterval(x, x + width))
         for u in (x, x + width):
             for v in (y, y + width):
                 exact = mp.atan2(mp.mpf(v.numerator) / v.denominator, mp.mpf(u.numerator) / u.denominator)

@@ -13,7 +13,7 @@ from limitsets.proofs.certify import certify
 from limitsets.proofs.cover import cover
 from limitsets.proofs.end_points import proved_ends
 from limitsets.proofs.parameters import parameter_box
-from limitsets.proofs.tiles import UnionImages, tiles_of
+from limitsets.proofs.proved_pieces import UnionImages, proved_pieces_of
 from limitsets.proofs.trapping import trapping
 from tests.sets.part import Part
 from tests.test_paper import LIMIT_SETS
@@ -114,7 +114,7 @@ def images_of(name):
     tiles = {}
     for side, (edges,) in enumerate(found.cover.grid.edges):
         mine = np.flatnonzero(found.component[found.cover.grid.of_side(side)] >= 0)
-        tiles[side] = tiles_of(found.cover.box, side, edges[mine], edges[mine + 1])
+        tiles[side] = proved_pieces_of(found.cover.box, side, edges[mine], edges[mine + 1])
     return UnionImages(found.cover.box, tiles)
 
 

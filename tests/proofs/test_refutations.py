@@ -16,8 +16,8 @@ from mpmath import mp, mpf
 
 import limitsets as ls
 from limitsets.maps import images
-from limitsets.proofs.asked.recurring import closed
-from limitsets.proofs.asked.search import Choice, Path
+from limitsets.proofs.goals.recurrent_orbits import closed
+from limitsets.proofs.goals.violating_orbits import Path, ThrowChoice
 from limitsets.proofs.parameters import parameter_box
 from limitsets.proofs.refutation import write_refutation
 from tests.attack import facts
@@ -232,7 +232,7 @@ def test_what_passes_once_closes_only_where_the_noise_brings_it_back():
     box = parameter_box(scene, noise={"throw.speed": "0.001 %"})
     (x,) = images(scene.map, [27.9], 2).x
     assert x > 20
-    path = Path([27.9, float(x)], [2, 0], [Choice(box.middle_kappa, 0.0)])
+    path = Path([27.9, float(x)], [2, 0], [ThrowChoice(box.middle_kappa, 0.0)])
     assert not closed(box, path, lambda x, side: (x > 20.0) & (side != 2)).states
 
 

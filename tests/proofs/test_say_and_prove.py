@@ -14,11 +14,11 @@ import pytest
 pytest.importorskip("flint", reason="the checker needs python-flint")
 
 import limitsets as ls
-from limitsets.proofs.asked.kind import peeled
-from limitsets.proofs.asked.reaches import _wanted
 from limitsets.proofs.attraction import attraction, near_section
 from limitsets.proofs.certificate import write
 from limitsets.proofs.cover import cover
+from limitsets.proofs.goals.kind import throws_to_reach
+from limitsets.proofs.goals.reaches import _wanted
 from limitsets.proofs.parameters import parameter_box
 from tests.proofs import forge
 from tests.proofs.test_recheck import COARSE, checker, parts, verdict, whole
@@ -335,7 +335,7 @@ def two():
 def dropped(found, component, starts, tmp_path, **more):
     """The goal of FOUR_GON with some attracting cells only, ranks and thinning made for them."""
     doctored = replace(found, component=component)
-    throws, left = peeled(doctored, component >= 0, _wanted(doctored, ls.load(FOUR_GON).goal))
+    throws, left = throws_to_reach(doctored, component >= 0, _wanted(doctored, ls.load(FOUR_GON).goal))
     section = {"kind": "reaches", "x": "69.0806 mm", "side": 1, "every_orbit": True}
     claims = [{"claim": "goal", "section": section | {"throws": throws, "starts": starts} | more}]
     path = tmp_path / "x.proof.zip"

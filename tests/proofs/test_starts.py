@@ -12,14 +12,14 @@ from scipy.optimize import brentq
 import limitsets as ls
 from limitsets.cells import Domain, grid
 from limitsets.graph.images.enclosed import enclosures
-from limitsets.proofs import asked
 from limitsets.proofs import cover as covers
+from limitsets.proofs import goals
 from limitsets.proofs.attraction import attraction
 from limitsets.proofs.certify import weakest_of
 from limitsets.proofs.cover import Cover, cover
 from limitsets.proofs.parameters import parameter_box
+from limitsets.proofs.perron_frobenius import perron_frobenius_bound
 from limitsets.proofs.proof import Claim
-from limitsets.proofs.thinning import thinned
 from tests.scene.four_gon import FOUR_GON
 
 
@@ -42,7 +42,7 @@ def test_a_fixed_point_that_attracts_and_never_meets_the_goal_is_seen():
         (there,) = found.cover.grid.index([274.729], 3)
         # either the cell around it attracts, and the goal fails in it; or nothing is claimed of its starts
         assert found.component[there] >= 0 or found.basin.rank[there] == -1
-        assert asked.prove(found, scene, scene.goal).verdict != "proved"
+        assert goals.prove(found, scene, scene.goal).verdict != "proved"
     proof = ls.certify(scene, ["goal"])
     assert proof.claims[0].verdict == "refuted"
     assert proof.claims[0].starts == "almost-every"
@@ -66,7 +66,7 @@ def test_a_limit_set_that_leaks_is_not_proved_for_almost_every_start():
     assert max(len(each) for each in found.cover.graph.recurrent_components()) > 100
     assert found.basin.starts == "cells"
     assert found.basin.leaves + found.basin.open > 0.15  # 17 % of 1000 starts do not stay on the arm
-    assert asked.ask(found, scene, scene.goal).verdict != "proved"
+    assert goals.prove_or_refute(found, scene, scene.goal).verdict != "proved"
 
 
 def test_every_start_of_the_papers_scenes():
@@ -193,6 +193,6 @@ def test_starts_next_to_a_fixed_point_that_attracts_do_not_thin_out():
     found = attraction_of(ls.load(FOUR_GON), 256)
     (there,) = found.cover.grid.index([274.729], 3)
     cells = np.arange(found.component.size) == there  # its jogs stay in it, with slope 0.519
-    result = thinned(found.cover, cells)
+    result = perron_frobenius_bound(found.cover, cells)
     assert result.thick[there]
     assert result.reason

@@ -8,7 +8,7 @@ import pytest
 import limitsets as ls
 from limitsets.proofs.cover import cover, targets
 from limitsets.proofs.parameters import parameter_box
-from limitsets.proofs.thinning import _Largest, _stretches
+from limitsets.proofs.perron_frobenius import _Largest, _stretches
 
 
 def by_definition(found, left, of, values):

@@ -10,14 +10,14 @@ import pytest
 from jinja2 import UndefinedError
 
 import limitsets as ls
-from limitsets.analysis import Answered
+from limitsets.analysis import GoalOutcome
 from limitsets.errors import LimitsetsError
 from limitsets.goals import OrientedBeyond
 from limitsets.report import page, write
 from limitsets.report import write as write_report
-from limitsets.report.audits import audit_page
+from limitsets.report.audit_pages import audit_page
+from limitsets.report.goals import verdict_of, void_of
 from limitsets.report.pages import words
-from limitsets.report.questions import verdict_of, void_of
 from limitsets.report.tables import bands
 
 SCENES = Path(__file__).parents[1] / "analysis"
@@ -141,14 +141,14 @@ def test_what_is_asked_from_anywhere_is_not_answered_by_where_the_limit_set_ends
 
 def test_a_limit_set_that_ends_before_is_named_where_another_does_not():
     goal = OrientedBeyond(20.0, 2)
-    asked = Answered(goal, True, 19.7, reach=(23.4, 12.0))
+    asked = GoalOutcome(goal, True, 19.7, reach=(23.4, 12.0))
     assert not asked.vacuous
     assert verdict_of(asked) == "holds"
     assert (
         void_of(asked, "in")
         == "not every part gets there: limit set 1 ends at x = 12.000 in, before x = 20 in"
     )
-    assert void_of(Answered(goal, False, 21.0, reach=(23.4, 12.0)), "in") == ""
+    assert void_of(GoalOutcome(goal, False, 21.0, reach=(23.4, 12.0)), "in") == ""
 
 
 def test_no_throw_leads_out_of_any_limit_set():

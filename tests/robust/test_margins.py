@@ -14,7 +14,7 @@ from mpmath import mp, mpf
 import limitsets as ls
 from limitsets.errors import LimitsetsError
 from limitsets.goals import AttractsAll, OrientedBeyond, Predicate, Reaches
-from limitsets.robust.margins.deviations import given, measure, measures
+from limitsets.robust.margins.deviations import deviation_scale, deviation_scales, given
 from tests.thrower import reference
 
 X = 20
@@ -130,7 +130,7 @@ def test_a_tolerance_in_turns_or_milligrams_says_the_unit_of_the_margin():
         "mass": {"plate_density": "1 kg/m^2", "points": [{"x": "2 in", "y": "1 in", "mass": "6000 mg"}]},
     }
     scene["tolerance"] = {"part.mass.points[0].mass": "500 mg"}
-    one = measure(ls.load(scene), "part.mass.points[0].mass")
+    one = deviation_scale(ls.load(scene), "part.mass.points[0].mass")
     assert (one.unit, one.least) == ("mg", 6)
 
 
@@ -254,16 +254,20 @@ def test_a_goal_that_fails_as_it_is_has_no_margin():
 def test_every_quantity_of_a_scene_is_measured():
     scene = ls.load("paper-designed")
     assert set(given(scene)) == set(ALL)
-    listed = [(one.quantity, one.reading, one.unit) for one in measures(scene)]
+    listed = [(one.quantity, one.reading, one.unit) for one in deviation_scales(scene)]
     assert [name for name, reading, _ in listed if reading == "fixed"] == ALL[:-1]
     assert [name for name, reading, _ in listed if reading == "per-throw"] == ["throw.speed", "landing.x"]
     assert ("part.sides[1]", "fixed", "%") in listed
     assert ("part.mass.center.along", "fixed", "in") in listed
     tilted = ls.load(scene.as_dict() | {"gravity": {"tilt": "30 deg"}, "throw": {"speed": "158.02 deg/s"}})
-    assert ("gravity.tilt", "fixed", "deg") in [(m.quantity, m.reading, m.unit) for m in measures(tilted)]
-    assert ("gravity.tilt", "per-throw", "deg") in [(m.quantity, m.reading, m.unit) for m in measures(tilted)]
+    assert ("gravity.tilt", "fixed", "deg") in [
+        (m.quantity, m.reading, m.unit) for m in deviation_scales(tilted)
+    ]
+    assert ("gravity.tilt", "per-throw", "deg") in [
+        (m.quantity, m.reading, m.unit) for m in deviation_scales(tilted)
+    ]
     own = ls.load(scene.as_dict() | {"tolerance": {"part.mass.center.along": "1 %"}})
-    (along,) = [m for m in measures(own) if m.quantity == "part.mass.center.along"]
+    (along,) = [m for m in deviation_scales(own) if m.quantity == "part.mass.center.along"]
     assert along.unit == "%"
 
 

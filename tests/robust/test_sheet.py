@@ -19,11 +19,11 @@ from limitsets.goals import OrientedBeyond
 from limitsets.plot import tolerance_box
 from limitsets.report.robust_pages import answer, robustness_page, tightest
 from limitsets.robust.margins.beyond import MarginsBeyond
-from limitsets.robust.margins.words import bound
-from limitsets.robust.sheet import against_x, gathering
-from limitsets.robust.sheet.chance import noise_of, scattering_from, still
+from limitsets.robust.margins.margin_texts import bound
+from limitsets.robust.sheet import margin_curve, sheet_run
+from limitsets.robust.sheet.checkpoint import Checkpoint
 from limitsets.robust.sheet.entries import Entry, in_unit_of, percent_of
-from limitsets.robust.sheet.keeping import Kept
+from limitsets.robust.sheet.noise_input import noise_of, scattering_from, still
 from tests.thrower import reference
 
 SHARP = 0.733
@@ -116,15 +116,15 @@ def test_what_was_found_is_found_again(sheet, folder, monkeypatch):
     def fails(*_, **__):
         raise AssertionError("asked again")
 
-    monkeypatch.setattr(gathering, "margin", fails)
-    monkeypatch.setattr(gathering, "joint_margin", fails)
+    monkeypatch.setattr(sheet_run, "margin", fails)
+    monkeypatch.setattr(sheet_run, "joint_margin", fails)
     again = asked(folder)
     assert again.again == 2
     assert again.entries == sheet.entries
 
 
 def test_an_interrupted_run_keeps_what_it_had_found(tmp_path, monkeypatch):
-    plain, asked = gathering.margin, []
+    plain, asked = sheet_run.margin, []
 
     def interrupted(scene, quantity, **words):
         asked.append(quantity)
@@ -133,11 +133,11 @@ def test_an_interrupted_run_keeps_what_it_had_found(tmp_path, monkeypatch):
         return plain(scene, quantity, **words)
 
     words = {"width": 0.5, "leave_out": ["curve", "noise", "audit"], "folder": tmp_path}
-    monkeypatch.setattr(gathering, "margin", interrupted)
+    monkeypatch.setattr(sheet_run, "margin", interrupted)
     with pytest.raises(KeyboardInterrupt):
         ls.robustness("paper-designed", "arm.surface_height", "landing.x", **words)
     assert json.loads((tmp_path / "robustness.json").read_text())["complete"] is False
-    monkeypatch.setattr(gathering, "margin", lambda *a, **w: asked.append("second run") or plain(*a, **w))
+    monkeypatch.setattr(sheet_run, "margin", lambda *a, **w: asked.append("second run") or plain(*a, **w))
     found = ls.robustness("paper-designed", "arm.surface_height", "landing.x", **words)
     assert asked == ["arm.surface_height", "landing.x", "second run"]
     assert [entry.quantity for entry in found.singles] == ["arm.surface_height", "landing.x"]
@@ -145,7 +145,7 @@ def test_an_interrupted_run_keeps_what_it_had_found(tmp_path, monkeypatch):
 
 def kept(folder, scene=None, goals=None, tolerance=None, width=0.1):
     scene = scene or ls.load("paper-designed")
-    return Kept(folder, scene, goals or (scene.goal,), tolerance or {"throw.speed": "2 %"}, width)
+    return Checkpoint(folder, scene, goals or (scene.goal,), tolerance or {"throw.speed": "2 %"}, width)
 
 
 def test_only_the_same_question_is_found_again(sheet, folder):
@@ -207,7 +207,7 @@ def no_goal():
     ],
 )
 def test_refused_before_anything_is_computed(scene, words, said, monkeypatch):
-    monkeypatch.setattr(gathering, "margin", None)
+    monkeypatch.setattr(sheet_run, "margin", None)
     with pytest.raises(LimitsetsError, match=said):
         ls.robustness(scene() if callable(scene) else scene, **words)
 
@@ -263,16 +263,16 @@ def test_margins_against_x_begin_in_the_middle_and_go_on_where_they_stopped(monk
         asked.append(float(step.rsplit(" ", 1)[1]))
 
     def ask(known, seconds):
-        return against_x.curve(scene, 2, {}, known, seconds=seconds, tell=told, keep=kept_so_far.append)
+        return margin_curve.curve(scene, 2, {}, known, seconds=seconds, tell=told, keep=kept_so_far.append)
 
-    monkeypatch.setattr(against_x, "margins_beyond", tent_of)
+    monkeypatch.setattr(margin_curve, "margins_beyond", tent_of)
     first, left = ask(None, -1.0)
     # the limit set ends at 19.753 on other sides, at 23.383 on side 2 (tests/test_paper.py)
     assert first.x.tolist() == pytest.approx([(19.753 + 23.383) / 2], abs=0.01)
-    assert left == against_x.PLACES - 1
+    assert left == margin_curve.PLACES - 1
     whole, left = ask(json.loads(json.dumps(kept_so_far[-1])), 100.0)
     assert left == 0
-    assert len(asked) == against_x.PLACES  # the middle is not asked again
+    assert len(asked) == margin_curve.PLACES  # the middle is not asked again
     assert whole.x.tolist() == pytest.approx(np.linspace(19.753, 23.383, 9)[1:-1].tolist(), abs=0.01)
     assert whole.proved[:, 0] == pytest.approx(1.0 - np.abs(whole.x - 21.5))
     assert whole.best()[0] == first.x[0]

@@ -19,8 +19,8 @@ from limitsets.robust import (
     noise_statistics,
     transfer,
 )
+from limitsets.robust.noise.chain_solution import starts_from
 from limitsets.robust.noise.sampling import scattering_map, throw_many
-from limitsets.robust.noise.solving import starts_from
 
 GOAL = (20.5, 2)
 

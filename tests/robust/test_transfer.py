@@ -9,8 +9,8 @@ from scipy import stats
 import limitsets as ls
 from limitsets.errors import AnswerError
 from limitsets.robust import Gaussian, Samples, Scattering, Uniform, classes, transfer
+from limitsets.robust.noise.boxcars import BoxcarOperator, Boxcars, laid
 from limitsets.robust.noise.scattering import kappa_strata, still_map, thrown
-from limitsets.robust.noise.sheets import Boxes, Sheets, laid
 from limitsets.sets import invariant_measures
 from tests.maps_of_tests import Baker
 
@@ -78,9 +78,9 @@ def test_boxcars_and_the_matrix_written_out_are_the_same():
     sheets = []
     for target in (0, 1):
         lo = rng.uniform(-1.5, 4.5, 50)
-        boxes = Boxes(10 * target, target, 0, lo, lo + rng.exponential(0.5, 50), rng.uniform(0, 1, 50))
+        boxes = Boxcars(10 * target, target, 0, lo, lo + rng.exponential(0.5, 50), rng.uniform(0, 1, 50))
         sheets.append(laid(boxes, edges[target])[0])
-    stage = Sheets(60, edges, tuple(sheets))
+    stage = BoxcarOperator(60, edges, tuple(sheets))
     dense = stage.matrix().toarray()
     v, u = rng.uniform(size=dense.shape[1]), rng.uniform(size=60)
     np.testing.assert_allclose(stage.apply(v), dense @ v, rtol=0, atol=1e-12)
@@ -88,7 +88,7 @@ def test_boxcars_and_the_matrix_written_out_are_the_same():
     # against an integral of one boxcar by hand
     overlap = np.clip(np.minimum(boxes.hi[3], edges[1][1:]) - np.maximum(boxes.lo[3], edges[1][:-1]), 0, None)
     by_hand = boxes.weight[3] * overlap / (boxes.hi[3] - boxes.lo[3])
-    only = Sheets(60, edges, (sheets[1],)).matrix().toarray()[13, 39:]
+    only = BoxcarOperator(60, edges, (sheets[1],)).matrix().toarray()[13, 39:]
     np.testing.assert_allclose(only, by_hand, rtol=0, atol=1e-14)
 
 

@@ -9,7 +9,7 @@ import pytest
 import limitsets as ls
 from limitsets.errors import LimitsetsError
 from limitsets.inverse import robust_design
-from limitsets.robust.margins.deviations import measure
+from limitsets.robust.margins.deviations import deviation_scale
 from limitsets.robust.margins.vector import Tolerance, corners, worst_corner
 
 TEXTS = {
@@ -44,10 +44,10 @@ def test_landings_are_noise_and_nothing_else_is():
 
 def test_a_quantity_alone_is_a_vector_of_one():
     scene = ls.load("paper-designed")
-    height = Tolerance.alone(measure(scene, "arm.surface_height"))
+    height = Tolerance.alone(deviation_scale(scene, "arm.surface_height"))
     assert height.texts(Fraction(1, 50)) == {"arm.surface_height": "0.02 in"}
     assert height.corner(Fraction(1, 50), (-1,)).texts() == {"arm.surface_height": ["-0.22 in"] * 2}
-    speed = Tolerance.alone(measure(scene, "throw.speed", "per-throw"))
+    speed = Tolerance.alone(deviation_scale(scene, "throw.speed", "per-throw"))
     assert speed.noise(Fraction(3, 10)) == {"throw.speed": "0.3 %"}
     assert speed.corner(Fraction(3, 10), ()) is None
 

@@ -28,7 +28,7 @@ def test_scaled_by_a_power_of_two(name, power):
     )
     for one, two in zip(graph.grid.edges, graph2.grid.edges, strict=True):
         np.testing.assert_array_equal(one[0] * scale, two[0])
-    np.testing.assert_array_equal(graph.survey().destination, graph2.survey().destination)
+    np.testing.assert_array_equal(graph.condensation().destination, graph2.condensation().destination)
     assert len(found) == len(found2) == 1
     assert found[0].lyapunov == found2[0].lyapunov
     assert found[0].jogs_per_visit == found2[0].jogs_per_visit

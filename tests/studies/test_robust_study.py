@@ -45,7 +45,9 @@ def test_the_design_holds_on_every_corner_of_its_box(recorded):
     found = estimated(scene, box, 2)
     kept = recorded["sampled"]
     assert found.threshold == pytest.approx(kept["threshold"], abs=1e-9)
-    at = type(found)(kept["margin"], recorded["x"], found.threshold, found.reach, found.kept, found.effects)
+    at = type(found)(
+        kept["margin"], recorded["x"], found.threshold, found.reach, found.invariant, found.effects
+    )
     assert failing(scene, box, 2, at, 0.9995 * kept["margin"]) == []
 
 

@@ -14,12 +14,12 @@ import numpy as np
 
 from limitsets.cells import Grid
 from limitsets.errors import AnswerError
-from limitsets.graph.images.samples import Samples
+from limitsets.graph.images.samples import SamplePoints
 
 __all__ = ["corners", "corners_padded", "end_points"]
 
 
-def corners(grid: Grid, side: int, **_: Any) -> Samples:
+def corners(grid: Grid, side: int, **_: Any) -> SamplePoints:
     """Two, four or eight corners per cell."""
     axes = grid.edges[side]
     sizes = [edges.size for edges in axes]
@@ -28,20 +28,20 @@ def corners(grid: Grid, side: int, **_: Any) -> Samples:
         sum(s * c for s, c in zip(strides, corner, strict=True))
         for corner in product((0, 1), repeat=len(axes))
     ]
-    return Samples(axes, strides, np.array(offsets, np.int64))
+    return SamplePoints(axes, strides, np.array(offsets, np.int64))
 
 
-def corners_padded(grid: Grid, side: int, **_: Any) -> Samples:
+def corners_padded(grid: Grid, side: int, **_: Any) -> SamplePoints:
     """Corners, and one cell more on every side of the box."""
     bare = corners(grid, side)
-    return Samples(bare.axes, bare.strides, bare.offsets, pad=1)
+    return SamplePoints(bare.axes, bare.strides, bare.offsets, pad=1)
 
 
-def end_points(grid: Grid, side: int, **_: Any) -> Samples:
+def end_points(grid: Grid, side: int, **_: Any) -> SamplePoints:
     """End points of cells in one dimension; raises AnswerError in more."""
     if grid.dimension != 1:
         raise AnswerError(
             "the image method", "end-points", "another in more than one dimension", "use corners-padded"
         )
     bare = corners(grid, side)
-    return Samples(bare.axes, bare.strides, bare.offsets, split=True)
+    return SamplePoints(bare.axes, bare.strides, bare.offsets, split=True)

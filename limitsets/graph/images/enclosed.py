@@ -2,7 +2,7 @@
 
 Cells whose branch is not proved are cut along every axis, and in the parameter that is known least, so that within one
 piece the decision and the image use nearly the same parameters; each branch then gets the hull of the pieces on which
-it is possible.  A cell of which nothing can be proved may go everywhere: whatever is claimed of it fails.
+it is possible.  A cell of which nothing can be proved may go everywhere, and every claim about it fails.
 """
 
 from __future__ import annotations
@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 
 from limitsets.cells import Grid
 from limitsets.errors import AnswerError
-from limitsets.graph.boxes import Boxes, merged, placed
-from limitsets.graph.images.hulls import BOTH, DECIDED, NOTHING, Columns, Hulls, Images
+from limitsets.graph.boxes import TargetBoxes, merged, placed
+from limitsets.graph.images.hulls import BOTH, DECIDED, NOTHING, BoxImages, Columns, Hulls
 from limitsets.graph.target import Target
 from limitsets.interval import guard
 from limitsets.maps import kind_of
@@ -153,7 +153,7 @@ def enclosures(
     for begin in range(0, n, BATCH):
         cells = np.arange(begin, min(begin + BATCH, n))
         some = slice(begin, begin + BATCH)
-        part = Images(map, upper, side, tuple(x[some] for x in lo), tuple(x[some] for x in hi))
+        part = BoxImages(map, upper, side, tuple(x[some] for x in lo), tuple(x[some] for x in hi))
         decided[some], witness[:, some] = part.count == DECIDED, part.witness
         hulls.join(part, decided[some], 0, cells)
     rest = np.flatnonzero(~decided)
@@ -162,14 +162,14 @@ def enclosures(
         below, above = _cut(tuple(x[rest] for x in lo), tuple(x[rest] for x in hi), parts)
         owner = np.repeat(rest, parts ** len(axes))
         for one, two in _parameter_pieces(map, upper, pieces or PIECES_OF_PARAMETER[len(axes)]):
-            part = Images(one, two, side, below, above)
+            part = BoxImages(one, two, side, below, above)
             lost[owner[part.count == NOTHING]] = True
             hulls.join(part, part.count != NOTHING, 0, rest)
             hulls.join(part, part.count == BOTH, 1, rest)
     return Enclosures(hulls.arrays(), witness, lost)
 
 
-def enclosed(map: Any, grid: Grid, side: int, target: Target, *, upper: Any = None) -> Boxes:  # noqa: A002  # the field's word
+def enclosed(map: Any, grid: Grid, side: int, target: Target, *, upper: Any = None) -> TargetBoxes:  # noqa: A002  # the field's word
     """Image method: enclose the images of all cells of one side.
 
     Parameters
@@ -189,7 +189,7 @@ def enclosed(map: Any, grid: Grid, side: int, target: Target, *, upper: Any = No
     return boxes_of(found, target, len(kind_of(map).exits))
 
 
-def boxes_of(found: Enclosures, target: Target, exits: int) -> Boxes:
+def boxes_of(found: Enclosures, target: Target, exits: int) -> TargetBoxes:
     """Target cells of proved images; a cell of which nothing is proved goes to every cell and leaves by every exit."""
     n, (sides, dimension) = found.lost.size, target.cells.shape
     parts = []
@@ -207,5 +207,5 @@ def boxes_of(found: Enclosures, target: Target, exits: int) -> Boxes:
     for side in range(sides):
         last = np.tile((target.cells[side] - 1).astype(np.int32), (lost.size, 1))
         of_side = np.full(lost.size, side, np.int32)
-        parts.append(Boxes(lost, of_side, np.zeros_like(last), last, everywhere, 0.0))
+        parts.append(TargetBoxes(lost, of_side, np.zeros_like(last), last, everywhere, 0.0))
     return merged(parts, n, 0.0)

@@ -1,4 +1,4 @@
-"""Images of boxes, and the hulls they are joined to: one for each side and branch they lead to.
+"""Images of boxes, and their hulls: one for each side and branch.
 
 The joining is compiled: done in numpy it took a third of the time of a rigorous image.  Only the loop that asks the map
 is compiled for each map; the others know but the number of coordinates.
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from limitsets.jit import proof_kernel, take_mark
 from limitsets.maps.kernels import fallback_box, image_box, on_side_box, pick, put
 
-__all__ = ["BOTH", "DECIDED", "NOTHING", "Columns", "Hulls", "Images"]
+__all__ = ["BOTH", "DECIDED", "NOTHING", "BoxImages", "Columns", "Hulls"]
 
 Floats: TypeAlias = NDArray[np.float64]
 Columns: TypeAlias = tuple[Floats, ...]
@@ -109,7 +109,7 @@ def _widen(begin: int, wanted: Any, lo: Any, hi: Any, side: Any, branch: Any, ce
     return elsewhere
 
 
-class Images:
+class BoxImages:
     """Images of boxes: `count`, and per slot the corners, an array for each axis, the sides and the branches.
 
     `count` is NOTHING too where the answer is none of the three, or no finite box, or a function was asked beyond where
@@ -140,7 +140,7 @@ class Hulls:
         self.n, self.dimension = n, dimension
         self.found: dict[tuple[int, int], tuple[Columns, Columns]] = {}
 
-    def join(self, images: Images, wanted: NDArray[np.bool_], slot: int, cells: NDArray[np.int64]) -> None:
+    def join(self, images: BoxImages, wanted: NDArray[np.bool_], slot: int, cells: NDArray[np.int64]) -> None:
         """Widen them by one slot of the wanted images, those of the pieces of `cells`, which follow each other."""
         lo, hi = images.slots[slot]
         side, branch = images.to[2 * slot], images.to[2 * slot + 1]

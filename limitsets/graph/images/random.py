@@ -8,12 +8,12 @@ import numpy as np
 
 from limitsets.cells import Grid
 from limitsets.errors import AnswerError
-from limitsets.graph.images.samples import Samples
+from limitsets.graph.images.samples import SamplePoints
 
 __all__ = ["random"]
 
 
-def random(grid: Grid, side: int, *, samples: int = 16, seed: int = 0, **_: Any) -> Samples:
+def random(grid: Grid, side: int, *, samples: int = 16, seed: int = 0, **_: Any) -> SamplePoints:
     """Draw `samples` uniform points per cell, from a seeded generator, so that a graph can be built again."""
     if samples < 1:
         raise AnswerError("the number of samples", samples, "an integer from 1", "pass samples=16")
@@ -25,4 +25,4 @@ def random(grid: Grid, side: int, *, samples: int = 16, seed: int = 0, **_: Any)
     shape = [int(n) for n in grid.shape[side]]
     strides = tuple(samples * int(np.prod(shape[k + 1 :])) for k in range(len(shape)))
     axes = tuple(np.ascontiguousarray(points[:, :, axis].ravel()) for axis in range(grid.dimension))
-    return Samples(axes, strides, np.arange(samples), scattered=True)
+    return SamplePoints(axes, strides, np.arange(samples), scattered=True)

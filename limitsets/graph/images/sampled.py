@@ -13,8 +13,8 @@ import numpy as np
 
 from limitsets.cells import Grid
 from limitsets.errors import AnswerError
-from limitsets.graph.boxes import Boxes, merged
-from limitsets.graph.images.samples import Samples
+from limitsets.graph.boxes import TargetBoxes, merged
+from limitsets.graph.images.samples import SamplePoints
 from limitsets.graph.images.undecided import every_branch, mark_bends, split
 from limitsets.graph.target import Target, place
 from limitsets.jit import kernel
@@ -117,10 +117,10 @@ def _hulls(
                 hint = first
 
 
-def sampled(method: Callable[..., Samples]) -> Callable[..., Boxes]:
+def sampled(method: Callable[..., SamplePoints]) -> Callable[..., TargetBoxes]:
     """Make an image method of a function that chooses the points of each cell."""
 
-    def images_of(params: Any, grid: Grid, side: int, target: Target, **options: Any) -> Boxes:
+    def images_of(params: Any, grid: Grid, side: int, target: Target, **options: Any) -> TargetBoxes:
         return _boxes_of_side(params, grid, side, target, method(grid, side, **options))
 
     return images_of
@@ -139,7 +139,7 @@ def _require_sides(grid: Grid, to: Any, code: Any) -> None:
             )
 
 
-def _boxes_of_side(params: Any, grid: Grid, side: int, target: Target, samples: Samples) -> Boxes:
+def _boxes_of_side(params: Any, grid: Grid, side: int, target: Target, samples: SamplePoints) -> TargetBoxes:
     """Boxes of all cells of one side."""
     dimension, shape = grid.dimension, grid.shape[side]
     n = int(shape.prod())
@@ -166,10 +166,10 @@ def _boxes_of_side(params: Any, grid: Grid, side: int, target: Target, samples: 
         mark_bends(after[0], to, code, MIXED, state)
     mixed = np.flatnonzero(state == MIXED)
     if not mixed.size and (state == DECIDED).all():
-        return Boxes(np.arange(n), side_out, lo, hi, exits, second)
+        return TargetBoxes(np.arange(n), side_out, lo, hi, exits, second)
     decided = np.flatnonzero(state == DECIDED)
     exits[mixed] = 0
-    parts = [Boxes(decided, side_out[decided], lo[decided], hi[decided], exits, second)]
+    parts = [TargetBoxes(decided, side_out[decided], lo[decided], hi[decided], exits, second)]
     if mixed.size and samples.split:
         parts.append(split(params, side, target, samples, mixed))
     elif mixed.size:

@@ -1,4 +1,4 @@
-"""What an image method gives: points of one side, and which of them stand for which cell."""
+"""Result of an image method: points of one side, and the cell that each point represents."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Samples"]
+__all__ = ["SamplePoints"]
 
 
 @dataclass(frozen=True, eq=False)
-class Samples:
+class SamplePoints:
     """Points of one side and their cells.
 
     The points of the cell at position (i, j, ...) are those with number ``i s_0 + j s_1 + ... + offset``.

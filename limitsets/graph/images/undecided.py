@@ -17,8 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from limitsets.errors import AnswerError
-from limitsets.graph.boxes import Boxes, leaving, placed
-from limitsets.graph.images.samples import Samples
+from limitsets.graph.boxes import TargetBoxes, leaving, placed
+from limitsets.graph.images.samples import SamplePoints
 from limitsets.graph.target import Target, place
 from limitsets.jit import kernel
 from limitsets.maps import codes, images, images_on, kind_of
@@ -174,7 +174,9 @@ def mark_bends(after: Any, to: Any, code: Any, mark: int, state: Any) -> None:
     state[state.size - 1] = mark
 
 
-def split(params: Any, side: int, target: Target, samples: Samples, cells: NDArray[np.int64]) -> Boxes:
+def split(
+    params: Any, side: int, target: Target, samples: SamplePoints, cells: NDArray[np.int64]
+) -> TargetBoxes:
     """Images of the pieces of some cells in one dimension."""
     borders = samples.axes[0]
     part = np.arange(PARTS + 1) / PARTS
@@ -201,18 +203,18 @@ def split(params: Any, side: int, target: Target, samples: Samples, cells: NDArr
     exits = np.zeros(int(cells[-1]) + 1, np.uint8)
     found = owner, side_out, first, last
     n = _place_pieces(params, side, target, samples.pad, PARTS * pieces, cells, flat, found, exits)
-    return Boxes(owner[:n], side_out[:n], first[:n], last[:n], exits, 0.0)
+    return TargetBoxes(owner[:n], side_out[:n], first[:n], last[:n], exits, 0.0)
 
 
 def every_branch(
     params: Any,
     side: int,
     target: Target,
-    samples: Samples,
+    samples: SamplePoints,
     cells: NDArray[np.int64],
     numbers: NDArray[np.int64],
     seen: Any,
-) -> list[Boxes]:
+) -> list[TargetBoxes]:
     """Images of undecided cells: under every branch that one of their points takes, from all their points.
 
     Without forced images (a map that has only `image`) each branch is given the points that take it.
@@ -241,7 +243,7 @@ def every_branch(
     flat = landed.ravel()
     points = real.reshape(-1, real.shape[-1])[flat]
     alone = placed(target, owner[flat], to.ravel()[flat], points, points, 0, inside=False)
-    found.append(Boxes(alone.cell[:0], alone.side[:0], alone.lo[:0], alone.hi[:0], alone.exits, 0.0))
+    found.append(TargetBoxes(alone.cell[:0], alone.side[:0], alone.lo[:0], alone.hi[:0], alone.exits, 0.0))
     if kind.has_image_on:
         for branch in range(len(kind.branches)):
             forced, forced_to = images_on(params, _states(starts), side, branch)

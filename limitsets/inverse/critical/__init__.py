@@ -1,1 +1,1 @@
-"""Critical points with their derivatives, and scenes in which they are where they are wanted."""
+"""Critical points with their derivatives, and scenes with given critical points."""

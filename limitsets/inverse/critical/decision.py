@@ -1,4 +1,4 @@
-"""The number that decides between jog and flip, on dual numbers: docs/model.md, flight, impact, decision.
+"""The deciding number between jog and flip, on dual numbers (docs/model.md: flight, impact, decision).
 
 The formulas of the impact are those of `thrower.impact`.  The impact angle is found by the kernels, refined here, and
 differentiated by the implicit function theorem, d phi = -df / (df/dphi).
@@ -9,12 +9,12 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from limitsets.inverse.critical.dual import Dual, cosine, sine, square_root
+from limitsets.inverse.critical.dual import MultiDual, cosine, sine, square_root
 from limitsets.thrower.impact import margin, strike
 from limitsets.thrower.params import FLIGHTS, FLIPS
 from limitsets.thrower.turn import Turned
 
-__all__ = ["Decision", "Part", "decided"]
+__all__ = ["DecidingNumber", "SideNumbers", "decided"]
 
 # Newton steps on an angle that is right to rounding but for the kernel's last bits.
 STEPS = 3
@@ -22,37 +22,37 @@ STEPS = 3
 SMALL = 0.5
 
 
-class Part(NamedTuple):
-    """One side of a part, as `limitsets.inverse.critical.seeded.Seeded` holds it; names are those of `params.Side`."""
+class SideNumbers(NamedTuple):
+    """One side of a part, as `limitsets.inverse.critical.seeded.Seeded` holds it; named as in `params.Side`."""
 
-    a: Dual
-    d: Dual
-    rho: Dual
-    kappa: Dual
-    h: Dual
+    a: MultiDual
+    d: MultiDual
+    rho: MultiDual
+    kappa: MultiDual
+    h: MultiDual
 
     @property
-    def ell(self) -> Dual:
+    def ell(self) -> MultiDual:
         """Distance of the centre of mass from the left vertex."""
         return square_root(self.a**2 + self.d**2)
 
     @property
-    def rho2(self) -> Dual:
+    def rho2(self) -> MultiDual:
         """Squared radius of gyration."""
         return self.rho**2
 
     @property
-    def inertia(self) -> Dual:
+    def inertia(self) -> MultiDual:
         """Moment of inertia about the left vertex, per mass."""
         return self.rho2 + self.a**2 + self.d**2
 
 
-class Decision(NamedTuple):
+class DecidingNumber(NamedTuple):
     """What decides.
 
     Parameters
     ----------
-    margin : Dual
+    margin : MultiDual
         Positive where the part flips; energies over m w^2 [length^2].
     size : float
         Size of the numbers of which it is the difference.
@@ -60,21 +60,21 @@ class Decision(NamedTuple):
         df/dphi at the impact, as a share of its two terms: 0 where the vertex only grazes the arm; -1 at small angles.
     """
 
-    margin: Dual
+    margin: MultiDual
     size: float
     steepness: float
 
 
-def decided(flight: str, flip: str, part: Part, x: Dual, phi: float) -> Decision:
+def decided(flight: str, flip: str, part: SideNumbers, x: MultiDual, phi: float) -> DecidingNumber:
     """Evaluate what decides for a throw from x that lands at phi.
 
     Parameters
     ----------
     flight, flip : str
         The models, in a scene's words.
-    part : Part
+    part : SideNumbers
         The side it rests on.
-    x : Dual
+    x : MultiDual
         Where it rests [length].
     phi : float
         The impact angle to rounding [rad]; not used at small angles.
@@ -85,9 +85,9 @@ def decided(flight: str, flip: str, part: Part, x: Dual, phi: float) -> Decision
         angle, steepness = _angle(part, x, phi)
         at = Turned(angle, sine(angle), 1.0 - cosine(angle), None)
     omega, barrier = strike(FLIGHTS[flight](), part, x, at)
-    decides: Dual = margin(FLIPS[flip](), part.inertia, omega, barrier)
+    decides: MultiDual = margin(FLIPS[flip](), part.inertia, omega, barrier)
     kinetic = 0.5 * part.inertia.value * omega.value**2
-    return Decision(decides, kinetic + abs(barrier.value), steepness)
+    return DecidingNumber(decides, kinetic + abs(barrier.value), steepness)
 
 
 def _short_of_arc(phi: float) -> float:
@@ -101,7 +101,7 @@ def _short_of_arc(phi: float) -> float:
     return total
 
 
-def _height(part: Part, x: Dual, phi: float) -> tuple[Dual, float, float]:
+def _height(part: SideNumbers, x: MultiDual, phi: float) -> tuple[MultiDual, float, float]:
     """Height of the left vertex over the arm, its derivative by phi, and the size of that one's terms."""
     s, v = math.sin(phi), 2.0 * math.sin(0.5 * phi) ** 2
     reach = x - part.a
@@ -111,7 +111,7 @@ def _height(part: Part, x: Dual, phi: float) -> tuple[Dual, float, float]:
     return f, up - down, abs(up) + down
 
 
-def _angle(part: Part, x: Dual, phi: float) -> tuple[Dual, float]:
+def _angle(part: SideNumbers, x: MultiDual, phi: float) -> tuple[MultiDual, float]:
     """Return the impact angle with its derivatives, and how steeply the vertex comes down."""
     f, slope, size = _height(part, x, phi)
     for _ in range(STEPS):
@@ -121,5 +121,5 @@ def _angle(part: Part, x: Dual, phi: float) -> tuple[Dual, float]:
         phi -= step
         f, slope, size = _height(part, x, phi)
     if not slope < 0.0:
-        return Dual(phi, f.slope * math.nan), 0.0
-    return Dual(phi, -f.slope / slope), slope / size
+        return MultiDual(phi, f.slope * math.nan), 0.0
+    return MultiDual(phi, -f.slope / slope), slope / size

@@ -1,8 +1,7 @@
 """First critical points with their derivatives by any quantities of the scene: the implicit function theorem.
 
 At a critical point r the deciding number F(r, q) is zero, so dr/dq = -(dF/dq) / (dF/dr).  F is evaluated on dual
-numbers: from the scene's own words through the formulas of `geometry`, and through the impact angle by the same
-theorem.
+numbers: from the scene's text through the formulas of `geometry`, and through the impact angle by the same theorem.
 """
 
 from __future__ import annotations
@@ -16,9 +15,9 @@ import numpy.typing as npt
 
 from limitsets.errors import AnswerError
 from limitsets.files import as_table, picked
-from limitsets.inverse.critical.decision import Decision, Part, decided
-from limitsets.inverse.critical.dual import Dual
-from limitsets.inverse.critical.first import first_points, nearest_miss
+from limitsets.inverse.critical.decision import DecidingNumber, SideNumbers, decided
+from limitsets.inverse.critical.dual import MultiDual
+from limitsets.inverse.critical.first_critical import first_points, nearest_miss
 from limitsets.inverse.critical.seeded import Seeded, numbers_of, present
 from limitsets.maps.critical import CriticalPoint
 from limitsets.scene import Scene, load
@@ -51,7 +50,7 @@ class CriticalJacobian:
     values : ndarray, shape (k,)
         Their values in the scene's units; 1 for a speed that the scene leaves open (given by kappa, without gravity).
     x : ndarray, shape (n,)
-        First critical point of each side, nan where there is none; may lie beyond the arm's end [scene's unit].
+        First critical point of each side, nan where there is none; may lie beyond the arm's end [length].
     kinds : tuple of str or None
         ``"jog->flip"`` or ``"flip->jog"``.
     matrix : ndarray, shape (n, k)
@@ -59,7 +58,7 @@ class CriticalJacobian:
     reasons : tuple of str or None
         Per side why there is no derivative.
     slack : ndarray, shape (3 n,)
-        a, L - a and d of all sides: above 0 as long as every side rests [scene's unit].
+        a, L - a and d of all sides: above 0 as long as every side rests [length].
     slack_matrix : ndarray, shape (3 n, k)
         Their derivatives.
     """
@@ -176,7 +175,7 @@ def critical_jacobian(scene: Scene | str, *names: str) -> CriticalJacobian:
     )
 
 
-def _slacks(numbers: Seeded) -> tuple[Sequence[Dual], ...]:
+def _slacks(numbers: Seeded) -> tuple[Sequence[MultiDual], ...]:
     right = [length - a for length, a in zip(numbers.length, numbers.a, strict=True)]
     return numbers.a, right, numbers.d
 
@@ -186,17 +185,17 @@ class _Row:
 
     def __init__(self, scene: Scene, numbers: Seeded, side: int, point: CriticalPoint | None) -> None:
         self.scene, self.side = scene, side
-        self.part = Part(numbers.a[side], numbers.d[side], numbers.rho, numbers.kappa, numbers.h)
+        self.part = SideNumbers(numbers.a[side], numbers.d[side], numbers.rho, numbers.kappa, numbers.h)
         self.slope = np.full(numbers.h.slope.size - 1, np.nan)
         self.x: float = np.nan if point is None else point.x
         self.kind: str | None = None if point is None else point.kind
         self.reason = "every throw is decided alike" if point is None else self._differentiate(point.x)
 
-    def _decision(self, x: float) -> Decision:
+    def _decision(self, x: float) -> DecidingNumber:
         seed = np.zeros(self.slope.size + 1)
         seed[0] = 1.0
         phi = float(impact_angles(self.scene.bare_map, [x], self.side)[0])
-        return decided(self.scene.flight, self.scene.flip, self.part, Dual(x, seed), phi)
+        return decided(self.scene.flight, self.scene.flip, self.part, MultiDual(x, seed), phi)
 
     def _differentiate(self, start: float) -> str | None:
         x = start

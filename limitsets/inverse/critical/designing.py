@@ -1,4 +1,4 @@
-"""Design: the quantities of a scene for which its critical points are where they are wanted."""
+"""Design: find quantities of a scene for which its critical points have given values."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from limitsets.files import as_table, picked
 from limitsets.inverse.critical.derivatives import CriticalJacobian, condition_of, require_minimal
 from limitsets.inverse.critical.nearest import KEPT, nearest_to_start, nearest_to_targets
 from limitsets.inverse.critical.seeded import present, with_present
-from limitsets.inverse.critical.solving import REACHED, Outcome, continued, restarted, solved, staged
-from limitsets.inverse.critical.trials import Search, Trial
+from limitsets.inverse.critical.solving import REACHED, Solution, continued, restarted, solved, staged
+from limitsets.inverse.critical.trials import Trial, TrialLog
 from limitsets.inverse.critical.unknowns import Bounds, Unknowns, unknowns_of
 from limitsets.scene import Scene, load
 from limitsets.scene.quantities import base_unit, find
@@ -39,11 +39,11 @@ class Design:
     start : Scene
         The scene that the search started from.
     targets : tuple of float or None
-        What was wanted, per side; None was free [scene's unit].
+        What was wanted, per side; None was free [length].
     reached : bool
         Whether every target is hit to 1e-9.
     residual : tuple of float or None
-        Critical point minus target, per side; None where it was free [scene's unit].
+        Critical point minus target, per side; None where it was free [length].
     before, jacobian : CriticalJacobian
         Critical points and derivatives of `start` and of `scene`.
     evaluations : int
@@ -168,7 +168,7 @@ def design(
     with_present(
         chosen, dict(zip(unknowns.names, unknowns.start.tolist(), strict=True))
     )  # refuses what cannot be set
-    search = Search(chosen, unknowns, targets, progress)
+    search = TrialLog(chosen, unknowns, targets, progress)
     outcome, how = _searched(search, unknowns, starts, stages, seed)
     return _answer(search, targets, outcome, how)
 
@@ -207,14 +207,14 @@ def _targets(scene: Scene, wanted: Sequence[float | str | None]) -> tuple[float 
 
 
 def _searched(
-    search: Search, unknowns: Unknowns, starts: int, count: int | None, seed: int
-) -> tuple[Outcome, str]:
+    search: TrialLog, unknowns: Unknowns, starts: int, count: int | None, seed: int
+) -> tuple[Solution, str]:
     """Try one way after the other until the targets are reached; else come as near as possible."""
     own = unknowns.seen(unknowns.start)
     search.require_effect(search.at(own))
     center = unknowns.inside(own)
     first = search.at(center)
-    found, how = Outcome(first, [] if first is None else [first], False), ""
+    found, how = Solution(first, [] if first is None else [first], False), ""
     if first is not None and count is not None:
         found, how = staged(search, first, count), f"continuation in {count} stages"
     elif first is not None:
@@ -233,18 +233,18 @@ def _searched(
     if not found.reached:
         best = search.best()
         if best is None:
-            return Outcome(None, [], False), "no scene was found that has the critical points wanted"
+            return Solution(None, [], False), "no scene was found that has the critical points wanted"
         near = nearest_to_targets(search, best)
         reached = search.cost(near) <= REACHED
-        return Outcome(near, [*found.path[:1], near], reached), "least squares"
+        return Solution(near, [*found.path[:1], near], reached), "least squares"
     if search.wanted.size < center.size and found.trial is not None:
         near = nearest_to_start(search, found.trial, own)
-        found = Outcome(near, [*(each for each in found.path if each is not found.trial), near], True)
+        found = Solution(near, [*(each for each in found.path if each is not found.trial), near], True)
         how += ", then the nearest to the scene"
     return found, how
 
 
-def _answer(search: Search, targets: tuple[float | None, ...], outcome: Outcome, how: str) -> Design:
+def _answer(search: TrialLog, targets: tuple[float | None, ...], outcome: Solution, how: str) -> Design:
     before = search.trials[0].found
     after = before if outcome.trial is None else outcome.trial.found
     residual = tuple(
@@ -274,7 +274,7 @@ def _named(found: Scene, start: Scene) -> Scene:
     return load(found.as_dict() | {"name": name})
 
 
-def _message(search: Search, outcome: Outcome, residual: tuple[float | None, ...]) -> str:
+def _message(search: TrialLog, outcome: Solution, residual: tuple[float | None, ...]) -> str:
     unit = search.scene.unit
     if outcome.reached:
         return f"reached: every critical point wanted is within {REACHED:g} {unit} of its place"
@@ -289,7 +289,7 @@ def _message(search: Search, outcome: Outcome, residual: tuple[float | None, ...
     return text + "".join(f"; {reason}" for reason in _in_the_way(search, outcome.trial))
 
 
-def _in_the_way(search: Search, trial: Trial) -> list[str]:
+def _in_the_way(search: TrialLog, trial: Trial) -> list[str]:
     """Say which bounds and which edges of the part hold the search."""
     unknowns, found = search.unknowns, []
     for row, side in enumerate(search.sides):

@@ -1,7 +1,7 @@
-"""The nearest scene: to the targets where they cannot be reached, to the start where many scenes reach them.
+"""The nearest scene: to the targets if they are out of reach, to the start if many scenes reach them.
 
 Both are least squares under constraints (every side rests, bounds, and in the second case the targets), which scipy's
-SLSQP solves; where a scene cannot be computed, constraints are continued in a straight line from the last that could.
+SLSQP solves; if a scene cannot be computed, constraints are extrapolated linearly from the last one that could.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from limitsets.inverse.critical.solving import REACHED
-from limitsets.inverse.critical.trials import Search, Trial
+from limitsets.inverse.critical.trials import Trial, TrialLog
 
 __all__ = ["nearest_to_start", "nearest_to_targets"]
 
@@ -27,7 +27,7 @@ NEWTONS = 6
 class _Model:
     """Critical points and slacks around a place; in a straight line from the last scene where there is none."""
 
-    def __init__(self, search: Search, base: Trial) -> None:
+    def __init__(self, search: TrialLog, base: Trial) -> None:
         self.search, self.base = search, base
         self.kept = KEPT * float(np.ptp(search.scene.vertices, axis=0).max())
 
@@ -69,7 +69,7 @@ def _minimised(model: _Model, start: Trial, cost: Any, slope: Any, more: list[di
     )
 
 
-def nearest_to_targets(search: Search, start: Trial) -> Trial:
+def nearest_to_targets(search: TrialLog, start: Trial) -> Trial:
     """Come as near to targets that are not reached as the constraints let."""
     model = _Model(search, start)
     worst = 10.0 * float(((start.x - search.wanted) ** 2).sum())
@@ -86,7 +86,7 @@ def nearest_to_targets(search: Search, start: Trial) -> Trial:
     return search.best() or start
 
 
-def nearest_to_start(search: Search, reached: Trial, center: Array) -> Trial:
+def nearest_to_start(search: TrialLog, reached: Trial, center: Array) -> Trial:
     """Of all scenes that reach the targets, find the one nearest to where the search began."""
     model = _Model(search, reached)
     equal = {"type": "eq", "fun": model.x, "jac": model.x_slope}
@@ -108,7 +108,7 @@ def nearest_to_start(search: Search, reached: Trial, center: Array) -> Trial:
     return reached
 
 
-def _tightened(search: Search, trial: Trial) -> Trial | None:
+def _tightened(search: TrialLog, trial: Trial) -> Trial | None:
     """Newton's steps of least length to the targets."""
     for _ in range(NEWTONS):
         if search.cost(trial) <= 0.01 * REACHED:

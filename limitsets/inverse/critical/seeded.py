@@ -1,4 +1,4 @@
-"""The numbers of a scene as dual numbers: what the throw needs, with derivatives by the scene's own quantities.
+"""The parameters of a scene as dual numbers, with derivatives with respect to the scene's quantities.
 
 From the text of the scene by the reading that floats and spans of rational numbers share (`limitsets.scene.numbers`).
 """
@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from limitsets.inverse.critical.dual import Dual, sine, square_root
+from limitsets.inverse.critical.dual import MultiDual, sine, square_root
 from limitsets.scene import Scene
 from limitsets.scene.numbers import Numbers
 from limitsets.scene.quantities import base_unit
@@ -26,18 +26,18 @@ class Seeded(NamedTuple):
 
     Parameters
     ----------
-    a, d, length : list of Dual
+    a, d, length : list of MultiDual
         Per side, in flip order (`limitsets.geometry.RestingSides`).
-    rho, kappa, h : Dual
+    rho, kappa, h : MultiDual
         Radius of gyration, gravity over squared speed, signed height of the arm's surface.
     """
 
-    a: list[Dual]
-    d: list[Dual]
-    length: list[Dual]
-    rho: Dual
-    kappa: Dual
-    h: Dual
+    a: list[MultiDual]
+    d: list[MultiDual]
+    length: list[MultiDual]
+    rho: MultiDual
+    kappa: MultiDual
+    h: MultiDual
 
 
 def present(scene: Scene, name: str) -> float:
@@ -100,18 +100,18 @@ class _Duals(Numbers):
         super().__init__(self.scene.text, square_root, sine)
         self.names, self.before = list(names), before
 
-    def seeded(self, value: float, name: str = "") -> Dual:
+    def seeded(self, value: float, name: str = "") -> MultiDual:
         """Return a number, the quantity of this name if it is one."""
-        found = Dual(value, np.zeros(self.before + len(self.names)))
+        found = MultiDual(value, np.zeros(self.before + len(self.names)))
         if name in self.names:
             found.slope[self.before + self.names.index(name)] = 1.0
         return found
 
-    def constant(self, text: str, dimension: str, key: str = "") -> Dual:
+    def constant(self, text: str, dimension: str, key: str = "") -> MultiDual:
         """Return a text of a dimension."""
         return self.seeded(convert(parse(text, dimension), base_unit(dimension, self.scene.unit)))
 
-    def number(self, name: str) -> Dual:
+    def number(self, name: str) -> MultiDual:
         """Return a quantity by its name; kappa by a share of the speed, where nothing else is known of the speed."""
         found = self.seeded(self.scene.value(name), name)
         if name == KAPPA and self.open_speed:

@@ -1,7 +1,7 @@
 """Root finding for critical points: scipy's trust region with our Jacobian, then continuation, then other starts.
 
-A scene that cannot be (a part that tips over on one of its sides) or lacks a wanted critical point has no residual;
-the trust region takes nan as a step too far and shrinks.
+An impossible scene (a part that tips over on one of its sides) and a scene without a wanted critical point have no
+residual; the trust region treats nan as a step too far and shrinks.
 """
 
 from __future__ import annotations
@@ -11,14 +11,14 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from limitsets.inverse.critical.trials import Search, Trial
+from limitsets.inverse.critical.trials import Trial, TrialLog
 
-__all__ = ["REACHED", "Outcome", "continued", "restarted", "solved", "staged"]
+__all__ = ["REACHED", "Solution", "continued", "restarted", "solved", "staged"]
 
 Array = npt.NDArray[np.float64]
 
 REACHED = 1e-9
-"""A critical point this near to its target is there [scene's unit]."""
+"""A critical point this near to its target is there [length]."""
 # A stage of a continuation only has to lead on.
 STAGE = 1e-6
 MOST, MOST_OF_STAGE = 60, 12
@@ -27,7 +27,7 @@ SHORTEST = 1.0 / 64.0
 DRAWS = 25
 
 
-class Outcome(NamedTuple):
+class Solution(NamedTuple):
     """Where a search came to.
 
     Parameters
@@ -45,12 +45,14 @@ class Outcome(NamedTuple):
     reached: bool
 
 
-def solved(search: Search, start: Array, goal: Array, most: int = MOST, within: float = REACHED) -> Outcome:
+def solved(
+    search: TrialLog, start: Array, goal: Array, most: int = MOST, within: float = REACHED
+) -> Solution:
     """Bring the critical points to a goal from a start, by least squares within bounds.
 
     Parameters
     ----------
-    search : Search
+    search : TrialLog
         What is varied.
     start : ndarray, shape (k,)
         Where to begin, as the solver sees it; inside the bounds.
@@ -65,7 +67,7 @@ def solved(search: Search, start: Array, goal: Array, most: int = MOST, within: 
 
     first = search.at(start)
     if first is None:
-        return Outcome(None, [], False)
+        return Solution(None, [], False)
     before = search.evaluations
     none = np.full(goal.size, np.nan)
 
@@ -95,15 +97,15 @@ def solved(search: Search, start: Array, goal: Array, most: int = MOST, within: 
         nearer = ((trial.x - goal) ** 2).sum() < ((path[-1].x - goal) ** 2).sum()
         if nearer and search.is_whole(trial):
             path.append(trial)
-    return Outcome(path[-1], path, bool(np.abs(path[-1].x - goal).max() <= within))
+    return Solution(path[-1], path, bool(np.abs(path[-1].x - goal).max() <= within))
 
 
-def continued(search: Search, first: Trial, step: float) -> Outcome:
+def continued(search: TrialLog, first: Trial, step: float) -> Solution:
     """Move the goal from where the critical points are to where they shall be, and follow it (homotopy).
 
     Parameters
     ----------
-    search : Search
+    search : TrialLog
         What is varied and wanted.
     first : Trial
         Where to begin.
@@ -125,10 +127,10 @@ def continued(search: Search, first: Trial, step: float) -> Outcome:
             path, share = [*path, found.trial], to
         else:
             step *= 0.5
-    return Outcome(path[-1], path, share == 1.0)
+    return Solution(path[-1], path, share == 1.0)
 
 
-def staged(search: Search, first: Trial, count: int) -> Outcome:
+def staged(search: TrialLog, first: Trial, count: int) -> Solution:
     """Continue in a number of equal stages, each of which is in the path."""
     path, begin, wanted = [first], first.x, search.wanted
     try:
@@ -136,17 +138,17 @@ def staged(search: Search, first: Trial, count: int) -> Outcome:
             search.wanted = wanted if stage == count else begin + stage / count * (wanted - begin)
             found = continued(search, path[-1], 1.0)
             if not found.reached or found.trial is None:
-                return Outcome(path[-1], path, False)
+                return Solution(path[-1], path, False)
             path.append(found.trial)
     finally:
         search.wanted = wanted
-    return Outcome(path[-1], path, True)
+    return Solution(path[-1], path, True)
 
 
-def restarted(search: Search, center: Array, spread: float, random: np.random.Generator) -> Outcome:
+def restarted(search: TrialLog, center: Array, spread: float, random: np.random.Generator) -> Solution:
     """Solve from a start drawn around a place."""
     for _ in range(DRAWS):
         start = search.unknowns.inside(center + spread * random.standard_normal(center.size))
         if search.at(start) is not None:
             return solved(search, start, search.wanted)
-    return Outcome(None, [], False)
+    return Solution(None, [], False)

@@ -1,4 +1,4 @@
-"""Scenes that a search has looked at: each computed once, counted, and remembered in order."""
+"""The log of a search: each scene is computed once, counted, and stored in order."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from limitsets.inverse.critical.seeded import with_present
 from limitsets.inverse.critical.unknowns import Unknowns
 from limitsets.scene import Scene
 
-__all__ = ["Search", "Trial"]
+__all__ = ["Trial", "TrialLog"]
 
 Array = npt.NDArray[np.float64]
 Progress = Callable[[str, int, int], None]
@@ -41,7 +41,7 @@ class Trial(NamedTuple):
     slope: Array
 
 
-class Search:
+class TrialLog:
     """What is varied and wanted, and all that has been computed.
 
     Parameters
@@ -119,7 +119,7 @@ class Search:
         return bool(np.isfinite(trial.slope).all() and np.isfinite(trial.x).all())
 
     def cost(self, trial: Trial) -> float:
-        """Largest distance of a critical point from its target [scene's unit]."""
+        """Largest distance of a critical point from its target [length]."""
         return float(np.abs(trial.x - self.wanted).max())
 
     def best(self) -> Trial | None:

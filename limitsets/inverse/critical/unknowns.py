@@ -1,8 +1,8 @@
-"""The quantities a design may vary, as the numbers that a solver sees.
+"""The varied quantities of a design, scaled for the solver.
 
-What is always above 0 (speed, kappa, gravity, masses, sides, radius of gyration) is seen by its logarithm, places and
-heights in sizes of the part, the tilt in radians: then a step of 0.1 is about as much for each, and "nearest" has a
-meaning.
+Positive quantities (speed, kappa, gravity, masses, sides, radius of gyration) are scaled by their logarithm, places and
+heights by the size of the part, the tilt in radians: a step of 0.1 is then comparable for all, and "nearest" is well
+defined.
 """
 
 from __future__ import annotations

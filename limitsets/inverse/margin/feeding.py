@@ -1,4 +1,4 @@
-"""Throws to feed: how many it takes until a part from anywhere on the arm rests beyond X on the wanted side."""
+"""Throws to feed: the number of throws until a part from anywhere on the arm rests beyond X on the wanted side."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def throws_to_feed(scene: Scene, x: float, side: int, *, starts: int = STARTS, s
     scene : Scene
         The scene, as simulated: with its effects, if any.
     x, side : float, int
-        Where parts are fed [scene's unit].
+        Where parts are fed [length].
     starts : int
         Random starts: sides with equal chance, and places evenly from a_i to x but for 5 % of the way.
     seed : int

@@ -1,7 +1,7 @@
-"""Robust design: the part for which the proved joint margin is large, and what it costs in throws.
+"""Robust design: the part with a large proved joint margin, and its cost in throws.
 
-The goal is both that whatever rests beyond X lies on the side, and that almost every orbit comes to rest there: an X
-that nothing reaches does not count.  Search by floats (`search`), round to what can be made, have it proved
+There are two goals: every part at rest beyond X lies on the side, and almost every orbit comes to rest there, so that
+an X that no orbit reaches does not count.  Search by floats (`search`), round to manufacturable values, prove
 (`limitsets.robust`).
 """
 
@@ -18,12 +18,12 @@ import numpy as np
 
 from limitsets.errors import AnswerError
 from limitsets.goals import Goal, OrientedBeyond, Reaches
-from limitsets.inverse.margin.answer import RobustDesign
+from limitsets.inverse.margin.counterweight import counterweight_of
+from limitsets.inverse.margin.design_result import RobustDesign
 from limitsets.inverse.margin.feeding import throws_to_feed
 from limitsets.inverse.margin.front import Option, front_of
-from limitsets.inverse.margin.lead import lead_of
 from limitsets.inverse.margin.polishing import polished
-from limitsets.inverse.margin.search import POPULATION, Candidate, Search, Tell, bounds_of
+from limitsets.inverse.margin.search import POPULATION, Candidate, DesignSearch, Tell, bounds_of
 from limitsets.robust import Margin
 from limitsets.robust.margins.estimate import on_all_corners
 from limitsets.robust.margins.joint import joint_margin
@@ -88,8 +88,8 @@ def orders_of(scene: Scene) -> list[Scene]:
 
 
 def _searched(
-    searches: Sequence[Search], evaluations: int, seed: int, tell: Tell
-) -> tuple[Search, list[list[float]]]:
+    searches: Sequence[DesignSearch], evaluations: int, seed: int, tell: Tell
+) -> tuple[DesignSearch, list[list[float]]]:
     """Draw in every order, go on in the best, and give the best search with the unknowns of its best design."""
     rng = np.random.default_rng(seed)
     drawn = []
@@ -109,7 +109,7 @@ def _searched(
     return searches[number], population.tolist()
 
 
-def _rounded(scene: Scene, search: Search) -> Scene:
+def _rounded(scene: Scene, search: DesignSearch) -> Scene:
     """Write what was varied with few decimals."""
     units = {name: base_unit(find(name).dimension, scene.unit) for name in search.bounds}
     return scene.with_values(
@@ -192,7 +192,7 @@ def robust_design(
     texts, begin = tolerance_of(start, tolerance), time.perf_counter()
     vector = Tolerance.of(start, texts)
     searches = [
-        Search(one, vector, on, bounds_of(one, vary), number, everywhere=everywhere)
+        DesignSearch(one, vector, on, bounds_of(one, vary), number, everywhere=everywhere)
         for number, one in enumerate(orders_of(start) if orders else [start])
     ]
     search, population = _searched(searches, evaluations, seed, tell)
@@ -230,7 +230,7 @@ def robust_design(
         tolerance=texts,
         sampled=found,
         margins=margins,
-        lead=lead_of(design),
+        lead=counterweight_of(design),
         feeding=feeding,
         front=front,
         history=history,

@@ -1,4 +1,4 @@
-"""What a margin costs: designs that no other one beats both in margin and in throws to feed."""
+"""The Pareto front of the designs tried, in margin and in throws to feed."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 
 from limitsets.files import as_table, picked
 from limitsets.inverse.margin.feeding import ThrowsToFeed, throws_to_feed
-from limitsets.inverse.margin.search import Candidate, Search
+from limitsets.inverse.margin.search import Candidate, DesignSearch
 from limitsets.robust.margins.estimate import on_all_corners
 
 __all__ = ["Option", "best_of", "front_of", "unbeaten"]
@@ -61,7 +61,7 @@ def unbeaten(margin: Sequence[float], throws: Sequence[float]) -> list[int]:
 
 
 def front_of(
-    searches: Sequence[Search],
+    searches: Sequence[DesignSearch],
     history: Sequence[Candidate],
     own: Option,
     side: int,
@@ -72,7 +72,7 @@ def front_of(
 
     Parameters
     ----------
-    searches : sequence of Search
+    searches : sequence of DesignSearch
         By order.
     history : sequence of Candidate
         Designs tried.
@@ -113,7 +113,7 @@ def front_of(
 
 def _sure(
     options: list[Option],
-    searches: Sequence[Search],
+    searches: Sequence[DesignSearch],
     side: int,
     seed: int,
     tell: Callable[[str, int, int], None],
@@ -140,7 +140,7 @@ def _sure(
     return tuple(best_of(sure))
 
 
-def _option(one: Candidate, search: Search, side: int, seed: int) -> Option | None:
+def _option(one: Candidate, search: DesignSearch, side: int, seed: int) -> Option | None:
     """Count the throws of a design at its best X; None if not every start is fed."""
     feeding = throws_to_feed(search.scene.with_values(dict(one.values)), one.found.x, side, seed=seed)
     return Option(one, feeding) if feeding.fed == feeding.starts else None

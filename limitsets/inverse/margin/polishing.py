@@ -1,8 +1,8 @@
-"""The last steps of a robust design: near the best one, with ratings that hold on every corner of the tolerance.
+"""The last steps of a robust design: designs near the best one, rated on every corner of the tolerance.
 
-The search knows some corners only, so that what it takes for the best fails a little earlier than it says.  Here a
-design counts as better once it is better on all of them.  The margin is the least of many smooth numbers, one per
-corner, and its top a ridge: scipy's simplex method climbs it, started anew each time a little smaller.
+The search knows some corners only and therefore overrates its best design.  Here a design counts as better only if it
+is better on all corners.  The margin is the minimum of many smooth numbers, one per corner, so its maximum is a ridge:
+scipy's simplex method climbs it, restarted each time with a smaller simplex.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from limitsets.inverse.margin.search import Search, Tell
+from limitsets.inverse.margin.search import DesignSearch, Tell
 from limitsets.robust.margins.estimate import FINE, FINELY, Estimate, estimated, failing, on_all_corners
 from limitsets.robust.margins.vector import Signs
 from limitsets.scene import Scene
@@ -26,7 +26,7 @@ EDGES = (0.02, 0.007, 0.0025)
 class _Best:
     """The best design so far, and the corners at which others failed."""
 
-    def __init__(self, search: Search, made: Callable[[Scene], Scene], tell: Tell, of: int) -> None:
+    def __init__(self, search: DesignSearch, made: Callable[[Scene], Scene], tell: Tell, of: int) -> None:
         self.search, self.made, self.tell, self.of = search, made, tell, of
         self.hard: list[Signs] = list(search.hard)
         self.unknowns: list[float] = []
@@ -57,7 +57,7 @@ class _Best:
 
 
 def polished(
-    search: Search,
+    search: DesignSearch,
     unknowns: Sequence[Sequence[float]],
     made: Callable[[Scene], Scene],
     evaluations: int,
@@ -67,7 +67,7 @@ def polished(
 
     Parameters
     ----------
-    search : Search
+    search : DesignSearch
         Whose quantities, tolerance and conditions.
     unknowns : sequence of sequence of float
         Where to begin: scaled unknowns, at least one.

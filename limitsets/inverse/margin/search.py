@@ -1,4 +1,4 @@
-"""Choose the part so that the margin is large: a global search by floats.
+"""Global search, by floats, for the part with the largest margin.
 
 The search knows one number, the joint margin by floats (`estimated`); what it ends with `limitsets.robust` proves.
 scipy's differential evolution moves a population of designs; in between, the best one is tried on all corners of the
@@ -17,15 +17,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from limitsets.errors import AnswerError, SceneError
-from limitsets.inverse.margin.lead import lead_of
-from limitsets.inverse.margin.sound import assumptions_kept
+from limitsets.inverse.margin.counterweight import counterweight_of
+from limitsets.inverse.margin.model_validity import validity_slack
 from limitsets.robust.margins.estimate import Estimate, estimated, failing
-from limitsets.robust.margins.trap import least_room
+from limitsets.robust.margins.invariant_set import least_slack
 from limitsets.robust.margins.vector import Signs, Tolerance
 from limitsets.scene import Scene
 from limitsets.scene.quantities import find
 
-__all__ = ["VARY", "Candidate", "Search"]
+__all__ = ["VARY", "Candidate", "DesignSearch"]
 
 VARY: dict[str, tuple[str, str]] = {
     "part.mass.center.along": ("0.05", "0.95"),
@@ -65,7 +65,7 @@ class Candidate:
 
 
 @dataclass(eq=False)
-class Search:
+class DesignSearch:
     """The search in one scene.
 
     Attributes
@@ -137,15 +137,15 @@ class Search:
         """Rate a part that no lead weight makes: -20 or below; 0 where one does."""
         if not self.lead:
             return 0.0
-        weight = lead_of(scene)
+        weight = counterweight_of(scene)
         lacking = max(weight.share - MOST_LEAD, -weight.inside / float(scene.sides.length.mean()))
         return 0.0 if lacking <= 0.0 else -20.0 - min(9.0, lacking)
 
     def broken(self, scene: Scene, found: Estimate) -> float:
         """Rate a design outside of the model, or one that loses parts: below 0; 0 or above for any other."""
-        spare = assumptions_kept(scene, found.kept)
+        spare = validity_slack(scene, found.invariant)
         if self.everywhere:
-            spare = min(spare, least_room(scene.bare_map) / scene.arm_length)
+            spare = min(spare, least_slack(scene.bare_map) / scene.arm_length)
         return max(spare, -9.0)
 
     def _values(self, scene: Scene) -> dict[str, float]:

@@ -1,4 +1,4 @@
-"""Where a textbook map is worth looking at: the domains used in the literature, as plain pairs of numbers.
+"""Domains of textbook maps as in the literature, as plain pairs of numbers.
 
 Pairs, and not `limitsets.cells.Domain`: rooms on one floor do not import each other.
 """

@@ -1,8 +1,8 @@
 """Margins as functions of X, for "beyond X only one side": where to let the arm end.
 
-Farther out more is to spare before a part on another side gets there, until the wanted side hardly gets there itself.
-So two goals are asked of every X: beyond it only that side, and almost every orbit comes to rest on that side beyond
-it.  Somewhere between the two the margin is largest.
+With growing X the slack to parts on other sides grows, and the slack of the wanted side falls.  Every X therefore has
+two goals: beyond X only the wanted side, and almost every orbit comes to rest on that side beyond X.  The margin is
+largest between the two limits.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ class MarginsBeyond:
     side : int
         The side wanted.
     x : ndarray, shape (n,)
-        Places, ascending [scene's length unit].
+        Places, ascending [length].
     names : tuple of str
         Quantity and reading of each margin.
     units : tuple of str
@@ -117,19 +117,19 @@ def margins_beyond(
     >>> found.proved[:, 0].round(1).tolist()
     [0.7, 3.4]
     """
-    asked = scene if isinstance(scene, Scene) else load(scene)
-    at = np.sort(np.asarray(places_beyond(asked, side, places) if x is None else x, dtype=float))
+    loaded = scene if isinstance(scene, Scene) else load(scene)
+    at = np.sort(np.asarray(places_beyond(loaded, side, places) if x is None else x, dtype=float))
     rows: list[tuple[Margin, ...]] = []
     for number, place in enumerate(at.tolist()):
         if progress is not None:
             progress(f"margins beyond x = {place:.4g}", number, at.size)
         goals: tuple[Goal, ...] = (OrientedBeyond(place, side), Reaches(place, side))
-        rows.append(tuple(_one(asked, name, goals, tolerance, width, seconds) for name in quantities))
+        rows.append(tuple(_one(loaded, name, goals, tolerance, width, seconds) for name in quantities))
     names = tuple(one.quantity for one in rows[0])
     proved = np.array([[one.proved for one in row] for row in rows])
     refuted = np.array([[np.nan if one.refuted is None else one.refuted for one in row] for row in rows])
     return MarginsBeyond(
-        asked, side, at, names, tuple(one.unit for one in rows[0]), proved, refuted, tuple(rows)
+        loaded, side, at, names, tuple(one.unit for one in rows[0]), proved, refuted, tuple(rows)
     )
 
 

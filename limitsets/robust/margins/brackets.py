@@ -1,9 +1,9 @@
 """The search for a bracket: how far a goal is proved to hold, and from where on an orbit refutes it.
 
-One quantity at a time.  Fixed but unknown: single scenes are asked first, which is quick and says where the goal
-breaks; then all scenes up to there are proved at once, where two throws with the same parameters settle it, or the
-proof grows outward from the scene as it is, in pieces that get narrower towards there, each proved as if the quantity
-differed at every throw.  Another one at every throw: there is no cutting, sizes are tried.
+One quantity at a time.  Time-invariant uncertainty: single scenes come first, which is quick and shows where the goal
+fails.  Then all scenes up to this deviation are proved at once, if two throws with the same parameters settle them; or
+the proof grows outward from the nominal scene in pieces that become narrower towards the failure, each proved as if the
+quantity differed at every throw.  Time-varying disturbance: the range cannot be cut; the search tries sizes.
 """
 
 from __future__ import annotations
@@ -13,8 +13,8 @@ from dataclasses import dataclass, field, replace
 from fractions import Fraction
 
 from limitsets.proofs.query import Outcome, Query
-from limitsets.proofs.tolerance import Piece
-from limitsets.robust.margins.deviations import Measure, short
+from limitsets.proofs.tolerance import SceneBox
+from limitsets.robust.margins.deviations import DeviationScale, short
 from limitsets.robust.margins.halving import a_little_beyond, halved
 from limitsets.robust.margins.vector import Signs, Tolerance
 
@@ -76,7 +76,7 @@ class Ray:
         self.found = Bracket()
         self.end: Fraction | None = None
 
-    def _at(self, size: Fraction) -> tuple[Piece | None, dict[str, str]]:
+    def _at(self, size: Fraction) -> tuple[SceneBox | None, dict[str, str]]:
         return self.tolerance.corner(size, self.signs), self.tolerance.noise(size)
 
     def proves(self, size: Fraction, finest: int = 3) -> bool:
@@ -115,12 +115,12 @@ class Ray:
         return self.found.refuted is not None and self.end is not None and self.end < self.found.refuted
 
 
-def _reach(query: Query, measure: Measure, sign: int, width: Fraction, known: Fraction | None) -> Ray:
+def _reach(query: Query, scale: DeviationScale, sign: int, width: Fraction, known: Fraction | None) -> Ray:
     """Go outward from the scene as it is until single scenes are refuted or cannot be, then halve."""
-    ray, step = Ray(query, Tolerance.alone(measure), (sign,)), measure.least
+    ray, step = Ray(query, Tolerance.alone(scale), (sign,)), scale.least
     found = ray.found
     for _ in range(STEPS):
-        size = step if measure.most is None else min(step, (step / FACTOR + measure.most) / 2)
+        size = step if scale.most is None else min(step, (step / FACTOR + scale.most) / 2)
         if known is not None and found.proved >= known:
             return ray
         if ray.ask(size) != "proved":
@@ -128,7 +128,7 @@ def _reach(query: Query, measure: Measure, sign: int, width: Fraction, known: Fr
         step *= FACTOR
     else:
         return ray
-    least = NONE * measure.least
+    least = NONE * scale.least
     # beyond a gap what is refuted is nearly as near as can be
     halved(found.proved, size, lambda s: ray.ask(s) == "proved", width, least, stop=lambda: ray.gap)
     if found.refuted is not None and ray.end is not None:
@@ -139,7 +139,7 @@ def _reach(query: Query, measure: Measure, sign: int, width: Fraction, known: Fr
 
 
 def _grow(
-    query: Query, measure: Measure, sign: int, target: Fraction, wall: Fraction, tell: Tell
+    query: Query, scale: DeviationScale, sign: int, target: Fraction, wall: Fraction, tell: Tell
 ) -> tuple[Fraction, list[Outcome], str]:
     """Prove from the scene as it is outward, in pieces; how far, the pieces, and what stops it."""
     low, pieces, reason = Fraction(0), list[Outcome](), ""
@@ -148,11 +148,11 @@ def _grow(
     for _ in range(TRIALS):
         if low >= target:
             return low, pieces, ""
-        step = step if measure.widest is None else min(step, measure.widest)
+        step = step if scale.widest is None else min(step, scale.widest)
         high = min(target, short(low + step, up=True))
         # far from the wall narrower pieces do as well as finer cells, and to fail with these is what takes time
         finest = 3 if low > NEAR * wall else 1
-        found = query.prove(measure.piece(measure.between(sign * low, sign * high)), finest=finest)
+        found = query.prove(scale.piece(scale.between(sign * low, sign * high)), finest=finest)
         if found.verdict == "proved":
             pieces.append(found)
             low, share = high, min(share * Fraction(9, 8), Fraction(3))
@@ -166,14 +166,14 @@ def _grow(
     return low, pieces, reason
 
 
-def bracket_fixed(query: Query, measure: Measure, width: Fraction, tell: Tell) -> Bracket:
+def bracket_fixed(query: Query, scale: DeviationScale, width: Fraction, tell: Tell) -> Bracket:
     """Bracket the margin of a quantity that is fixed but unknown."""
     ways: dict[int, Ray] = {}
     for sign in (-1, 1):
         known = min(
             (way.found.refuted for way in ways.values() if way.found.refuted is not None), default=None
         )
-        ways[sign] = _reach(query, measure, sign, width / 4, known)
+        ways[sign] = _reach(query, scale, sign, width / 4, known)
     found = Bracket()
     for sign, way in ways.items():
         bad = way.found.refuted
@@ -187,29 +187,29 @@ def bracket_fixed(query: Query, measure: Measure, width: Fraction, tell: Tell) -
         goal = min(way.found.proved for way in ends or ways.values())
     first = next((way for way in ends if way.found.proved == goal), None)
     if first is not None and first.end is not None:
-        found.reason = f"from {measure.text(first.end)} on: {first.found.reason}"
-    found = _fixed_proof(query, measure, found, short(goal), tell)
+        found.reason = f"from {scale.text(first.end)} on: {first.found.reason}"
+    found = _fixed_proof(query, scale, found, short(goal), tell)
     found.reason = "" if found.closed(width) else found.reason
     return found
 
 
-def _fixed_proof(query: Query, measure: Measure, found: Bracket, goal: Fraction, tell: Tell) -> Bracket:
+def _fixed_proof(query: Query, scale: DeviationScale, found: Bracket, goal: Fraction, tell: Tell) -> Bracket:
     """Prove it all at once, or grow the proof in both directions."""
-    if goal <= NONE * measure.least:
+    if goal <= NONE * scale.least:
         return found
     # all at once first: two throws with the same parameters may settle it
-    whole = query.prove(measure.piece(measure.between(-goal, goal)), finest=1)
+    whole = query.prove(scale.piece(scale.between(-goal, goal)), finest=1)
     if whole.verdict == "proved":
         found.pieces, found.proved = [whole], goal
         return found
     wall = found.refuted or goal * Fraction(101, 100)
     for sign in (-1, 1):
         near = found.against is not None and sign == found.sign
-        far, pieces, reason = _grow(query, measure, sign, goal, wall if near else 3 * wall, tell)
+        far, pieces, reason = _grow(query, scale, sign, goal, wall if near else 3 * wall, tell)
         found.pieces += pieces
         if far < goal:
             goal, found.reason = far, reason + NARROWER
-            _fails_beyond(Ray(query, Tolerance.alone(measure), (sign,)), sign, far, found)
+            _fails_beyond(Ray(query, Tolerance.alone(scale), (sign,)), sign, far, found)
             if not far:
                 break
     found.proved = goal
@@ -227,16 +227,16 @@ def _fails_beyond(ray: Ray, sign: int, far: Fraction, found: Bracket) -> None:
             return
 
 
-def bracket_per_throw(query: Query, measure: Measure, width: Fraction, tell: Tell) -> Bracket:
+def bracket_per_throw(query: Query, scale: DeviationScale, width: Fraction, tell: Tell) -> Bracket:
     """Bracket the margin of a quantity that is another one at every throw."""
-    ray, size, most = Ray(query, Tolerance.alone(measure), ()), measure.least, measure.most
+    ray, size, most = Ray(query, Tolerance.alone(scale), ()), scale.least, scale.most
     found = ray.found
     for _ in range(STEPS):
         if not ray.proves(size, 1):
             break
         nearer = FACTOR * size
         size = nearer if most is None or nearer < most else (size + most) / 2
-    _, size = halved(found.proved, size, lambda s: ray.proves(s, 1), Fraction(1, 40), NONE * measure.least)
+    _, size = halved(found.proved, size, lambda s: ray.proves(s, 1), Fraction(1, 40), NONE * scale.least)
     tell(0.3)
     for beyond in a_little_beyond(size, Fraction(1, 100), 8):
         if (most is None or short(beyond) < most) and ray.refutes(short(beyond)):
@@ -245,7 +245,7 @@ def bracket_per_throw(query: Query, measure: Measure, width: Fraction, tell: Tel
     if found.refuted is not None and not found.closed(width):
         ray.proves(short(found.refuted * (1 - width * Fraction(9, 10))), 3)
     low = high = None  # nothing is known between them
-    while found.refuted is not None and not found.closed(width) and found.refuted > NONE * measure.least:
+    while found.refuted is not None and not found.closed(width) and found.refuted > NONE * scale.least:
         middle = short(((high or found.proved) + found.refuted) / 2)
         if found.refuted - (high or found.proved) > width / 4 * found.refuted:
             if ray.refutes(middle) or ray.proves(middle, 3):

@@ -1,7 +1,7 @@
-"""Deviations of one quantity: which there are, in which unit people give them, and the values that they stand for.
+"""Deviations of one quantity: the possible readings, their units, and the values that they stand for.
 
-A deviation has a size, a rational number of its unit: percent of the value, or a length or an angle.  The texts made
-here are what `limitsets.certify` and a certificate take, so a size is always one that a short decimal can say.
+A deviation has a size, a rational number of its unit: percent of the value, or a length or an angle.  The texts
+written here are input of `limitsets.certify` and of certificates, so every size is a short decimal.
 """
 
 from __future__ import annotations
@@ -12,14 +12,14 @@ from fractions import Fraction
 
 from limitsets.errors import AnswerError
 from limitsets.proofs.parameters import VARYING
-from limitsets.proofs.rational import Span
-from limitsets.proofs.tolerance import Piece
+from limitsets.proofs.rational import RationalInterval
+from limitsets.proofs.tolerance import SceneBox
 from limitsets.scene import Scene
 from limitsets.scene.facts import Deviation
 from limitsets.scene.quantities import base_unit, find, parsed_deviation, text_at, texts
 from limitsets.scene.units import Quantity, exact_factor, parse
 
-__all__ = ["READINGS", "Measure", "decimal", "given", "measure", "measures", "short"]
+__all__ = ["READINGS", "DeviationScale", "decimal", "deviation_scale", "deviation_scales", "given", "short"]
 
 READINGS = ("fixed", "per-throw")
 """Fixed but unknown, or another one at every throw."""
@@ -68,7 +68,7 @@ def short(value: Fraction | float, *, up: bool = False) -> Fraction:
 
 
 @dataclass(frozen=True)
-class Measure:
+class DeviationScale:
     """One quantity of a scene, read in one way.
 
     Attributes
@@ -155,23 +155,23 @@ class Measure:
             return self.nominal * (1 + size / 100)
         return self.nominal + size * exact_factor(self.unit, self.given.unit)
 
-    def between(self, one: Fraction, other: Fraction) -> Span:
+    def between(self, one: Fraction, other: Fraction) -> RationalInterval:
         """Return the values at all deviations between two."""
         ends = self.value(one), self.value(other)
-        return Span(min(ends), max(ends))
+        return RationalInterval(min(ends), max(ends))
 
-    def at(self, size: Fraction) -> Span:
+    def at(self, size: Fraction) -> RationalInterval:
         """Return the value at a deviation, as a decimal that is not farther from the nominal one."""
         exact, places = self.value(size), 10**18
         scaled = exact * places
         rounded = Fraction(scaled.numerator // scaled.denominator, places)
         if rounded != exact and exact < self.nominal:
             rounded += Fraction(1, places)
-        return Span(rounded, rounded)
+        return RationalInterval(rounded, rounded)
 
-    def piece(self, span: Span) -> Piece:
+    def piece(self, span: RationalInterval) -> SceneBox:
         """Return the box of scenes with these values."""
-        return Piece(self.scene, {self.key: span})
+        return SceneBox(self.scene, {self.key: span})
 
 
 def _text_at(scene: Scene, name: str) -> str:
@@ -212,7 +212,7 @@ def _unit(scene: Scene, quantity: str, reading: str) -> str:
     return scene.unit
 
 
-def measure(scene: Scene, quantity: str, reading: str | None = None) -> Measure:
+def deviation_scale(scene: Scene, quantity: str, reading: str | None = None) -> DeviationScale:
     """Say how deviations of a quantity are measured.
 
     Parameters
@@ -246,13 +246,13 @@ def measure(scene: Scene, quantity: str, reading: str | None = None) -> Measure:
         raise AnswerError(
             "the quantity", quantity, "one that the throw depends on; it is given by kappa", remedy
         )
-    found = Measure(quantity, reading, _unit(scene, quantity, reading), scene)
+    found = DeviationScale(quantity, reading, _unit(scene, quantity, reading), scene)
     if quantity not in ("landing.x", "throw.speed"):
         _text_at(scene, quantity)
     return found
 
 
-def measures(scene: Scene, reading: str | None = None) -> tuple[Measure, ...]:
+def deviation_scales(scene: Scene, reading: str | None = None) -> tuple[DeviationScale, ...]:
     """List what can deviate in a scene, fixed but unknown first.
 
     Parameters
@@ -269,5 +269,5 @@ def measures(scene: Scene, reading: str | None = None) -> tuple[Measure, ...]:
             if word == "fixed" and (name == "landing.x" or (by_kappa and name == "gravity.tilt")):
                 continue
             if word == "fixed" or name in VARYING:
-                found.append(measure(scene, name, word))
+                found.append(deviation_scale(scene, name, word))
     return tuple(found)

@@ -1,10 +1,10 @@
-"""The joint margin by floats: how far a whole vector of tolerances may be stretched before a part is fed wrongly.
+"""Estimate of the joint margin by floats: the factor on a vector of tolerances at which a part is fed wrongly.
 
-Fed at X on a side means: whatever rests beyond X lies on the side, and parts come to rest there at X or beyond.  With
+Fed at X on a side means: every part at rest beyond X lies on the side, and parts come to rest there.  With
 every quantity off by s tolerances the highest place T(s) on another side has risen, the farthest place R(s) on the
 side has come down, and some X serves every scene in the box as long as T(s) <= R(s).  Both are nearly linear: their
-worst corners are found by differences.  Where an itinerary changes they jump; corners that turned out bad before
-("hard" ones) are tried first.
+worst corners are found by differences.  Where an itinerary changes they jump; corners that failed before
+("hard" corners) are tried first.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from limitsets.files import as_table, picked
-from limitsets.robust.margins.trap import Trap, trap
+from limitsets.robust.margins.invariant_set import InvariantIntervals, invariant_intervals
 from limitsets.robust.margins.vector import Signs, Tolerance, corners, worst_corner
 from limitsets.scene import Scene
 
@@ -43,10 +43,10 @@ class Estimate:
     margin : float
         Factor on the tolerance up to which parts are fed at `x`; 0 or below where they are not even as it is.
     x : float
-        The X that lasts longest [scene's unit].
+        The X that lasts longest [length].
     threshold, reach : float
-        Of the scene as it is: X may lie between them [scene's unit].
-    kept : Trap
+        Of the scene as it is: X may lie between them [length].
+    invariant : InvariantIntervals
         Where the part is kept, the scene as it is.
     effects : dict of str to (float, float)
         By how much one tolerance of each quantity raises the threshold and lowers the reach, at worst.
@@ -56,7 +56,7 @@ class Estimate:
     x: float
     threshold: float
     reach: float
-    kept: Trap
+    invariant: InvariantIntervals
     effects: dict[str, tuple[float, float]]
 
     def to_json(self) -> dict[str, Any]:
@@ -64,13 +64,13 @@ class Estimate:
         return as_table(**picked(self, "margin", "x", "threshold", "reach", "effects"))
 
 
-def _kept(scene: Scene | None, start: tuple[float, int], landing: float) -> Trap | None:
+def _kept(scene: Scene | None, start: tuple[float, int], landing: float) -> InvariantIntervals | None:
     if scene is None or not (scene.sides.a[start[1]] < start[0] < scene.arm_length):
         return None
-    return trap(scene.bare_map, *start, landing=landing)
+    return invariant_intervals(scene.bare_map, *start, landing=landing)
 
 
-def _ways(scene: Scene, found: Trap, side: int) -> Array:
+def _ways(scene: Scene, found: InvariantIntervals, side: int) -> Array:
     """Numbers that must not rise: the threshold, minus the reach, and what keeps the part from the joint."""
     near = np.nan_to_num(found.lo - scene.sides.a)
     creep = np.where(np.isfinite(found.creep), found.creep, 0.0)
@@ -96,14 +96,14 @@ class _Fed:
         # the farthest place that landings always off inward still lead to
         return found.threshold(self.side), float(found.hi[self.side]) - 2.0 * landing
 
-    def all(self, factor: float, asked: list[Signs]) -> tuple[float, float, Signs | None]:
+    def all(self, factor: float, loaded: list[Signs]) -> tuple[float, float, Signs | None]:
         """Threshold and reach over corners, and the corner at which they cross, which moves to the front."""
         highest, least = -math.inf, math.inf
-        for k, signs in enumerate(asked):
+        for k, signs in enumerate(loaded):
             threshold, reach = self.spare(factor, signs)
             highest, least = max(highest, threshold), min(least, reach)
             if highest > least:
-                asked.insert(0, asked.pop(k))
+                loaded.insert(0, loaded.pop(k))
                 return highest, least, signs
         return highest, least, None
 
@@ -181,10 +181,10 @@ def estimated(
     linear = (reach - threshold) / cost if cost > 0.0 else math.inf
     if linear <= above:
         return Estimate(linear, math.nan, threshold, reach, nominal, effects)
-    asked = list(hard or [])
-    asked += [worst_corner(row) for row in falls.T]
+    loaded = list(hard or [])
+    loaded += [worst_corner(row) for row in falls.T]
     spare, top = reach - threshold, min(linear, 1e3)
-    margin, x = _sought(fed, list(dict.fromkeys(asked)), top, above, spare, steps, close)
+    margin, x = _sought(fed, list(dict.fromkeys(loaded)), top, above, spare, steps, close)
     return Estimate(margin, x, threshold, reach, nominal, effects)
 
 
@@ -241,14 +241,14 @@ def _start(found: Estimate, side: int) -> tuple[float, int]:
 
 
 def _sought(
-    fed: _Fed, asked: list[Signs], top: float, above: float, spare: float, steps: int, close: float
+    fed: _Fed, loaded: list[Signs], top: float, above: float, spare: float, steps: int, close: float
 ) -> tuple[float, float]:
     """Close in on the margin between 0 (or `above`) and a little over its linear estimate."""
     good, bad, x = 0.0, 1.05 * top, math.nan
     factor = above if above > 0.0 else 0.98 * top
     under = 1.0 - 0.4 * close
     for _ in range(steps):
-        highest, least, failed = fed.all(factor, asked)
+        highest, least, failed = fed.all(factor, loaded)
         if failed is None:
             good, x = factor, 0.5 * (highest + least)
             # T and R close in on each other about evenly

@@ -1,7 +1,7 @@
 """Margins: how much a quantity may deviate before a goal fails, as a bracket that is proved and refuted.
 
 `proved` is the largest symmetric deviation for which a certificate can be written; `refuted` the smallest for which an
-orbit is proved to violate the goal.  Floats propose both, nothing is believed of them.
+orbit is proved to violate the goal.  Floats only propose both.
 """
 
 from __future__ import annotations
@@ -15,10 +15,10 @@ from typing import Any
 from limitsets.errors import AnswerError
 from limitsets.goals import Goal, Predicate, unknown_goal
 from limitsets.proofs.query import Outcome, Query
-from limitsets.robust.margins.answer import Margin
 from limitsets.robust.margins.brackets import Bracket, bracket_fixed, bracket_per_throw
-from limitsets.robust.margins.deviations import Measure, measure, measures
+from limitsets.robust.margins.deviations import DeviationScale, deviation_scale, deviation_scales
 from limitsets.robust.margins.joint import joint_margin
+from limitsets.robust.margins.margin_result import Margin
 from limitsets.scene import Scene, load
 from limitsets.scene.units import exact_factor
 
@@ -92,18 +92,18 @@ def margin(
     >>> speed.proved < 0.733 < speed.refuted, speed.unit
     (True, '%')
     """
-    asked = scene if isinstance(scene, Scene) else load(scene)
+    loaded = scene if isinstance(scene, Scene) else load(scene)
     if not 1e-4 <= width < 1:
         raise AnswerError("the width", width, "from 0.0001 to below 1", "0.01 is a hundredth")
-    goals = goals_of(asked, goal)
-    query = Query.of(asked, goals)
+    goals = goals_of(loaded, goal)
+    query = Query.of(loaded, goals)
     names: tuple[str, ...] = tuple(dict.fromkeys(quantities))
-    todo: list[Measure | str] = []
+    todo: list[DeviationScale | str] = []
     if names:
-        todo = [name if name == "joint" else measure(query.scene, name, reading) for name in names]
+        todo = [name if name == "joint" else deviation_scale(query.scene, name, reading) for name in names]
     else:
-        todo = [*measures(query.scene, reading)]
-        todo += ["joint"] if asked.tolerance and reading is None else []
+        todo = [*deviation_scales(query.scene, reading)]
+        todo += ["joint"] if loaded.tolerance and reading is None else []
     found = []
     for number, one in enumerate(todo):
         label = one if isinstance(one, str) else f"{one.quantity} {one.reading}"
@@ -114,13 +114,13 @@ def margin(
 
         tell(0.0)
         if isinstance(one, str):
-            found.append(joint_margin(asked, goals, width=width, tell=tell))
+            found.append(joint_margin(loaded, goals, width=width, tell=tell))
         else:
             found.append(_single(query, one, Fraction(repr(width)), tell))
     return tuple(found)
 
 
-def _single(query: Query, one: Measure, width: Fraction, tell: Callable[[float], None]) -> Margin:
+def _single(query: Query, one: DeviationScale, width: Fraction, tell: Callable[[float], None]) -> Margin:
     begin = time.perf_counter()
     nominal = query.prove()
     if nominal.verdict != "proved":
@@ -147,7 +147,7 @@ def _single(query: Query, one: Measure, width: Fraction, tell: Callable[[float],
     )
 
 
-def _texts(one: Measure, size: Fraction) -> tuple[dict[str, str], dict[str, str]]:
+def _texts(one: DeviationScale, size: Fraction) -> tuple[dict[str, str], dict[str, str]]:
     """Say what is fixed but unknown, and what differs at every throw."""
     if not size:
         return {}, {}
@@ -155,7 +155,7 @@ def _texts(one: Measure, size: Fraction) -> tuple[dict[str, str], dict[str, str]
     return (said, {}) if one.reading == "fixed" else ({}, said)
 
 
-def _nominal(one: Measure) -> float | None:
+def _nominal(one: DeviationScale) -> float | None:
     """Give the value; of a length or an angle in the unit of its deviation."""
     if one.key != one.quantity or one.quantity == "landing.x":
         return None

@@ -1,6 +1,6 @@
 """The joint margin: the factor on a whole vector of tolerances, up to which goals are proved.
 
-Every quantity is fixed but unknown, but for the landing place, which differs at every throw.  The worst corners, each
+Every quantity is fixed but unknown, except the landing place, which differs at every throw.  The worst corners, each
 a single scene, bracket the factor from above, the proof of the whole box from below.
 """
 
@@ -12,11 +12,11 @@ from fractions import Fraction
 
 from limitsets.goals import Goal
 from limitsets.proofs.query import Outcome, Query
-from limitsets.robust.margins.answer import Margin
 from limitsets.robust.margins.brackets import Bracket, Ray, Tell
-from limitsets.robust.margins.cutting import Cutting
 from limitsets.robust.margins.halving import a_little_beyond, halved
+from limitsets.robust.margins.margin_result import Margin
 from limitsets.robust.margins.sensitivity import Sensitivity, sensitivity_of
+from limitsets.robust.margins.subdivision import Subdivision
 from limitsets.robust.margins.vector import Tolerance
 from limitsets.scene import Scene
 
@@ -77,7 +77,7 @@ def joint_margin(
     end = time.perf_counter() + seconds
     for stage in STAGES if target > 0 else ():
         # the smaller box first: what is proved of it stands, whatever becomes of the larger one
-        cutting = Cutting(query, vector, rounded(target * stage), sensitivity)
+        cutting = Subdivision(query, vector, rounded(target * stage), sensitivity)
         left = end - time.perf_counter()
         part, why = cutting.run(left if stage == STAGES[-1] else left / 2, tell)
         reason = why or reason
@@ -111,7 +111,7 @@ def joint_margin(
 
 def _at_corners(query: Query, tolerance: Tolerance, sensitivity: Sensitivity, width: Fraction) -> Bracket:
     """Bracket the factor at the worst corners, as single scenes."""
-    count, found, proved = len(tolerance.measures), Bracket(), list[Fraction]()
+    count, found, proved = len(tolerance.scales), Bracket(), list[Fraction]()
     for signs in (sensitivity.corners() or [(1,) * count, (-1,) * count])[:CORNERS]:
         own = _at_one(Ray(query, tolerance, signs), width, found.refuted)
         proved.append(own.proved)

@@ -1,4 +1,4 @@
-"""How much each quantity matters to a goal, by floats: where the worst corner of a box is, and what to cut.
+"""Sensitivities of a goal to each quantity, by floats: the worst corner of a box, and the quantity to cut.
 
 The slack before a goal fails (from the highest place on another side to X, from X to the highest place on the wanted
 one) is nearly linear in the quantities.  It is read off one long orbit for each change of one quantity.  Nothing is
@@ -18,9 +18,9 @@ from numpy.typing import NDArray
 from limitsets.errors import AnswerError
 from limitsets.goals import Goal, OrientedBeyond, Reaches
 from limitsets.maps import orbit
-from limitsets.proofs.asked.search import settled
+from limitsets.proofs.goals.violating_orbits import on_limit_set
 from limitsets.proofs.query import Query
-from limitsets.proofs.tolerance import Piece
+from limitsets.proofs.tolerance import SceneBox
 from limitsets.robust.margins.vector import Signs, Tolerance, worst_corner
 
 __all__ = ["Sensitivity", "sensitivity_of"]
@@ -81,17 +81,17 @@ def sensitivity_of(query: Query, tolerance: Tolerance) -> Sensitivity:
     tolerance : Tolerance
         Quantities that are fixed but unknown, with sizes.
     """
-    count = len(tolerance.measures)
+    count = len(tolerance.scales)
     nominal = query.prove(finest=1) if count else None
     if nominal is None or nominal.found is None or not (nominal.found.component >= 0).any():
         return Sensitivity.none(count)
-    start, step = settled(nominal.found), float(CHANGE)
+    start, step = on_limit_set(nominal.found), float(CHANGE)
     slack, level = (
         _slack(query, tolerance.corner(Fraction(0), [0] * count), start),
         _proved_slack(query, None),
     )
     falls, costs = [], []
-    for k, one in enumerate(tolerance.measures):
+    for k, one in enumerate(tolerance.scales):
         size = CHANGE * tolerance.sizes[k]
         ends = []
         for sign in (-1, 1):
@@ -120,7 +120,7 @@ def sensitivity_of(query: Query, tolerance: Tolerance) -> Sensitivity:
     )
 
 
-def _slack(query: Query, piece: Piece | None, start: tuple[float, int]) -> Array:
+def _slack(query: Query, piece: SceneBox | None, start: tuple[float, int]) -> Array:
     """Read the slack of one scene off a long orbit."""
     box = query.box(piece, {})
     path = orbit(box.at_kappa(box.middle_kappa), *start, BEFORE + LENGTH)
@@ -138,7 +138,7 @@ def _slack_of(goal: Goal, highest: Sequence[float]) -> list[float]:
     return []
 
 
-def _proved_slack(query: Query, piece: Piece | None) -> Array:
+def _proved_slack(query: Query, piece: SceneBox | None) -> Array:
     """Say what slack is proved; of a place to be reached, nothing of the kind is."""
     extents = query.cells(piece, STEP).cells.extents()
     highest = [max((hi for _, hi in parts), default=-math.inf) for _, parts in sorted(extents.items())]

@@ -16,9 +16,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from limitsets.errors import AnswerError, SceneError
-from limitsets.proofs.rational import Span
-from limitsets.proofs.tolerance import Piece
-from limitsets.robust.margins.deviations import Measure, measure, short
+from limitsets.proofs.rational import RationalInterval
+from limitsets.proofs.tolerance import SceneBox
+from limitsets.robust.margins.deviations import DeviationScale, deviation_scale, short
 from limitsets.scene import Scene
 from limitsets.scene.facts import Deviation
 from limitsets.scene.quantities import deviation, parsed_deviation
@@ -63,57 +63,55 @@ class Tolerance:
 
     Attributes
     ----------
-    measures : tuple of Measure
+    scales : tuple of DeviationScale
         What is fixed but unknown.
     sizes : tuple of Fraction
         A size for each.
-    varying : Measure or None
+    varying : DeviationScale or None
         What differs at every throw, if something does: where parts land.
     varying_size : Fraction
         How much.
     """
 
-    measures: tuple[Measure, ...]
+    scales: tuple[DeviationScale, ...]
     sizes: Parts
-    varying: Measure | None = None
+    varying: DeviationScale | None = None
     varying_size: Fraction = Fraction(0)
 
     @classmethod
     def of(cls, scene: Scene, texts: Mapping[str, str]) -> Tolerance:
         """Read it from texts by quantity."""
-        measures, sizes, landing, landing_size = list[Measure](), list[Fraction](), None, Fraction(0)
+        scales, sizes, landing, landing_size = list[DeviationScale](), list[Fraction](), None, Fraction(0)
         if not texts:
             raise AnswerError(
                 "the tolerance", "empty", "deviations by quantity", "give the scene [tolerance]"
             )
         for name, text in texts.items():
             deviation(text, name, scene.unit, key=f'tolerance."{name}"')  # refuses what is none
-            one, given = measure(scene, name), parsed_deviation(text, name)
+            one, given = deviation_scale(scene, name), parsed_deviation(text, name)
             one = replace(one, unit=given.unit)
             if name == "throw.speed" and one.key != name and given.unit != "%":
                 raise AnswerError("the tolerance", text, "percent, for a scene given by kappa", "give it so")
             if name == "landing.x":
                 landing, landing_size = one, Fraction(given.number)
             else:
-                measures.append(one)
+                scales.append(one)
                 sizes.append(Fraction(given.number))
-        return cls(tuple(measures), tuple(sizes), landing, landing_size)
+        return cls(tuple(scales), tuple(sizes), landing, landing_size)
 
     @classmethod
-    def alone(cls, one: Measure) -> Tolerance:
+    def alone(cls, one: DeviationScale) -> Tolerance:
         """Return one quantity, by 1 of its unit."""
         return cls((one,), (Fraction(1),)) if one.reading == "fixed" else cls((), (), one, Fraction(1))
 
     @cached_property
     def deviations(self) -> dict[str, Deviation]:
         """What is fixed but unknown, in floats of the scene's units."""
-        return {
-            one.quantity: one.deviation(size) for one, size in zip(self.measures, self.sizes, strict=True)
-        }
+        return {one.quantity: one.deviation(size) for one, size in zip(self.scales, self.sizes, strict=True)}
 
     @cached_property
     def scatter(self) -> float:
-        """How far landings are off, in floats [scene's unit]; 0 where they are not."""
+        """How far landings are off, in floats [length]; 0 where they are not."""
         return 0.0 if self.varying is None else self.varying.deviation(self.varying_size).value
 
     def noise(self, factor: Fraction) -> dict[str, str]:
@@ -124,24 +122,24 @@ class Tolerance:
     def texts(self, factor: Fraction) -> dict[str, str]:
         """Say what is fixed but unknown, as `limitsets.certify` takes it."""
         return {
-            one.quantity: one.text(factor * size) for one, size in zip(self.measures, self.sizes, strict=True)
+            one.quantity: one.text(factor * size) for one, size in zip(self.scales, self.sizes, strict=True)
         }
 
-    def corner(self, factor: Fraction, signs: Sequence[int]) -> Piece | None:
+    def corner(self, factor: Fraction, signs: Sequence[int]) -> SceneBox | None:
         """Return the scene at a corner of the box stretched by a factor, exactly; None where nothing is fixed."""
-        ends = zip(self.measures, self.sizes, signs, strict=True)
+        ends = zip(self.scales, self.sizes, signs, strict=True)
         return self._piece([one.at(factor * size * sign) for one, size, sign in ends])
 
-    def piece(self, low: Parts, high: Parts, factor: Fraction) -> Piece | None:
+    def piece(self, low: Parts, high: Parts, factor: Fraction) -> SceneBox | None:
         """Return the scenes between two corners, given as parts of the whole deviation."""
-        ends = zip(self.measures, self.sizes, low, high, strict=True)
+        ends = zip(self.scales, self.sizes, low, high, strict=True)
         return self._piece(
             [one.between(factor * size * lo, factor * size * hi) for one, size, lo, hi in ends]
         )
 
-    def _piece(self, spans: Sequence[Span]) -> Piece | None:
-        keys = [one.key for one in self.measures]
-        return Piece(self.measures[0].scene, dict(zip(keys, spans, strict=True))) if keys else None
+    def _piece(self, spans: Sequence[RationalInterval]) -> SceneBox | None:
+        keys = [one.key for one in self.scales]
+        return SceneBox(self.scales[0].scene, dict(zip(keys, spans, strict=True))) if keys else None
 
     def scene_at(self, scene: Scene, factor: float, signs: Sequence[float]) -> Scene | None:
         """Give another scene, in floats, at a corner of the same box about it; None where there is no such part."""

@@ -1,8 +1,8 @@
-"""Where a noisy chain ends and how long that takes: absorption probabilities and mean numbers of throws.
+"""Absorption of a noisy chain: probabilities and mean numbers of throws.
 
-What absorbs is a goal (some cells), the closed classes of the rest, and the ways out.  With Q the operator on all other
-cells and b the probability of going to one of these in one step, its probability h solves (I - Q) h = b.  Of those
-throws that lead to the goal the number T has E[T; goal] = t with (I - Q) t = h on all cells.
+The absorbing sets are a goal (some cells), the closed classes of the rest, and the exits.  With Q the operator on all
+other cells and b the probability of going to one of these in one step, its probability h solves (I - Q) h = b.  Of
+those throws that lead to the goal the number T has E[T; goal] = t with (I - Q) t = h on all cells.
 """
 
 from __future__ import annotations
@@ -15,9 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from limitsets.graph.components import strong_components
-from limitsets.robust.noise.settling import closed_sets, graph_of
-from limitsets.robust.noise.sheets import Array
-from limitsets.robust.noise.ulam import Part, Transfer
+from limitsets.robust.noise.boxcars import Array
+from limitsets.robust.noise.communicating_classes import graph_of, recurrent_classes
+from limitsets.robust.noise.ulam import SubOperator, Transfer
 
 __all__ = ["Absorption", "absorption"]
 
@@ -72,7 +72,7 @@ class _Equations:
             # In the order of the graph's components an edge leads back, or stays in its component: a triangle holds
             # most of Q, and, larger cells first, the long ways by which orbits creep outward from the joint.
             cells = cells[np.lexsort((-cells, label[cells]))]
-        self.part, self.worst = Part(chain, cells), 0.0
+        self.part, self.worst = SubOperator(chain, cells), 0.0
         self.inverse = _triangle(self.part.matrix) if chain.written_out and cells.size else None
 
     def _product(self, values: Array) -> Array:
@@ -140,7 +140,7 @@ def absorption(
     goal = np.asarray(goal, dtype=bool)
     graph = graph_of(chain)
     absorbing = goal if other is None else goal | other
-    closed = closed_sets(chain, graph, absorbing)[0] if classes is None else list(classes)
+    closed = recurrent_classes(chain, graph, absorbing)[0] if classes is None else list(classes)
     open_ = ~absorbing
     for cells in closed:
         open_[cells] = False

@@ -1,4 +1,4 @@
-"""How many throws it takes from a random start to the goal: the whole distribution, by moving the starts' masses on."""
+"""Distribution of the number of throws from a random start to the goal, by propagating the masses of the starts."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from limitsets.cells import Grid
 from limitsets.errors import GridError
 from limitsets.robust.noise.absorbing import Absorption
-from limitsets.robust.noise.sheets import Array
+from limitsets.robust.noise.boxcars import Array
 from limitsets.robust.noise.ulam import Transfer
 
 __all__ = ["Feeding", "feeding", "random_starts", "with_border"]

@@ -1,8 +1,8 @@
-"""Distributions of a deviation, and their cut into strata: parts of the law whose mean and spread are kept.
+"""Probability laws of a deviation, and their strata: parts of the law that preserve mean and variance.
 
-A stratum stands for a piece of the law by its probability, mean and standard deviation; the transfer operator spreads
-it over an interval of the same mean and spread.  Points instead would leave spikes in every density.  Half of the cuts
-follow the probability and half the length: rare deviations decide about rare escapes and have to be seen.
+A stratum represents a part of the law by its probability, mean and standard deviation; the transfer operator spreads it
+over an interval of the same mean and variance.  Point masses would leave spikes in every density.  Half of the cuts
+follow the probability and half the length, because rare deviations decide rare escapes.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
-"""The same statistics by throwing: many parts thrown again and again with counted random numbers, with error bars.
+"""The same statistics by Monte Carlo: many parts, counter-based random numbers, standard errors.
 
-Parts are independent of each other, so the spread between them gives the standard error of every mean.  It is the check
-of the transfer operator, which knows nothing of it: these throws are those of `limitsets.orbit`.
+Parts are independent of each other, so the spread between them gives the standard error of every mean.  It is an
+independent check of the transfer operator: the throws are those of `limitsets.orbit`.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from limitsets.robust.noise.scattering import Scattering, still_map
 if TYPE_CHECKING:
     from limitsets.scene import Scene
 
-__all__ = ["Thrown", "scattering_map", "throw_many"]
+__all__ = ["SampledStatistics", "scattering_map", "throw_many"]
 
 # Throws that are not counted: the part comes onto the limit set first.
 BEFORE = 400
@@ -33,7 +33,7 @@ Answers: TypeAlias = dict[str, tuple[float, float]]
 
 
 @dataclass(frozen=True, eq=False)
-class Thrown:
+class SampledStatistics:
     """What many parts did; sampled.
 
     Attributes
@@ -119,7 +119,7 @@ def throw_many(
     seed: int = 0,
     bins: int = 200,
     progress: Callable[[int, int], None] | None = None,
-) -> Thrown:
+) -> SampledStatistics:
     """Throw many parts: for the time fractions on the limit set, and from random starts to the goal.
 
     Parameters
@@ -152,7 +152,7 @@ def throw_many(
     fed, arrived = _to_goal(_Many(scattering_map(scene, scatter, seed + 1), x, side), goal)
     answers = {**long_run, **fed}
     numbers, errors = ({name: pair[k] for name, pair in answers.items()} for k in (0, 1))
-    return Thrown(rounds * parts, numbers, errors, density, borders, arrived, parts)
+    return SampledStatistics(rounds * parts, numbers, errors, density, borders, arrived, parts)
 
 
 def _starts(

@@ -1,4 +1,4 @@
-"""Which quantities of a throw scatter, by which laws, and the map that a scene throws with them."""
+"""The random quantities of a throw, their laws, and the map of a scene with them."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class Scattering:
     tilt : Law or None
         Deviation of the table's tilt [rad]; the scene has to give gravity.tilt.
     landing : Law or None
-        Deviation of the landing place [scene's length unit].
+        Deviation of the landing place [length].
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""What noise makes of a scene: where it settles, how a goal is reached, and what more or less noise changes."""
+"""Statistics of a scene with noise: stationary densities, throws to the goal, sensitivity to the noise level."""
 
 from __future__ import annotations
 
@@ -11,8 +11,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from limitsets.files import as_table, picked
+from limitsets.robust.noise.chain_solution import (
+    ChainSolution,
+    LevelSensitivity,
+    chain_problem_of,
+    errors_of,
+    slopes_of,
+    solve,
+)
 from limitsets.robust.noise.scattering import Scattering, scattering_of
-from limitsets.robust.noise.solving import Sensitivity, Solved, asked_of, errors_of, slopes_of, solve
 from limitsets.robust.noise.ulam import STRATA
 
 if TYPE_CHECKING:
@@ -26,7 +33,7 @@ Progress = Callable[[str, int, int], None]
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class NoiseStatistics(Solved):
+class NoiseStatistics(ChainSolution):
     """Answers about a noisy scene from the transfer operator; approximations between cells, not proved.
 
     Attributes
@@ -38,9 +45,9 @@ class NoiseStatistics(Solved):
     scatter : Scattering
         The noise.
     goal : (float, int)
-        A part at rest at x or beyond, on this side, is fed [unit].
+        A part at rest at x or beyond, on this side, is fed [length].
     starts : ndarray, shape (n_sides,)
-        Random starts lie from here to x of the goal, equally likely per length on all sides [unit].
+        Random starts lie from here to x of the goal, equally likely per length on all sides [length].
     grid : Grid
         The cells.
     strata : int
@@ -61,7 +68,7 @@ class NoiseStatistics(Solved):
     errors : dict of str to float
         How much each changes from half as many cells and from half as many strata: an estimate of the error, on the
         safe side as long as it falls with their width.
-    sensitivity : dict of str to dict of str to Sensitivity
+    sensitivity : dict of str to dict of str to LevelSensitivity
         By quantity, then by number.
     how : str
         "sampled".
@@ -82,7 +89,7 @@ class NoiseStatistics(Solved):
     starts: NDArray[np.float64]
     strata: int
     errors: dict[str, float]
-    sensitivity: dict[str, dict[str, Sensitivity]]
+    sensitivity: dict[str, dict[str, LevelSensitivity]]
     how: str = "sampled"
 
     def to_json(self) -> dict[str, Any]:
@@ -146,7 +153,7 @@ def noise_statistics(
     strata : int
         Into how many pieces each law is cut.
     offset : float, optional
-        How far beyond a_i random starts begin; by default a twentieth of the arm [scene's length unit].
+        How far beyond a_i random starts begin; by default a twentieth of the arm [length].
     sensitivity : bool
         Compute the derivatives with respect to the noise of each quantity: six more solutions for each.
     progress : callable, optional
@@ -172,25 +179,25 @@ def noise_statistics(
     >>> round(found.numbers["mean throws"], 1), round(float(found.feeding.survivors[40]), 2)
     (23.2, 0.2)
     """
-    asked = asked_of(scene, goal, cells, strata, offset)
-    noise = scattering_of(asked.scene) if scatter is None else scatter
+    problem = chain_problem_of(scene, goal, cells, strata, offset)
+    noise = scattering_of(problem.scene) if scatter is None else scatter
     names = noise.given() if sensitivity else ()
     stages = 3 + 6 * len(names)
     tell = progress or (lambda stage, done, total: None)
     tell("noise", 0, stages)
-    found = solve(asked, noise)
+    found = solve(problem, noise)
     tell("noise", 1, stages)
-    errors = errors_of(asked, noise, found.numbers)
+    errors = errors_of(problem, noise, found.numbers)
     slopes = {}
     for number, name in enumerate(names):
         tell("noise", 3 + 6 * number, stages)
-        slopes[name] = slopes_of(asked, noise, name)
+        slopes[name] = slopes_of(problem, noise, name)
     tell("noise", stages, stages)
     return NoiseStatistics(
         **vars(found),
-        **picked(asked, "goal", "starts", "strata"),
-        **picked(asked.scene, "unit"),
-        scene=asked.scene.name,
+        **picked(problem, "goal", "starts", "strata"),
+        **picked(problem.scene, "unit"),
+        scene=problem.scene.name,
         scatter=noise,
         errors=errors,
         sensitivity=slopes,
@@ -214,9 +221,9 @@ def noise_levels(
     factors : sequence of float
         Factors on all deviations; 0 is the throw without noise.
     """
-    asked = asked_of(scene, goal, cells, strata, offset)
-    noise = scattering_of(asked.scene) if scatter is None else scatter
-    rows = [solve(asked, noise.scaled(float(factor))).numbers for factor in factors]
+    problem = chain_problem_of(scene, goal, cells, strata, offset)
+    noise = scattering_of(problem.scene) if scatter is None else scatter
+    rows = [solve(problem, noise.scaled(float(factor))).numbers for factor in factors]
     names = {name: None for row in rows for name in row}
     table = {name: np.array([row.get(name, math.nan) for row in rows]) for name in names}
     return Levels(np.array(factors, dtype=np.float64), table)

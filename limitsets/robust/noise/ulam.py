@@ -2,8 +2,8 @@
 
 P[i, j] is the probability that a state anywhere in cell i, equally likely, is in cell j one step later.  The noise of
 the step itself (speed, tilt: a parameter of the map) and the noise of the landing place, added afterwards, are two
-stages.  Between them the cells go on beyond the domain by as far as the second can bring something back.  Ways out are
-columns of their own: nothing that leaves is counted in a neighbouring cell.
+stages.  Between them the cells extend beyond the domain, as far as the second stage can bring a part back.  Exits are
+columns of their own: no mass that leaves is counted in a neighbouring cell.
 Source: Ulam, "A Collection of Mathematical Problems", 1960, ch. VI; Hsu, "Cell-to-Cell Mapping", 1987, ch. 10;
 Dellnitz and Junge, SIAM J. Numer. Anal. 36, 1999.
 """
@@ -21,13 +21,13 @@ from numpy.typing import NDArray
 from limitsets.cells import Grid
 from limitsets.errors import AnswerError
 from limitsets.maps import kind_of
-from limitsets.robust.noise.casting import uses_pieces
-from limitsets.robust.noise.cutting import Cutter
+from limitsets.robust.noise.boxcars import Array, BoxcarOperator
+from limitsets.robust.noise.cell_images import uses_pieces
+from limitsets.robust.noise.interpolated_pieces import InterpolatedPieces
 from limitsets.robust.noise.laws import Law, Strata, certain
-from limitsets.robust.noise.sheets import Array, Sheets
-from limitsets.robust.noise.staging import beyond, from_pieces, from_points, landing_stage
+from limitsets.robust.noise.stages import beyond, from_pieces, from_points, landing_stage
 
-__all__ = ["STRATA", "Part", "Transfer", "transfer"]
+__all__ = ["STRATA", "SubOperator", "Transfer", "transfer"]
 
 STRATA = 24
 # Landing places are cut more finely, into boxcars about as narrow as cells, as long as there are no more than this.
@@ -46,9 +46,9 @@ class Transfer:
         The map at the parameter's first stratum, for names of branches and ways out.
     grid : Grid
         The cells.
-    throw : Sheets or sparse array
+    throw : BoxcarOperator or sparse array
         First stage, from the cells to the cells that go on beyond the domain.
-    landing : Sheets or None
+    landing : BoxcarOperator or None
         Second stage, back to the cells.
     sinks : ndarray, shape (n_cells, n_exits)
         Probability of leaving by each way out, in the order of `exits`.
@@ -63,7 +63,7 @@ class Transfer:
     map: Any
     grid: Grid
     throw: Any
-    landing: Sheets | None
+    landing: BoxcarOperator | None
     sinks: Array
     branches: Array
     reach: tuple[float, float]
@@ -85,7 +85,7 @@ class Transfer:
     @cached_property
     def entries(self) -> int:
         """Entries of the two stages, if they were written out."""
-        first = self.throw.entries if isinstance(self.throw, Sheets) else int(self.throw.nnz)
+        first = self.throw.entries if isinstance(self.throw, BoxcarOperator) else int(self.throw.nnz)
         if self.landing is None:
             return first
         wide = self.landing.entries / max(self.landing.rows, 1)
@@ -94,7 +94,7 @@ class Transfer:
     @cached_property
     def matrix(self) -> Any:
         """P as a sparse matrix, written out."""
-        first = self.throw.matrix() if isinstance(self.throw, Sheets) else self.throw
+        first = self.throw.matrix() if isinstance(self.throw, BoxcarOperator) else self.throw
         return first if self.landing is None else (first @ self.landing.matrix()).tocsr()
 
     @cached_property
@@ -104,7 +104,7 @@ class Transfer:
     @property
     def written_out(self) -> bool:
         """Whether products use the matrix written out."""
-        return not isinstance(self.throw, Sheets) or self.entries <= WRITTEN_OUT
+        return not isinstance(self.throw, BoxcarOperator) or self.entries <= WRITTEN_OUT
 
     def apply(self, values: Array) -> Array:
         """Return a function's expected value one step later, from each cell: P v; ways out count nothing."""
@@ -129,7 +129,7 @@ class Transfer:
         return LinearOperator(shape, matvec=self.apply, rmatvec=self.adjoint, dtype=np.float64)
 
 
-class Part:
+class SubOperator:
     """The operator on some of the cells; what leaves them is missing.
 
     Parameters
@@ -177,7 +177,7 @@ def transfer(
     parameter: Law | Strata | None = None,
     landing: Law | None = None,
     strata: int = STRATA,
-    cutter: Cutter | None = None,
+    cutter: InterpolatedPieces | None = None,
 ) -> Transfer:
     """Build the transfer operator of a map with noise.
 
@@ -193,7 +193,7 @@ def transfer(
         Noise added to x after every step, in one dimension.
     strata : int
         Into how many pieces the law of the parameter is cut, and at least that of the landing place.
-    cutter : Cutter, optional
+    cutter : InterpolatedPieces, optional
         Where the sides are cut, if that is known already.
 
     Returns
@@ -236,7 +236,9 @@ def transfer(
     second = None
     if added is not None:
         second, late = landing_stage(grid, edges, added, kind.exits)
-        columns = [throw.apply(column) if isinstance(throw, Sheets) else throw @ column for column in late.T]
+        columns = [
+            throw.apply(column) if isinstance(throw, BoxcarOperator) else throw @ column for column in late.T
+        ]
         sinks = sinks + np.stack(columns, axis=1)
         cut += added.cut
     return Transfer(params, grid, throw, second, sinks, branches, reach, cut)

@@ -1,5 +1,5 @@
-"""The tolerance sheet of a scene: all its margins, the joint one, margins against X and noise, kept as they are found.
+"""The tolerance sheet of a scene: all margins, the joint margin, the margin curve and noise, stored as they are found.
 
-`gathering` asks, `keeping` goes on with what an earlier run found, `entries` and `summary` hold the answers; `chance`
-and `against_x` are the questions about noise and about X.
+`gathering` runs the parts, `keeping` resumes an earlier run, `entries` and `summary` hold the answers; `chance` reads
+the noise, `against_x` computes the margin curve.
 """

@@ -1,7 +1,7 @@
-"""One line of a tolerance sheet: a margin as plain data, which a file can hold and give back.
+"""One line of a tolerance sheet: a margin as plain data, to be written to a file and read again.
 
-A `Margin` has the cells of its proof with it; a sheet has thousands of times less: the bracket, the orbit at its upper
-end, and the names of the files that prove both.
+A `Margin` holds the cells of its proof.  A line of the sheet is thousands of times smaller: the bracket, the orbit at
+its upper end, and the names of the files that prove both.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The robustness of a scene as one answer: margins, where X is best, noise, and what there is nothing of."""
+"""The robustness of a scene as one answer: margins, the best X, noise, and the parts left out with their reasons."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from limitsets.files import as_table, picked
 from limitsets.goals import Goal
 from limitsets.robust.margins.beyond import MarginsBeyond
 from limitsets.robust.margins.finding import Margin
-from limitsets.robust.margins.words import void_of
+from limitsets.robust.margins.margin_texts import void_of
 from limitsets.robust.noise.statistics import Levels, NoiseStatistics
 from limitsets.robust.sheet.entries import Entry, percent_of
 from limitsets.scene import Scene

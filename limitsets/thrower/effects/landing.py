@@ -38,8 +38,8 @@ def _height(part: FullSide, x: float, k: int, at: Turned) -> tuple[float, float]
     """Height of vertex k over the arm, and its derivative, when the part has turned by phi in its first flight."""
     p, q, own = part.p[k], part.q[k], part.own
     rise = x + p
-    height = (own.d + q) + at.phi * (rise - 0.5 * own.kappa * at.phi) - p * at.w - q * at.v
-    return height, rise - own.kappa * at.phi - p * at.v - q * at.s
+    height = (own.d + q) + at.phi * (rise - 0.5 * own.kappa * at.phi) - p * at.phi_minus_sin - q * at.versin
+    return height, rise - own.kappa * at.phi - p * at.versin - q * at.sin
 
 
 @kernel
@@ -91,7 +91,7 @@ def first_arrival(landing: Any, part: FullSide, x: float) -> tuple[Arrival, bool
     k = side_number(part, vertex)
     now = turn(phi)
     # X, how far the centre is right of the vertex that lands, and its shift if the part fell back on side `vertex`
-    right = part.q[k] * now.s - part.p[k] * (1.0 - now.v)
+    right = part.q[k] * now.sin - part.p[k] * (1.0 - now.versin)
     pull, speed = pulled(drive, own.kappa, phi)
     moved = pull - (own.h + own.d) * phi + (part.a[k] - right)
     offset = own.corner

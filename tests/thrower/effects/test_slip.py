@@ -225,7 +225,7 @@ def test_without_friction_the_horizontal_velocity_stays_and_nothing_rests() -> N
         part = gather_full(case.full(("slip",)), case.side)
         hit = Arrival(case.side, turn(0.3 * part.own.corner), 0.0, -0.7, -2.0, 1.0)
         after = struck(None, entry_of(part.effects, Slip), part, hit)
-        high = part.own.a * hit.psi.s + part.own.d * (1.0 - hit.psi.v)
+        high = part.own.a * hit.psi.sin + part.own.d * (1.0 - hit.psi.versin)
         assert after.slide - after.omega * high == pytest.approx(hit.vx, rel=1e-12)
         assert case.mapped(("slip",)) is None
 

@@ -1,0 +1,246 @@
+"""The audit: every assumption of the minimal model, evaluated on the limit set and on the whole domain.
+
+An assumption is broken if its number is proved to be on the wrong side of its limit at a tested throw; it holds if the
+number is proved to be on the right side on every cell.  Otherwise the answer is sampled.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from limitsets.auditing.assumptions import ASSUMPTIONS, Assumption
+from limitsets.auditing.judging import Row, all_hold, enclosed_at
+from limitsets.auditing.places import Places, Sample, places
+from limitsets.auditing.stretches import where
+from limitsets.files import as_table, picked
+
+if TYPE_CHECKING:
+    from limitsets.proofs.parameters import ParameterBox
+    from limitsets.scene import Scene
+
+__all__ = ["Audit", "Finding", "audit"]
+
+Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+Extents = dict[int, list[tuple[float, float]]]
+
+
+@dataclass(frozen=True)
+class Finding:
+    """What became of one assumption in one place.
+
+    Attributes
+    ----------
+    about : Assumption
+        Which: its effect, words, dimension.
+    place : str
+        "limit-set" or "domain".
+    called_for : bool or None
+        Whether the effect is called for: the assumption is broken somewhere.  None: cannot tell.
+    how : str
+        "proved" or "sampled".
+    side, x : int or None, float or None
+        Of the throw that is worst, or nearest to the limit [length].
+    worst : float or None
+        The number there; None where it is beyond all bounds, or nothing was looked at.
+    threshold : float or None
+        Its limit on that side; where a fact is missing, the value of the fact at which it would begin to matter.
+    missing : str
+        The fact of the world that is missing, empty if none.
+    ranges : dict of int to list of (lo, hi)
+        Per side where on the domain the assumption is broken [length]; empty for the limit set.
+    jogs, flips, others : (int, int)
+        On the orbits: how many such throws break it, of how many; others are rolls.
+    simulated : bool
+        Whether the scene simulates the effect.
+    """
+
+    about: Assumption
+    place: str
+    called_for: bool | None
+    how: str
+    side: int | None = None
+    x: float | None = None
+    worst: float | None = None
+    threshold: float | None = None
+    missing: str = ""
+    ranges: Extents = field(default_factory=dict)
+    jogs: tuple[int, int] = (0, 0)
+    flips: tuple[int, int] = (0, 0)
+    others: tuple[int, int] = (0, 0)
+    simulated: bool = False
+
+    @property
+    def effect(self) -> str:
+        """Name of the effect that lifts the assumption."""
+        return self.about.effect
+
+    def to_json(self) -> dict[str, Any]:
+        """Give it as plain tables for JSON."""
+        return as_table(
+            effect=self.effect,
+            assumption=self.about.what,
+            where=self.place,
+            called_for="cannot tell" if self.called_for is None else self.called_for,
+            **picked(self, "how", "side", "x", "worst", "threshold"),
+            missing=self.missing or None,
+            **picked(self, "ranges", "jogs", "flips", "others", "simulated"),
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Audit:
+    """What a scene calls for.
+
+    Attributes
+    ----------
+    scene : Scene
+        The scene.
+    findings : tuple of Finding
+        Every assumption, first on the limit set, then on the domain.
+    extents : dict of int to list of (lo, hi)
+        Cells that hold the limit set [length].
+    enclosed : bool
+        Whether that is proved.
+    """
+
+    scene: Scene
+    findings: tuple[Finding, ...]
+    extents: Extents
+    enclosed: bool
+
+    def on(self, place: str) -> tuple[Finding, ...]:
+        """Give the findings of one place: "limit-set" or "domain"."""
+        return tuple(finding for finding in self.findings if finding.place == place)
+
+    def to_json(self) -> list[dict[str, Any]]:
+        """Give it as plain tables for JSON, one per finding."""
+        return [finding.to_json() for finding in self.findings]
+
+
+def _worst(row: Row, found: Mapping[int, Array], samples: Mapping[int, Sample]) -> dict[str, Any]:
+    """Find the throw whose number is farthest beyond its limit, or nearest to it."""
+    best: tuple[float, dict[str, Any]] = (-math.inf, {})
+    for side, seen in found.items():
+        reached = row.reached(seen)
+        known = ~np.isnan(reached) & ~(np.isneginf(reached) if row.about.below else np.isposinf(reached))
+        if not known.any():
+            continue
+        limit = 0.0 if row.terms.limit is None else row.limit(side)
+        excess = np.where(known, reached - limit if row.about.below else limit - reached, -np.inf)
+        k = int(excess.argmax())
+        if not best[1] or excess[k] > best[0]:
+            value: float | None = _finite(float(reached[k]))
+            threshold: float | None = row.limit(side)
+            if row.terms.limit is None and value is not None:
+                threshold = row.terms.matters(value)
+            x = float(samples[side].x[k])
+            best = excess[k], {"side": side, "x": x, "worst": value, "threshold": _finite(threshold)}
+    return best[1]
+
+
+def _finite(value: float | None) -> float | None:
+    return None if value is None or not math.isfinite(value) else value
+
+
+def _shares(broken: Mapping[int, Flags], samples: Mapping[int, Sample]) -> dict[str, Any]:
+    from limitsets.maps import codes
+
+    def count(wanted: int) -> tuple[int, int]:
+        which = {side: sample.code == wanted for side, sample in samples.items()}
+        hit = sum(int((broken[side] & mask).sum()) for side, mask in which.items())
+        return hit, sum(int(mask.sum()) for mask in which.values())
+
+    return {"jogs": count(codes.JOG), "flips": count(codes.FLIP), "others": count(codes.ROLL)}
+
+
+def _ranges(box: ParameterBox, row: Row, found: Mapping[int, Array], domain: Mapping[int, Sample]) -> Extents:
+    ranges = {}
+    for side, sample in domain.items():
+
+        def broken(x: Array, side: int = side) -> Flags:
+            return row.broken(enclosed_at(box, side, x), side)
+
+        ranges[side] = where(broken, sample.x, row.broken(found[side], side))
+    return {side: parts for side, parts in ranges.items() if parts}
+
+
+def _findings(
+    place: str, scene: Scene, box: ParameterBox, rows: list[Row], sites: Places
+) -> tuple[Finding, ...]:
+    """Every assumption in one place."""
+    limit = place == "limit-set"
+    samples, cells = (sites.orbits, sites.limit_cells) if limit else (sites.domain, sites.domain_cells)
+    sound = sites.enclosed or not limit
+    found = {side: enclosed_at(box, side, sample.x) for side, sample in samples.items()}
+    broken = [{side: row.broken(seen, side) for side, seen in found.items()} for row in rows]
+    hit = [any(flags.any() for flags in each.values()) for each in broken]
+    hopeful = [k for k, row in enumerate(rows) if not hit[k] and row.terms.limit is not None and bool(cells)]
+    proved = dict(zip(hopeful, all_hold(box, cells, [rows[k] for k in hopeful]), strict=True))
+    findings = []
+    for k, row in enumerate(rows):
+        called = True if hit[k] else (None if row.terms.limit is None or not samples else False)
+        sure = (hit[k] and not limit) or (sound and proved.get(k, False))
+        findings.append(
+            Finding(
+                row.about,
+                place,
+                called,
+                "proved" if sure else "sampled",
+                **_worst(row, found, samples),
+                missing=row.terms.missing,
+                ranges={} if limit or not hit[k] else _ranges(box, row, found, samples),
+                **_shares(broken[k], samples),
+                simulated=row.about.effect in scene.effects.on(),
+            )
+        )
+    return tuple(findings)
+
+
+def audit(scene: str | Path | Mapping[str, Any] | Scene) -> Audit:
+    """Find out which of the effects that the minimal model leaves out a scene calls for.
+
+    Facts in ``[world]`` are used whether or not an effect is simulated.  The formulas are those of the minimal model;
+    where a scene simulates effects, they are asked of the places to which its map leads.
+
+    Parameters
+    ----------
+    scene : str, Path, mapping or Scene
+        A scene, or what `limitsets.load` reads.
+
+    Returns
+    -------
+    Audit
+        Per assumption: broken or not on the limit set and on the domain, where worst, how often, and how that is known.
+
+    Raises
+    ------
+    SceneError
+        For a scene that cannot be read.
+
+    Examples
+    --------
+    >>> import limitsets as ls
+    >>> found = ls.audit("paper-initial")
+    >>> [(each.effect, each.how) for each in found.on("limit-set") if each.called_for]
+    [('pivot', 'sampled'), ('pivot', 'sampled'), ('roll', 'sampled')]
+    >>> [(each.effect, each.how) for each in found.on("limit-set") if each.called_for is False]
+    [('release', 'proved'), ('landing', 'proved'), ('slip', 'proved'), ('arm', 'proved')]
+    """
+    from limitsets.proofs.parameters import parameter_box
+    from limitsets.scene import Scene, load
+
+    chosen = scene if isinstance(scene, Scene) else load(scene)
+    # what the minimal model assumes is asked of its throws, whichever effects are on
+    box = parameter_box(load({**chosen.as_dict(), "effects": {}}))
+    rows = [Row(about, about.terms(chosen, box)) for about in ASSUMPTIONS]
+    sites = places(chosen, box)
+    two = (_findings(place, chosen, box, rows, sites) for place in ("limit-set", "domain"))
+    return Audit(chosen, sum(two, ()), sites.extents, sites.enclosed)

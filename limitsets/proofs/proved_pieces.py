@@ -1,0 +1,262 @@
+"""Images of unions of intervals, rounded outward or inward, from pieces on which branch or slope are proved.
+
+A tile is a part of the attracting cells on which the branch, the sign of the slope, or both are proved (throws of
+boxes).  Where the map is monotone on a tile, the images of two points (throws of points) span that of all between
+them.  Where one branch is proved it is continuous, a throw being proved only where the impact is the one root there
+is, so that the image of an interval covers all between the images of two of its points.  Undecided or bent tiles are
+halved down to the rounding error, which brackets critical and turning points.
+
+Brackets and images are a little wider (inward images a little narrower) than they are found, so that other arithmetic
+of about the same quality can confirm what rests on them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from limitsets.interval import Interval
+from limitsets.jit import proof_kernel
+from limitsets.maps import codes
+from limitsets.proofs.parameters import ParameterBox
+from limitsets.thrower.side_box import gather_box
+from limitsets.thrower.throw_box import BOTH, NOTHING, throw_box
+
+__all__ = [
+    "Intervals",
+    "Pair",
+    "PieceImage",
+    "ProvedPiece",
+    "UnionImages",
+    "at_rest",
+    "proved_pieces_of",
+    "union_of",
+]
+
+Pair = tuple[float, float]
+Intervals = dict[int, list[Pair]]
+Array = NDArray[np.float64]
+
+UNDECIDED = (BOTH, NOTHING)
+
+# Tiles are halved down to this width relative to x, and no further than to so many of one side at a time.
+FLOOR, MOST_TILES = 2.0**-47, 1024
+
+MOST_IMAGES = 20_000
+
+# Undecided and bent tiles grow by this share of their width at either end; images move by this share of x.
+WIDER, SLACK = 2.0**-4, 2.0**-48
+
+
+# ---------------------------------------------------------------- tiles
+
+
+class ProvedPiece(NamedTuple):
+    """A part of N with one answer: the branch (`BOTH` if not proved), the sign of the slope (0 if not proved)."""
+
+    lo: float
+    hi: float
+    branch: int
+    sign: int
+
+
+@proof_kernel(entry=True)
+def _judge(lo_map: Any, hi_map: Any, side: int, lo: Any, hi: Any, branch: Any, sign: Any) -> None:
+    b = gather_box(lo_map, hi_map, side)
+    for k in range(lo.size):
+        state, _, _, slope, _ = throw_box(b, Interval(lo[k], hi[k]))
+        branch[k] = state
+        sign[k] = 1 if slope.lo > 0.0 else (-1 if slope.hi < 0.0 else 0)
+        sign[k] = 0 if state == NOTHING else sign[k]
+
+
+def proved_pieces_of(box: ParameterBox, side: int, lo: Array, hi: Array) -> list[ProvedPiece]:
+    """Tile the given cells of one side, finely only where the branch changes or the slope has no sign."""
+    done: list[ProvedPiece] = []
+    while lo.size:
+        branch, sign = np.empty(lo.size, np.int64), np.empty(lo.size, np.int64)
+        _judge(box.lo, box.hi, side, lo, hi, branch, sign)
+        middle = lo + 0.5 * (hi - lo)
+        wide = (hi - lo > FLOOR * np.abs(hi)) & (lo < middle) & (middle < hi)
+        open_ = (np.isin(branch, UNDECIDED) | (sign == 0)) & wide
+        if int(open_.sum()) > MOST_TILES:
+            open_[:] = False
+        done += map(ProvedPiece, *(part[~open_].tolist() for part in (lo, hi, branch, sign)))
+        lo, hi = np.append(lo[open_], middle[open_]), np.append(middle[open_], hi[open_])
+    return _widened(_merged_tiles(sorted(done)))
+
+
+def _merged_tiles(tiles: Iterable[ProvedPiece]) -> list[ProvedPiece]:
+    """Join neighbours of one branch and one proved sign."""
+    merged: list[ProvedPiece] = []
+    for piece in tiles:
+        last = merged[-1] if merged else None
+        if last and last.hi == piece.lo and last.sign == piece.sign != 0 and last.branch == piece.branch:
+            merged[-1] = last._replace(hi=piece.hi)
+        else:
+            merged.append(piece)
+    return merged
+
+
+def _widened(tiles: list[ProvedPiece]) -> list[ProvedPiece]:
+    """Let tiles of which less is known grow a little into their neighbours."""
+    wide = list(tiles)
+    for k, piece in enumerate(tiles):
+        more = WIDER * (piece.hi - piece.lo)
+        if k and _knows_more(tiles[k - 1], piece, more):
+            border = piece.lo - more
+            wide[k - 1], wide[k] = wide[k - 1]._replace(hi=border), wide[k]._replace(lo=border)
+        if k + 1 < len(tiles) and _knows_more(tiles[k + 1], piece, more):
+            border = piece.hi + more
+            wide[k], wide[k + 1] = wide[k]._replace(hi=border), wide[k + 1]._replace(lo=border)
+    return wide
+
+
+def _knows_more(known: ProvedPiece, piece: ProvedPiece, more: float) -> bool:
+    """Whether `piece`, grown by `more` into its neighbour `known`, still says nothing that is not proved."""
+    weak = piece.branch in UNDECIDED or piece.sign == 0
+    strong = known.branch not in UNDECIDED and known.sign != 0
+    true = (piece.branch in (known.branch, *UNDECIDED)) and piece.sign in (known.sign, 0)
+    touches = piece.lo == known.hi or piece.hi == known.lo
+    return weak and strong and true and touches and known.hi - known.lo > 4.0 * more
+
+
+# ---------------------------------------------------------------- images of unions of intervals
+
+
+@proof_kernel(entry=True)
+def _images(lo_map: Any, hi_map: Any, side: Any, lo: Any, hi: Any, out: Any) -> None:
+    """Images of lo, of hi, and of all between; rows 0 to 5 by a jog, 6 to 11 by a flip."""
+    for k in range(lo.size):
+        b = gather_box(lo_map, hi_map, side[k])
+        for j in range(3):
+            first = hi[k] if j == 1 else lo[k]
+            last = lo[k] if j == 0 else hi[k]
+            state, jog, _, _, _ = throw_box(b, Interval(first, last))
+            flip = jog - b.shift
+            good = state != NOTHING
+            out[2 * j, k], out[2 * j + 1, k] = jog.lo if good else -np.inf, jog.hi if good else np.inf
+            out[6 + 2 * j, k], out[7 + 2 * j, k] = flip.lo if good else -np.inf, flip.hi if good else np.inf
+
+
+class PieceImage(NamedTuple):
+    """What of interval number `owner` of a side lies on one tile, and the image by one of the tile's branches."""
+
+    side: int
+    owner: int
+    piece: ProvedPiece
+    lo: float
+    hi: float
+    branch: int
+    to: int
+    at_lo: Pair
+    at_hi: Pair
+    whole: Pair
+
+
+def union_of(intervals: Iterable[Pair]) -> list[Pair]:
+    """Union of closed intervals, ascending."""
+    union: list[Pair] = []
+    for lo, hi in sorted(intervals):
+        if union and lo <= union[-1][1]:
+            union[-1] = (union[-1][0], max(union[-1][1], hi))
+        else:
+            union.append((lo, hi))
+    return union
+
+
+def _both_of(one: Intervals, other: Intervals) -> Intervals:
+    """Intersection of two unions."""
+    common: Intervals = {}
+    for side, intervals in one.items():
+        parts = [(max(a, c), min(b, d)) for a, b in intervals for c, d in other.get(side, [])]
+        kept = union_of(part for part in parts if part[0] <= part[1])
+        if kept:
+            common[side] = kept
+    return common
+
+
+@dataclass(frozen=True, eq=False)
+class UnionImages:
+    """Images of unions of intervals inside the tiled set."""
+
+    box: ParameterBox
+    tiles: dict[int, list[ProvedPiece]]
+
+    def parts(self, union: Intervals) -> list[PieceImage]:
+        """Cut a union at the borders of the tiles, and throw every part."""
+        cuts = [
+            (side, owner, piece, max(lo, piece.lo), min(hi, piece.hi))
+            for side, intervals in union.items()
+            for owner, (lo, hi) in enumerate(intervals)
+            for piece in self.tiles[side]
+            if piece.lo <= hi and piece.hi >= lo
+        ]
+        side = np.array([cut[0] for cut in cuts], dtype=np.int64)
+        lo, hi = np.array([cut[3] for cut in cuts]), np.array([cut[4] for cut in cuts])
+        out = np.empty((12, lo.size))
+        _images(self.box.lo, self.box.hi, side, lo, hi, out)
+        parts = []
+        for cut, row in zip(cuts, out.T.tolist(), strict=True):
+            piece = cut[2]
+            for branch in (codes.JOG, codes.FLIP) if piece.branch in UNDECIDED else (piece.branch,):
+                to = (cut[0] + branch) % self.box.lo.a.size
+                pairs = [(row[k], row[k + 1]) for k in range(6 * branch, 6 * branch + 6, 2)]
+                parts.append(PieceImage(*cut, branch, to, *pairs))
+        return parts
+
+    def outward(self, union: Intervals) -> Intervals:
+        """Return a superset of F(union)."""
+        images: Intervals = {}
+        for part in self.parts(union):
+            ends = (part.at_lo, part.at_hi) if part.piece.sign else (part.whole,)
+            lo, hi = min(end[0] for end in ends), max(end[1] for end in ends)
+            images.setdefault(part.to, []).append((lo - SLACK * abs(lo), hi + SLACK * abs(hi)))
+        return {side: union_of(intervals) for side, intervals in images.items()}
+
+    def inward(self, union: Intervals) -> Intervals:
+        """Return a subset of F(union), from decided starts only."""
+        images: Intervals = {}
+        for run in _runs(self.parts(union)):
+            ends = [end for part in run for end in (part.at_lo, part.at_hi)]
+            lo, hi = min(end[1] for end in ends), max(end[0] for end in ends)
+            lo, hi = lo + SLACK * abs(lo), hi - SLACK * abs(hi)
+            if lo <= hi:
+                images.setdefault(run[0].to, []).append((lo, hi))
+        return {side: union_of(intervals) for side, intervals in images.items()}
+
+
+def _runs(parts: list[PieceImage]) -> Iterator[list[PieceImage]]:
+    """Decided parts of one interval that follow one another on one branch: the map is continuous on their union."""
+    run: list[PieceImage] = []
+    for part in parts:
+        if part.piece.branch not in (codes.JOG, codes.FLIP):
+            continue
+        last = run[-1] if run else None
+        if last and (last.side, last.owner, last.branch, last.hi) == (
+            part.side,
+            part.owner,
+            part.branch,
+            part.lo,
+        ):
+            run.append(part)
+        else:
+            if run:
+                yield run
+            run = [part]
+    if run:
+        yield run
+
+
+def at_rest(image: Callable[[Intervals], Intervals], union: Intervals) -> tuple[Intervals, int]:
+    """Intersect with the image until nothing moves; the number of images, or -1 if it still does."""
+    for count in range(1, MOST_IMAGES):
+        smaller = _both_of(image(union), union)
+        if smaller == union:
+            return union, count
+        union = smaller
+    return union, -1

@@ -1,0 +1,201 @@
+"""A margin, and what others get of it: plain tables for JSON, certificates, the orbit that refutes."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+from limitsets.errors import AnswerError
+from limitsets.files import as_table, picked
+from limitsets.goals import Goal, Predicate, as_written
+from limitsets.proofs.certify import weakest_of
+from limitsets.proofs.confirm import DeniedError
+from limitsets.proofs.goals import State, rechecked
+from limitsets.proofs.proof import Claim, Proof
+from limitsets.proofs.query import Outcome
+from limitsets.proofs.refutation import KINDS, write_refutation
+from limitsets.scene import Scene
+
+__all__ = ["Margin", "goal_table", "settled"]
+
+
+@dataclass(frozen=True, eq=False)
+class Margin:
+    """How much one quantity of a scene, or all of its tolerance, may deviate.
+
+    Attributes
+    ----------
+    quantity : str
+        Its name; "joint" for all of the tolerance together.
+    reading : str
+        "fixed" (but unknown), "per-throw" (another one at every throw), or "tolerance" for joint.
+    goals : tuple of Goal
+        What has to hold: all of them.
+    proved : float
+        The goals are proved for every deviation up to this; 0 if for none.
+    refuted : float or None
+        At this deviation an orbit violates a goal; None if no such deviation is found.
+    unit : str
+        Of both: "%" of the value, a length or an angle; "" for joint, a factor on the tolerance.
+    nominal : float or None
+        The value about which it deviates; of a length or angle in its `unit`.
+    reason : str
+        Why there is no upper end, or why the two are farther apart than asked; empty if they are not.
+    closed : bool
+        Whether they are as close as was asked.
+    seconds : float
+        Time it took.
+    scene : Scene
+        The scene.
+    tolerance : dict of str to str
+        Of joint: the deviations of which `proved` and `refuted` are factors; empty otherwise.
+    deviations, noise : dict of str to str
+        What may be fixed but unknown and what differs at every throw, as it is proved, as `limitsets.certify` takes it.
+    pieces : tuple of Outcome
+        What proves it.
+    against : Outcome or None
+        What refutes it.
+    """
+
+    quantity: str
+    reading: str
+    goals: tuple[Goal, ...]
+    proved: float
+    refuted: float | None
+    unit: str
+    nominal: float | None
+    reason: str
+    closed: bool
+    seconds: float
+    scene: Scene
+    tolerance: dict[str, str]
+    deviations: dict[str, str]
+    noise: dict[str, str]
+    pieces: tuple[Outcome, ...] = field(repr=False)
+    against: Outcome | None = field(repr=False)
+
+    @property
+    def counterexample(self) -> tuple[State, ...]:
+        """The orbit that violates a goal, every state enclosed; empty if there is none."""
+        return () if self.against is None else self.against.counterexample
+
+    def to_json(self) -> dict[str, Any]:
+        """Give it as a plain table for JSON; every number is finite or null."""
+        goals = [goal_table(goal, self.scene.unit) for goal in self.goals]
+        return as_table(
+            **picked(self, "quantity", "reading"),
+            goal=goals[0] if len(goals) == 1 else goals,
+            **picked(self, "proved", "refuted"),
+            unit=self.unit or None,
+            **picked(self, "nominal", "closed"),
+            reason=self.reason or None,
+            counterexample=self._states() or None,
+            certificate=None,
+            pieces=len(self.pieces),
+            timings={"margin": self.seconds},
+        )
+
+    def _states(self) -> list[dict[str, Any]]:
+        against = self.against
+        if against is None:
+            return []
+        fixed: dict[str, Any] = {} if against.piece is None else dict(against.piece.texts())
+        return [_state(state, fixed, self.scene.unit) for state in against.counterexample]
+
+    @property
+    def stem(self) -> str:
+        """Name of its files: scene, quantity, reading."""
+        quantity = re.sub(r"[^A-Za-z0-9]+", "-", self.quantity).strip("-")
+        return f"{self.scene.name}-{quantity}-{self.reading}".replace(" ", "-")
+
+    def save(self, folder: str | Path, *, recheck: bool = True) -> tuple[Path, ...]:
+        """Write what `limitsets.recheck` checks: a certificate for each goal, and the orbit that refutes one.
+
+        Parameters
+        ----------
+        folder : str or Path
+            Where; it is made.
+        recheck : bool
+            Whether to have each checked before it gets its name.
+
+        Raises
+        ------
+        AnswerError
+            Effects are on, which no recheck knows, or a goal is a function of the caller's.
+        DeniedError
+            The checker does not confirm one: it is kept as NAME.denied.zip.
+        """
+        self._require_checkable()
+        folder = Path(folder)
+        folder.mkdir(parents=True, exist_ok=True)
+        stem, written = self.stem, []
+        for number, goal in enumerate(self.goals if self.pieces else ()):
+            claims = [
+                Claim("goal", "proved", "", dict(piece.answers[number].section)) for piece in self.pieces
+            ]
+            found = tuple(piece.found for piece in self.pieces if piece.found is not None)
+            proof = Proof(self.scene, self.noise, self.deviations, found, (weakest_of(claims),), self.seconds)
+            last = f"-{goal.kind.replace('_', '-')}" if len(self.goals) > 1 else ""
+            written.append(proof.save(folder / f"{stem}{last}.proof.zip", recheck=recheck))
+        against = self.against
+        if against is not None and against.found is not None and against.refuted is not None:
+            states, recurs = against.counterexample, against.answers[0].recurs
+            if any(word in recurs for word in KINDS):
+                path = folder / f"{stem}.refuted.zip"
+                about = against.found, against.refuted, states, recurs, against.within, self.scene
+                write_refutation(path, *about, recheck=recheck)
+                written.append(path)
+        return tuple(written)
+
+    def _require_checkable(self) -> None:
+        on = [name for name in self.scene.effects.on() if name != "spread"]
+        if on:
+            raise AnswerError(
+                "the certificate",
+                f"with the effects {', '.join(on)}",
+                "the minimal model, and noise",
+                "nothing rechecks other maps; the margin stands",
+            )
+        for goal in self.goals:
+            if not rechecked(goal):
+                raise AnswerError(
+                    "the certificate",
+                    f"of the goal {goal.kind}",
+                    "goals that the checker knows",
+                    "nothing rechecks others; the margin stands",
+                )
+
+
+def goal_table(goal: Goal, unit: str) -> dict[str, Any]:
+    """Give a goal as a scene would name it; a function by its name."""
+    if isinstance(goal, Predicate):
+        return {"predicate": goal.name, "from_anywhere": goal.from_anywhere}
+    return as_written(goal, unit)
+
+
+def _state(state: State, fixed: dict[str, Any], unit: str) -> dict[str, Any]:
+    thrown = dict(fixed)
+    if state.kappa is not None and "throw.kappa" not in thrown:
+        thrown["throw.kappa"] = f"{state.kappa!r} {unit}"
+    if state.landing is not None:
+        thrown["landing.x"] = f"{state.landing!r} {unit}"
+    return {
+        "x": 0.5 * (state.lo + state.hi),
+        "between": [state.lo, state.hi],
+        "side": state.side,
+        "parameters": thrown if state.kappa is not None else None,
+    }
+
+
+def settled(margin: Margin, folder: Path, *, recheck: bool = True) -> tuple[Margin, tuple[Path, ...]]:
+    """Write a margin's files; the margin without what the checker denies, for that is undecided."""
+    try:
+        return margin, margin.save(folder, recheck=recheck)
+    except DeniedError as error:
+        reason = f"{error}"
+        left = replace(margin, proved=0.0, pieces=(), closed=False, reason=reason)
+        if "refuted" in error.claims:
+            left = replace(margin, refuted=None, against=None, closed=False, reason=reason)
+        return settled(left, folder, recheck=recheck)
