@@ -7,10 +7,24 @@ from typing import NamedTuple
 
 import limitsets as ls
 import limitsets.interval as iv
-from limitsets.interval.arithmetic import Ends
+from limitsets.interval import Interval
+from limitsets.interval.number import hull_of
 from limitsets.jit import proof_kernel
 from limitsets.maps import OUTSIDE
-from limitsets.maps.textbook.slots import NO_WITNESS, Line, Plane, Point, plane, plane_of_two
+from limitsets.maps.derived import NO_WITNESS
+from limitsets.maps.textbook.slots import Line, Plane, Point, plane
+
+
+@proof_kernel
+def plane_of_two(
+    first: bool, a: tuple[Interval, Interval], second: bool, b: tuple[Interval, Interval], side: int
+) -> Plane:
+    """Images of branches 0 and 1 in the plane, each as far as it is possible."""
+    n, zero, _, witness = plane(a, side, 0)
+    m, one, _, _ = plane(b, side, 1)
+    sound = ((n == 1) | (not first)) & ((m == 1) | (not second))
+    count = (1 if first else 0) + (1 if second else 0)
+    return count if sound & (count > 0) else -1, zero if first else one, one, witness
 
 
 class Contraction(NamedTuple):
@@ -114,17 +128,15 @@ def _baker_on(params: Baker, x: Point, side: int, branch: int) -> tuple[Point, i
 
 def _baker_box(params_lo: Baker, params_hi: Baker, lo: Point, hi: Point, side: int) -> Plane:
     """Both branches at x = 1/2; products with 2 are exact, and the unit square is not left by rounding."""
-    c = (params_lo.contraction, params_hi.contraction)
+    c, y = Interval(params_lo.contraction, params_hi.contraction), Interval(lo[1], hi[1])
     dough = (lo[0] >= 0.0) & (hi[0] <= 1.0)
-    y = (lo[1], hi[1])
-    thin = iv.mul(c, y)
     # c y + 1 - c = 1 - c (1 - y), with each number once
-    lifted = iv.sub((1.0, 1.0), iv.mul(c, iv.sub((1.0, 1.0), y)))
-    bottom = 0.0 if (c[0] >= 0.0) & (y[0] >= 0.0) else -math.inf
-    top = 1.0 if (c[0] >= 0.0) & (y[1] <= 1.0) else math.inf
-    left = (2.0 * lo[0], min(2.0 * hi[0], 1.0)), (max(thin[0], bottom), thin[1])
-    right = iv.sub((2.0 * lo[0], 2.0 * hi[0]), (1.0, 1.0))
-    moved = (max(right[0], 0.0), min(right[1], 1.0)), (lifted[0], min(lifted[1], top))
+    thin, lifted = c * y, 1.0 - c * (1.0 - y)
+    bottom = 0.0 if (c.lo >= 0.0) & (y.lo >= 0.0) else -math.inf
+    top = 1.0 if (c.lo >= 0.0) & (y.hi <= 1.0) else math.inf
+    left = Interval(2.0 * lo[0], min(2.0 * hi[0], 1.0)), Interval(max(thin.lo, bottom), thin.hi)
+    right = Interval(2.0 * lo[0], 2.0 * hi[0]) - 1.0
+    moved = Interval(max(right.lo, 0.0), min(right.hi, 1.0)), Interval(lifted.lo, min(lifted.hi, top))
     return plane_of_two(dough & (lo[0] <= 0.5), left, dough & (hi[0] >= 0.5), moved, side)
 
 
@@ -161,19 +173,17 @@ def _product_on(params: Product, x: Point, side: int, branch: int) -> tuple[Poin
 
 
 @proof_kernel
-def _moebius(pole: Ends, lo: float, hi: float) -> Ends:
+def _moebius(pole: Interval, lo: float, hi: float) -> Interval:
     """Exact range of x / (pole - x) left of the pole: monotone in x; nan or infinite where it may be met."""
-    first = iv.div((lo, lo), iv.sub(pole, (lo, lo)))
-    last = iv.div((hi, hi), iv.sub(pole, (hi, hi)))
-    after = iv.hull(first, last)
-    left = iv.sub(pole, (hi, hi))[0] > 0.0
-    return (max(after[0], 0.0) if lo >= 0.0 else after[0]) if left else -math.inf, after[
-        1
-    ] if left else math.inf
+    low, high = Interval(lo, lo), Interval(hi, hi)
+    after = hull_of(low / (pole - low), high / (pole - high))
+    left = (pole - high).lo > 0.0
+    least = max(after.lo, 0.0) if lo >= 0.0 else after.lo
+    return Interval(least if left else -math.inf, after.hi if left else math.inf)
 
 
 def _product_box(params_lo: Product, params_hi: Product, lo: Point, hi: Point, side: int) -> Plane:
-    pole = (params_lo.pole, params_hi.pole)
+    pole = Interval(params_lo.pole, params_hi.pole)
     return plane((_moebius(pole, lo[0], hi[0]), _moebius(pole, lo[1], hi[1])), side, 0)
 
 
@@ -213,8 +223,8 @@ def _two_state_box(params_lo: TwoState, params_hi: TwoState, lo: Point, hi: Poin
     """Both states on x = 0."""
     r = (params_lo.r, params_hi.r)
     # below 1/2 both states are the origin
-    reach = (r[0] if r[0] >= 0.5 else 0.0, r[1] if r[1] >= 0.5 else 0.0)
-    down = iv.neg(reach)
+    reach = Interval(r[0] if r[0] >= 0.5 else 0.0, r[1] if r[1] >= 0.5 else 0.0)
+    down = -reach
     return plane_of_two(lo[0] <= 0.0, (down, down), hi[0] >= 0.0, (reach, reach), side)
 
 

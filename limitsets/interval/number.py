@@ -22,6 +22,7 @@ __all__ = [
     "Interval",
     "PerSide",
     "ends_of",
+    "hull_of",
     "intervals_between",
     "larger",
     "signed_square",
@@ -308,6 +309,12 @@ def where_positive(x: Number, yes: Number, no: Number) -> Number:
     return yes if x > 0.0 else no
 
 
+def hull_of(x: Interval, y: Interval) -> Interval:
+    """Return the smallest interval that holds both."""
+    lo, hi = arithmetic.hull(ends_of(x), ends_of(y))
+    return Interval(lo, hi)
+
+
 def _signed_square(x: Any) -> Interval:
     return Interval(down(x.lo * abs(x.lo)), up(x.hi * abs(x.hi)))
 
@@ -322,6 +329,7 @@ def _where_positive(x: Any, yes: Any, no: Any) -> Interval:
     return Interval(yes.lo if sure else no.lo, yes.hi if sure else no.hi)
 
 
+operation(hull_of, Interval, hull_of)
 for _plain, _enclosed in (
     (square_root, _sqrt),
     (smaller, _min),

@@ -39,7 +39,17 @@ from limitsets.maps.kernels import (
     state_of,
 )
 
-__all__ = ["MAYBE", "NEVER", "SURE", "UNKNOWN", "BranchBoxes", "branch_boxes", "derive", "try_slope"]
+__all__ = [
+    "MAYBE",
+    "NEVER",
+    "NO_WITNESS",
+    "SURE",
+    "UNKNOWN",
+    "BranchBoxes",
+    "branch_boxes",
+    "derive",
+    "try_slope",
+]
 
 Floats: TypeAlias = NDArray[np.float64]
 

@@ -13,9 +13,9 @@ import numpy as np
 import pytest
 
 import limitsets as ls
-import limitsets.interval as iv
 from limitsets import maps
 from limitsets.graph.images.enclosed import enclosures
+from limitsets.interval import Interval
 from limitsets.maps.kernels import forced, image
 from limitsets.maps.textbook.slots import Plane, Point, plane, rectangle
 from limitsets.thrower import SmallAngle
@@ -48,8 +48,8 @@ class HenonByHand(NamedTuple):
 def _henon_box(lo_map: HenonByHand, hi_map: HenonByHand, lo: Point, hi: Point, side: int) -> Plane:
     """Exact range: each number occurs once."""
     x, y = rectangle(lo, hi)
-    bent = iv.sub((1.0, 1.0), iv.mul((lo_map.a, hi_map.a), iv.sqr(x)))
-    return plane((iv.add(bent, y), iv.mul((lo_map.b, hi_map.b), x)), side, 0)
+    bent = 1.0 - Interval(lo_map.a, hi_map.a) * x**2
+    return plane((bent + y, Interval(lo_map.b, hi_map.b) * x), side, 0)
 
 
 class SmallThrow(NamedTuple):

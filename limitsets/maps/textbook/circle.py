@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
-import limitsets.interval as iv
-from limitsets.interval.arithmetic import Ends
+from limitsets.interval import Interval
 from limitsets.jit import kernel, proof_kernel
 from limitsets.maps import codes
 from limitsets.maps.contract import register
@@ -68,25 +67,32 @@ def _margin(params: Circle, x: float, side: int) -> float:
 
 
 @proof_kernel
-def _lifted_box(omega: Ends, coupling: Ends, x: Ends) -> Ends:
+def _lifted_box(omega: Interval, coupling: Interval, x: Any) -> Interval:
     """Images before whole turns are taken off; exact where x is one number."""
-    wave = iv.div(iv.sin(iv.mul(TURN, x)), TURN)
-    return iv.sub(iv.add(x, omega), iv.mul(coupling, wave))
+    turn: Any = Interval(TURN[0], TURN[1])
+    wave: Any = math.sin(turn * x) / turn
+    return (omega + x) - coupling * wave  # type: ignore[no-any-return]  # an interval
 
 
 def _image_box(params_lo: Circle, params_hi: Circle, lo: float, hi: float, side: int) -> Line:
     """Both branches at equality; up to a coupling of 1 the map rises from omega to omega + 1."""
-    omega, coupling = (params_lo.omega, params_hi.omega), (params_lo.coupling, params_hi.coupling)
-    rises = (coupling[0] >= 0.0) & (coupling[1] <= 1.0)
-    first, last = _lifted_box(omega, coupling, (lo, lo)), _lifted_box(omega, coupling, (hi, hi))
-    turned = (first[0], last[1]) if rises else _lifted_box(omega, coupling, (lo, hi))
-    less = iv.sub(turned, (1.0, 1.0))
+    omega, coupling = (
+        Interval(params_lo.omega, params_hi.omega),
+        Interval(params_lo.coupling, params_hi.coupling),
+    )
+    rises = (coupling.lo >= 0.0) & (coupling.hi <= 1.0)
+    first, last = (
+        _lifted_box(omega, coupling, Interval(lo, lo)),
+        _lifted_box(omega, coupling, Interval(hi, hi)),
+    )
+    turned = Interval(first.lo, last.hi) if rises else _lifted_box(omega, coupling, Interval(lo, hi))
+    less = turned - 1.0
     circle = (lo >= 0.0) & (hi <= 1.0)
-    bottom = 0.0 if rises & (omega[0] >= 0.0) else -math.inf
-    top = 1.0 if rises & (omega[1] <= 1.0) else math.inf
-    stay = max(turned[0], bottom), min(turned[1], 1.0)
-    wrap = max(less[0], 0.0), min(less[1], top)
-    return line_of_two(circle & (turned[0] <= 1.0), stay, circle & (turned[1] >= 1.0), wrap, side)
+    bottom = 0.0 if rises & (omega.lo >= 0.0) else -math.inf
+    top = 1.0 if rises & (omega.hi <= 1.0) else math.inf
+    stay = Interval(max(turned.lo, bottom), min(turned.hi, 1.0))
+    wrap = Interval(max(less.lo, 0.0), min(less.hi, top))
+    return line_of_two(circle & (turned.lo <= 1.0), stay, circle & (turned.hi >= 1.0), wrap, side)
 
 
 register(

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-import limitsets.interval as iv
-from limitsets.interval.arithmetic import Ends
+from limitsets.interval import Interval
+from limitsets.interval.number import hull_of, larger, square_root
 from limitsets.jit import proof_kernel
 from limitsets.maps import codes
 from limitsets.maps.contract import register
@@ -43,27 +43,30 @@ def _image_on(params: Cubic, x: float, side: int, branch: int) -> tuple[float, i
 
 
 @proof_kernel
-def _half(r: Ends, a: float, b: float) -> Ends:
+def _at(r: float, x: float) -> Interval:
+    at = Interval(x, x)
+    return at * (r - at**2)
+
+
+@proof_kernel
+def _half(r: Interval, a: float, b: float) -> Interval:
     """Exact range on [a, b], 0 <= a: least at an end, with the least r; largest at an end or the turning point."""
-    first_lo = iv.mul((a, a), iv.sub((r[0], r[0]), iv.sqr((a, a))))
-    last_lo = iv.mul((b, b), iv.sub((r[0], r[0]), iv.sqr((b, b))))
-    first_hi = iv.mul((a, a), iv.sub((r[1], r[1]), iv.sqr((a, a))))
-    last_hi = iv.mul((b, b), iv.sub((r[1], r[1]), iv.sqr((b, b))))
-    most = max(r[1], 0.0)
-    turn = iv.sqrt(iv.maximum(iv.div((most, most), (3.0, 3.0)), (0.0, 0.0)))
-    top = iv.mul(iv.mul((2.0, 2.0), turn), iv.div((most, most), (3.0, 3.0)))
-    turns = (turn[0] <= b) & (turn[1] >= a)
-    ends = max(first_hi[1], last_hi[1])
-    return min(first_lo[0], last_lo[0]), max(ends, top[1]) if turns else ends
+    most = max(r.hi, 0.0)
+    square = Interval(most, most) / 3.0
+    turn = square_root(larger(square, Interval(0.0, 0.0)))
+    top = 2.0 * turn * square
+    ends = max(_at(r.hi, a).hi, _at(r.hi, b).hi)
+    turns = (turn.lo <= b) & (turn.hi >= a)
+    return Interval(min(_at(r.lo, a).lo, _at(r.lo, b).lo), max(ends, top.hi) if turns else ends)
 
 
 def _image_box(params_lo: Cubic, params_hi: Cubic, lo: float, hi: float, side: int) -> Line:
     """Exact range; continuous, so one box, named middle where it holds a turning point."""
-    r = (params_lo.r, params_hi.r)
-    right, left = _half(r, max(lo, 0.0), max(hi, 0.0)), iv.neg(_half(r, max(-hi, 0.0), max(-lo, 0.0)))
+    r = Interval(params_lo.r, params_hi.r)
+    right, left = _half(r, max(lo, 0.0), max(hi, 0.0)), -_half(r, max(-hi, 0.0), max(-lo, 0.0))
     after = right if lo >= 0.0 else left
-    after = iv.hull(left, right) if (lo < 0.0) & (hi > 0.0) else after
-    outer = iv.mul((3.0, 3.0), iv.sqr((lo, hi)))[0] > r[1]
+    after = hull_of(left, right) if (lo < 0.0) & (hi > 0.0) else after
+    outer = (3.0 * Interval(lo, hi) ** 2).lo > r.hi
     return line(after, side, 1 if not outer else (0 if hi < 0.0 else 2))
 
 

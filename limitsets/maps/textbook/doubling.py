@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-import limitsets.interval as iv
+from limitsets.interval import Interval
 from limitsets.maps import codes
 from limitsets.maps.contract import register
 from limitsets.maps.textbook.domains import DOMAINS
@@ -51,15 +51,15 @@ def _image_on(params: Doubling, x: float, side: int, branch: int) -> tuple[float
 
 def _image_box(params_lo: Doubling, params_hi: Doubling, lo: float, hi: float, side: int) -> Line:
     """Both branches at equality; clipped to what x on the circle and a factor in [0, 2] allow."""
-    factor = (params_lo.factor, params_hi.factor)
-    times = iv.mul(factor, (lo, hi))
-    less = iv.sub(times, (1.0, 1.0))
+    factor = Interval(params_lo.factor, params_hi.factor)
+    times = factor * Interval(lo, hi)
+    less = times - 1.0
     circle = (lo >= 0.0) & (hi <= 1.0)
-    bottom = 0.0 if factor[0] >= 0.0 else -math.inf
-    top = 1.0 if factor[1] <= 2.0 else math.inf
-    low = max(times[0], bottom), min(times[1], 1.0)
-    high = max(less[0], 0.0), min(less[1], top)
-    return line_of_two(circle & (times[0] <= 1.0), low, circle & (times[1] >= 1.0), high, side)
+    bottom = 0.0 if factor.lo >= 0.0 else -math.inf
+    top = 1.0 if factor.hi <= 2.0 else math.inf
+    low = Interval(max(times.lo, bottom), min(times.hi, 1.0))
+    high = Interval(max(less.lo, 0.0), min(less.hi, top))
+    return line_of_two(circle & (times.lo <= 1.0), low, circle & (times.hi >= 1.0), high, side)
 
 
 register(Doubling, image=_image, image_on=_image_on, image_box=_image_box, branches=("low", "high"))

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
-import limitsets.interval as iv
-from limitsets.interval.arithmetic import Ends
+from limitsets.interval import Interval
+from limitsets.interval.number import hull_of
 from limitsets.jit import proof_kernel
 from limitsets.maps import codes
 from limitsets.maps.contract import register
@@ -58,50 +58,50 @@ def _image_on(params: Leslie, x: Point, side: int, branch: int) -> tuple[Point, 
 class _Rates(NamedTuple):
     """Parameters as intervals."""
 
-    young: Ends
-    old: Ends
-    crowding: Ends
+    young: Interval
+    old: Interval
+    crowding: Interval
 
 
 @proof_kernel
-def _born(p: _Rates, x: Ends, y: Ends) -> Ends:
-    return iv.add(iv.mul(p.young, x), iv.mul(p.old, y))
+def _born(p: _Rates, x: Interval, y: Interval) -> Interval:
+    return p.young * x + p.old * y
 
 
 @proof_kernel
-def _young(p: _Rates, x: Ends, y: Ends) -> Ends:
+def _young(p: Any, x: Any, y: Any) -> Interval:
     """First coordinate of the image, from each operation in turn."""
-    return iv.mul(_born(p, x, y), iv.exp(iv.neg(iv.mul(p.crowding, iv.add(x, y)))))
+    return _born(p, x, y) * math.exp(-(p.crowding * (x + y)))
 
 
 @proof_kernel
-def _crest(own: Ends, other: Ends, crowding: Ends, z: float) -> float:
+def _crest(own: Any, other: Any, crowding: Any, z: float) -> float:
     """Largest value along the line on which the other age stays z: (own/c) exp(c z (other/own - 1) - 1)."""
-    ratio = iv.sub(iv.div(other, own), (1.0, 1.0))
-    power = iv.sub(iv.mul(iv.mul(crowding, (z, z)), ratio), (1.0, 1.0))
-    return iv.mul(iv.div(own, crowding), iv.exp(power))[1]
+    ratio = other / own - 1.0
+    top: Interval = own / crowding * math.exp(crowding * Interval(z, z) * ratio - 1.0)
+    return top.hi
 
 
 @proof_kernel
-def _may_be_zero(a: Ends) -> bool:
-    return not ((a[0] > 0.0) | (a[1] < 0.0))
+def _may_be_zero(a: Interval) -> bool:
+    return not ((a.lo > 0.0) | (a.hi < 0.0))
 
 
 @proof_kernel
-def _crests(p: _Rates, x: Ends, y: Ends) -> float:
+def _crests(p: _Rates, x: Interval, y: Interval) -> float:
     """Largest value inside the four borders of a box: there the slope along the border is 0."""
     most = -math.inf
     for end in range(2):
-        at, beside = (y[0], x[0]) if end == 0 else (y[1], x[1])
-        if _may_be_zero(iv.sub(p.young, iv.mul(p.crowding, _born(p, x, (at, at))))):
+        at, beside = (y.lo, x.lo) if end == 0 else (y.hi, x.hi)
+        if _may_be_zero(p.young - p.crowding * _born(p, x, Interval(at, at))):
             most = max(most, _crest(p.young, p.old, p.crowding, at))
-        if _may_be_zero(iv.sub(p.old, iv.mul(p.crowding, _born(p, (beside, beside), y)))):
+        if _may_be_zero(p.old - p.crowding * _born(p, Interval(beside, beside), y)):
             most = max(most, _crest(p.old, p.young, p.crowding, beside))
     return most
 
 
 @proof_kernel
-def _young_range(p: _Rates, x: Ends, y: Ends) -> Ends:
+def _young_range(p: _Rates, x: Interval, y: Interval) -> Interval:
     """Range over a box: exact, but for parameters that are intervals.
 
     Where both slopes keep their signs, the corners span it.  Where some are born and the parameters are positive,
@@ -109,31 +109,37 @@ def _young_range(p: _Rates, x: Ends, y: Ends) -> Ends:
     only for young = old, and then along whole lines).
     """
     born = _born(p, x, y)
-    fewer = iv.mul(p.crowding, born)
-    across, along = iv.sub(p.young, fewer), iv.sub(p.old, fewer)
-    monotone = ((across[0] >= 0.0) | (across[1] <= 0.0)) & ((along[0] >= 0.0) | (along[1] <= 0.0))
-    concave = (born[0] > 0.0) & (p.young[0] > 0.0) & (p.old[0] > 0.0) & (p.crowding[0] > 0.0)
+    fewer = p.crowding * born
+    across, along = p.young - fewer, p.old - fewer
+    monotone = ((across.lo >= 0.0) | (across.hi <= 0.0)) & ((along.lo >= 0.0) | (along.hi <= 0.0))
+    concave = (born.lo > 0.0) & (p.young.lo > 0.0) & (p.old.lo > 0.0) & (p.crowding.lo > 0.0)
     if not (monotone | concave):
         return _young(p, x, y)
-    west = iv.hull(_young(p, (x[0], x[0]), (y[0], y[0])), _young(p, (x[0], x[0]), (y[1], y[1])))
-    east = iv.hull(_young(p, (x[1], x[1]), (y[0], y[0])), _young(p, (x[1], x[1]), (y[1], y[1])))
-    ends = iv.hull(west, east)
-    return ends if monotone else (ends[0], max(ends[1], _crests(p, x, y)))
+    left, right, low, high = (
+        Interval(x.lo, x.lo),
+        Interval(x.hi, x.hi),
+        Interval(y.lo, y.lo),
+        Interval(y.hi, y.hi),
+    )
+    west = hull_of(_young(p, left, low), _young(p, left, high))
+    east = hull_of(_young(p, right, low), _young(p, right, high))
+    ends = hull_of(west, east)
+    return Interval(ends.lo, ends.hi if monotone else max(ends.hi, _crests(p, x, y)))
 
 
 def _image_box(params_lo: Leslie, params_hi: Leslie, lo: Point, hi: Point, side: int) -> Plane:
     rates = _Rates(
-        (params_lo.young, params_hi.young),
-        (params_lo.old, params_hi.old),
-        (params_lo.crowding, params_hi.crowding),
+        Interval(params_lo.young, params_hi.young),
+        Interval(params_lo.old, params_hi.old),
+        Interval(params_lo.crowding, params_hi.crowding),
     )
-    survival = (params_lo.survival, params_hi.survival)
+    survival = Interval(params_lo.survival, params_hi.survival)
     x, y = rectangle(lo, hi)
-    u, v = _young_range(rates, x, y), iv.mul(survival, x)
+    u, v = _young_range(rates, x, y), survival * x
     # Nobody is born of nobody, exactly.
-    several = (lo[0] >= 0.0) & (lo[1] >= 0.0) & (rates.young[0] >= 0.0) & (rates.old[0] >= 0.0)
-    u = (max(u[0], 0.0) if several else u[0], u[1])
-    v = (max(v[0], 0.0) if (lo[0] >= 0.0) & (survival[0] >= 0.0) else v[0], v[1])
+    several = (lo[0] >= 0.0) & (lo[1] >= 0.0) & (rates.young.lo >= 0.0) & (rates.old.lo >= 0.0)
+    u = Interval(max(u.lo, 0.0) if several else u.lo, u.hi)
+    v = Interval(max(v.lo, 0.0) if (lo[0] >= 0.0) & (survival.lo >= 0.0) else v.lo, v.hi)
     return plane((u, v), side, 0)
 
 

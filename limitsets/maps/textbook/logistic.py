@@ -5,8 +5,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-import limitsets.interval as iv
-from limitsets.interval.arithmetic import Ends
+from limitsets.interval import Interval
 from limitsets.jit import proof_kernel
 from limitsets.maps import codes
 from limitsets.maps.contract import register
@@ -43,29 +42,26 @@ def _image_on(params: Logistic, x: float, side: int, branch: int) -> tuple[float
 
 
 @proof_kernel
-def _hump(x: float) -> Ends:
+def _hump(x: float) -> Interval:
     """x (1 - x) at one point; x near 1/2 does not come out above 1/4."""
-    value = iv.mul((x, x), iv.sub((1.0, 1.0), (x, x)))
-    return value[0], min(value[1], 0.25)
+    at = Interval(x, x)
+    value = at * (1.0 - at)
+    return Interval(value.lo, min(value.hi, 0.25))
 
 
 def _image_box(params_lo: Logistic, params_hi: Logistic, lo: float, hi: float, side: int) -> Line:
     """Exact range from the ends and the top at 1/2: continuous, so one box, named right where it holds both."""
-    r = (params_lo.r, params_hi.r)
-    first, last = _hump(lo), _hump(hi)
+    r, first, last = Interval(params_lo.r, params_hi.r), _hump(lo), _hump(hi)
     inside = (lo >= 0.0) & (hi <= 1.0)
-    bottom = min(first[0], last[0])
-    hump = (
-        max(bottom, 0.0) if inside else bottom,
-        0.25 if (lo <= 0.5) & (hi >= 0.5) else max(first[1], last[1]),
-    )
-    after = iv.mul(r, hump)
+    bottom = min(first.lo, last.lo)
+    bottom = max(bottom, 0.0) if inside else bottom
+    after = r * Interval(bottom, 0.25 if (lo <= 0.5) & (hi >= 0.5) else max(first.hi, last.hi))
     # 0 and r/4 are met exactly and may be the domain's ends: the outward step must not pass them.
-    grows = r[0] >= 0.0
-    below = max(after[0], 0.0) if grows & (hump[0] >= 0.0) else after[0]
-    top = 0.25 * r[1] if r[1] >= 1e-300 else math.inf
-    above = min(after[1], top) if grows else after[1]
-    return line((below, above), side, 0 if hi < 0.5 else 1)
+    grows = r.lo >= 0.0
+    below = max(after.lo, 0.0) if grows & (bottom >= 0.0) else after.lo
+    top = 0.25 * r.hi if r.hi >= 1e-300 else math.inf
+    above = min(after.hi, top) if grows else after.hi
+    return line(Interval(below, above), side, 0 if hi < 0.5 else 1)
 
 
 register(Logistic, image=_image, image_on=_image_on, image_box=_image_box, branches=("left", "right"))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-import limitsets.interval as iv
+from limitsets.interval import Interval
 from limitsets.maps import codes
 from limitsets.maps.contract import register
 from limitsets.maps.textbook.domains import DOMAINS
@@ -43,15 +43,15 @@ def _image_on(params: Rotation, x: float, side: int, branch: int) -> tuple[float
 
 def _image_box(params_lo: Rotation, params_hi: Rotation, lo: float, hi: float, side: int) -> Line:
     """Both branches at equality; clipped to what x on the circle and an angle in [0, 1] allow."""
-    angle = (params_lo.angle, params_hi.angle)
-    turned = iv.add((lo, hi), angle)
-    less = iv.sub(turned, (1.0, 1.0))
+    angle = Interval(params_lo.angle, params_hi.angle)
+    turned = Interval(lo, hi) + angle
+    less = turned - 1.0
     circle = (lo >= 0.0) & (hi <= 1.0)
-    bottom = 0.0 if angle[0] >= 0.0 else -math.inf
-    top = 1.0 if angle[1] <= 1.0 else math.inf
-    stay = max(turned[0], bottom), min(turned[1], 1.0)
-    wrap = max(less[0], 0.0), min(less[1], top)
-    return line_of_two(circle & (turned[0] <= 1.0), stay, circle & (turned[1] >= 1.0), wrap, side)
+    bottom = 0.0 if angle.lo >= 0.0 else -math.inf
+    top = 1.0 if angle.hi <= 1.0 else math.inf
+    stay = Interval(max(turned.lo, bottom), min(turned.hi, 1.0))
+    wrap = Interval(max(less.lo, 0.0), min(less.hi, top))
+    return line_of_two(circle & (turned.lo <= 1.0), stay, circle & (turned.hi >= 1.0), wrap, side)
 
 
 register(Rotation, image=_image, image_on=_image_on, image_box=_image_box, branches=("stay", "wrap"))
