@@ -168,7 +168,11 @@ def entries_of(x: Any) -> Any:
     """Undo `state_of`."""
 
 
-@generic
+def _as_given(found: Any, params: Any, x: Any, side: int, branch: int) -> Any:
+    return found
+
+
+@generic(default=_as_given)
 def _with_slope(found: Any, params: Any, x: Any, side: int, branch: int) -> Any:
     """Return ``(x', side', slope)``, whether the slope is there or not."""
 
@@ -201,10 +205,6 @@ def _row(y: Any, i: int, columns: Any) -> Any:
     return state_of(_entry(columns, i))
 
 
-def _as_given(found: Any, params: Any, x: Any, side: int, branch: int) -> Any:
-    return found
-
-
 def _with_derivative(found: Any, params: Any, x: Any, side: int, branch: int) -> Any:
     start = entries_of(x)
     columns = _column(start, params, start, side, branch)
@@ -215,7 +215,6 @@ state_of.on(1, _first)
 entries_of.on(2, _itself)
 entries_of.on(3, _itself)
 _with_slope.on(2, _with_derivative)
-_with_slope.on(3, _as_given)
 
 
 @kernel

@@ -245,7 +245,7 @@ def certify(
     >>> proof = ls.certify("paper-designed")
     >>> [(claim.claim, claim.verdict, claim.starts) for claim in proof.claims]
     [('attracts-all', 'proved', None), ('goal', 'proved', 'every')]
-    >>> proof = ls.certify(ls.maps.Logistic(3.2), ls.grid([(0.1, 0.9)], cells=512), ["attracts-all"])
+    >>> proof = ls.certify(ls.maps.Logistic(2.5), ls.grid([(0.1, 0.9)], cells=512), ["attracts-all"])
     >>> proof.claims[0].verdict
     'proved'
     """

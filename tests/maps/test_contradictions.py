@@ -75,8 +75,8 @@ def swapped_branches(params, x, side, branch):
     return tent_on(params, x, side, 1 - branch)
 
 
-def no_slope(params, x, side, branch):
-    return params.slope * x, side
+def no_side(params, x, side, branch):
+    return params.slope * x
 
 
 def other_box(low, high, lo, hi, side):
@@ -131,9 +131,9 @@ GRID = [(0.0, 1.0)]
         ({"image": tent, "image_on": other_side, "branches": TWO}, None, ["image_on on branch", "side"]),
         ({"image": tent, "image_on": swapped_branches, "branches": TWO}, None, ["image_on on branch 0"]),
         (
-            {"image": tent, "image_on": no_slope, "branches": TWO},
+            {"image": tent, "image_on": no_side, "branches": TWO},
             None,
-            ["image_on of Case", "2 values", "3 values"],
+            ["image_on of Case", "float64", "a tuple"],
         ),
         ({"image": tent, "image_box": other_box, "branches": TWO}, "boxes", ["image_box of Case", "x = "]),
         ({"image": tent, "image_box": other_side_box, "branches": TWO}, "boxes", ["image_box of Case"]),

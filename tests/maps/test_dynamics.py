@@ -85,8 +85,8 @@ def test_an_orbit_with_its_exponent_is_the_orbit_and_the_exponent(name: str) -> 
 
 
 def test_an_orbit_that_leaves_early_ends_both() -> None:
-    path, growth = orbit_with_exponent(maps.Linear2(2.0, 0.0, 0.0, 3.0), (1.0, 1.0), 0, 10, 5000)
-    alone = maps.orbit(maps.Linear2(2.0, 0.0, 0.0, 3.0), (1.0, 1.0), 0, 5010)
+    path, growth = orbit_with_exponent(Linear2(2.0, 0.0, 0.0, 3.0), (1.0, 1.0), 0, 10, 5000)
+    alone = maps.orbit(Linear2(2.0, 0.0, 0.0, 3.0), (1.0, 1.0), 0, 5010)
     assert (path.stopped, growth.stopped) == (alone.stopped, alone.stopped)
     assert np.array_equal(path.x, alone.x)
     assert growth.steps == alone.code.size - 11  # the step that leaves has no slope
@@ -109,13 +109,13 @@ def rotor_on(params: Rotor, x: Any, side: int, branch: int) -> Any:
 
 
 class Bare(NamedTuple):
-    """A map without slopes."""
+    """A map without slopes: boxes and derivatives cannot follow its comparison."""
 
     size: float
 
 
 def bare(params: Bare, x: float, side: int) -> Any:
-    return params.size * x, side, 0
+    return (params.size if x < 1.0 else 0.0) * x, side, 0
 
 
 maps.register(Rotor, image=rotor, image_on=rotor_on, dimension=3)

@@ -13,7 +13,7 @@ import pytest
 from limitsets import maps
 from limitsets.errors import LimitsetsError
 from limitsets.jit import kernel
-from limitsets.maps import contract
+from limitsets.maps import kernels
 from limitsets.maps.textbook.domains import DOMAINS as PUBLIC
 from limitsets.maps.textbook.exponential import exponential
 from tests.maps_of_tests import DOMAINS, Baker, Contraction, Linear2, Product, ThreeState, TwoState
@@ -136,7 +136,7 @@ def test_image_on_the_branch_taken_is_the_image(name: str) -> None:
 def test_slopes_are_those_of_central_differences(name: str) -> None:
     params, *_ = TABLE[name]
     dimension = maps.kind_of(params).dimension
-    image_on: Any = contract.image_on
+    image_on: Any = kernels.forced
     method = image_on.methods[type(params)]
     for x in points(params, 20):
         branch = int(maps.images(params, x[None, :], 0).code[0])
@@ -161,7 +161,7 @@ def test_known_fixed_points(name: str) -> None:
 @ONE_OF_EACH
 def test_source_and_machine_code_agree(name: str) -> None:
     params, *_ = TABLE[name]
-    image: Any = contract.image
+    image: Any = kernels.image
     source = image.methods[type(params)]
     xs = points(params, 30)
     found = maps.images(params, xs, 0)

@@ -326,7 +326,7 @@ def test_terms_and_their_derivatives_hold_those_at_50_digits(model):
             here = mpf(point[k])
             up, down = by_one(k, here + step), by_one(k, here - step)
             for term, above, below in zip(rising, up, down, strict=True):
-                slope = term.by[k].rows(1)
+                slope = term.derivatives[k].rows(1)
                 # a central difference at 50 digits is right to some 1e-25
                 assert slope.lo[0] - 1e-20 <= (above - below) / (2 * step) <= slope.hi[0] + 1e-20
                 assert slope.hi[0] - slope.lo[0] < most
@@ -334,7 +334,7 @@ def test_terms_and_their_derivatives_hold_those_at_50_digits(model):
 
 def test_the_root_of_what_may_be_0_is_nan_with_its_derivatives():
     found = root(variable(Intervals.of(-1.0, 1.0), 0, 1))
-    for each in (found.value, found.by[0]):
+    for each in (found.value, found.derivatives[0]):
         assert np.isnan(each.lo).all()
         assert np.isnan(each.hi).all()
 
@@ -376,7 +376,7 @@ def test_what_neither_rises_nor_falls_costs_its_derivative(second):
     rising = [
         variable(Intervals(*each), k, lo.size) for k, each in enumerate(zip(ends[0], ends[2], strict=True))
     ]
-    slopes = [[by.rows(1) for by in term.by] for term in boxes._terms(kind, rising)]
+    slopes = [[by.rows(1) for by in term.derivatives] for term in boxes._terms(kind, rising)]
     weights = [Intervals.of(each) for each in (0.0, 0.0, u)]
     for x, failed in ((middle + 1e-5, 1), (top - 1e-5, 1), (top + 0.5, 0)):
         boxes.x = x

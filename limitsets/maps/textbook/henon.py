@@ -33,13 +33,13 @@ class Henon(NamedTuple):
 
 
 def _image(params: Henon, x: Point, side: int) -> tuple[Point, int, int]:
-    u = 1.0 - params.a * x[0] * x[0] + x[1]
+    u = 1.0 - params.a * x[0] ** 2 + x[1]
     v = params.b * x[0]
     return (u, v), side, 0 if (abs(u) < math.inf) & (abs(v) < math.inf) else codes.OUTSIDE
 
 
 def _image_on(params: Henon, x: Point, side: int, branch: int) -> tuple[Point, int, tuple[Point, Point]]:
-    u = 1.0 - params.a * x[0] ** 2 + x[1]  # the power is exact on boxes: each number occurs once
+    u = 1.0 - params.a * x[0] ** 2 + x[1]  # as a power, each number occurs once: the derived box is exact
     return (u, params.b * x[0]), side, ((-2.0 * params.a * x[0], 1.0), (params.b, 0.0))
 
 

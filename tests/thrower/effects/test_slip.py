@@ -9,7 +9,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from limitsets.jit import entry_of
+from limitsets.jit import entry_of, kernel
 from limitsets.thrower import throw_map
 from limitsets.thrower.effects.bounce import Bounce, struck
 from limitsets.thrower.effects.slip import Slip
@@ -260,17 +260,23 @@ def _landing(a: float, d: float, kappa: float, x: float) -> float:
     return float(phi[below[0]])
 
 
+@kernel(entry=True)
+def slid(slip: Slip, shift: float, part: FullSide, face: Face) -> float:
+    """As a throw does it: compiled, where a division by 0 is infinite."""
+    return moved(slip, shift, part, face)
+
+
 def test_the_rest_slides_on_by_its_braking_distance() -> None:
     part = square(0.5)
     # speed 2, braked by mu kappa = 2: 2^2/(2 * 2) = 1, either way
-    assert moved(Slip(0.5), 0.0, part, Face(0, 0.0, 0, 0.0, 2.0)) == pytest.approx(1.0, rel=1e-15)
-    assert moved(Slip(0.5), 0.0, part, Face(0, 0.0, 0, 0.0, -2.0)) == pytest.approx(-1.0, rel=1e-15)
+    assert slid(Slip(0.5), 0.0, part, Face(0, 0.0, 0, 0.0, 2.0)) == pytest.approx(1.0, rel=1e-15)
+    assert slid(Slip(0.5), 0.0, part, Face(0, 0.0, 0, 0.0, -2.0)) == pytest.approx(-1.0, rel=1e-15)
     # turning down about its left end by 1, xdot = d = 1 and J_n = a = 1: friction takes half of it
-    assert moved(Slip(0.5), 0.0, part, Face(0, 0.0, 0, -1.0, 0.0)) == pytest.approx(0.25 / 4.0, rel=1e-14)
-    assert moved(Slip(1.5), 0.0, part, Face(0, 0.0, 0, -1.0, 0.0)) == 0.0
+    assert slid(Slip(0.5), 0.0, part, Face(0, 0.0, 0, -1.0, 0.0)) == pytest.approx(0.25 / 4.0, rel=1e-14)
+    assert slid(Slip(1.5), 0.0, part, Face(0, 0.0, 0, -1.0, 0.0)) == 0.0
     # with mu d beyond the leading end the part would tip over it; without friction it slides for ever
-    assert math.isnan(moved(Slip(1.5), 0.0, part, Face(0, 0.0, 0, 0.0, 2.0)))
-    assert math.isinf(moved(Slip(0.0), 0.0, part, Face(0, 0.0, 0, 0.0, 2.0)))
+    assert math.isnan(slid(Slip(1.5), 0.0, part, Face(0, 0.0, 0, 0.0, 2.0)))
+    assert math.isinf(slid(Slip(0.0), 0.0, part, Face(0, 0.0, 0, 0.0, 2.0)))
 
 
 def test_painleves_paradox_is_outside_the_model() -> None:

@@ -5,11 +5,12 @@ import pytest
 from scipy import stats
 
 import limitsets as ls
-from limitsets.jit import kernel
+from limitsets.jit import entry_of, kernel
 from limitsets.maps import advance, codes, images, orbit
 from limitsets.maps.counting_random import normal_pair, philox, uniform_pair
 from limitsets.scene import Scene
 from limitsets.thrower import trace
+from limitsets.thrower.effects.spread import Spread
 from tests.kept import kept
 
 DESIGNED = ls.load("paper-designed")
@@ -111,7 +112,7 @@ def test_a_scatter_in_degrees_per_second_is_one_in_percent() -> None:
     }
     speed = np.degrees(np.sqrt(193.045 / DESIGNED.kappa))
     tree["world"] = {"scatter": {"speed": f"{float(0.004 * speed)!r} deg/s"}}
-    assert ls.load(tree).map.effects.spread.speed == pytest.approx(0.004, rel=1e-12)
+    assert entry_of(ls.load(tree).map.effects, Spread).speed == pytest.approx(0.004, rel=1e-12)
     del tree["gravity"]
     with pytest.raises(ls.errors.SceneError, match="gravity"):
         _ = ls.load(tree).map
