@@ -6,6 +6,7 @@ read, answer, print or draw goals ask the class.  What proves it stands in `limi
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, fields, is_dataclass
 from typing import Annotated, Any, ClassVar, NamedTuple, TypeAlias, get_type_hints
@@ -108,6 +109,11 @@ GOALS: dict[str, type[Goal]] = {}
 """The goals that a scene can name, by their word."""
 
 
+@functools.cache  # a scene is read many times in a search
+def _hints_of(goal: Any) -> dict[str, Any]:
+    return get_type_hints(goal, include_extras=True)
+
+
 def words_of(goal: type[Goal]) -> dict[str, str]:
     """Name what a scene writes of a goal: "place", "side", "sides" or "flag", by field.
 
@@ -119,7 +125,7 @@ def words_of(goal: type[Goal]) -> dict[str, str]:
     >>> words_of(Reaches)
     {'x': 'place', 'side': 'side', 'every_orbit': 'flag'}
     """
-    hints = get_type_hints(goal, include_extras=True)
+    hints = _hints_of(goal)
     names = [each.name for each in fields(goal) if each.name != "from_anywhere"]
     return {name: getattr(hints[name], "__metadata__", ("flag",))[0] for name in names}
 
