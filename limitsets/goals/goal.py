@@ -125,7 +125,7 @@ def words_of(goal: type[Goal]) -> dict[str, str]:
     >>> words_of(Reaches)
     {'x': 'place', 'side': 'side', 'every_orbit': 'flag'}
     """
-    hints = _hints_of(goal)
+    hints = _hints_of(goal)  # type: ignore[arg-type]  # a class is hashable
     names = [each.name for each in fields(goal) if each.name != "from_anywhere"]
     return {name: getattr(hints[name], "__metadata__", ("flag",))[0] for name in names}
 
