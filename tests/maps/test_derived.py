@@ -61,8 +61,8 @@ EXACT = {
 
 
 def registered(name, fields, **kernels):
-    """A fresh class of parameters, with these kernels."""
-    cls = NamedTuple(name, fields)
+    """A fresh class of parameters, with these kernels; found in this file by its name, so that its code is kept."""
+    cls = globals()[name] = NamedTuple(name, fields)
     cls.__module__ = __name__
     return ls.register(cls, **kernels)
 
