@@ -7,6 +7,7 @@ read, answer, print or draw goals ask the class.  What proves it stands in `limi
 from __future__ import annotations
 
 import functools
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, fields, is_dataclass
 from typing import Annotated, Any, ClassVar, NamedTuple, TypeAlias, get_type_hints
@@ -65,7 +66,7 @@ class Found(NamedTuple):
     leaving: float = 0.0
 
 
-class Goal:
+class Goal(ABC):
     """What a goal of any kind is asked.
 
     Attributes
@@ -83,13 +84,13 @@ class Goal:
     of_every_start: ClassVar[bool] = False
     from_anywhere: bool = False
 
+    @abstractmethod
     def decide(self, found: Found) -> Verdict:
         """Decide it from what an analysis found."""
-        raise NotImplementedError
 
+    @abstractmethod
     def question(self, unit: str) -> str:
         """Say what is asked, a main clause."""
-        raise NotImplementedError
 
     def explained(self, threshold: float, unit: str) -> str:
         """Say what a threshold means, a sentence; empty for goals that have none."""
@@ -125,7 +126,7 @@ def words_of(goal: type[Goal]) -> dict[str, str]:
     >>> words_of(Reaches)
     {'x': 'place', 'side': 'side', 'every_orbit': 'flag'}
     """
-    hints = _hints_of(goal)  # type: ignore[arg-type]  # a class is hashable
+    hints = _hints_of(goal)
     names = [each.name for each in fields(goal) if each.name != "from_anywhere"]
     return {name: getattr(hints[name], "__metadata__", ("flag",))[0] for name in names}
 

@@ -233,7 +233,7 @@ class Predicate(Goal):
 
 def unknown_goal(goal: object) -> AnswerError:
     """Build the error for what is no goal of these: nothing else has a rule and words of its own."""
-    kinds = ", ".join(kind.__name__ for kind in (*GOALS.values(), Predicate))
+    kinds = ", ".join([*(kind.__name__ for kind in GOALS.values()), Predicate.__name__])
     return AnswerError(
         "the goal",
         type(goal).__name__,
