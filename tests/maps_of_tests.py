@@ -57,6 +57,38 @@ def _contraction_on(params: Contraction, x: float, side: int, branch: int) -> tu
 ls.register(Contraction, image=_contraction, image_on=_contraction_on)
 
 
+class Tent(NamedTuple):
+    """x' = slope x up to 1/2 and slope (1 - x) beyond; without boxes or slopes of its own, as a user writes it down.
+
+    Known answers: the core [slope (1 - slope/2), slope/2] is invariant, every slope is +-slope, and slope/(1 + slope)
+    is a fixed point.
+
+    Attributes
+    ----------
+    slope : float
+        Between sqrt 2 and 2.
+    """
+
+    slope: float = 1.9
+
+
+def _tent(params: Tent, x: float, side: int) -> tuple[float, int, int]:
+    return (params.slope * (1.0 - x), side, 1) if x > 0.5 else (params.slope * x, side, 0)
+
+
+def _tent_on(params: Tent, x: float, side: int, branch: int) -> tuple[float, int]:
+    if branch == 1:
+        return params.slope * (1.0 - x), side
+    return params.slope * x, side
+
+
+def _tent_margin(params: Tent, x: float, side: int) -> float:
+    return x - 0.5
+
+
+ls.register(Tent, image=_tent, image_on=_tent_on, margin=_tent_margin, branches=("up", "down"))
+
+
 class Linear2(NamedTuple):
     """(x, y)' = (xx x + xy y, yx x + yy y); by default the saddle diag(0.5, 2).
 

@@ -13,6 +13,7 @@ from limitsets.errors import MapError
 from limitsets.graph.images.enclosed import enclosures
 from limitsets.graph.images.hulls import BoxImages
 from limitsets.maps.derived import MAYBE, NEVER, SURE, branch_boxes
+from tests.maps_of_tests import Tent
 
 
 class Wave(NamedTuple):
@@ -178,38 +179,19 @@ def test_three_dimensions_with_parameters_by_side_in_a_nested_class():
 # ---------------------------------------------------------------- two branches
 
 
-def _tent(p, x, side):
-    return (p.s * (1.0 - x), side, 1) if x > 0.5 else (p.s * x, side, 0)
-
-
-def _tent_on(p, x, side, branch):
-    if branch == 1:
-        return p.s * (1.0 - x), side
-    return p.s * x, side
-
-
-def _tent_margin(p, x, side):
-    return x - 0.5
-
-
-TENT = registered(
-    "Tented", [("s", float)], image=_tent, image_on=_tent_on, margin=_tent_margin, branches=("up", "down")
-)
-
-
 def test_a_margin_decides_between_two_branches():
     lo, hi = np.array([0.1, 0.4, 0.6]), np.array([0.2, 0.6, 0.7])
-    found = BoxImages(TENT(2.0), TENT(2.0), 0, (lo,), (hi,))
+    found = BoxImages(Tent(2.0), Tent(2.0), 0, (lo,), (hi,))
     assert found.count.tolist() == [1, 2, 1]
     assert found.to[1].tolist() == [0, 0, 1]
     states = [
-        branch_boxes(TENT(2.0), TENT(2.0), 0, b, lo[:, None], hi[:, None]).state.tolist() for b in (0, 1)
+        branch_boxes(Tent(2.0), Tent(2.0), 0, b, lo[:, None], hi[:, None]).state.tolist() for b in (0, 1)
     ]
     assert states == [[SURE, MAYBE, NEVER], [NEVER, MAYBE, SURE]]
 
 
 def test_slopes_that_image_on_leaves_out_are_derived():
-    assert maps.lyapunov(TENT(1.9), 0.3, 0, 500).exponent == pytest.approx(math.log(1.9), abs=1e-12)
+    assert maps.lyapunov(Tent(1.9), 0.3, 0, 500).exponent == pytest.approx(math.log(1.9), abs=1e-12)
     own, hand = Young(10.0, 12.0), maps.Leslie(10.0, 12.0)
     one, two = (maps.lyapunov(m, (3.0, 2.0), 0, 400).exponent for m in (own, hand))
     assert one == pytest.approx(two, abs=1e-6)

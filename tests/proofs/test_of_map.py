@@ -1,6 +1,7 @@
 """Claims about any map, proved from its plain kernels: against answers on paper, and against sampled orbits."""
 
 import math
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -9,6 +10,9 @@ import pytest
 import limitsets as ls
 from limitsets import maps
 from limitsets.errors import AnswerError
+from limitsets.proofs.of_map import _prove
+from limitsets.sets import cycles
+from tests.maps_of_tests import Tent
 
 CLAIMS = ["invariant", "trapping", "attracts-all", "expanding", "cycles"]
 
@@ -19,24 +23,6 @@ class Ricker(NamedTuple):
 
 def _ricker(p, x, side):
     return x * math.exp(p.r * (1.0 - x)), side, 0
-
-
-class Slanted(NamedTuple):
-    s: float
-
-
-def _tent(p, x, side):
-    return (p.s * (1.0 - x), side, 1) if x > 0.5 else (p.s * x, side, 0)
-
-
-def _tent_on(p, x, side, branch):
-    if branch == 1:
-        return p.s * (1.0 - x), side
-    return p.s * x, side
-
-
-def _tent_margin(p, x, side):
-    return x - 0.5
 
 
 class Spiral(NamedTuple):
@@ -52,7 +38,6 @@ def _spiral(p, x, side):
 
 
 ls.register(Ricker, image=_ricker)
-ls.register(Slanted, image=_tent, image_on=_tent_on, margin=_tent_margin, branches=("up", "down"))
 ls.register(Spiral, image=_spiral, dimension=2)
 
 
@@ -99,14 +84,14 @@ def test_a_period_two_orbit_and_the_fixed_point_that_keeps_all_from_being_attrac
 
 def test_a_user_map_of_two_branches_expands_for_a_box_of_parameters():
     grid = ls.grid([(0.15, 0.93)], cells=2048)
-    proof = ls.certify(Slanted(1.80), grid, ["invariant", "expanding"], upper=Slanted(1.81))
+    proof = ls.certify(Tent(1.80), grid, ["invariant", "expanding"], upper=Tent(1.81))
     assert verdicts(proof) == {"invariant": "proved", "expanding": "proved"}
     assert 1.79 < float.fromhex(proof.claims[1].section["least_slope"]) <= 1.80
     lo, hi = proof.cells.extents()[0][0][0], proof.cells.extents()[0][-1][1]
     for s in (1.80, 1.805, 1.81):  # the core of a tent: from s (1 - s/2) to s/2
         assert lo <= s * (1.0 - s / 2.0)
         assert s / 2.0 <= hi
-    cycles = ls.certify(Slanted(1.80), grid, ["cycles"])
+    cycles = ls.certify(Tent(1.80), grid, ["cycles"])
     fixed = next(cycle for cycle in cycles.cycles if cycle.period == 1)
     assert fixed.lo[0, 0] < 1.8 / 2.8 < fixed.hi[0, 0]
     assert fixed.attracts is False
@@ -136,6 +121,13 @@ def test_henon_has_the_orbit_of_period_two_that_attracts():
     order = np.argsort(cycle.lo[:, 0])
     assert (cycle.lo[order, 0] < roots).all()
     assert (roots < cycle.hi[order, 0]).all()
+
+
+def test_an_orbit_that_is_not_there_is_not_proved():
+    proof = ls.certify(Ricker(2.3), ls.grid([(0.2, 1.7)], cells=4096), ["invariant"])
+    (true,) = cycles(proof.graph, 2, proof.cells)
+    assert not isinstance(_prove(proof, true), str)
+    assert _prove(proof, replace(true, x=true.x + 0.02)) == "no box is found that Newton's operator contracts"
 
 
 def test_words_and_maps_that_cannot_be_proved():
