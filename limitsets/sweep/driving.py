@@ -41,7 +41,7 @@ class _Told:
         done, of = len(self.store.done), math.prod(self.plan.chunks)
         if done == of:
             return
-        words, seconds = "atlas", time.monotonic() - self.began
+        words, seconds = "atlas, workers start", time.monotonic() - self.began
         if self.points and seconds > 0:
             rate = self.points / seconds
             left = (of - done) * seconds / (done - self.before)

@@ -97,6 +97,10 @@ class Plan:
         steps = zip(self.place(number), self.chunk, self.shape, strict=True)
         return tuple(slice(k * step, min((k + 1) * step, n)) for k, step, n in steps)
 
+    def point(self, number: int) -> Region:
+        """Return the region of a single point."""
+        return tuple(slice(int(k), int(k) + 1) for k in np.unravel_index(number, self.shape))
+
     def numbers(self, region: Region) -> npt.NDArray[np.int64]:
         """Return the numbers of the points of a region."""
         index = np.indices(tuple(part.stop - part.start for part in region))
@@ -153,9 +157,12 @@ class Plan:
             raise LimitsetsError("the axes", ", ".join(names), "different quantities", "name each once")
         task = registered(resolved(self.task))
         self.subject.require(self.base, block=task is not None)
-        if task is not None and self.variables is not None:
+        if task is not None:
             known = task.variables(self.subject, **self.options)
-            unknown = [name for name in self.variables if name not in known]
+            both = [name for name in names if name in known]
+            if both:
+                raise LimitsetsError("the axis", both[0], "no variable of the task", "it would be both")
+            unknown = [name for name in self.variables or () if name not in known]
             if unknown:
                 raise LimitsetsError("the variable", unknown[0], ", ".join(known), "name some of these")
         try:

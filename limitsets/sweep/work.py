@@ -112,7 +112,7 @@ def _single(
             status[k] = REFUSED
             continue
         except Exception as error:
-            place = ", ".join(f"{name} {each[k]!r}" for name, each in values.items())
+            place = plan.words(plan.point(int(numbers[k])))
             raise _wrong(plan, "", f"{type(error).__name__}: {error}", f"an answer at {place}") from error
         for name, each in _numbers(plan, given).items():
             if name not in found:
