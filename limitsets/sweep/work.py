@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from limitsets.errors import LimitsetsError
+from limitsets.maps.stacks import chosen
 from limitsets.sweep.plan import Plan, require_same_code
 from limitsets.sweep.tasks import Block, BlockTask, Variable, registered, resolved
 
@@ -59,12 +60,6 @@ def variables_of(plan: Plan, task: BlockTask) -> dict[str, Variable]:
     if plan.variables is None:
         return {name: each for name, each in known.items() if each.default}
     return {name: each for name, each in known.items() if name in plan.variables}
-
-
-def chosen(stack: Any, points: Any) -> Any:
-    if isinstance(stack, np.ndarray):
-        return np.ascontiguousarray(stack[points])
-    return type(stack)(*(chosen(entry, points) for entry in stack)) if hasattr(stack, "_fields") else stack
 
 
 Found = dict[str, tuple[Variable, npt.NDArray[Any]]]
