@@ -30,6 +30,8 @@ if TYPE_CHECKING:
 
 __all__ = ["Atlas", "atlas"]
 
+TOPOLOGY = "limitsets.sweep.of_topology:topology"
+
 
 @dataclass(frozen=True, eq=False)
 class Atlas:
@@ -67,7 +69,7 @@ class Atlas:
                 columns[label] = variable.isel(dict(zip(more, places, strict=True))).values.ravel()
         names = [str(axis) for axis in self.axes]
         index = pd.MultiIndex.from_product([data[name].values for name in names], names=names)
-        return pd.DataFrame(columns, index=index).reset_index()  # type: ignore[no-any-return]
+        return pd.DataFrame(columns, index=index).reset_index()
 
     def to_json(self) -> dict[str, Any]:
         """Give the document of docs/json.md: the scene, the axes, and every variable as nested lists."""
@@ -147,7 +149,7 @@ def atlas(
     task : str or callable
         What is asked of each point: an importable function, or ``"module:function"``.  It takes a scene (or a map's
         parameters), and `seed` if it has such an argument, and returns numbers, or arrays of them, by name; or it is
-        registered for blocks of points (`limitsets.sweep.block_task`).
+        registered for blocks of points (`limitsets.sweep.block_task`).  By default: the topology of the attractors.
     variables : sequence of str, optional
         Those that are wanted.
     options : mapping, optional
@@ -225,9 +227,7 @@ def plan_of(
     """Make the plan of an atlas, and refuse one that cannot be carried out (`atlas`)."""
     chosen = _subject(subject, domain)
     axes = tuple(axis_of(each, chosen.unit_of) for each in (y, x) if each is not None)
-    if task is None:
-        raise LimitsetsError("the task", None, "module:function, or a function of a module", "name one")
-    name = named(task)
+    name = named(TOPOLOGY if task is None else task)
     resolved(name)
     shape = tuple(axis.values.size for axis in axes)
     parts = chunk_shape(shape, name) if chunk is None else tuple(int(n) for n in chunk)

@@ -57,6 +57,11 @@ class SceneSubject:
         return self.scene.name
 
     @property
+    def sides(self) -> int:
+        """How many sides there are."""
+        return len(self.scene.sides)
+
+    @property
     def unit(self) -> str:
         """Unit of lengths."""
         return self.scene.unit
@@ -130,6 +135,17 @@ class MapSubject:
         return type(self.params).__name__
 
     @property
+    def sides(self) -> int:
+        """How many sides there are."""
+        return self._domain.sides
+
+    @property
+    def _domain(self) -> Domain:
+        if self.domain is None:
+            raise AnswerError("the domain", None, "a box of x per side", "pass domain=[(lo, hi), ...]")
+        return self.domain
+
+    @property
     def unit(self) -> str:
         """Unit of x: none."""
         return ""
@@ -156,17 +172,16 @@ class MapSubject:
         """Return the maps at many points, on one domain."""
         from limitsets.scene.arrays import repeated
 
-        if self.domain is None:
-            raise AnswerError("the domain", None, "a box of x per side", "pass domain=[(lo, hi), ...]")
         count = next(iter(values.values())).size
         stack = repeated(self.params, count)
         for name, each in values.items():
             stack = _with(stack, _path(name), np.ascontiguousarray(each, dtype=np.float64), name)
-        ends = [self.domain.lo, self.domain.hi]
-        if self.domain.dimension == 1:
+        domain = self._domain
+        ends = [domain.lo, domain.hi]
+        if domain.dimension == 1:
             ends = [corner[:, 0] for corner in ends]
         lo, hi = (np.repeat(corner[None], count, axis=0) for corner in ends)
-        anchor = self.domain.anchor
+        anchor = domain.anchor
         anchors = None if anchor is None else np.repeat(anchor[None], count, axis=0)
         return Points(stack, lo, hi, anchors, np.ones(count, dtype=np.bool_))
 

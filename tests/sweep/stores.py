@@ -13,7 +13,9 @@ def run(store, **options):
     """Compute the atlas of these tests, by threads where nothing else is said."""
     if not options.keys() & {"workers", "executor", "cluster"}:
         with ThreadPoolExecutor(2) as pool:
-            return atlas("paper-designed", X, Y, task=TASK, chunk=(3, 3), store=store, executor=pool, **options)
+            return atlas(
+                "paper-designed", X, Y, task=TASK, chunk=(3, 3), store=store, executor=pool, **options
+            )
     return atlas("paper-designed", X, Y, task=TASK, chunk=(3, 3), store=store, **options)
 
 
