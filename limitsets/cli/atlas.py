@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -39,7 +40,7 @@ def atlas(
 
     A run that was interrupted goes on when the same command is given again.
     """
-    with progress() as tell:
+    with progress() as tell, saved(csv) if csv is not None else nullcontext() as draft:
         from limitsets.sweep import atlas as run
 
         chosen, _ = opened(scene, None)
@@ -56,9 +57,8 @@ def atlas(
             cluster=cluster,
             progress=tell,
         )
-        if csv is not None:
-            with saved(csv) as draft:
-                found.to_dataframe().to_csv(draft, index=False)
+        if draft is not None:
+            found.to_dataframe().to_csv(draft, index=False)
     answer(found if json else None, json, lambda: _text(found, csv))
 
 
