@@ -10,6 +10,7 @@ from typing import Any
 
 from limitsets.jit import kernel
 from limitsets.maps.kernels import image_on, on_side
+from limitsets.topology.cells import COLLAPSES, LEAVES, cell_of
 from limitsets.topology.work import MOST_INTERVALS, Cells, Components, Pieces, Region, Unions
 
 __all__ = ["IMAGE", "NOTHING", "PUSHED", "SET", "begin_union", "push_through", "settle", "stays_around"]
@@ -18,8 +19,8 @@ __all__ = ["IMAGE", "NOTHING", "PUSHED", "SET", "begin_union", "push_through", "
 SET, IMAGE, PUSHED = 0, 1, 2
 # Of the largest side: ends rest that move by less; a gap this small is rounding, and a part this short.
 REST, GAP, SLIVER = 1e-12, 1e-13, 1e-10
-# Half the length of the interval whose images are followed, likewise.
-SEED = 1e-4
+# Half the length of the interval whose images are followed, likewise, and gaps that are filled where there are many.
+SEED, FILLED, MANY = 1e-6, 1e-3, 16
 MOST_IMAGES, MOST_STEPS = 2000, 100_000
 # What a search may end with besides an answer.
 NOTHING, TOO_MANY, MOVES, OUT = 0, 1, 2, 3
@@ -141,9 +142,23 @@ def settle(params: Any, r: Region, p: Pieces, u: Unions) -> int:
     return MOVES
 
 
+@kernel
+def _lost(r: Region, c: Cells, k: Components, side: int, x: float) -> bool:
+    """Whether a state is out of the domain, or in a cell all of whose starts leave it."""
+    if x < r.lo[side] or x > r.hi[side]:
+        return True
+    cell = cell_of(c, side, x)
+    return not k.held[cell] and k.ends[cell] in (LEAVES, COLLAPSES)
+
+
 @kernel(entry=True, counting=False)
-def stays_around(params: Any, x: float, side: int, scale: float, r: Region, p: Pieces, u: Unions) -> bool:
-    """Whether the images of a short interval about a state stay in the domain, as far as they are followed."""
+def stays_around(
+    params: Any, x: float, side: int, scale: float, r: Region, p: Pieces, c: Cells, k: Components, u: Unions
+) -> bool:
+    """Whether no part of the images of a short interval about a state is lost, as far as they are followed.
+
+    Gaps are filled where there are many: near a fixed point that repels slowly one interval follows another.
+    """
     half = SEED * scale
     u.size[SET] = 0
     _put(u, SET, side, max(x - half, r.lo[side]), min(x + half, r.hi[side]))
@@ -154,11 +169,13 @@ def stays_around(params: Any, x: float, side: int, scale: float, r: Region, p: P
         if u.size[IMAGE] > MOST_INTERVALS:
             return True
         for i in range(u.size[IMAGE]):
-            if u.lo[IMAGE, i] < r.lo[u.side[IMAGE, i]] or u.hi[IMAGE, i] > r.hi[u.side[IMAGE, i]]:
+            if _lost(r, c, k, u.side[IMAGE, i], u.lo[IMAGE, i]) or _lost(
+                r, c, k, u.side[IMAGE, i], u.hi[IMAGE, i]
+            ):
                 return False
         for i in range(u.size[SET]):
             _put(u, IMAGE, u.side[SET, i], u.lo[SET, i], u.hi[SET, i])
-        if not _merge(u, IMAGE, GAP * scale):
+        if not _merge(u, IMAGE, (FILLED if u.size[IMAGE] > MANY else GAP) * scale):
             return True
         grown = u.size[IMAGE] != u.size[SET]
         for i in range(u.size[IMAGE]):

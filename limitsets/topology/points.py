@@ -17,7 +17,7 @@ from limitsets.maps.kernels import on_side
 from limitsets.maps.stacks import point_of, size_of
 from limitsets.topology.bands import NOTHING, SET, begin_union, push_through, settle, stays_around
 from limitsets.topology.cells import fill_cells
-from limitsets.topology.orbits import CLOSES, INNER, averages, cycle_length, stays_somewhere, visits_all
+from limitsets.topology.orbits import CLOSES, INNER, averages, cycle_length, remaining, visits_all
 from limitsets.topology.pieces import find_pieces
 from limitsets.topology.records import (
     BANDS_JOIN,
@@ -92,9 +92,10 @@ def _point(params: Any, decided: bool, r: Region, w: Work, t: Topologies, i: int
     for a in range(count):
         found = _attractor(params, a, r, scale, w, t, i)
         doubt = found if doubt == DECIDED else doubt
-    if doubt == DECIDED and stays_somewhere(params, sides, w.cells, w.components, w.starts):
+    if doubt == DECIDED and remaining(params, sides, w.cells, w.components, w.starts) > 0:
         x, side = w.starts.x[0], w.starts.side[0]
-        doubt = STAYING if stays_around(params, x, side, scale, r, w.pieces, w.unions) else DECIDED
+        if stays_around(params, x, side, scale, r, w.pieces, w.cells, w.components, w.unions):
+            doubt = STAYING
     sure = shares(r, count, w.pieces.to, w.cells, w.components, w.split)
     t.leaves[i], t.collapses[i] = w.split[0], w.split[1]
     for a in range(MOST_ATTRACTORS):
