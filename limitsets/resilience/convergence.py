@@ -1,7 +1,8 @@
 """Convergence times: steps until an orbit is in the attracting cells, or has left.
 
 Sampled on random starts; and, where the images of cells are enclosed, bounded for every start of the inner basin by the
-rank of its cell, the longest path to the attracting cells or out of the domain.
+rank of its cell, the longest path to the attracting cells or out of the domain, with the longest stays in the recurrent
+components on the way, each of which an orbit passes once.
 
 Source: Datseris, Rossi, Wagemakers, "Framework for global stability analysis of dynamical systems", Chaos 33, 073151,
 2023; ranks: docs/certificates.md.
@@ -9,6 +10,7 @@ Source: Datseris, Rossi, Wagemakers, "Framework for global stability analysis of
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 from typing import Any
 
@@ -22,6 +24,7 @@ from limitsets.maps import codes
 from limitsets.resilience.colours import Colours, colours
 from limitsets.resilience.orbits import STEPS, follow, random_starts
 from limitsets.sets import Attractor
+from limitsets.sets.passing import longest_stays
 
 __all__ = ["ConvergenceTimes", "Times", "convergence_times"]
 
@@ -150,14 +153,23 @@ def _bounds(parted: Colours) -> list[tuple[int | None, float | None]]:
     if not parted.proved:
         return [(None, None)] * parted.codes.size
     graph, parts = parted.graph, parted.graph.components()
-    # off the attracting cells an inner basin has no recurrent cell: a rank falls by 1 at least with every step
-    rank = ranks(graph.ranges, parts, np.asarray(parts.recurrent))
+    sets, attracting, stays = (
+        graph.recurrent_components(),
+        graph.condensation().attracting,
+        longest_stays(graph),
+    )
+    settled = np.zeros(parts.count, dtype=bool)
+    settled[[parts.label[cells[0]] for cells in itertools.compress(sets, attracting)]] = True
+    # a rank falls with every step, but for those within a recurrent component, through which orbits pass
+    rank = ranks(graph.ranges, parts, settled)
+    within = np.array([parted.labels[cells[0]] for cells in sets], dtype=np.int64)
     bounds: list[tuple[int | None, float | None]] = []
     for number, code in enumerate(parted.codes):
         mask = parted.inner(number).mask
         if not mask.any():
             bounds.append((None, None))
             continue
-        steps, weight = rank[mask] + (0 if code >= 0 else 1), parted.grid.measure[mask]
+        more = int((stays[(within == code) & (stays > 0)] - 1).sum()) + (0 if code >= 0 else 1)
+        steps, weight = rank[mask] + np.where(parted.blocks[mask] == code, 0, more), parted.grid.measure[mask]
         bounds.append((int(steps.max()), float((steps * weight).sum() / weight.sum())))
     return bounds

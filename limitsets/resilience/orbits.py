@@ -96,7 +96,14 @@ def follow(
 
 
 def labelled_starts(parted: Colours, steps: int, rng: np.random.Generator) -> Integers:
-    """Label of a random start in each cell: the cell's where it is decided, else where its orbit comes to."""
-    label, cells = parted.labels.astype(np.int64), parted.undecided
-    label[cells] = follow(parted.graph, parted.labels, *starts_in(parted.grid, cells, rng), steps)[0]
+    """Label of a start in each cell: the cell's where it is decided, else where its orbit comes to.
+
+    The places along each axis are drawn once, so that starts of one row differ in one coordinate only.
+    """
+    grid, label = parted.grid, parted.labels.astype(np.int64)
+    for s, axes in enumerate(grid.edges):
+        places = [edges[:-1] + rng.random(edges.size - 1) * np.diff(edges) for edges in axes]
+        cells = parted.undecided[grid.side_of(parted.undecided) == s]
+        x = np.stack([at[k] for at, k in zip(places, grid.axes(cells, s), strict=True)], axis=1)
+        label[cells] = follow(parted.graph, parted.labels, x, np.full(cells.size, s), steps)[0]
     return label

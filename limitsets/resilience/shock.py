@@ -47,8 +47,8 @@ class FatalShock:
         Where it comes to: number of the attractor, or name of the exit.
     shock : ndarray, shape (dimension,)
         The push to the nearest place known to be fatal.
-    into : int, str or None
-        Where that leads to; None if only that it is fatal is known.
+    into : int or str
+        Where the nearest decided place that is fatal leads to.
     """
 
     lo: float
@@ -58,7 +58,7 @@ class FatalShock:
     side: int
     basin: int | str
     shock: Floats
-    into: int | str | None
+    into: int | str
 
     def to_json(self) -> dict[str, Any]:
         """Give the shock as JSON takes it."""
@@ -115,16 +115,20 @@ def minimal_fatal_shock(
     border = _border(parted, state, side)
     least = min(float(distance[~safe].min(initial=np.inf)), *(near for near, *_ in border))
     far, where, into = min(((far, push, code) for _, far, push, code in border), key=lambda each: each[0])
+    decided, beyond = parted.labels[here] != codes.UNDECIDED, far
     if fatal.any():
         nearest = int(np.flatnonzero(fatal)[distance[fatal].argmin()])
         if distance[nearest] <= far:
-            far, where, into = float(distance[nearest]), push[nearest], int(parted.labels[number[nearest]])
+            far, where = float(distance[nearest]), push[nearest]
+    if (fatal & decided).any():
+        nearest = int(np.flatnonzero(fatal & decided)[distance[fatal & decided].argmin()])
+        into = int(parted.labels[number[nearest]]) if distance[nearest] <= beyond else into
     if parted.proved:
         least, far = least * (1.0 - ROUNDING), far * (1.0 + ROUNDING)
     else:
         width = CELLS * float(np.sqrt(((hi - lo) ** 2).sum(axis=1)).max())
         least, far = max(least - width, 0.0), far + width
-    name = None if into == codes.UNDECIDED else parted.names[int(np.flatnonzero(parted.codes == into)[0])]
+    name = parted.names[int(np.flatnonzero(parted.codes == into)[0])]
     return FatalShock(least, far, parted.how, state, side, parted.names[own], where, name)
 
 

@@ -111,7 +111,7 @@ def basin_stability(
     >>> graph = ls.transitions(ls.maps.Cubic(1.5), ls.grid([(-1.2, 1.2)], cells=1001), "boxes")
     >>> found = ls.resilience.basin_stability(graph, ls.attractors(graph, throws=100))
     >>> found.how, found.attractors[0].lo <= 0.5 <= found.attractors[0].hi, round(found.undecided, 3)
-    ('proved', True, 0.005)
+    ('proved', True, 0.001)
     """
     parted = colours(graph, found)
     inner = tuple(parted.inner(number) for number in range(parted.codes.size))

@@ -1,9 +1,9 @@
 """Uncertainty exponent: how the share of uncertain starts falls with the error of the start.
 
-One start is drawn in each cell.  f(e) is the share of pairs of them, e apart along an axis, that come to different
-basins; f ~ e^a with the uncertainty exponent a = d - D in d dimensions, D being the box-counting dimension of the
-boundary.  A straight boundary gives a = 1.  Reducing the error of the start by 10 halves the uncertain starts where
-a = 0.3.
+One start is drawn in each cell, so that starts of one row differ in one coordinate only.  f(e) is the share of those
+that come to another basin than one of the two starts e away along an axis; f ~ e^a with the uncertainty exponent a = d - D
+in d dimensions, D being the box-counting dimension of the boundary.  A straight boundary gives a = 1.  Where a = 0.3 an
+error of the start that is ten times smaller halves the uncertain starts.
 
 Source: Grebogi, McDonald, Ott, Yorke, "Final state sensitivity: an obstruction to predictability", Physics Letters A
 99, 1983; "Fractal basin boundaries", Physica D 17, 1985.
@@ -48,11 +48,11 @@ class UncertaintyExponent:
     apart : ndarray of int, shape (n,)
         Distances in cells.
     shares : ndarray, shape (n,)
-        Share of pairs, so far apart, that come to different basins.
+        Share of uncertain starts: one of the starts so far away comes to another basin; mean over the axes.
     dimension : int
         Of the states: that of the boundary is `dimension` - `exponent`.
     undecided : float
-        Share of the starts, by measure, that came nowhere; their pairs are left out.
+        Share of the starts, by measure, that came nowhere: left out, with those that are compared with them.
     how : str
         "sampled": orbits of one start in each cell, followed until the basin of their cell is decided.
     """
@@ -126,24 +126,30 @@ def uncertainty_exponent(
     label = labelled_starts(colours(graph, found), steps, np.random.default_rng(seed))
     farthest = min(FARTHEST, fewest // PARTS)
     apart = np.unique(np.rint(np.geomspace(1, farthest, DISTANCES)).astype(np.int64))
-    shares = np.array([_different(graph.grid, label, int(m)) for m in apart])
+    shares = np.array([_uncertain(graph.grid, label, int(m)) for m in apart])
     weight = graph.grid.measure
     undecided = float(weight[label == codes.UNDECIDED].sum() / weight.sum())
     return UncertaintyExponent(*_fit(apart, shares), apart, shares, graph.grid.dimension, undecided)
 
 
-def _different(grid: Grid, label: NDArray[np.int64], apart: int) -> float:
-    """Share of decided pairs, so many cells apart along an axis, with different labels."""
-    different = total = 0.0
+def _uncertain(grid: Grid, label: NDArray[np.int64], apart: int) -> float:
+    """Share of the starts whose label is not that of a start so many cells away, up or down an axis."""
+    uncertain = total = 0.0
     for side in range(grid.sides):
         shape = tuple(int(n) for n in grid.shape[side])
         block, weight = (values[grid.of_side(side)].reshape(shape) for values in (label, grid.measure))
-        for axis, n in enumerate(shape):
-            one, other = (block.take(range(*ends), axis) for ends in ((n - apart,), (apart, n)))
-            of = weight.take(range(n - apart), axis) * ((one != codes.UNDECIDED) & (other != codes.UNDECIDED))
-            total += float(of.sum())
-            different += float(of[one != other].sum())
-    return different / total if total else np.nan
+        for axis in range(grid.dimension):
+            one, of = np.moveaxis(block, axis, 0), np.moveaxis(weight, axis, 0)
+            differs, known = np.zeros(one.shape, dtype=bool), one != codes.UNDECIDED
+            both = known[apart:] & known[:-apart]
+            known[apart:] &= both
+            known[:-apart] &= both
+            other = one[apart:] != one[:-apart]
+            differs[apart:] |= other
+            differs[:-apart] |= other
+            total += float(of[known].sum())
+            uncertain += float(of[known & differs].sum())
+    return uncertain / total if total else np.nan
 
 
 def _fit(apart: NDArray[np.int64], shares: NDArray[np.float64]) -> tuple[float, float]:
