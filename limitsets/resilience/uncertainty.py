@@ -1,9 +1,9 @@
 """Uncertainty exponent: how the share of uncertain starts falls with the error of the start.
 
 One start is drawn in each cell, so that starts of one row differ in one coordinate only.  f(e) is the share of those
-that come to another basin than one of the two starts e away along an axis; f ~ e^a with the uncertainty exponent a = d - D
-in d dimensions, D being the box-counting dimension of the boundary.  A straight boundary gives a = 1.  Where a = 0.3 an
-error of the start that is ten times smaller halves the uncertain starts.
+that come to another basin than one of the two starts e away along an axis; f ~ e^a with the uncertainty exponent
+a = d - D in d dimensions, D being the box-counting dimension of the boundary.  A straight boundary gives a = 1.  Where
+a = 0.3 an error of the start that is ten times smaller halves the uncertain starts.
 
 Source: Grebogi, McDonald, Ott, Yorke, "Final state sensitivity: an obstruction to predictability", Physics Letters A
 99, 1983; "Fractal basin boundaries", Physica D 17, 1985.
