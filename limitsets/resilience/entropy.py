@@ -44,7 +44,7 @@ class BasinEntropy:
     Attributes
     ----------
     value : float
-        Without the undecided cells; nan where there is no box to take the mean over.
+        Without the undecided cells, within the bracket; nan where there is no box to take the mean over.
     lo, hi : float
         Least and largest value for any allotment of the undecided cells.
     how : str
@@ -174,7 +174,8 @@ def boundary_basin_entropy(
 
 
 def _answer(each: _Boxes, value: float, lo: float, hi: float, boxes: int, box: int) -> BasinEntropy:
-    return BasinEntropy(value, max(lo - ROUNDING, 0.0), hi + ROUNDING, each.how, boxes, box, each.undecided)
+    kept = float(np.clip(value, lo, hi))
+    return BasinEntropy(kept, max(lo - ROUNDING, 0.0), hi + ROUNDING, each.how, boxes, box, each.undecided)
 
 
 def _mean(values: Floats, weights: Floats) -> float:

@@ -28,7 +28,7 @@ CONFIDENCE = 0.95
 
 @dataclass(frozen=True)
 class Share:
-    """A share of the starts: the best number, without what is undecided, and the bracket in which it lies."""
+    """A share of the starts: the best number, of the decided ones within the bracket, and the bracket in which it lies."""
 
     share: float
     lo: float
@@ -131,7 +131,7 @@ def _counted(
     shares = []
     for some, most in zip(inner, outer, strict=True):
         lo, hi = some.measure() / total, most.measure() / total
-        best = lo / (1.0 - undecided) if undecided < 1.0 else np.nan
+        best = min(lo / (1.0 - undecided), hi) if undecided < 1.0 else np.nan
         down = lo - ROUNDING if 0 < len(some) < some.mask.size else float(len(some) > 0)
         up = hi + ROUNDING if 0 < len(most) < most.mask.size else float(len(most) > 0)
         shares.append(Share(float(best), max(down, 0.0), min(up, 1.0)))

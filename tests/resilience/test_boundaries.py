@@ -164,6 +164,8 @@ def test_the_joint_is_a_basin_of_its_own(method):
     assert found.lo <= 8.0 - lo <= found.hi < found.lo + 0.15
     shares = ls.resilience.basin_stability(graph, attractors)
     assert shares.exits["inward"].lo > 0.0
+    for share in (*shares.attractors, *shares.exits.values()):
+        assert share.lo <= share.share <= share.hi
     assert shares.exits["outward"].hi == 0.0
 
 
