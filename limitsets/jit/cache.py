@@ -51,6 +51,7 @@ KERNEL_FREE = {
     "analysis",
     "robust",
     "inverse",
+    "sweep",
     "plot",
     "report",
     "cli",
