@@ -137,7 +137,7 @@ def _told_apart(place: Place, cycles: list[Cycle]) -> list[Cycle]:
                 continue
             x = np.linspace(cycle.x[0], near[np.abs(near - cycle.x[0]).argmin()], 9)
             y, _, slope = along(place.params, x, int(cycle.side[0]), cycle.branches)
-            noise = 64.0 * EPS * place.extent * (1.0 + np.abs(slope))
+            noise = 16.0 * EPS * place.extent * (1.0 + np.abs(slope))
             twin |= bool((np.abs(y - x) <= noise).all())
         kept += [] if twin else [cycle]
     return kept

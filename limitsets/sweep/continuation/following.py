@@ -162,7 +162,7 @@ def _whereto(found: Found, there: Snapshot, numbers: list[int], reach: float) ->
     ends = arrivals(found, there, reach)
     words = [f"attractor {numbers[position]}" for position in sorted(ends) if position >= 0]
     words += ["an exit"] if -2 in ends else []
-    return " and ".join(words) or "nowhere"
+    return " and ".join(words) or "no attractor within 1000 steps"
 
 
 class _Between(NamedTuple):
@@ -196,10 +196,10 @@ class _Between(NamedTuple):
         words = " and ".join(State.of(each).words() for each in one_side)
         if not group.after:
             goes = _whereto(one_side[0], self.after, self.new, reach)
-            return self.event("death", group, f"{words}, its states go to {goes}", None, met)
+            return self.event("death", group, f"{words}, its states come to {goes}", None, met)
         if not group.before:
             came = _whereto(one_side[0], self.before, self.old, reach)
-            return self.event("birth", group, f"{words}, its states went to {came}", None, met)
+            return self.event("birth", group, f"{words}, its states came to {came}", None, met)
         many = [self.after.found[k] for k in group.after]
         change = f"{words} -> {' and '.join(State.of(each).words() for each in many)}"
         kind = "merge" if len(group.before) >= len(group.after) else "split"
@@ -229,7 +229,7 @@ def continuation(
     path: Curve,
     *,
     steps: int = 100,
-    cells: int = 1024,
+    cells: int = 512,
     domain: Any = None,
     most: int = 300,
     progress: Progress | None = None,

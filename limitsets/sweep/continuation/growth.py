@@ -131,11 +131,14 @@ def carried(
     Returns
     -------
     union, bool
-        The set with its ends, and whether that came about.
+        The set with its ends, empty where part of it leaves the domain: then it is no attractor, however long its
+        orbits stay; and whether its ends came to be so.
     """
     union, rested = read(extents, domain), 0  # type: ignore[arg-type]  # a Domain
     for _ in range(images):
-        image, _ = forward.image(union)
+        image, leaves = forward.image(union)
+        if leaves:
+            return {}, False
         rested = rested + 1 if same(union, image, 1e-12, extent) else 0
         union = image
         known = all(end.kind != BORDER for parts in union.values() for part in parts for end in part)
