@@ -23,43 +23,15 @@ from limitsets.maps import along, images, kind_of
 from limitsets.maps.critical import branches_of_side
 from limitsets.sets.unions import EPS
 from limitsets.sweep.continuation.attracting_cycles import on_itinerary
-from limitsets.sweep.continuation.path import Path, Place
+from limitsets.sweep.continuation.path import Border, Path, Place
 from limitsets.sweep.continuation.result import Collision
 from limitsets.sweep.continuation.snapshot import Found, Snapshot
 
-__all__ = ["Approach", "approaches", "borders_of", "crossing", "nearest"]
+__all__ = ["Approach", "approaches", "crossing", "nearest"]
 
 # Of the extent: the window in which a critical point is looked for again; slopes and images that differ by less are
 # the same.
 WINDOW, SMOOTH = 0.01, 1e-6
-KINDS = ("critical", "turning", "jump")
-
-
-class Border(NamedTuple):
-    """A place where two monotone pieces of a side meet."""
-
-    side: int
-    kind: str
-    below: int
-    above: int
-    x_below: float
-    x_above: float
-
-    def like(self, other: Border) -> bool:
-        """Whether both are of one kind."""
-        return self[:4] == other[:4]
-
-
-def borders_of(place: Place) -> list[Border]:
-    """All borders between pieces."""
-    found = []
-    for side, pieces in place.forward.pieces.items():
-        for lower, upper in zip(pieces, pieces[1:], strict=False):
-            if lower.top.kind in KINDS:
-                found.append(
-                    Border(side, lower.top.kind, lower.branch, upper.branch, lower.top.x, upper.bottom.x)
-                )
-    return found
 
 
 def _nearest(borders: list[Border], wanted: Border, guess: float) -> Border | None:
@@ -69,8 +41,8 @@ def _nearest(borders: list[Border], wanted: Border, guess: float) -> Border | No
 
 def _again(place: Place, wanted: Border, guess: float) -> Border | None:
     """Find a border again at another place, near a guess."""
-    if wanted.kind != "critical":
-        return _nearest(borders_of(place), wanted, guess)
+    if wanted.kind != "critical" or place.is_cut:
+        return _nearest(place.borders, wanted, guess)
     lo, hi = place.domain.lo.copy(), place.domain.hi.copy()
     bottom, top = float(lo[wanted.side, 0]), float(hi[wanted.side, 0])
     reach = WINDOW * (top - bottom)
@@ -219,7 +191,7 @@ def _tracked(found: Found, here: list[Border], names: tuple[str, ...]) -> Iterat
 
 def approaches(path: Path, lo: Snapshot, hi: Snapshot) -> Iterator[Approach]:
     """All ends and cycle points of two places, each with every border on its side, tracked between them."""
-    borders = borders_of(lo.place), borders_of(hi.place)
+    borders = lo.place.borders, hi.place.borders
     names = kind_of(lo.place.params).branches
     seen = set()
     for which, snapshot in enumerate((lo, hi)):

@@ -10,7 +10,7 @@ import numpy as np
 
 from limitsets.errors import AnswerError
 from limitsets.scene import load
-from limitsets.sweep.continuation.collisions import Approach, approaches, borders_of, crossing, nearest
+from limitsets.sweep.continuation.collisions import Approach, approaches, crossing, nearest
 from limitsets.sweep.continuation.matching import REACH, Group, Match, distance, matched
 from limitsets.sweep.continuation.path import Curve, Path, read_path
 from limitsets.sweep.continuation.result import Collision, Continuation, Event, State
@@ -329,7 +329,7 @@ def _critical(snapshot: Snapshot) -> dict[int, tuple[float, ...]]:
     if not snapshot.place.on_line:
         return {}
     found: dict[int, list[float]] = {side: [] for side in snapshot.place.forward.pieces}
-    for border in borders_of(snapshot.place):
+    for border in snapshot.place.borders:
         if border.kind == "critical":
             found[border.side].append(border.x_above)
     return {side: tuple(x) for side, x in found.items()}

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
+from itertools import pairwise
 from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
@@ -16,13 +17,32 @@ from limitsets.scene import Scene
 from limitsets.scene.quantities import in_units
 from limitsets.sets.interval_map import IntervalMap
 
-__all__ = ["Curve", "Path", "Place", "read_path"]
+__all__ = ["Border", "Curve", "Path", "Place", "read_path"]
 
 Values: TypeAlias = Mapping[str, Any]
 Curve: TypeAlias = Mapping[str, tuple[Any, Any]] | Callable[[float], Any]
 
 # Samples per side in which changes of branch are looked for; pairs between two samples are found all the same.
 SAMPLES = 512
+
+
+# Kinds of ends of pieces that another piece follows.
+KINDS = ("critical", "turning", "jump")
+
+
+class Border(NamedTuple):
+    """A place where two monotone pieces of a side meet."""
+
+    side: int
+    kind: str
+    below: int
+    above: int
+    x_below: float
+    x_above: float
+
+    def like(self, other: Border) -> bool:
+        """Whether both are of one kind."""
+        return self[:4] == other[:4]
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,6 +80,21 @@ class Place:
     def forward(self) -> IntervalMap:
         """Images of intervals, and the monotone pieces."""
         return IntervalMap(self.params, self.domain, SAMPLES)
+
+    @property
+    def is_cut(self) -> bool:
+        """Whether the monotone pieces are there already."""
+        return "forward" in vars(self)
+
+    @cached_property
+    def borders(self) -> list[Border]:
+        """Where two monotone pieces meet."""
+        return [
+            Border(side, lower.top.kind, lower.branch, upper.branch, lower.top.x, upper.bottom.x)
+            for side, pieces in self.forward.pieces.items()
+            for lower, upper in pairwise(pieces)
+            if lower.top.kind in KINDS
+        ]
 
 
 class Path(NamedTuple):
@@ -148,6 +183,5 @@ def _of_map(params: Any, path: Curve, domain: Any) -> Path:
 
 def read_path(subject: Any, path: Curve, domain: Any) -> Path:
     """Read a path of a scene, or of a map; AnswerError for what is none."""
-    if isinstance(subject, Scene):
-        return _of_scene(subject, path)
-    return _of_map(subject, path, domain)
+    found = _of_scene(subject, path) if isinstance(subject, Scene) else _of_map(subject, path, domain)
+    return found._replace(at=lru_cache(maxsize=65_536)(found.at))  # a place remembers what was found there
