@@ -10,7 +10,7 @@ import numpy as np
 
 from limitsets.maps import advance, along, images
 from limitsets.maps.bisection import Array, Flags
-from limitsets.sets.cycle import Cycle, Ints, distinct
+from limitsets.sets.cycle import Cycle, Ints
 from limitsets.sets.unions import EPS
 from limitsets.sweep.continuation.path import Place
 
@@ -18,7 +18,7 @@ __all__ = ["MOST_PERIOD", "Recorded", "attracting_cycles", "on_itinerary", "reco
 
 MOST_PERIOD = 128
 # Of the extent: a return that may be one of a cycle; how far Newton's method may lead; cycles nearer are one.
-RETURN, FAR, ONE = 1e-4, 0.05, 1e-7
+RETURN, FAR, ONE = 1e-4, 0.05, 1e-9
 
 
 class Recorded:
@@ -28,7 +28,7 @@ class Recorded:
         self.x, self.side, self.code = x, side, code
 
     def rows(self, chosen: Flags) -> Recorded:
-        """Some of the orbits."""
+        """Give some of the orbits."""
         return Recorded(self.x[chosen], self.side[chosen], self.code[chosen])
 
 
@@ -123,13 +123,13 @@ def attracting_cycles(place: Place, found: Recorded) -> tuple[list[Cycle], Flags
                         continue
                     cycles.append(_shortest(place, cycle))
                 left[k[j]] = False
-    return _told_apart(place, distinct(cycles, ONE * place.extent)), left
+    return _told_apart(place, cycles), left
 
 
 def _told_apart(place: Place, cycles: list[Cycle]) -> list[Cycle]:
     """Cycles of which rounding lets one be told from another: near slope 1 all numbers between two are roots."""
     kept: list[Cycle] = []
-    for cycle in cycles:  # the shorter ones first
+    for cycle in sorted(cycles, key=lambda each: each.period):
         twin = False
         for other in kept:
             near = other.x[other.side == cycle.side[0]]

@@ -60,7 +60,9 @@ def _is_smooth(place: Place, border: Border) -> bool:
     """Whether image and slope are the same on both sides."""
     x, branches = [border.x_below, border.x_above], [[border.below], [border.above]]
     y, side, slope = along(place.params, x, border.side, branches)
-    near = abs(y[1] - y[0]) <= SMOOTH * place.extent and abs(slope[1] - slope[0]) <= SMOOTH * (1.0 + abs(slope[0]))
+    near = abs(y[1] - y[0]) <= SMOOTH * place.extent and abs(slope[1] - slope[0]) <= SMOOTH * (
+        1.0 + abs(slope[0])
+    )
     return bool(side[0] == side[1] and near)
 
 
@@ -171,57 +173,71 @@ class Approach(NamedTuple):
         itinerary = tuple(names[branch] for branch in self.word)
         limit = "cycle" if self.start is None else ("c+" if self.from_above else "c-")
         start = None if self.start is None else begin[0]
-        return Collision(border.x_above, border.side, change, len(self.word), start, begin[1], limit, itinerary)
+        return Collision(
+            border.x_above, border.side, change, len(self.word), start, begin[1], limit, itinerary
+        )
 
 
-def _tracked(found: Found, here: list[Border], names: tuple[str, ...]) -> Iterator[tuple]:  # type: ignore[type-arg]
-    """Points to track of one attractor: border and limit, or x, with side, word and side of the point."""
+class _Tracked(NamedTuple):
+    """A point to track: the critical point that its orbit begins at, or where it is on its cycle."""
+
+    start: Border | None
+    from_above: bool
+    x: float
+    side: int
+    word: tuple[int, ...]
+    to_side: int
+
+
+def _tracked(found: Found, borders: list[Border], names: tuple[str, ...]) -> Iterator[_Tracked]:
+    """Points to track of one attractor."""
     if found.cycle is not None:
         word = found.cycle.branches.tolist()
         for k, (x, side) in enumerate(zip(found.cycle.x.tolist(), found.cycle.side.tolist(), strict=True)):
-            yield None, False, x, side, tuple(word[k:] + word[:k]), side
-        return
+            yield _Tracked(None, False, x, side, tuple(word[k:] + word[:k]), side)
     for end in found.ends:
-        origin = end.origin
-        for border in here:
-            if border.side == origin.side and origin.x in (border.x_below, border.x_above):
-                word = tuple(names.index(name) for name in origin.branches)
-                yield border, origin.x == border.x_above, origin.x, origin.side, word, end.side
+        x, side, word = (
+            end.origin.x,
+            end.origin.side,
+            tuple(names.index(name) for name in end.origin.branches),
+        )
+        for border in borders:
+            if border.side == side and x in (border.x_below, border.x_above):
+                yield _Tracked(border, x == border.x_above, x, side, word, end.side)
+
+
+def _at_both(border: Border, others: list[Border], which: int) -> tuple[Border, Border] | None:
+    """Pair a border of the first or second place with the same at the other; None where that is not there."""
+    other = _nearest(others, border, border.x_above)
+    if other is None:
+        return None
+    return (border, other) if which == 0 else (other, border)
 
 
 def approaches(path: Path, lo: Snapshot, hi: Snapshot) -> Iterator[Approach]:
     """All ends and cycle points of two places, each with every border on its side, tracked between them."""
-    borders = lo.place.borders, hi.place.borders
-    names = kind_of(lo.place.params).branches
+    borders, names = (lo.place.borders, hi.place.borders), kind_of(lo.place.params).branches
     seen = set()
     for which, snapshot in enumerate((lo, hi)):
-        for found in snapshot.found:
-            for start, above, x, side, word, to_side in _tracked(found, borders[which], names):
-                for target in borders[which]:
-                    if target.side != to_side or target.kind == "turning":
-                        continue
-                    ends = [_nearest(borders[1 - which], each, each.x_above) for each in (start, target) if each]
-                    if None in ends or _is_smooth(snapshot.place, target):
-                        continue
-                    pairs = [
-                        (mine, other) if which == 0 else (other, mine)
-                        for mine, other in zip([each for each in (start, target) if each], ends, strict=True)
-                    ]
-                    key = (word, above, pairs[0][0] if start else round(x / (WINDOW * lo.place.extent)), pairs[-1][0])
-                    if key in seen:
-                        continue
+        targets = [
+            (target, pair)
+            for target in borders[which]
+            if target.kind != "turning" and not _is_smooth(snapshot.place, target)
+            if (pair := _at_both(target, borders[1 - which], which)) is not None
+        ]
+        points = [point for found in snapshot.found for point in _tracked(found, borders[which], names)]
+        for point in points if targets else ():
+            start = None if point.start is None else _at_both(point.start, borders[1 - which], which)
+            if point.start is not None and start is None:
+                continue
+            for target, pair in targets:
+                # An end that both places have is the same if it is of the same orbit, a point of a cycle if it is near.
+                where = start[0] if start else round(point.x / (WINDOW * lo.place.extent))
+                key = (point.word, point.from_above, where, pair[0])
+                if target.side == point.to_side and key not in seen:
                     seen.add(key)
-                    yield Approach(
-                        path,
-                        (lo.t, hi.t),
-                        pairs[0] if start else None,
-                        above,
-                        (x, x),
-                        side,
-                        word,
-                        to_side,
-                        pairs[-1],
-                    )
+                    x = (point.x, point.x)
+                    yield Approach(path, (lo.t, hi.t), start, point.from_above, x, *point[3:], pair)
 
 
 def _solved(gap: Callable[[float], float], lo: float, hi: float) -> float | None:
@@ -248,14 +264,16 @@ def crossing(approach: Approach, lo: Snapshot, hi: Snapshot) -> float | None:
 
 
 def nearest(approach: Approach, middle: float) -> tuple[float, float] | None:
-    """Least gap between two places at whose ends it is larger than in the middle: t, and the gap there."""
+    """Least gap between two places at whose ends it is no smaller than in the middle: t, and the gap there."""
     lo, hi = approach.span
     first, between, last = (approach.at(t) for t in (lo, middle, hi))
     if not np.isfinite([first, between, last]).all():
         return None
     sign = 1.0 if between > 0.0 else -1.0
-    if not (0.0 < sign * between < min(sign * first, sign * last)):
+    if not (0.0 < sign * between <= min(sign * first, sign * last)):
         return None
     options = {"xatol": 1e-12}
-    found = minimize_scalar(lambda t: sign * approach.at(t), bounds=(lo, hi), method="bounded", options=options)
+    found = minimize_scalar(
+        lambda t: sign * approach.at(t), bounds=(lo, hi), method="bounded", options=options
+    )
     return float(found.x), sign * float(found.fun)

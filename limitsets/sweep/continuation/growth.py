@@ -21,6 +21,8 @@ __all__ = ["carried", "grown"]
 # Of the extent: half the length of the first pieces, the length at which their images are kept, what counts as none.
 SHORT, LONG, NONE = 1e-9, 1e-3, 1e-14
 MOST_STEPS, MOST_INTERVALS = 3000, 4000
+# Pieces that have not grown tenfold by then do not expand: a quasi-periodic orbit, or the ghost of a cycle.
+EARLY, TENFOLD = 500, 10.0
 
 
 class _Intervals(NamedTuple):
@@ -67,7 +69,9 @@ class _Pieces:
 
     def joined(self, *given: _Intervals) -> _Intervals:
         """Union; intervals that touch up to rounding are one."""
-        side, lo, hi = (np.concatenate([getattr(each, name) for each in given]) for name in _Intervals._fields)
+        side, lo, hi = (
+            np.concatenate([getattr(each, name) for each in given]) for name in _Intervals._fields
+        )
         order = np.lexsort((lo, side))
         side, lo, hi = side[order], lo[order], hi[order]
         parts = []
@@ -96,11 +100,13 @@ def grown(
     pieces = _Pieces(forward, extent)
     lo, hi = np.maximum(x - SHORT * extent, pieces.lo[side]), np.minimum(x + SHORT * extent, pieces.hi[side])
     found = pieces.joined(_Intervals(side, lo, hi))
-    for _ in range(MOST_STEPS):
-        if float((found.hi - found.lo).sum()) >= LONG * extent:
+    first = float((found.hi - found.lo).sum())
+    for count in range(MOST_STEPS):
+        length = float((found.hi - found.lo).sum())
+        if length >= LONG * extent:
             break
         found = pieces.image(found)
-        if found.lo.size == 0 or found.lo.size > MOST_INTERVALS:
+        if not 0 < found.lo.size <= MOST_INTERVALS or (count == EARLY and length < TENFOLD * first):
             return None
     if float((found.hi - found.lo).sum()) < SHORT * extent:
         return None

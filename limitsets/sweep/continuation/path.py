@@ -172,7 +172,9 @@ def _of_map(params: Any, path: Curve, domain: Any) -> Path:
             there = params._replace(**given)
         else:
             names = ", ".join(params._fields)
-            raise AnswerError("a point of the path", given, f"values of {names}", "name parameters of the map")
+            raise AnswerError(
+                "a point of the path", given, f"values of {names}", "name parameters of the map"
+            )
         there = coerce(there)
         kept = given if isinstance(given, Mapping) else there._asdict()
         values = {name: float(value) for name, value in kept.items() if np.ndim(value) == 0}

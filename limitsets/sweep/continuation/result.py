@@ -183,7 +183,9 @@ class Continuation:
             }
             for k, t in enumerate(self.t.tolist())
         ]
-        events = [picked(e, *Event.__dataclass_fields__) | {"collision": _table(e.collision)} for e in self.events]
+        events = [
+            picked(e, *Event.__dataclass_fields__) | {"collision": _table(e.collision)} for e in self.events
+        ]
         return as_table(**picked(self, "name", "unit", "evaluations"), steps=steps, events=events)
 
     def to_dataframe(self) -> pd.DataFrame:

@@ -133,9 +133,7 @@ def _of_cycle(cycle: Cycle) -> Found:
 
 
 def _of_intervals(place: Place, extents: Intervals, *, inside: bool) -> Found | None:
-    union, known = carried(
-        place.forward, extents, place.domain, place.extent, MOST_IMAGES, rest=not inside
-    )
+    union, known = carried(place.forward, extents, place.domain, place.extent, MOST_IMAGES, rest=not inside)
     if not union:
         return None
     ends = ends_of(kind_of(place.params).branches, union)
@@ -144,7 +142,7 @@ def _of_intervals(place: Place, extents: Intervals, *, inside: bool) -> Found | 
 
 
 def _grown_sets(place: Place, rows: Recorded, sets: list[CellSet]) -> list[Found]:
-    """Sets of the orbits that are on no cycle."""
+    """Find the sets of the orbits that are on no cycle."""
     found: list[Found] = []
     x, side = rows.x[:, -1], rows.side[:, -1]
     left, tried = np.arange(x.size), 0
@@ -171,7 +169,7 @@ def _holds(outer: Found, inner: Found, slack: float) -> bool:
 
 
 def _least(found: list[Found], slack: float) -> tuple[Found, ...]:
-    """Sets that hold no other one; of two that are the same the first."""
+    """Keep the sets that hold no other one; of two that are the same the first."""
     return tuple(
         each
         for k, each in enumerate(found)
