@@ -57,7 +57,9 @@ class Follower:
     def step(self, first: float, last: float) -> None:
         """Halve a step until nothing happens in its parts, or what happens is bracketed."""
         self.left = self.most
-        stack = [(first, last)]
+        self._halve([(first, last)])
+
+    def _halve(self, stack: list[tuple[float, float]]) -> None:
         while stack:
             lo, hi = (self.at(t) for t in stack.pop())
             met = self._collision(lo, hi)
@@ -116,16 +118,20 @@ class Follower:
             met = self._confirmed("touch", each, (t - TOUCH_BRACKET, t + TOUCH_BRACKET))
             self.met += [met] if met is not None else []
         elif (gap > 0.0) != (each.at(steps[1]) > 0.0):
-            for lo, hi in ((steps[0], t), (t, steps[2])):
+            between = [step for step in self.snapshots if steps[0] < step < steps[2]]
+            for lo, hi in pairwise(sorted({steps[0], steps[2], t, *between})):
                 self.step(lo, hi)
 
     def settle(self) -> None:
         """Halve steps beside places that were only looked at on the way to something else."""
         brackets = {met.t for met in self.met}
-        for lo, hi in pairwise(sorted(self.snapshots)):
-            if (
-                hi - lo > BRACKET
-                and (lo, hi) not in brackets
-                and not self.match(self.at(lo), self.at(hi)).smooth
-            ):
-                self.step(lo, hi)
+        pairs = [
+            (lo, hi)
+            for lo, hi in pairwise(sorted(self.snapshots))
+            if hi - lo > BRACKET
+            and (lo, hi) not in brackets
+            and not self.match(self.at(lo), self.at(hi)).smooth
+        ]
+        # One allowance for all: steps that were left wide are not begun anew.
+        self.left = self.most
+        self._halve(pairs[::-1])
