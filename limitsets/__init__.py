@@ -37,6 +37,7 @@ if TYPE_CHECKING:  # each from the file that holds it: most rooms have a file of
     from limitsets.sets.cycles import cycles
     from limitsets.sets.limit_set import limit_set
     from limitsets.sweep.continuation import continuation
+    from limitsets.sweep.parameter_atlas import atlas
 
 __version__ = "0.1.0"
 
@@ -44,6 +45,7 @@ __version__ = "0.1.0"
 # the function.  A namespace is its own room.
 _ROOMS = {
     "analyse": "analysis",
+    "atlas": "sweep.parameter_atlas",
     "attractors": "sets.attractors",
     "audit": "auditing",
     "basins": "sets.basins",
@@ -74,6 +76,7 @@ _ROOMS = {
 
 __all__ = [
     "analyse",
+    "atlas",
     "attractors",
     "audit",
     "basins",

@@ -154,7 +154,8 @@ def _events(panels: list[Axes], found: Continuation, sides: list[int], name: str
         for axes in panels:
             axes.axvline(at, color=style.FAINT, lw=0.5, ls=":", zorder=1)
         if event.collision is not None:
-            axes, y, how = panels[sides.index(event.collision.side)], event.collision.x, {}
+            axes, y = panels[sides.index(event.collision.side)], event.collision.x
+            how: dict[str, Any] = {}
         else:
             axes, y, how = panels[0], 1.02, {"transform": panels[0].get_xaxis_transform()}
         axes.plot([at], [y], mfc="none", zorder=6, clip_on=False, gid=event.kind, **MARK, **look, **how)
