@@ -36,6 +36,7 @@ if TYPE_CHECKING:  # each from the file that holds it: most rooms have a file of
     from limitsets.sets.basins import basins
     from limitsets.sets.cycles import cycles
     from limitsets.sets.limit_set import limit_set
+    from limitsets.sweep.continuation import continuation
     from limitsets.sweep.parameter_atlas import atlas
 
 __version__ = "0.1.0"
@@ -49,6 +50,7 @@ _ROOMS = {
     "audit": "auditing",
     "basins": "sets.basins",
     "certify": "proofs.certify",
+    "continuation": "sweep.continuation",
     "critical_points": "maps",
     "cycles": "sets.cycles",
     "design": "inverse",
@@ -80,6 +82,7 @@ __all__ = [
     "audit",
     "basins",
     "certify",
+    "continuation",
     "critical_points",
     "cycles",
     "design",
