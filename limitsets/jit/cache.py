@@ -50,6 +50,7 @@ KERNEL_FREE = {
     "auditing",
     "analysis",
     "robust",
+    "regions",
     "inverse",
     "plot",
     "report",
