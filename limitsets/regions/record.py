@@ -134,19 +134,22 @@ def certify_cell(
         box = parameter_box(scene, tree=piece.tree())
         middle = parameter_box(scene, tree=_middle(piece).tree())
         cuts = dict.fromkeys(range(box.lo.a.size), borders(scene.goal))
-        for rung, number in enumerate(cells):
+        first: Record | None = None
+        for number in cells:
             found = attraction(cover(box, number, cuts, PIECES))
             doubtful = _may_violate(found, scene)
-            chain = _refuting(found, scene, middle) if doubtful and not rung else None
-            # finer cells may decide what these do not, at less cost than two throws at once
-            record = _record(found, scene, ends, ask=not doubtful or number == cells[-1])
+            chain = _refuting(found, scene, middle) if doubtful and first is None else None
+            # where cells do not prove it finer ones are asked before two throws at once, which cost more
+            record = _record(found, scene, ends, ask=chain is None and (not doubtful or number == cells[-1]))
             if chain is not None:
                 return replace(record, goal="refuted", reason="", chain=chain)
             if record.settled:
                 return record
+            first = record if first is None or not first.blocks else first
     except AnswerError as error:  # no such part or throw somewhere in the cell
         return Record(ends, "undecided" if scene.goal else "", str(error).splitlines()[0])
-    return record
+    # of a cell that stays undecided the coarse cells say as much as the fine ones
+    return replace(first if first is not None and first.blocks else record, reason=record.reason)
 
 
 def _middle(piece: SceneBox) -> SceneBox:
