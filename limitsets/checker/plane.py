@@ -4,6 +4,7 @@ docs/certificates.md, "Regions".
 """
 
 import copy
+import itertools
 import re
 from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor
@@ -25,9 +26,10 @@ STARTS_WORDS = ("every", "almost-every", "from", "cells")  # the codes of the ar
 MOST_BORDERS = 4_097
 MOST_CELLS = 1 << 20
 WHOLE = {"<i2": 2, "<i4": 4}
-FLAT = {  # the arrays with one row for each cell of parameters: type and columns, S for one column for each side
-    "cells": ("<i4", 4), "goal": ("|i1", 1), "region": ("<i4", 1), "grid": ("<i4", 1), "starts": ("|i1", 1),
-    "from": ("<f8", "S"), "near": ("|i1", 1), "joint": ("<f8", "3S"), "counts": ("<i4", 3),
+FLAT: dict[str, tuple[str, int, int]] = {  # one row for each cell of parameters: type, columns, columns for each side
+    "cells": ("<i4", 4, 0), "goal": ("|i1", 1, 0), "region": ("<i4", 1, 0), "grid": ("<i4", 1, 0),
+    "starts": ("|i1", 1, 0), "from": ("<f8", 0, 1), "near": ("|i1", 1, 0), "joint": ("<f8", 0, 3),
+    "counts": ("<i4", 3, 0),
 }  # fmt: skip
 TALL = ("jog", "flip", "rank", "component", "phi")  # one row for each cell of the arm
 
@@ -92,10 +94,11 @@ def read_plane(header: dict[str, Any], entries: dict[str, memoryview]) -> Plane:
         require(dtype in WHOLE, f"array {name} does not hold whole numbers")
         return array(name, str(dtype), columns)
 
-    many = {"S": n_sides, "3S": 3 * n_sides}
-    flat = {name: array(name, dtype, many.get(str(n), n)) for name, (dtype, n) in FLAT.items()}  # type: ignore[call-overload]
+    flat = {name: array(name, dtype, n + each * n_sides) for name, (dtype, n, each) in FLAT.items()}
     n = len(flat["cells"])
-    require(0 < n <= MOST_CELLS and all(len(each) == n for each in flat.values()), "the cells are not alike many")
+    require(
+        0 < n <= MOST_CELLS and all(len(each) == n for each in flat.values()), "the cells are not alike many"
+    )
     grids = [
         [array(f"edges.{g}.{i}", "<f8", 1) for i in range(n_sides)]
         for g in range(int(flat["grid"].max(initial=-1)) + 1)
@@ -105,11 +108,15 @@ def read_plane(header: dict[str, Any], entries: dict[str, memoryview]) -> Plane:
     tall["phi"] = array("phi", "<f4", 2)
     sizes = np.array([sum(len(e) - 1 for e in grid) for grid in grids] + [0], dtype=np.int64)
     first = np.concatenate([[0], np.cumsum(sizes[flat["grid"]])])
-    require(all(len(each) == first[-1] for each in tall.values()), "the arrays do not fit the cells of the arm")
+    require(
+        all(len(each) == first[-1] for each in tall.values()), "the arrays do not fit the cells of the arm"
+    )
     blocks, chain = array("blocks", "<i4", 3 + 3 * n_sides), array("chain", "<i4", 3)
     ends = array("chain.ends", "<f8", 2)
     require(len(ends) == len(chain), "the arrays of the orbits do not fit")
-    require(read == set(said) and {f"{name}.npy" for name in read} == set(entries), "there are other arrays too")
+    require(
+        read == set(said) and {f"{name}.npy" for name in read} == set(entries), "there are other arrays too"
+    )
     return Plane(raw, axes, n_sides, flat, tall, grids, first, blocks, chain, ends)
 
 
@@ -121,7 +128,7 @@ def read_axis(value: object, raw: dict[str, Any]) -> Axis:
     texts = rows(axis["borders"], "borders", 2, MOST_BORDERS)
     values = [quantity(text, KINDS, name) for text in texts]
     alike = len({(q.pi, q.unit) for q in values}) == 1 and all(q.lo == q.hi for q in values)
-    ascending = all(a.lo < b.lo for a, b in zip(values, values[1:], strict=False))
+    ascending = all(a.lo < b.lo for a, b in itertools.pairwise(values))
     require(alike and ascending, f"the borders of {plain(name)} do not ascend in one unit")
     return Axis(plain(name), texts, values)
 
@@ -143,7 +150,12 @@ def raster_of(plane: Plane) -> tuple[Array, str]:
 def check_codes(plane: Plane, has_goal: bool) -> str:
     """Check that codes are codes, and that blocks and orbits belong to cells; "" or the reason."""
     f, n = plane.flat, len(plane.flat["cells"])
-    for name, least, most in (("goal", 0, 2), ("starts", 0, 3), ("near", 0, 1), ("grid", -1, len(plane.grids) - 1)):
+    for name, least, most in (
+        ("goal", 0, 2),
+        ("starts", 0, 3),
+        ("near", 0, 1),
+        ("grid", -1, len(plane.grids) - 1),
+    ):
         if not ((f[name] >= least) & (f[name] <= most)).all():
             return f"array {name} holds a code that is none"
     if not has_goal and (f["goal"] == GOAL_REFUTED).any():
@@ -228,7 +240,7 @@ def name_of_cell(plane: Plane, k: int) -> str:
 
 
 def check_regions(plane: Plane, raster: Array) -> str:
-    """Check the numbers of the regions: those of cells with a common face are one only where blocks correspond."""
+    """Check the numbers of the regions: cells with a common face are of one only where blocks correspond."""
     n, grid = len(plane.flat["cells"]), plane.flat["grid"]
     root = list(range(n))
 
@@ -241,7 +253,13 @@ def check_regions(plane: Plane, raster: Array) -> str:
     for one, other in ((raster[:-1], raster[1:]), (raster[:, :-1], raster[:, 1:])):
         pairs = np.unique(np.stack([one.ravel(), other.ravel()], axis=1), axis=0)
         for i, j in pairs.tolist():
-            if i != j and grid[i] >= 0 and grid[j] >= 0 and top(i) != top(j) and blocks_correspond(plane, i, j):
+            if (
+                i != j
+                and grid[i] >= 0
+                and grid[j] >= 0
+                and top(i) != top(j)
+                and blocks_correspond(plane, i, j)
+            ):
                 root[max(top(i), top(j))] = min(top(i), top(j))
     numbers: dict[int, int] = {}
     mine = [numbers.setdefault(top(k), len(numbers)) if grid[k] >= 0 else -1 for k in range(n)]
@@ -250,7 +268,7 @@ def check_regions(plane: Plane, raster: Array) -> str:
 
 
 def blocks_correspond(plane: Plane, i: int, j: int) -> bool:
-    """Whether the blocks of two cells intersect one to one, and lie among the starts that come to the other's blocks."""
+    """Whether the blocks of two cells intersect one to one, and lie among the starts that come to the other's."""
     one, other = (slice(int(plane.first[k]), int(plane.first[k + 1])) for k in (i, j))
     here, there = common_cells(plane, i, j)
     a, b = plane.tall["component"][one], plane.tall["component"][other]

@@ -11,7 +11,7 @@ import numpy as np
 from flint import arb
 
 from .balls import PRECISION, Array, Pair, UnprovedError, prove
-from .cells import check_cell, check_components, check_structure, range_max, tasks_of
+from .cells import check_cell, check_components, check_structure, tasks_of
 from .end_points import Throws
 from .file import Cells
 from .goals import check_goal, goal_of_scene
@@ -22,7 +22,9 @@ from .texts import BadFileError
 from .thinning import not_arriving
 
 UNDECIDED, GOAL_PROVED, GOAL_REFUTED = 0, 1, 2
-LARGEST_OPEN = 0.01  # the share of the arm of whose starts nothing may be known where starts are claimed from some x on
+LARGEST_OPEN = (
+    0.01  # the share of the arm of whose starts nothing may be known where starts are claimed from some x on
+)
 MOST_CUT = 64  # pieces of an interval of an orbit, so that the decision is proved on it
 
 
@@ -37,7 +39,9 @@ class Claimed(NamedTuple):
     since: list[float]  # where the starts begin that are claimed, by side
     near: list[list[float]] | None  # by side q and the ends of a fixed point, 0 0 without one
     counts: list[int]  # thinning, throws, jogs
-    blocks: list[list[int]]  # per block its number, 1 if the flip order is claimed, and per side bands, least, most
+    blocks: list[
+        list[int]
+    ]  # per block its number, 1 if the flip order is claimed, and per side bands, least, most
     chain: list[list[int]]  # side and branch of each interval of the orbit
     ends: list[list[float]]  # and its ends
 
@@ -69,7 +73,7 @@ def check_region_cell(claimed: Claimed) -> str:
 
 
 def check_record(scene: Scene, goal: dict[str, Any] | None, claimed: Claimed) -> str:
-    """Check the blocks, the starts that come to them, the goal where it is claimed, and the throws; "" or the reason."""
+    """Check the blocks, the starts that come to them, the goal if it is claimed, and the throws; "" or the reason."""
     c = cells_of(claimed)
     bad = check_structure(c, scene, -1) or check_components(c)
     if bad:
@@ -185,7 +189,7 @@ def marked(targets: Array, cells: Array) -> Array:
 
 
 def check_visits(found: tuple[int, int] | None, least: int, most: int) -> str:
-    """Check bounds of the jogs of a visit: -1 -1 where no flip leads to the side, and `most` -1 where none is claimed."""
+    """Check bounds of the jogs of a visit: -1 -1 where no flip leads to the side; `most` is -1 if none is claimed."""
     if found is None:
         return "" if (least, most) == (-1, -1) else "no flip leads to it"
     if not 0 <= least <= found[0]:
@@ -206,7 +210,7 @@ def check_bands(c: Cells, inside: Array, side: int, bands: int) -> str:
 
 
 def comes_round(c: Cells, inside: Array, visits: list[tuple[int, int] | None]) -> bool:
-    """Whether every orbit of a block leaves every side again, so that flips lead it round; or it stays on its one side."""
+    """Whether every orbit of a block leaves every side again, so that flips lead it round; or stays on its one side."""
     sides = [bool((inside & (c.side == i)).any()) for i in range(len(visits))]
     if sum(sides) == 1 and not any(visits):
         return not (c.flip[inside, 0] >= 0).any()
@@ -233,7 +237,9 @@ def check_chain(scene: Scene, goal: dict[str, Any] | None, claimed: Claimed) -> 
     for k, ((side, branch), (lo, hi)) in enumerate(zip(claimed.chain, claimed.ends, strict=True)):
         prove(0 <= side < len(scene.sides) and branch in (0, 1), "a side or a branch is none")
         s = scene.sides[side]
-        prove(lo < hi and bool(arb(lo) > s.a) and bool(arb(hi) <= s.arm), f"interval {k} is not one of the arm")
+        prove(
+            lo < hi and bool(arb(lo) > s.a) and bool(arb(hi) <= s.arm), f"interval {k} is not one of the arm"
+        )
         prove(decided_on(throws, side, branch, lo, hi), f"the decision on interval {k} is not proved")
         after = (k + 1) % len(claimed.chain)
         on = (side + branch) % len(scene.sides)

@@ -190,7 +190,11 @@ def check_certificate(
 
 
 def recheck_plane(
-    plane: Plane, header: dict[str, Any], workers: int, progress: Callable[[int, int], None] | None, report: Report
+    plane: Plane,
+    header: dict[str, Any],
+    workers: int,
+    progress: Callable[[int, int], None] | None,
+    report: Report,
 ) -> None:
     """Check regions of a plane, and fill in the report."""
     model = plane.raw["model"]["flight"], plane.raw["model"]["flip"]

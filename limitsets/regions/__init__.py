@@ -1,7 +1,7 @@
 """Certified regions: a plane of two quantities in cells, and of each cell a record that holds for all parameters in it.
 
-The record is that of a Conley-Morse database (Arai, Kalies, Kokubu, Mischaikow, Oka, Pilarczyk, SIAM J. Appl. Dyn. Syst.
-8, 2009), for the throw: attracting blocks, the starts that come to them, the order of flips, the goal.
+The record is that of a Conley-Morse database (Arai, Kalies, Kokubu, Mischaikow, Oka, Pilarczyk, SIAM J. Appl. Dyn.
+Syst. 8, 2009), for the throw: attracting blocks, the starts that come to them, the order of flips, the goal.
 """
 
 from limitsets.regions.axes import Axis, evenly

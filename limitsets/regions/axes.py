@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from itertools import pairwise
 
 from limitsets.errors import AnswerError
 from limitsets.proofs.tolerance import DIGITS
@@ -48,7 +49,7 @@ class Axis:
         read = [parse(text, place.dimension) for text in borders]
         values = tuple(Fraction(each.number) for each in read)
         units = {each.unit for each in read}
-        ascending = all(a < b for a, b in zip(values, values[1:], strict=False))
+        ascending = all(a < b for a, b in pairwise(values))
         if len(values) < 2 or len(units) != 1 or not ascending:
             raise AnswerError(
                 f"the borders of {quantity}",
@@ -62,7 +63,7 @@ class Axis:
         """Halve every cell so many times."""
         borders = self.borders
         for _ in range(depth):
-            middles = [(a + b) / 2 for a, b in zip(borders, borders[1:], strict=False)]
+            middles = [(a + b) / 2 for a, b in pairwise(borders)]
             borders = tuple(sorted([*borders, *middles]))
         return Axis(self.quantity, self.unit, borders)
 
@@ -72,7 +73,7 @@ class Axis:
 
     def widths(self) -> list[float]:
         """Width of each cell, in the unit."""
-        return [float(b - a) for a, b in zip(self.borders, self.borders[1:], strict=False)]
+        return [float(b - a) for a, b in pairwise(self.borders)]
 
 
 def evenly(quantity: str, first: str, last: str, cells: int) -> Axis:
@@ -112,7 +113,9 @@ def placed(scene: Scene, axes: Sequence[Axis]) -> Scene:
         One quantity twice, effects that no certificate can hold, or noise.
     """
     if len({axis.quantity for axis in axes}) < len(axes):
-        raise AnswerError("the axes", [axis.quantity for axis in axes], "two quantities", "choose another one")
+        raise AnswerError(
+            "the axes", [axis.quantity for axis in axes], "two quantities", "choose another one"
+        )
     if scene.effects.on():
         raise AnswerError(
             "the scene's effects", list(scene.effects.on()), "none", "regions are proved of the minimal model"

@@ -32,7 +32,7 @@ def neighbours(raster: NDArray[np.int64]) -> NDArray[np.int64]:
 
 
 def regions(records: Sequence[Record], raster: NDArray[np.int64]) -> NDArray[np.int32]:
-    """Number the regions from 0 in the order of their first cells; -1 for cells without a block."""
+    """Give each cell the number of its region, from 0 in the order of first cells; -1 without a block."""
     root = list(range(len(records)))
 
     def of(k: int) -> int:

@@ -21,11 +21,11 @@ from limitsets.goals import OrientedBeyond
 from limitsets.maps import Orbit, orbit
 from limitsets.proofs.attraction import Attraction
 from limitsets.proofs.goals.kind import above
-from limitsets.proofs.goals.violating_orbits import middle
+from limitsets.proofs.goals.violating_orbits import MORE_THAN_ROUNDING, middle
 from limitsets.proofs.orbits import follow
 from limitsets.proofs.parameters import ParameterBox
 
-__all__ = ["Chain", "violating_chain"]
+__all__ = ["Chain", "Violation", "violating_chain"]
 
 # Throws until an orbit of the middle scene has settled, and throws of it that are searched.
 SETTLING, SEARCHED = 2_000, 20_000
@@ -63,8 +63,15 @@ class Return(NamedTuple):
     branches: Ints
 
 
-def violating_chain(found: Attraction, middle_box: ParameterBox, goal: OrientedBeyond) -> Chain | None:
-    """Prove that every map of the box has a periodic orbit that violates the goal; None where none is found.
+class Violation(NamedTuple):
+    """Whether an orbit of the scene in the middle violates the goal, and the chain that proves it of all parameters."""
+
+    seen: bool = False
+    chain: Chain | None = None
+
+
+def violating_chain(found: Attraction, middle_box: ParameterBox, goal: OrientedBeyond) -> Violation:
+    """Look for a periodic orbit that violates the goal, and prove that every map of the box has one.
 
     Parameters
     ----------
@@ -76,19 +83,16 @@ def violating_chain(found: Attraction, middle_box: ParameterBox, goal: OrientedB
         The goal.
     """
     box = found.cover.box
-    bare = box.bare[1]
-    if not (box.bare[0].kappa > np.hypot(bare.a, bare.d) * (1.0 + 1e-12)).all():
-        return None  # the impact may not depend continuously on where the throw starts
-    if not (found.component >= 0).any():
-        return None
     map_now = middle_box.at_kappa(middle_box.middle_kappa)
     start = orbit(map_now, *middle(found, found.cells.numbers()), SETTLING)
     path = orbit(map_now, float(start.x[-1]), int(start.side[-1]), SEARCHED)
-    for near in _returns(path, goal):
-        chain = _widened(box, near, above(goal.x))
-        if chain is not None:
-            return chain
-    return None
+    if not goal.wrong()(path.x * MORE_THAN_ROUNDING, path.side).any():
+        return Violation()
+    bare = box.bare[1]
+    if not (box.bare[0].kappa > np.hypot(bare.a, bare.d) * (1.0 + 1e-12)).all():
+        return Violation(True)  # the impact may not depend continuously on where the throw starts
+    chains = (_widened(box, near, above(goal.x)) for near in _returns(path, goal))
+    return Violation(True, next((chain for chain in chains if chain is not None), None))
 
 
 def _returns(path: Orbit, goal: OrientedBeyond) -> Iterator[Return]:

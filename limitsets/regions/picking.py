@@ -61,8 +61,9 @@ def largest_square(
     Examples
     --------
     >>> import limitsets as ls
-    >>> square = largest_square(ls.load("paper-designed"), {"throw.speed": "162 deg/s", "arm.surface_height": "-0.2 in"},
-    ...                         {"throw.speed": "0.5 deg/s", "arm.surface_height": "0.02 in"}, width=0.2)
+    >>> centre = {"throw.speed": "162 deg/s", "arm.surface_height": "-0.2 in"}
+    >>> scales = {"throw.speed": "0.5 deg/s", "arm.surface_height": "0.02 in"}
+    >>> square = largest_square(ls.load("paper-designed"), centre, scales, width=0.2)
     >>> 2.0 < square.proved < square.refuted < 6.0
     True
     """
@@ -113,7 +114,9 @@ def roomiest(found: Regions, scales: Mapping[str, str]) -> Pick:
         low, high = np.where(good, size, low), np.where(good, high, size)
     best = int(low.argmax())
     if not low[best] > 0.0:
-        raise AnswerError("the plane", found.shares(), "one in which something is proved", "choose another one")
+        raise AnswerError(
+            "the plane", found.shares(), "one in which something is proved", "choose another one"
+        )
     i, j = np.unravel_index(best, tuple(each.size for each in places))
     values = {axis.quantity: axis.text(int(k)) for axis, k in zip(found.axes, (i, j), strict=True)}
     return Pick(values, float(low[best]) * (1.0 - ROOM))
@@ -122,6 +125,6 @@ def roomiest(found: Regions, scales: Mapping[str, str]) -> Pick:
 def _between(
     borders: np.ndarray[tuple[int], np.dtype[np.float64]], middle: np.ndarray, half: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Numbers of the last border not above, and the first not below, middle -+ half; one too many where there is none."""
+    """Numbers of the last border not above, and the first not below, middle -+ half; -1 or n where there is none."""
     low = np.searchsorted(borders, middle - half, side="right") - 1
     return low, np.searchsorted(borders, middle + half, side="left")

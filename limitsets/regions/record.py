@@ -25,7 +25,7 @@ from limitsets.proofs.goals.kind import throws_to_reach
 from limitsets.proofs.parameters import ParameterBox, parameter_box
 from limitsets.proofs.rational import RationalInterval
 from limitsets.proofs.tolerance import SceneBox
-from limitsets.regions.persisting import Chain, violating_chain
+from limitsets.regions.persisting import Chain, Violation, violating_chain
 from limitsets.regions.visits import Visit, visit
 from limitsets.scene import Scene
 
@@ -36,6 +36,8 @@ CELLS = (256, 1024)
 
 # Pieces of the parameter that is known least, where a cell is open to both decisions.
 PIECES = 8
+
+SEEN = "an orbit of the middle violates the goal, and no such orbit is proved of all parameters"
 
 
 class Block(NamedTuple):
@@ -138,11 +140,15 @@ def certify_cell(
         for number in cells:
             found = attraction(cover(box, number, cuts, PIECES))
             doubtful = _may_violate(found, scene)
-            chain = _refuting(found, scene, middle) if doubtful and first is None else None
-            # where cells do not prove it finer ones are asked before two throws at once, which cost more
-            record = _record(found, scene, ends, ask=chain is None and (not doubtful or number == cells[-1]))
-            if chain is not None:
-                return replace(record, goal="refuted", reason="", chain=chain)
+            against = _refuting(found, scene, middle) if doubtful and first is None else Violation()
+            # where these cells do not prove it finer ones are asked before two throws at once, which cost more
+            record = _record(
+                found, scene, ends, ask=not against.seen and (not doubtful or number == cells[-1])
+            )
+            if against.chain is not None:
+                return replace(record, goal="refuted", reason="", chain=against.chain)
+            if against.seen:
+                return replace(record, reason=SEEN)
             if record.settled:
                 return record
             first = record if first is None or not first.blocks else first
@@ -171,7 +177,7 @@ def _record(
         answer = prove(found, scene, scene.goal)
         verdict = "proved" if answer.verdict == "proved" else "undecided"
         reason, section = answer.reason, dict(answer.section) if verdict == "proved" else {}
-    counts = {"thinning": basin.thinning, "near": basin.near}
+    counts: dict[str, Any] = {"thinning": basin.thinning, "near": basin.near}
     if basin.near:
         counts["joint"] = [(near.q, *(near.fixed_point or (0.0, 0.0))) for near in found.joint]
     return Record(
@@ -198,11 +204,11 @@ def _may_violate(found: Attraction, scene: Scene) -> bool:
     )
 
 
-def _refuting(found: Attraction, scene: Scene, middle: ParameterBox) -> Chain | None:
+def _refuting(found: Attraction, scene: Scene, middle: ParameterBox) -> Violation:
     """Look for a periodic orbit of all parameters that violates the goal."""
     goal = scene.goal
     if not isinstance(goal, OrientedBeyond) or goal.from_anywhere:
-        return None
+        return Violation()
     return violating_chain(found, middle, goal)
 
 

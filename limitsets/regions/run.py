@@ -89,7 +89,7 @@ class Regions:
         DeniedError
             The checker does not confirm it: it is kept as NAME.denied.zip.
         """
-        arrays = {"cells": self.index, "goal": self.code, "region": self.region}
+        arrays: dict[str, NDArray[Any]] = {"cells": self.index, "goal": self.code, "region": self.region}
         return write(path, self.scene, self.axes, arrays, self.records, recheck=recheck, workers=workers)
 
 

@@ -14,14 +14,14 @@ Ends = NDArray[np.int32]
 
 
 class Visit(NamedTuple):
-    """Bounds of the jogs in a row, from the landing after a flip until the next flip; `most` is -1 where none is proved."""
+    """Bounds of the jogs in a row, from the landing after a flip to the next flip; `most` -1 where none is proved."""
 
     least: int
     most: int
 
 
 def met(ends: Ends, cells: Mask) -> Mask:
-    """Return the cells that images of some cells meet; `ends` are the first and the last of each, -1 where it has none."""
+    """Return the cells that images of some cells meet; `ends` are the first and last of each, -1 where it has none."""
     some = ends[cells & (ends[:, 0] >= 0)]
     count = np.zeros(cells.size + 1, dtype=np.int64)
     np.add.at(count, some[:, 0], 1)

@@ -1,7 +1,7 @@
 """The certificate of a plane: for each cell of parameters all that a recheck needs, and nothing that it has to trust.
 
-The file is laid out as every certificate (docs/certificates.md).  The cells of the arm stand one after another, those of
-all cells of parameters together; borders that several cells of parameters share stand once.
+The file is laid out as every certificate (docs/certificates.md).  The cells of the arm stand one after another, those
+of all cells of parameters together; borders that several cells of parameters share stand once.
 """
 
 from __future__ import annotations
@@ -71,14 +71,19 @@ def write(
         "claims": spelled_plainly([{"claim": "region", "section": section}]),
         "producer": producer,
     }
-    held = arrays | _of_records(records, scene.sides.a.size) | _of_blocks(records, scene.sides.a.size) | _of_chains(records)
+    held = (
+        arrays
+        | _of_records(records, scene.sides.a.size)
+        | _of_blocks(records, scene.sides.a.size)
+        | _of_chains(records)
+    )
     held = {name: np.ascontiguousarray(value) for name, value in held.items()}
     pack(path, header, held, scene.unit, {"region": "proved"} if recheck else None, workers)
     return Path(path)
 
 
 def _of_records(records: Sequence[Record], sides: int) -> Arrays:
-    """Starts, counts and cells of the arm."""
+    """Write starts, counts and cells of the arm."""
     n = len(records)
     grid, starts = np.full(n, -1, np.int32), np.full(n, STARTS.index("cells"), np.int8)
     since, joint = np.zeros((n, sides)), np.zeros((n, 3 * sides))
@@ -148,9 +153,7 @@ def _of_chains(records: Sequence[Record]) -> Arrays:
         for side, branch in zip(chain.side.tolist(), chain.branches.tolist(), strict=True)
     ]
     ends = [
-        [lo, hi]
-        for _, chain in found
-        for lo, hi in zip(chain.lo.tolist(), chain.hi.tolist(), strict=True)
+        [lo, hi] for _, chain in found for lo, hi in zip(chain.lo.tolist(), chain.hi.tolist(), strict=True)
     ]
     return {
         "chain": np.array(word, dtype=np.int32).reshape(-1, 3),
