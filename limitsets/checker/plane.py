@@ -312,27 +312,32 @@ def area_shares(plane: Plane) -> tuple[Fraction, Fraction, Fraction]:
     return sums[0] / total, sums[1] / total, sums[2] / total
 
 
-def plane_in_words(plane: Plane, has_goal: bool) -> list[str]:
+def plane_in_words(plane: Plane, goal: dict[str, Any] | None) -> list[str]:
     """Put the claim in words, with what was checked."""
     undecided, proved, refuted = (f"{float(100 * share):.6g} %" for share in area_shares(plane))
     f = plane.flat
-    what = "the scene's goal holds" if has_goal else "starts come to the attracting blocks"
-    counts = np.bincount(plane.blocks[:, 0], minlength=len(f["cells"]))
+    what = "starts come to attracting blocks" if goal is None else "the scene's goal is proved"
+    against = "" if goal is None else f" refuted on {refuted}, by a periodic orbit that violates it;"
     lines = [
         f"region: {name_of_whole(plane)}, in {len(f['cells'])} cells of parameters, each for every parameter in it:",
-        f"    {what} on {proved} of the area;"
-        + (f" a periodic orbit violates it on {refuted};" if has_goal else "")
-        + f" undecided on {undecided}",
+        f"    {what} on {proved} of the area;{against} undecided on {undecided}",
     ]
-    for kind, word in enumerate(STARTS_WORDS[:3]):
-        number = int(((f["starts"] == kind) & (f["goal"] == GOAL_PROVED)).sum())
-        if number:
-            said = {"from": "starts from some x on, of 99 % of the arm at least"}.get(word, f"{word} start")
-            lines.append(f"    {number} of the proved cells: for {said}")
-    lines.append(
-        f"    at least {int(counts.min())} to {int(counts.max())} attractors; {int(f['region'].max()) + 1} regions,"
-        " in which attracting blocks of neighbours correspond one to one"
+    said = (
+        "every start comes",
+        "almost every start comes",
+        "starts from some x on, of 99 % of the arm or more, come",
     )
+    for kind, words in enumerate(said):
+        number = int(((f["starts"] == kind) & (f["goal"] == GOAL_PROVED)).sum())
+        lines += [f"    in {number} of the proved cells {words} to the blocks"] if number else []
+    if goal is not None and goal["kind"] == "reaches" and not goal["every"]:
+        lines.append(
+            "    the goal speaks of almost every orbit: it is proved but for starts of total length zero"
+        )
+    counts = np.bincount(plane.blocks[:, 0], minlength=len(f["cells"]))
+    least, number = int(counts.min()), int(f["region"].max()) + 1
+    joined = "in which attracting blocks of neighbours correspond one to one"
+    lines.append(f"    in each cell at least {least} attracting blocks; {number} regions, {joined}")
     return lines
 
 

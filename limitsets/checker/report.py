@@ -205,14 +205,14 @@ def recheck_plane(
     report.parameters |= {axis.name: axis.between(0, len(axis.texts) - 1) for axis in plane.axes}
     report.parameters["noise (at every throw)"] = "none"
     report.cells = int(plane.first[-1])
-    has_goal = goal_of_scene(plane.raw, plane.n_sides) is not None
+    goal = goal_of_scene(plane.raw, plane.n_sides)
     raster, bad = raster_of(plane)
-    bad = bad or check_codes(plane, has_goal)
+    bad = bad or check_codes(plane, goal is not None)
     if not bad:
         cell, why = check_plane_cells(plane, workers, progress)
         bad = f"{name_of_cell(plane, cell)}: {why}" if why else check_regions(plane, raster)
     if not bad:
-        report.statement = plane_in_words(plane, has_goal)
+        report.statement = plane_in_words(plane, goal)
         undecided, proved, refuted = (float(share) for share in area_shares(plane))
         report.area = {"proved": proved, "refuted": refuted, "undecided": undecided}
     report.verdict = "failed" if bad else "proved"

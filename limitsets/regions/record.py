@@ -77,7 +77,8 @@ class Record:
         The starts that are proved to come to the blocks: "every", "almost-every", {"from": {"0": x}} or "cells"; None
         without a block.
     shares : dict of str to float
-        Shares of the arm: `share` comes to the blocks, `leaves`, `creeps`, `open`.
+        Shares of the arm: `share` comes to the blocks, `leaves`, `creeps`, `open`.  A certificate does not hold those
+        that leave.
     blocks : tuple of Block
         Attracting blocks, disjoint: there are at least so many attractors.
     section : dict
@@ -167,9 +168,9 @@ def _record(
     found: Attraction, scene: Scene, spans: dict[str, tuple[Fraction, Fraction]], *, ask: bool
 ) -> Record:
     """Put together what some cells prove; the goal is undecided where it is not asked for."""
-    if not (found.component >= 0).any():
-        return Record(spans, "undecided" if scene.goal else "", found.reason)
     basin = found.basin
+    if not (found.component >= 0).any():
+        return Record(spans, "undecided" if scene.goal else "", found.reason, shares=basin.shares)
     verdict, reason, section = "", basin.missing, dict[str, Any]()
     if scene.goal is not None and not ask:
         verdict = "undecided"
