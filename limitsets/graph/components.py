@@ -17,7 +17,7 @@ from limitsets.graph import segment_tree
 from limitsets.graph.ranges import ROWS, RUN, SIDE, START, Ranges, box_rows, boxes_of, row_start
 from limitsets.jit import kernel
 
-__all__ = ["Components", "descend", "ranks", "reach", "strong_components"]
+__all__ = ["Components", "descend", "fill_components", "ranks", "reach", "strong_components"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,7 +48,7 @@ class Components:
 
 
 @kernel(entry=True, counting=False)
-def _strong(
+def fill_components(
     r: Ranges, rank: Any, label: Any, order: Any, path: Any, boxes: Any, rows: Any, waiting: Any, loops: Any
 ) -> Any:
     """Fill `label`, `order` and `loops` (cells that meet their own image); the number of components.
@@ -190,7 +190,7 @@ def strong_components(r: Ranges) -> Components:
     path, waiting, rows = np.empty(n, np.int32), np.empty(n, np.int32), np.empty(n, np.int32)
     boxes = np.empty(n, np.int64 if len(r.box) >= 2**31 else np.int32)
     loops = np.zeros(n, dtype=np.bool_)
-    count = _strong(r, np.zeros(n, np.int32), label, order, path, boxes, rows, waiting, loops)
+    count = fill_components(r, np.zeros(n, np.int32), label, order, path, boxes, rows, waiting, loops)
     return _components(label, order, loops, count)
 
 

@@ -21,6 +21,7 @@ from limitsets.jit.compiling import kernel, proof_kernel
 from limitsets.jit.dispatch import entry_of, generic, named_tuple_class, with_entry
 from limitsets.jit.marks import mark_undefined, take_mark
 from limitsets.jit.number_types import corners_as_numbers, entries_of, formula, number, of_entries, operation
+from limitsets.jit.rows import row_of
 
 __all__ = [
     "corners_as_numbers",
@@ -36,6 +37,7 @@ __all__ = [
     "of_entries",
     "operation",
     "proof_kernel",
+    "row_of",
     "take_mark",
     "with_entry",
 ]

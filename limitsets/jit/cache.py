@@ -52,6 +52,7 @@ KERNEL_FREE = {
     "robust",
     "regions",
     "inverse",
+    "sweep",
     "plot",
     "report",
     "cli",

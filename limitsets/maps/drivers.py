@@ -24,6 +24,7 @@ __all__ = [
     "advance",
     "columns",
     "displacements",
+    "fill_images",
     "images",
     "images_on",
     "orbit",
@@ -48,7 +49,8 @@ def step(params: Any, x: Any, side: Any) -> Any:
 
 
 @kernel(entry=True)
-def _images(params: Any, side: int, xs: Any, after: Any, side_after: Any, code_after: Any) -> Any:
+def fill_images(params: Any, side: int, xs: Any, after: Any, side_after: Any, code_after: Any) -> Any:
+    """Images of states on one side; how many of them the fast kernel could not vouch for."""
     here = on_side(params, side)
     for k in range(xs[0].size):
         x, to, code = image(here, pick(xs, k), side)
@@ -186,7 +188,7 @@ def images(params: Any, x: ArrayLike, side: int) -> Images:
     count = xs[0].size
     after = tuple(np.empty(count) for _ in xs)
     side_after, code = np.empty(count, np.int64), np.empty(count, np.int64)
-    again = _images(params, side, xs, after, side_after, code)
+    again = fill_images(params, side, xs, after, side_after, code)
     return Images(rows(after), side_after, code, again / max(count, 1))
 
 

@@ -51,6 +51,10 @@ def _no_fallback(params: Any, x: Any, side: int) -> Any:
     return x, side, codes.OUTSIDE_MODEL
 
 
+def _first_branch(params: Any, x: Any, side: int) -> Any:
+    return -1.0
+
+
 @generic
 def image(params: Any, x: Any, side: int) -> Any:
     """One step: ``(x', side', code)``."""
@@ -86,9 +90,9 @@ def fallback(params: Any, x: Any, side: int) -> Any:
     """One step, slow and sure."""
 
 
-@generic
+@generic(default=_first_branch)
 def margin(params: Any, x: Any, side: int) -> Any:
-    """Return a number whose sign decides between branches 0 and 1."""
+    """Return a number whose sign decides between branches 0 and 1; of a map without one -1, which is branch 0."""
 
 
 @generic

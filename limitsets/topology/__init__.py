@@ -1,0 +1,6 @@
+"""The topology of attractors at one parameter point after another: how many, of how many bands, in which order."""
+
+from limitsets.topology.points import topologies
+from limitsets.topology.records import DOUBTS, Topologies
+
+__all__ = ["DOUBTS", "Topologies", "topologies"]

@@ -1,0 +1,152 @@
+"""Orbits that check what cells and intervals say: they stay, visit every band, close a cycle.  Means along orbits."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from limitsets.jit import kernel
+from limitsets.maps.drivers import step
+from limitsets.maps.kernels import image_on
+from limitsets.topology.bands import SET
+from limitsets.topology.cells import cell_of
+from limitsets.topology.work import Cells, Components, Starts, Unions
+
+__all__ = ["CLOSES", "INNER", "averages", "cycle_length", "remaining", "visits_all"]
+
+# Throws of the orbits from cells that recur though they are left, and those between two looks at where they are.
+THROWS, LOOKED = 400, 4
+# Throws until every band has to be visited; throws before a cycle is sought, and the longest one that is found.
+MOST_VISITS, BEFORE, MOST_PERIOD = 20_000, 1000, 4096
+# Throws before means are taken.
+SKIPPED = 200
+# An orbit closes where it comes back this near, as a share of the largest side.
+CLOSES = 1e-9
+# Golden ratio: multiples of it, modulo 1, fill an interval evenly.
+GOLDEN = 0.6180339887498949
+# Where in a band an orbit starts: no whole fraction, whose orbit may be short.
+INNER = 1.0 - GOLDEN
+
+
+@kernel(entry=True, counting=False)
+def _starts(sides: int, total: float, c: Cells, k: Components, s: Starts) -> None:
+    """Spread the starts over the cells in `held`, in proportion to their lengths."""
+    for start in range(s.x.size):
+        place = total * ((0.5 + start * GOLDEN) % 1.0)
+        for side in range(sides):
+            for cell in range(c.begin[side], c.begin[side + 1]):
+                if k.held[cell]:
+                    length = c.hi[cell] - c.lo[cell]
+                    if 0.0 <= place < length:
+                        s.x[start], s.side[start] = c.lo[cell] + place, side
+                    place -= length
+
+
+@kernel(entry=True, counting=False)
+def remaining(params: Any, sides: int, c: Cells, k: Components, s: Starts) -> int:
+    """Count the orbits from the cells in `held` that are still among these cells after some throws; they lead `s`.
+
+    All orbits make a throw before one makes the next, so that the processor works on several at a time.
+    """
+    total, left = 0.0, s.x.size
+    for cell in range(c.begin[sides]):
+        if k.held[cell]:
+            total += c.hi[cell] - c.lo[cell]
+    if total == 0.0:
+        return 0
+    _starts(sides, total, c, k, s)
+    for throw in range(THROWS):
+        for i in range(left):
+            s.x[i], s.side[i], s.code[i] = step(params, s.x[i], s.side[i])
+        looked, kept = throw % LOOKED == LOOKED - 1, 0
+        for i in range(left):
+            s.x[kept], s.side[kept] = s.x[i], s.side[i]
+            stays = s.code[i] >= 0
+            if looked and stays:
+                here = cell_of(c, s.side[i], s.x[i])
+                stays = k.held[here] and s.x[i] >= c.lo[here]
+            kept += stays
+        left = kept
+        if left == 0:
+            break
+    return left
+
+
+@kernel(entry=True, counting=False)
+def visits_all(params: Any, slack: float, u: Unions) -> bool:
+    """Whether one orbit comes to every interval of SET, and leaves them never."""
+    n, missing = u.size[SET], u.size[SET]
+    for i in range(n):
+        u.seen[i] = 0
+    x, side = u.lo[SET, 0] + INNER * (u.hi[SET, 0] - u.lo[SET, 0]), u.side[SET, 0]
+    for _ in range(MOST_VISITS):
+        inside = False
+        for i in range(n):
+            if u.side[SET, i] == side and u.lo[SET, i] - slack <= x <= u.hi[SET, i] + slack:
+                inside = True
+                missing -= 1 - u.seen[i]
+                u.seen[i] = 1
+        if missing == 0 or not inside:
+            return inside
+        x, side, code = step(params, x, side)
+        if code < 0:
+            return False
+    return False
+
+
+@kernel(entry=True, counting=False)
+def cycle_length(params: Any, x: float, side: int, scale: float) -> int:
+    """Length of the attracting cycle that an orbit comes to, 0 where it closes none."""
+    for _ in range(BEFORE):
+        x, side, code = step(params, x, side)
+        if code < 0:
+            return 0
+    at, on, length, since, slope = x, side, 1, 0, 1.0
+    while length <= MOST_PERIOD:
+        after, side_after, code = step(params, x, side)
+        if code < 0:
+            return 0
+        _, _, factor = image_on(params, x, side, code)
+        x, side, slope, since = after, side_after, slope * factor, since + 1
+        if side == on and abs(x - at) <= CLOSES * scale and abs(slope) < 1.0:
+            return since
+        if since == length:  # Brent's method: a later state to come back to
+            at, on, length, since, slope = x, side, 2 * length, 0, 1.0
+    return 0
+
+
+@kernel(entry=True, counting=False)
+def averages(params: Any, x: float, side: int, throws: int, out: Any) -> None:
+    """Fill `out`: share of the throws that change sides, mean logarithm of the slopes, and its standard error.
+
+    The error is that of the means of 16 stretches of the orbit; nan where the orbit leaves.
+    """
+    for _ in range(SKIPPED):
+        x, side, code = step(params, x, side)
+        if code < 0:
+            out[:] = math.nan
+            return
+    stretches = 16
+    flips, total, squares = 0, 0.0, 0.0
+    length = max(throws // stretches, 1)
+    for _ in range(stretches):
+        growth, size = 0.0, 1.0
+        for _ in range(length):
+            after, side_after, code = step(params, x, side)
+            if code < 0:
+                out[:] = math.nan
+                return
+            _, _, slope = image_on(params, x, side, code)
+            size *= abs(slope)
+            if size < 1e-100 or size > 1e100:
+                growth += math.log(size)
+                size = 1.0
+            flips += side_after != side
+            x, side = after, side_after
+        mean = (growth + math.log(size)) / length
+        total += mean
+        squares += mean * mean
+    mean = total / stretches
+    out[0] = flips / (stretches * length)
+    out[1] = mean
+    out[2] = math.sqrt(max(squares / stretches - mean * mean, 0.0) / (stretches - 1))

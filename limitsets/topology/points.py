@@ -1,0 +1,220 @@
+"""The topology of the attractors of many parameter points: one compiled loop, finer cells where doubt remains.
+
+Cells find what may be an attractor; its bands, jogs and order come from intervals, and orbits check both.  A point at
+which these do not agree is looked at again on finer cells.  What is in doubt then is undecided, with the reason.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from limitsets.errors import AnswerError
+from limitsets.jit import kernel, row_of
+from limitsets.maps.contract import has_slope, kind_of
+from limitsets.maps.kernels import on_side
+from limitsets.maps.stacks import point_of, size_of
+from limitsets.topology.bands import NOTHING, SET, begin_union, push_through, settle, stays_around
+from limitsets.topology.cells import fill_cells
+from limitsets.topology.orbits import CLOSES, INNER, averages, cycle_length, remaining, visits_all
+from limitsets.topology.pieces import find_pieces
+from limitsets.topology.records import (
+    BANDS_JOIN,
+    DECIDED,
+    MOVING,
+    NOT_ONE,
+    STAYING,
+    TOO_FINE,
+    UNSURE_EXIT,
+    Topologies,
+    empty,
+)
+from limitsets.topology.recurrence import find_components, shares
+from limitsets.topology.work import MOST_ATTRACTORS, Region, Work, work_for
+
+__all__ = ["topologies"]
+
+# Cells and samples a side: from coarse to fine.
+LEVELS = ((300, 48), (1200, 192), (4800, 768), (16_384, 1536))
+# Bands whose gap is below this are one or two: not decided [of the largest side].
+GAP = 1e-7
+# A set all of whose intervals are shorter is a cycle [of the largest side].
+POINT = 1e-8
+
+
+@kernel(entry=True, counting=False)
+def _attractor(params: Any, a: int, r: Region, scale: float, w: Work, t: Topologies, i: int) -> int:
+    """Fill the fields of one attractor of point i; DECIDED, or a doubt."""
+    sides, u = r.lo.size, w.unions
+    expands = begin_union(sides, a, w.cells, w.components, u)
+    if settle(params, r, w.pieces, u) != NOTHING:
+        return MOVING
+    widest = 0.0
+    for k in range(u.size[SET]):
+        widest = max(widest, u.hi[SET, k] - u.lo[SET, k])
+        if k > 0 and u.side[SET, k] == u.side[SET, k - 1] and u.lo[SET, k] - u.hi[SET, k - 1] < GAP * scale:
+            return BANDS_JOIN
+    x, side = u.lo[SET, 0] + INNER * (u.hi[SET, 0] - u.lo[SET, 0]), u.side[SET, 0]
+    t.period[i, a] = u.size[SET] if widest <= POINT * scale else 0
+    if t.period[i, a] == 0 and not expands and cycle_length(params, x, side, scale) > 0:
+        return NOT_ONE
+    if not visits_all(params, CLOSES * scale, u):
+        return NOT_ONE
+    t.start[i, a], t.start_side[i, a] = x, side
+    t.bands[i, a, :], t.reach[i, a, :], t.lowest[i, a, :] = 0, np.nan, np.nan
+    for k in range(u.size[SET]):
+        side = u.side[SET, k]
+        if t.bands[i, a, side] == 0:
+            t.lowest[i, a, side] = u.lo[SET, k]
+        t.bands[i, a, side] += 1
+        t.reach[i, a, side] = u.hi[SET, k]
+    jogs_min, jogs_max, order = t.jogs_min[i, a], t.jogs_max[i, a], t.flip_order[i, a]
+    found = push_through(params, sides, scale, w.pieces, u, jogs_min, jogs_max, order)
+    return DECIDED if found == NOTHING else MOVING
+
+
+@kernel(entry=True, counting=False)
+def _point(params: Any, decided: bool, r: Region, w: Work, t: Topologies, i: int) -> int:
+    """Fill the fields of point i; DECIDED, or the first doubt."""
+    sides, scale, doubt = r.lo.size, 0.0, DECIDED
+    w.pieces.begin[0] = 0
+    for side in range(sides):
+        scale = max(scale, r.hi[side] - r.lo[side])
+        if not find_pieces(on_side(params, side), side, decided, r, w.scan, w.samples, w.pieces):
+            return TOO_FINE
+    if not fill_cells(params, r, w.shape, w.pieces, w.cells):
+        doubt = TOO_FINE
+    count, whole = find_components(sides, w.cells, w.components)
+    t.attractors[i] = count
+    if not whole:
+        return TOO_FINE
+    for a in range(count):
+        found = _attractor(params, a, r, scale, w, t, i)
+        doubt = found if doubt == DECIDED else doubt
+    if doubt == DECIDED and remaining(params, sides, w.cells, w.components, w.starts) > 0:
+        x, side = w.starts.x[0], w.starts.side[0]
+        if stays_around(params, x, side, scale, r, w.pieces, w.cells, w.components, w.unions):
+            doubt = STAYING
+    sure = shares(r, count, w.pieces.to, w.cells, w.components, w.split)
+    t.leaves[i], t.collapses[i] = w.split[0], w.split[1]
+    for a in range(MOST_ATTRACTORS):
+        t.share[i, a] = w.split[2 + a] if a < count else np.nan
+    return UNSURE_EXIT if doubt == DECIDED and not sure else doubt
+
+
+@kernel(entry=True)
+def _points(stack: Any, points: Any, decided: bool, region: Region, w: Work, t: Topologies) -> None:
+    """Fill the points of a stack that are listed."""
+    for i in points:
+        t.undecided[i] = _point(row_of(stack, i), decided, row_of(region, i), w, t, i)
+
+
+@kernel(entry=True)
+def _means(stack: Any, throws: int, t: Topologies, out: Any) -> None:
+    """Fill the averages along an orbit of every attractor of every point that is decided."""
+    for i in range(t.attractors.size):
+        params = row_of(stack, i)
+        for a in range(t.attractors[i] if t.undecided[i] == DECIDED else 0):
+            averages(params, t.start[i, a], t.start_side[i, a], throws, out)
+            t.flips_per_throw[i, a], t.lyapunov[i, a], t.lyapunov_error[i, a] = out[0], out[1], out[2]
+
+
+def topologies(
+    stack: Any,
+    lo: Any,
+    hi: Any,
+    anchor: Any = None,
+    *,
+    levels: Any = LEVELS,
+    throws: int = 0,
+) -> Topologies:
+    """Find the topology of the attractors at many parameter points.
+
+    Parameters
+    ----------
+    stack : NamedTuple
+        Stacked parameters of a one-dimensional map with slopes (`limitsets.maps.stacks`), n points.
+    lo, hi : array_like, shape (n, S)
+        The domain of each side at each point [length].
+    anchor : array_like, shape (n, S), optional
+        Points below `lo` towards which cells shrink (the throw: a_i).
+    levels : sequence of (int, int)
+        Cells and samples a side; each further pair serves the points that are still in doubt.
+    throws : int
+        Of an orbit along which flips per throw and the Lyapunov exponent are averaged; 0 for neither.
+
+    Returns
+    -------
+    Topologies
+
+    Raises
+    ------
+    AnswerError
+        For a map of more dimensions, or without the slopes that intervals and cycles need.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from limitsets import maps
+    >>> from limitsets.maps.stacks import stacked
+    >>> from limitsets.topology import topologies
+    >>> stack = stacked([maps.Logistic(r) for r in (3.2, 3.5, 3.83, 4.0)])
+    >>> found = topologies(stack, np.zeros((4, 1)), np.ones((4, 1)))
+    >>> found.period[:, 0], found.bands[:, 0, 0]
+    (array([2, 4, 3, 0]), array([2, 4, 3, 1]))
+    """
+    n, first = size_of(stack), point_of(stack, 0)
+    kind = kind_of(first)
+    if kind.dimension != 1 or not has_slope(first):
+        raise AnswerError(
+            "the map",
+            kind.name,
+            "a map of one dimension with image_on",
+            "register image_on: one step on a forced branch; for more dimensions ask transitions and attractors",
+        )
+    region = _region(lo, hi, anchor, n)
+    decided = kind.has_margin or len(kind.branches) == 1
+    found = empty(n, region.lo.shape[1])
+    points = np.arange(n)
+    for cells, samples in levels:
+        _points(stack, points, decided, region, _work(region, cells, samples), found)
+        points = np.flatnonzero(found.undecided != DECIDED)
+        if points.size == 0:
+            break
+    _tidy(found)
+    if throws:
+        _means(stack, throws, found, np.zeros(3))
+    return found
+
+
+def _region(lo: Any, hi: Any, anchor: Any, n: int) -> Region:
+    ends = [lo, hi, lo if anchor is None else anchor]
+    region = Region(*(np.ascontiguousarray(values, dtype=np.float64) for values in ends))
+    shapes = [values.shape for values in region]
+    if len(set(shapes)) != 1 or region.lo.ndim != 2 or len(region.lo) != n:
+        raise AnswerError(
+            "the shapes of the domains", shapes, f"({n}, sides) each", "give a row for each point"
+        )
+    return region
+
+
+def _work(region: Region, cells: int, samples: int) -> Work:
+    """Make scratch arrays for cells that shrink towards the anchor down to the least distance any point has from it."""
+    near = (region.lo - region.bottom) / (region.hi - region.bottom)
+    return work_for(region.lo.shape[1], cells, samples, float(near.min()))
+
+
+def _tidy(t: Topologies) -> None:
+    """Order the attractors of each point by side and place, and clear what coarser cells left of others."""
+    for i in np.flatnonzero(t.attractors > 1):
+        count = t.attractors[i]
+        order = np.lexsort((np.nanmin(t.lowest[i, :count], axis=1), t.start_side[i, :count]))
+        for array in t[2:]:
+            if array.ndim > 1:
+                array[i, :count] = array[i, order]
+    beyond = np.arange(MOST_ATTRACTORS) >= t.attractors[:, None]
+    for array in t[2:]:
+        if array.ndim > 1:
+            array[beyond] = -1 if array.dtype == np.int64 else np.nan
+    t.bands[beyond] = 0

@@ -1,0 +1,218 @@
+"""Scratch arrays of the topology of one parameter point; made once for a block of points and a number of cells."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = [
+    "MOST_ATTRACTORS",
+    "MOST_INTERVALS",
+    "MOST_PIECES",
+    "Cells",
+    "Components",
+    "Pieces",
+    "Region",
+    "Samples",
+    "Starts",
+    "Unions",
+    "Work",
+    "work_for",
+]
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+# Orbits from cells that recur though they are left.
+STARTS = 20
+# More than these are not followed: the point is undecided, and says which of them ran over.
+MOST_PIECES, MOST_INTERVALS, MOST_ATTRACTORS = 24, 256, 4
+
+
+class Region(NamedTuple):
+    """The domain: ends of each side, and the point towards which its cells shrink, which is `lo` where they do not."""
+
+    lo: Floats
+    hi: Floats
+    bottom: Floats
+
+
+class Samples(NamedTuple):
+    """Samples of one side from which its pieces are found: place, deciding number, branch, slope on the branch."""
+
+    x: Floats
+    margin: Floats
+    branch: Ints
+    slope: Floats
+    cuts: Floats
+
+
+class Pieces(NamedTuple):
+    """Monotone pieces of all sides, side by side and ascending; a stretch without an image has branch -1.
+
+    `begin` counts those of the sides before; `to` is the side of the images, for branch -1 the code of the exit;
+    `cells` counts the cells within.
+    """
+
+    begin: Ints
+    lo: Floats
+    hi: Floats
+    y_lo: Floats
+    y_hi: Floats
+    branch: Ints
+    to: Ints
+    cells: Ints
+
+
+class Cells(NamedTuple):
+    """Cells of all sides, side by side and ascending, each within one piece.
+
+    `begin` counts those of the sides before; `x`, `y`, `to`, `code` (sides, edges) are edges and their images;
+    `first` and `last` the cells that an image meets (none where last < first); `out` bits of the ways out.
+    """
+
+    begin: Ints
+    x: Floats
+    y: Floats
+    to: Ints
+    code: Ints
+    edge: Ints
+    lo: Floats
+    hi: Floats
+    piece: Ints
+    image_lo: Floats
+    image_hi: Floats
+    first: Ints
+    last: Ints
+    out: NDArray[np.uint8]
+    expands: NDArray[np.bool_]
+
+
+class Components(NamedTuple):
+    """Scratch of the search for components; of each cell where its starts may end; the label of each closed one."""
+
+    box: NDArray[np.int32]
+    zero: Ints
+    stride: Ints
+    rank: NDArray[np.int32]
+    label: NDArray[np.int32]
+    order: NDArray[np.int32]
+    path: NDArray[np.int32]
+    boxes: NDArray[np.int32]
+    rows: NDArray[np.int32]
+    waiting: NDArray[np.int32]
+    loops: NDArray[np.bool_]
+    ends: NDArray[np.uint8]
+    held: NDArray[np.bool_]
+    closed: Ints
+    share: Floats
+
+
+class Unions(NamedTuple):
+    """Three unions of intervals, ascending by side and place: a set, its image, and what is pushed through it."""
+
+    side: Ints
+    lo: Floats
+    hi: Floats
+    size: Ints
+    seen: Ints
+
+
+class Starts(NamedTuple):
+    """States of several orbits, and their last codes."""
+
+    x: Floats
+    side: Ints
+    code: Ints
+
+
+class Work(NamedTuple):
+    """All of it, and how the cells of a side are placed."""
+
+    shape: Floats
+    scan: Floats
+    samples: Samples
+    pieces: Pieces
+    cells: Cells
+    components: Components
+    unions: Unions
+    starts: Starts
+    split: Floats
+
+
+def _places(cells: int, nearest: float) -> Floats:
+    """Edges of cells between 0 and 1: equal ones, and towards an anchor at 0 cells that double from `nearest` on."""
+    equal = np.arange(cells + 1) / cells
+    if nearest == 0.0:
+        return equal
+    near = nearest * 2.0 ** np.arange(int(np.log2(1.0 / (nearest * cells))) + 1)
+    return np.concatenate([near[near < 0.75 / cells], equal[1:]])
+
+
+def work_for(sides: int, cells: int, samples: int, nearest: float) -> Work:
+    """Make the arrays for `cells` cells and `samples` samples a side; `nearest`: see `_places`, 0 without anchor."""
+    shape, scan = _places(cells, nearest), _places(samples, nearest)
+    edges, pieces = shape.size + 2 * MOST_PIECES, sides * MOST_PIECES
+    n = sides * edges
+
+    def ints(*size: int) -> Any:
+        return np.zeros(size, np.int64)
+
+    def floats(*size: int) -> Any:
+        return np.zeros(size)
+
+    def small(*size: int) -> Any:
+        return np.zeros(size, np.int32)
+
+    m = scan.size
+    return Work(
+        shape,
+        scan,
+        Samples(floats(m), floats(m), ints(m), floats(m), floats(4 * MOST_PIECES)),
+        Pieces(ints(sides + 1), *(floats(pieces) for _ in range(4)), *(ints(pieces) for _ in range(3))),
+        Cells(
+            ints(sides + 1),
+            floats(sides, edges),
+            floats(sides, edges),
+            ints(sides, edges),
+            ints(sides, edges),
+            ints(sides),
+            floats(n + 1),
+            floats(n + 1),
+            ints(n),
+            floats(n),
+            floats(n),
+            ints(n),
+            ints(n),
+            np.zeros(n, np.uint8),
+            np.zeros(n, np.bool_),
+        ),
+        Components(
+            small(n, 5),
+            ints(n + 1),
+            ints(sides),
+            small(n),
+            small(n),
+            small(n),
+            small(n),
+            small(n),
+            small(n),
+            small(n),
+            np.zeros(n, np.bool_),
+            np.zeros(n, np.uint8),
+            np.zeros(n, np.bool_),
+            ints(MOST_ATTRACTORS),
+            floats(n, MOST_ATTRACTORS + 2),
+        ),
+        Unions(
+            ints(3, MOST_INTERVALS),
+            floats(3, MOST_INTERVALS),
+            floats(3, MOST_INTERVALS),
+            ints(3),
+            ints(MOST_INTERVALS),
+        ),
+        Starts(floats(STARTS), ints(STARTS), ints(STARTS)),
+        floats(MOST_ATTRACTORS + 2),
+    )
