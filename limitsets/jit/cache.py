@@ -51,6 +51,7 @@ KERNEL_FREE = {
     "analysis",
     "resilience",
     "robust",
+    "regions",
     "inverse",
     "sweep",
     "plot",
