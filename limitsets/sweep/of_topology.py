@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from limitsets.errors import AnswerError
 from limitsets.goals import OrientedBeyond, Reaches
+from limitsets.sweep.checking import ABOUT, CODES, NOT_CHECKED, checks
 from limitsets.sweep.float_margins import float_margins, threshold_of, unit_of_margin
 from limitsets.sweep.subjects import SceneSubject, Subject
 from limitsets.sweep.tasks import Block, Variable, block_task
@@ -42,6 +43,7 @@ def _variables(
     found = {
         "attractors": Variable("int8", about="how many attractors"),
         "undecided": Variable("int8", codes=_CODES, about=doubts),
+        "checked": Variable("int8", codes=CODES, about=ABOUT, fill=NOT_CHECKED),
         "bands": Variable("int16", sides, about="intervals of the attractor on each side", fill=0),
         "flip_order": Variable("int8", sides, about="sides in cyclic order, then -1; all -2: it changes"),
         "jogs_min": Variable("int32", sides, about="fewest throws of one visit that stay on the side"),
@@ -85,10 +87,14 @@ def topology(
         found["threshold"] = _threshold(goal, told.reach)
     if "margin" in block.wanted and margin is not None:
         found["margin"] = float_margins(block.subject.scene, block.values, told, margin, reading)
+    if "checked" in block.wanted:
+        found["checked"] = checks(block, told)
     decided = told.undecided == DECIDED
     variables = _variables(block.subject, throws, margin, reading)
     return {
-        name: found[name] if name == "undecided" else _kept(found[name], decided, variables[name].empty)
+        name: found[name]
+        if name in ("undecided", "checked")
+        else _kept(found[name], decided, variables[name].empty)
         for name in block.wanted
     }
 
