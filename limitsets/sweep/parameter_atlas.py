@@ -28,6 +28,8 @@ if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
 
+    from limitsets.regions import Regions
+
 __all__ = ["Atlas", "atlas"]
 
 TOPOLOGY = "limitsets.sweep.of_topology:topology"
@@ -91,6 +93,54 @@ class Atlas:
             "plan_hash": data.attrs["plan_hash"],
             "versions": plan["versions"],
         }
+
+    def certify(
+        self, *, depth: int = 2, executor: Executor | None = None, progress: Progress | None = None
+    ) -> Regions:
+        """Cut the window into as many cells as there are points, and prove of each what holds for all its parameters.
+
+        Parameters
+        ----------
+        depth : int
+            How often a cell is halved along both axes while it is undecided.
+        executor : concurrent.futures.Executor, optional
+            Where the cells are done; here by default.
+        progress : callable, optional
+            Told ``(step, done, of)``.
+
+        Returns
+        -------
+        Regions
+            Codes, regions and a certificate to save (`limitsets.regions.certified`).
+
+        Raises
+        ------
+        LimitsetsError
+            For an atlas of a map, or along one axis.
+
+        Examples
+        --------
+        >>> import limitsets as ls
+        >>> task = "limitsets.sweep.examples:critical_points"
+        >>> x, y = "throw.speed=157 deg/s:158 deg/s:2", "arm.surface_height=-0.2:-0.15:2"
+        >>> found = ls.atlas("paper-designed", x, y, task=task)
+        >>> found.certify().shares()["proved"]
+        1.0
+        """
+        from limitsets.regions import certified, evenly  # lazily: an atlas without proofs does not load them
+
+        plan = self.dataset.attrs["plan"]
+        if "scene" not in plan or len(self.axes) != 2:
+            raise LimitsetsError(
+                "the atlas", f"of {len(self.axes)} axes", "an atlas of a scene with two axes", "give x and y"
+            )
+        axes = []
+        for name in reversed(self.axes):  # x first
+            values, unit = self.dataset[name].values, self.dataset[name].attrs["units"]
+            first, last = (f"{float(each)!r} {unit}" for each in (values[0], values[-1]))
+            axes.append(evenly(name, first, last, values.size))
+        x, y = axes
+        return certified(load(plan["scene"]), x, y, depth=depth, executor=executor, progress=progress)
 
 
 def _entries(lengths: Sequence[int]) -> Iterator[tuple[int, ...]]:
