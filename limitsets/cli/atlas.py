@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 __all__ = ["atlas"]
 
 HELP_X = "What varies: throw.speed=120:180:1000, or with units throw.speed='120 deg/s:180 deg/s:1000'."
-HELP_TASK = "What is asked: a function that can be imported, of a scene."
+HELP_TASK = "What is asked: a function of a scene; by default the topology of the attractors."
 HELP_OUT = "The store (Zarr), ./NAME-atlas.zarr by default; one that was begun is continued."
 HELP_CLUSTER = "Compute on a Dask cluster, by its scheduler's address: tcp://10.0.0.1:8786."
 HELP_CSV = "Write a table with a row for each point."
