@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 __all__ = ["atlas"]
 
 HELP_X = "What varies: throw.speed=120:180:1000, or with units throw.speed='120 deg/s:180 deg/s:1000'."
-HELP_TASK = "What is asked: a function that can be imported, of a scene."
+HELP_TASK = "What is asked: a function of a scene; by default the topology of the attractors."
 HELP_MARGIN = "Find the goal's margin at every point, by floats: throw.speed, or joint."
 HELP_CERTIFY = "Prove what holds in each cell of the window; writes NAME-regions.proof.zip."
 HELP_OUT = "The store (Zarr), ./NAME-atlas.zarr by default; one that was begun is continued."

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import math
-import threading
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import Executor, ThreadPoolExecutor
+from concurrent.futures import Executor
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,7 +17,7 @@ from limitsets.maps import coerce, kind_of
 from limitsets.scene import Scene, load
 from limitsets.sweep.axes import Axis, axis_of
 from limitsets.sweep.driving import Progress, drive
-from limitsets.sweep.executors import Given, Processes, on_cluster, present_cores
+from limitsets.sweep.executors import Given, Here, Processes, on_cluster, present_cores
 from limitsets.sweep.plan import Plan, chunk_shape, code_of
 from limitsets.sweep.store import CHECKSUM, Store, imported
 from limitsets.sweep.subjects import MapSubject, SceneSubject, Subject
@@ -316,9 +315,8 @@ def _pool(
     elif cluster is not None:
         with on_cluster(cluster) as pool:
             yield pool
-    elif chunks == 1 and threading.current_thread() is threading.main_thread():
-        with ThreadPoolExecutor(1) as here:  # starting a process takes longer than most single chunks
-            yield Given(here)
+    elif chunks == 1:  # to start a process takes longer than most single chunks
+        yield Given(Here(), 1)
     else:
         _require_importable(plan)
         yield Processes(min(workers or present_cores(), chunks))
