@@ -36,6 +36,8 @@ if TYPE_CHECKING:  # each from the file that holds it: most rooms have a file of
     from limitsets.sets.basins import basins
     from limitsets.sets.cycles import cycles
     from limitsets.sets.limit_set import limit_set
+    from limitsets.sweep.continuation import continuation
+    from limitsets.sweep.parameter_atlas import atlas
 
 __version__ = "0.1.0"
 
@@ -43,10 +45,12 @@ __version__ = "0.1.0"
 # the function.  A namespace is its own room.
 _ROOMS = {
     "analyse": "analysis",
+    "atlas": "sweep.parameter_atlas",
     "attractors": "sets.attractors",
     "audit": "auditing",
     "basins": "sets.basins",
     "certify": "proofs.certify",
+    "continuation": "sweep.continuation",
     "critical_points": "maps",
     "cycles": "sets.cycles",
     "design": "inverse",
@@ -73,10 +77,12 @@ _ROOMS = {
 
 __all__ = [
     "analyse",
+    "atlas",
     "attractors",
     "audit",
     "basins",
     "certify",
+    "continuation",
     "critical_points",
     "cycles",
     "design",

@@ -7,6 +7,7 @@ from typing import Annotated
 import typer
 
 from limitsets.cli.analyse import analyse
+from limitsets.cli.atlas import atlas
 from limitsets.cli.audit import audit
 from limitsets.cli.certify import certify
 from limitsets.cli.design import design
@@ -47,5 +48,5 @@ def limitsets(
     """
 
 
-for command in (scenes, analyse, throw, plot, certify, recheck, audit, margin, robustness, design):
+for command in (scenes, analyse, throw, plot, certify, recheck, audit, margin, robustness, design, atlas):
     app.command()(command)

@@ -9,7 +9,16 @@ edge P(n-1)-P0, side 2 the edge P(n-2)-P(n-1), and so on: a flip about the left 
 """
 
 from limitsets.geometry.mass import Mass, mass_of, plate_with_points
-from limitsets.geometry.polygon import convex_polygon, require_inside, side_ends, triangle, triangle_of
+from limitsets.geometry.polygon import (
+    convex_polygon,
+    heights_inside,
+    is_convex,
+    is_triangle,
+    require_inside,
+    side_ends,
+    triangle,
+    triangle_of,
+)
 from limitsets.geometry.sides import OnSide, RestingSides, require_rest, rest_of, resting_sides
 
 __all__ = [
@@ -17,6 +26,9 @@ __all__ = [
     "OnSide",
     "RestingSides",
     "convex_polygon",
+    "heights_inside",
+    "is_convex",
+    "is_triangle",
     "mass_of",
     "plate_with_points",
     "require_inside",

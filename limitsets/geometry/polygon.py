@@ -19,6 +19,9 @@ __all__ = [
     "Vector",
     "above_side",
     "convex_polygon",
+    "heights_inside",
+    "is_convex",
+    "is_triangle",
     "require_inside",
     "side_ends",
     "triangle",
@@ -46,8 +49,14 @@ def side_ends(count: int, side: int) -> tuple[int, int]:
     return left, (left + 1) % count
 
 
+def _by_size(lengths: Sequence[Scalar]) -> Sequence[Scalar]:
+    return sorted(lengths, key=float)
+
+
 def triangle_of(
-    lengths: Sequence[Scalar], sqrt: Callable[[Scalar], Scalar] = math.sqrt
+    lengths: Sequence[Scalar],
+    sqrt: Callable[[Scalar], Scalar] = math.sqrt,
+    by_size: Callable[[Sequence[Scalar]], Sequence[Scalar]] = _by_size,
 ) -> tuple[Vector, ...]:
     """Place a triangle's vertices P0 = (0, 0), P1 = (L0, 0) and P2 above, without any check.
 
@@ -57,6 +66,8 @@ def triangle_of(
         Side lengths in flip order: |P0 P1|, |P2 P0|, |P1 P2|.
     sqrt : callable
         Square root for these scalars.
+    by_size : callable
+        Sorts three of these scalars, the least first.
 
     Returns
     -------
@@ -74,7 +85,7 @@ def triangle_of(
     ((0.0, 0.0), (4.0, 0.0), (0.0, 3.0))
     """
     first, second, third = lengths
-    c, b, a = sorted(lengths, key=float)
+    c, b, a = by_size(lengths)
     area = sqrt((a + (b + c)) * (c - (a - b)) * (c + (a - b)) * (a + (b - c))) / 4
     zero = first - first
     x = (first + (second - third) * (second + third) / first) / 2
@@ -117,7 +128,7 @@ def triangle(lengths: npt.ArrayLike) -> npt.NDArray[np.float64]:
         if not 0 < value < math.inf:
             raise GeometryError(f"the length of side {side}", value, "a length above 0", "correct it")
     c, b, a = sorted(values)
-    if c - (a - b) <= _FLAT * a:
+    if not is_triangle(values):
         raise GeometryError(
             f"the length of side {values.index(a)}",
             a,
@@ -125,6 +136,18 @@ def triangle(lengths: npt.ArrayLike) -> npt.NDArray[np.float64]:
             f"it is too long by {(a - b) - c:.3g}; no triangle has these sides",
         )
     return np.array(triangle_of(values))
+
+
+def is_triangle(lengths: Sequence[Scalar]) -> Any:
+    """Whether three lengths above 0, or arrays of them, are the sides of a triangle.
+
+    Examples
+    --------
+    >>> is_triangle([3.0, 4.0, 5.0]), is_triangle([1.0, 2.0, 3.0])
+    (np.True_, np.False_)
+    """
+    c, b, a = np.sort(np.array(lengths, dtype=np.float64), axis=0)
+    return c - (a - b) > _FLAT * a
 
 
 def convex_polygon(vertices: npt.ArrayLike) -> npt.NDArray[np.float64]:
@@ -163,21 +186,43 @@ def convex_polygon(vertices: npt.ArrayLike) -> npt.NDArray[np.float64]:
     if not np.isfinite(points).all():
         raise GeometryError("a coordinate of a vertex", "not finite", "finite numbers", "correct it")
     _refuse_repeated(points)
-    edges = np.roll(points, -1, axis=0) - points
-    lengths = np.hypot(edges[:, 0], edges[:, 1])
-    unit = edges / lengths[:, None]
-    before = np.roll(unit, 1, axis=0)
-    sine = before[:, 0] * unit[:, 1] - before[:, 1] * unit[:, 0]
-    turns = np.arctan2(sine, (before * unit).sum(axis=1))
-    _refuse_shape(sine, turns)
+    sine, rounds = _turning(points)
+    _refuse_shape(sine, int(rounds))
     return points
 
 
+def is_convex(points: npt.NDArray[np.float64]) -> Any:
+    """Whether vertices, of shape (..., n, 2), are those of convex polygons, counterclockwise.
+
+    Examples
+    --------
+    >>> is_convex(np.array([[(0, 0), (2, 0), (2, 1)], [(0, 0), (2, 1), (2, 0)]], dtype=float))
+    array([ True, False])
+    """
+    sine, rounds = _turning(points)
+    return ~_repeated(points).any(axis=(-2, -1)) & (sine > _FLAT).all(axis=-1) & (rounds == 1)
+
+
+def _turning(points: npt.NDArray[np.float64]) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
+    """Return the sine of the turn at each vertex, and how often the boundary turns round."""
+    edges = np.roll(points, -1, axis=-2) - points
+    unit = edges / np.hypot(edges[..., 0], edges[..., 1])[..., None]
+    before = np.roll(unit, 1, axis=-2)
+    sine = before[..., 0] * unit[..., 1] - before[..., 1] * unit[..., 0]
+    turns = np.arctan2(sine, (before * unit).sum(axis=-1))
+    return sine, np.rint(turns.sum(axis=-1) / (2 * math.pi))
+
+
+def _repeated(points: npt.NDArray[np.float64]) -> npt.NDArray[np.bool_]:
+    """Whether vertices are one and the same, for each pair of them."""
+    relative = points - points[..., :1, :]
+    size = np.abs(relative).max(axis=(-2, -1))
+    gap = np.abs(relative[..., :, None, :] - relative[..., None, :, :]).max(axis=-1)
+    return np.triu(gap <= _FLAT * size[..., None, None], k=1)
+
+
 def _refuse_repeated(points: npt.NDArray[np.float64]) -> None:
-    relative = points - points[0]
-    size = float(np.abs(relative).max())
-    gap = np.abs(relative[:, None, :] - relative[None, :, :]).max(axis=2)
-    same = np.argwhere(np.triu(gap <= _FLAT * size, k=1))
+    same = np.argwhere(_repeated(points))
     if len(same):
         first, second = (int(index) for index in same[0])
         raise GeometryError(
@@ -188,9 +233,8 @@ def _refuse_repeated(points: npt.NDArray[np.float64]) -> None:
         )
 
 
-def _refuse_shape(sine: npt.NDArray[np.float64], turns: npt.NDArray[np.float64]) -> None:
+def _refuse_shape(sine: npt.NDArray[np.float64], rounds: int) -> None:
     """Refuse what is not convex and counterclockwise; the boundary of such a part turns left, once around."""
-    rounds = round(float(turns.sum()) / (2 * math.pi))
     flat = np.flatnonzero(np.abs(sine) <= _FLAT)
     left = int((sine > 0).sum())
     crossing = GeometryError(
@@ -238,6 +282,21 @@ def above_side(
     return (edge_x * x + edge_y * y) / length, (edge_x * y - edge_y * x) / length, length
 
 
+def heights_inside(
+    corners: Sequence[Vector], point: Vector, sqrt: Callable[[Scalar], Scalar] = math.sqrt
+) -> tuple[list[Scalar], Scalar]:
+    """Measure a point from every side, inwards, and say by how much rounding may put it outside.
+
+    Rounding moves a point that was given on the boundary by a few units in the last place of the size.
+    """
+    ends = [side_ends(len(corners), side) for side in range(len(corners))]
+    measured = [above_side(corners[left], corners[right], point, sqrt) for left, right in ends]
+    longest = measured[0][2]
+    for _, _, length in measured[1:]:
+        longest = np.maximum(longest, length)
+    return [height for _, height, _ in measured], 1e-12 * longest
+
+
 def require_inside(vertices: npt.NDArray[np.float64], point: Sequence[float], thing: str) -> None:
     """Refuse a point that lies outside the part; the boundary counts as inside.
 
@@ -247,15 +306,9 @@ def require_inside(vertices: npt.NDArray[np.float64], point: Sequence[float], th
         With the side beyond which the point lies, and how far.
     """
     corners: list[Vector] = [(x, y) for x, y in np.asarray(vertices).tolist()]
-    count = len(corners)
-    measured = [
-        above_side(corners[left], corners[right], (point[0], point[1]))
-        for left, right in (side_ends(count, side) for side in range(count))
-    ]
-    # rounding moves a point that was given on the boundary by a few units in the last place of the size
-    slack = 1e-12 * max(length for _, _, length in measured)
-    side = min(range(count), key=lambda index: float(measured[index][1]))
-    height = measured[side][1]
+    heights, slack = heights_inside(corners, (point[0], point[1]))
+    side = int(np.argmin(heights))
+    height = heights[side]
     if height < -slack:
         raise GeometryError(
             thing,

@@ -11,6 +11,7 @@ import of that file `plot.map` would be a module.
 
 from limitsets.plot.audit_strips import audit
 from limitsets.plot.basin import basins
+from limitsets.plot.bifurcations import bifurcation
 from limitsets.plot.counterexamples import counterexample
 from limitsets.plot.designs import design
 from limitsets.plot.flights import flight
@@ -24,6 +25,7 @@ from limitsets.plot.noise import noise_arrivals, noise_density, noise_levels
 __all__ = [
     "audit",
     "basins",
+    "bifurcation",
     "counterexample",
     "design",
     "flight",

@@ -28,7 +28,7 @@ CONFIDENCE = 0.95
 
 @dataclass(frozen=True)
 class Share:
-    """A share of the starts: the best number, of the decided ones within the bracket, and the bracket that holds it."""
+    """A share of the starts: the best number, of the decided ones within the bracket, and its bracket."""
 
     share: float
     lo: float

@@ -22,10 +22,16 @@ if TYPE_CHECKING:
     from limitsets.thrower import Throw
     from limitsets.thrower.motion import FullThrow
 
-__all__ = ["Scene"]
+__all__ = ["Scene", "resting_places"]
 
 # below this share of the way from a_i to the arm's end the number of throws needed to get away is unbounded
 _NEAREST = 1e-6
+
+
+def resting_places(a: Any, arm_length: Any) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
+    """Return the least and the largest x at which a part can rest on sides with these a."""
+    hi = np.zeros_like(a) + arm_length
+    return a + _NEAREST * (hi - a), hi
 
 
 @dataclass(frozen=True, eq=False)
@@ -150,8 +156,7 @@ class Scene:
         from limitsets.cells import Domain
 
         a = self.sides.a
-        hi = np.full_like(a, self.arm_length)
-        lo = a + _NEAREST * (hi - a)
+        lo, hi = resting_places(a, self.arm_length)
         return Domain(lo[:, None], hi[:, None], a)
 
     def value(self, name: str) -> float:

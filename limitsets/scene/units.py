@@ -22,6 +22,7 @@ __all__ = [
     "convert",
     "density_dimension",
     "exact_factor",
+    "fits",
     "parse",
     "share_of_pi",
     "spelled_plainly",
@@ -170,12 +171,22 @@ def parse(text: object, dimension: str, *, key: str | None = None, file: str | N
     if match is None:
         raise refuse(text, _why_no_quantity(text, example))
     number, unit = match[1], _SPELLINGS.get(match[2], match[2])
-    size = abs(float(number))
-    if not (_SMALLEST <= size <= _LARGEST or _is_zero(number)):
+    if not (fits(float(number)) or _is_zero(number)):
         raise refuse(text, f"give 0 or a size from {_SMALLEST:g} to {_LARGEST:g}; choose another unit")
     if unit not in UNITS[dimension]:
         raise refuse(text, _why_not_unit(number, unit, dimension))
     return Quantity(number, unit)
+
+
+def fits(value: Any) -> Any:
+    """Whether a number other than 0, or each of an array, has a size that a quantity may have.
+
+    Examples
+    --------
+    >>> fits(-2.5), fits(1e13)
+    (True, False)
+    """
+    return (abs(value) >= _SMALLEST) & (abs(value) <= _LARGEST)
 
 
 def _is_zero(number: str) -> bool:

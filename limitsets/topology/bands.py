@@ -10,16 +10,32 @@ from typing import Any
 
 from limitsets.jit import kernel
 from limitsets.maps.kernels import image_on, on_side
+from limitsets.topology.cells import COLLAPSES, LEAVES, cell_of
 from limitsets.topology.work import MOST_INTERVALS, Cells, Components, Pieces, Region, Unions
 
-__all__ = ["IMAGE", "NOTHING", "PUSHED", "SET", "begin_union", "push_through", "settle", "stays_around"]
+__all__ = [
+    "ANY",
+    "GAP",
+    "IMAGE",
+    "NOTHING",
+    "PUSHED",
+    "SET",
+    "begin_union",
+    "images_of",
+    "is_still",
+    "merge",
+    "push_through",
+    "put",
+    "settle",
+    "stays_around",
+]
 
 # Rows of `Unions`.
 SET, IMAGE, PUSHED = 0, 1, 2
 # Of the largest side: ends rest that move by less; a gap this small is rounding, and a part this short.
 REST, GAP, SLIVER = 1e-12, 1e-13, 1e-10
-# Half the length of the interval whose images are followed, likewise.
-SEED = 1e-4
+# Half the length of the interval whose images are followed, likewise, and gaps that are filled where there are many.
+SEED, FILLED, MANY = 1e-6, 1e-3, 16
 MOST_IMAGES, MOST_STEPS = 2000, 100_000
 # What a search may end with besides an answer.
 NOTHING, TOO_MANY, MOVES, OUT = 0, 1, 2, 3
@@ -29,7 +45,8 @@ IRREGULAR = -2
 
 
 @kernel
-def _put(u: Unions, row: int, side: int, lo: float, hi: float) -> None:
+def put(u: Unions, row: int, side: int, lo: float, hi: float) -> None:
+    """Append an interval to a row; past the last place it is only counted."""
     n = u.size[row]
     if n < MOST_INTERVALS:
         u.side[row, n], u.lo[row, n], u.hi[row, n] = side, lo, hi
@@ -37,7 +54,7 @@ def _put(u: Unions, row: int, side: int, lo: float, hi: float) -> None:
 
 
 @kernel(entry=True, counting=False)
-def _merge(u: Unions, row: int, gap: float) -> bool:
+def merge(u: Unions, row: int, gap: float) -> bool:
     """Sort a union and join what touches; False where it has too many intervals."""
     n = u.size[row]
     if n > MOST_INTERVALS:
@@ -61,6 +78,20 @@ def _merge(u: Unions, row: int, gap: float) -> bool:
 
 
 @kernel(entry=True, counting=False)
+def is_still(u: Unions, rest: float) -> bool:
+    """Make SET what IMAGE is; whether no end moved by more than `rest`."""
+    still: bool = u.size[IMAGE] == u.size[SET]
+    for i in range(u.size[IMAGE]):
+        lo, hi, side = u.lo[IMAGE, i], u.hi[IMAGE, i], u.side[IMAGE, i]
+        still = (
+            still and side == u.side[SET, i] and max(abs(lo - u.lo[SET, i]), abs(hi - u.hi[SET, i])) <= rest
+        )
+        u.side[SET, i], u.lo[SET, i], u.hi[SET, i] = side, lo, hi
+    u.size[SET] = u.size[IMAGE]
+    return still
+
+
+@kernel(entry=True, counting=False)
 def begin_union(sides: int, attractor: int, c: Cells, k: Components, u: Unions) -> bool:
     """Make SET the union of the cells of a closed component; whether the images of all are longer than they."""
     n, expands = 0, True
@@ -81,7 +112,7 @@ def begin_union(sides: int, attractor: int, c: Cells, k: Components, u: Unions) 
 
 
 @kernel(entry=True, counting=False)
-def _images(
+def images_of(
     params: Any, p: Pieces, u: Unions, row: int, into: int, leaving: int, only: int, sliver: float
 ) -> bool:
     """Append to a row the images of the parts of another, by piece; whether some part has no image.
@@ -109,7 +140,7 @@ def _images(
                 y_a, _, _ = image_on(here, a, side, branch)
             if b != p.hi[q]:
                 y_b, _, _ = image_on(here, b, side, branch)
-            _put(u, into, to, min(y_a, y_b), max(y_a, y_b))
+            put(u, into, to, min(y_a, y_b), max(y_a, y_b))
     return out
 
 
@@ -122,54 +153,56 @@ def settle(params: Any, r: Region, p: Pieces, u: Unions) -> int:
     rest, rested = REST * scale, 0
     for _ in range(MOST_IMAGES):
         u.size[IMAGE] = 0
-        if _images(params, p, u, SET, IMAGE, ANY, ANY, 0.0):
+        if images_of(params, p, u, SET, IMAGE, ANY, ANY, 0.0):
             return OUT
-        if not _merge(u, IMAGE, GAP * scale):
+        if not merge(u, IMAGE, GAP * scale):
             return TOO_MANY
-        moved = 0.0 if u.size[IMAGE] == u.size[SET] else scale
         for i in range(u.size[IMAGE]):
             side = u.side[IMAGE, i]
             if u.lo[IMAGE, i] < r.lo[side] - rest or u.hi[IMAGE, i] > r.hi[side] + rest:
                 return OUT
-            moved = scale if side != u.side[SET, i] else moved
-            moved = max(moved, abs(u.lo[IMAGE, i] - u.lo[SET, i]), abs(u.hi[IMAGE, i] - u.hi[SET, i]))
-            u.side[SET, i], u.lo[SET, i], u.hi[SET, i] = side, u.lo[IMAGE, i], u.hi[IMAGE, i]
-        u.size[SET] = u.size[IMAGE]
-        rested = rested + 1 if moved <= rest else 0
+        rested = rested + 1 if is_still(u, rest) else 0
         if rested == 2:
             return NOTHING
     return MOVES
 
 
+@kernel
+def _lost(r: Region, c: Cells, k: Components, side: int, x: float) -> bool:
+    """Whether a state is out of the domain, or in a cell all of whose starts leave it."""
+    if x < r.lo[side] or x > r.hi[side]:
+        return True
+    cell = cell_of(c, side, x)
+    return not k.held[cell] and k.ends[cell] in (LEAVES, COLLAPSES)
+
+
 @kernel(entry=True, counting=False)
-def stays_around(params: Any, x: float, side: int, scale: float, r: Region, p: Pieces, u: Unions) -> bool:
-    """Whether the images of a short interval about a state stay in the domain, as far as they are followed."""
+def stays_around(
+    params: Any, x: float, side: int, scale: float, r: Region, p: Pieces, c: Cells, k: Components, u: Unions
+) -> bool:
+    """Whether no part of the images of a short interval about a state is lost, as far as they are followed.
+
+    Gaps are filled where there are many: near a fixed point that repels slowly one interval follows another.
+    """
     half = SEED * scale
     u.size[SET] = 0
-    _put(u, SET, side, max(x - half, r.lo[side]), min(x + half, r.hi[side]))
+    put(u, SET, side, max(x - half, r.lo[side]), min(x + half, r.hi[side]))
     for _ in range(MOST_IMAGES):
         u.size[IMAGE] = 0
-        if _images(params, p, u, SET, IMAGE, ANY, ANY, 0.0):
+        if images_of(params, p, u, SET, IMAGE, ANY, ANY, 0.0):
             return False
         if u.size[IMAGE] > MOST_INTERVALS:
             return True
         for i in range(u.size[IMAGE]):
-            if u.lo[IMAGE, i] < r.lo[u.side[IMAGE, i]] or u.hi[IMAGE, i] > r.hi[u.side[IMAGE, i]]:
+            if _lost(r, c, k, u.side[IMAGE, i], u.lo[IMAGE, i]) or _lost(
+                r, c, k, u.side[IMAGE, i], u.hi[IMAGE, i]
+            ):
                 return False
         for i in range(u.size[SET]):
-            _put(u, IMAGE, u.side[SET, i], u.lo[SET, i], u.hi[SET, i])
-        if not _merge(u, IMAGE, GAP * scale):
+            put(u, IMAGE, u.side[SET, i], u.lo[SET, i], u.hi[SET, i])
+        if not merge(u, IMAGE, (FILLED if u.size[IMAGE] > MANY else GAP) * scale):
             return True
-        grown = u.size[IMAGE] != u.size[SET]
-        for i in range(u.size[IMAGE]):
-            grown |= (
-                u.lo[IMAGE, i] < u.lo[SET, i]
-                or u.hi[IMAGE, i] > u.hi[SET, i]
-                or u.side[IMAGE, i] != u.side[SET, i]
-            )
-            u.side[SET, i], u.lo[SET, i], u.hi[SET, i] = u.side[IMAGE, i], u.lo[IMAGE, i], u.hi[IMAGE, i]
-        u.size[SET] = u.size[IMAGE]
-        if not grown:
+        if is_still(u, 0.0):
             break
     return True
 
@@ -186,16 +219,16 @@ def push_through(
     regular, least = True, -1
     for side in range(sides):
         u.size[PUSHED] = 0
-        _images(params, p, u, SET, PUSHED, 1, side, SLIVER * scale)
+        images_of(params, p, u, SET, PUSHED, 1, side, SLIVER * scale)
         u.seen[side] = -1
         steps = 0
         while u.size[PUSHED] > 0:
-            if not _merge(u, PUSHED, GAP * scale):
+            if not merge(u, PUSHED, GAP * scale):
                 return TOO_MANY
             if steps == MOST_STEPS:
                 return MOVES
             u.size[IMAGE] = 0
-            _images(params, p, u, PUSHED, IMAGE, 1, ANY, SLIVER * scale)
+            images_of(params, p, u, PUSHED, IMAGE, 1, ANY, SLIVER * scale)
             for i in range(min(u.size[IMAGE], MOST_INTERVALS)):
                 regular &= u.seen[side] in (-1, u.side[IMAGE, i])
                 u.seen[side] = u.side[IMAGE, i]
@@ -203,7 +236,7 @@ def push_through(
                 jogs_min[side] = steps if jogs_min[side] < 0 else jogs_min[side]
                 jogs_max[side] = steps
             u.size[IMAGE] = 0
-            _images(params, p, u, PUSHED, IMAGE, 0, ANY, SLIVER * scale)
+            images_of(params, p, u, PUSHED, IMAGE, 0, ANY, SLIVER * scale)
             if u.size[IMAGE] > MOST_INTERVALS:
                 return TOO_MANY
             for i in range(u.size[IMAGE]):

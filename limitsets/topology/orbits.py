@@ -12,10 +12,10 @@ from limitsets.topology.bands import SET
 from limitsets.topology.cells import cell_of
 from limitsets.topology.work import Cells, Components, Starts, Unions
 
-__all__ = ["CLOSES", "INNER", "averages", "cycle_length", "stays_somewhere", "visits_all"]
+__all__ = ["CLOSES", "INNER", "averages", "cycle_length", "remaining", "visits_all"]
 
-# Throws after which an orbit is said to stay, and those between two looks at where it is.
-MOST_THROWS, LOOKED = 1000, 8
+# Throws of the orbits from cells that recur though they are left, and those between two looks at where they are.
+THROWS, LOOKED = 400, 4
 # Throws until every band has to be visited; throws before a cycle is sought, and the longest one that is found.
 MOST_VISITS, BEFORE, MOST_PERIOD = 20_000, 1000, 4096
 # Throws before means are taken.
@@ -43,37 +43,33 @@ def _starts(sides: int, total: float, c: Cells, k: Components, s: Starts) -> Non
 
 
 @kernel(entry=True, counting=False)
-def stays_somewhere(params: Any, sides: int, c: Cells, k: Components, s: Starts) -> bool:
-    """Whether an orbit from the cells in `held` stays in the domain and comes to no closed component.
+def remaining(params: Any, sides: int, c: Cells, k: Components, s: Starts) -> int:
+    """Count the orbits from the cells in `held` that are still among these cells after some throws; they lead `s`.
 
-    The first that does is in `s` then.  All orbits make a throw before one makes the next, so that the processor works
-    on several at a time.
+    All orbits make a throw before one makes the next, so that the processor works on several at a time.
     """
     total, left = 0.0, s.x.size
     for cell in range(c.begin[sides]):
         if k.held[cell]:
             total += c.hi[cell] - c.lo[cell]
     if total == 0.0:
-        return False
+        return 0
     _starts(sides, total, c, k, s)
-    for _ in range(MOST_THROWS // LOOKED):
-        for _ in range(LOOKED):
-            for i in range(left):
-                s.x[i], s.side[i], s.code[i] = step(params, s.x[i], s.side[i])
-            kept = 0
-            for i in range(left):
-                s.x[kept], s.side[kept] = s.x[i], s.side[i]
-                kept += s.code[i] >= 0
-            left = kept
-        kept = 0
+    for throw in range(THROWS):
         for i in range(left):
-            here = cell_of(c, s.side[i], s.x[i])
+            s.x[i], s.side[i], s.code[i] = step(params, s.x[i], s.side[i])
+        looked, kept = throw % LOOKED == LOOKED - 1, 0
+        for i in range(left):
             s.x[kept], s.side[kept] = s.x[i], s.side[i]
-            kept += k.held[here] and s.x[i] >= c.lo[here]
+            stays = s.code[i] >= 0
+            if looked and stays:
+                here = cell_of(c, s.side[i], s.x[i])
+                stays = k.held[here] and s.x[i] >= c.lo[here]
+            kept += stays
         left = kept
         if left == 0:
-            return False
-    return True
+            break
+    return left
 
 
 @kernel(entry=True, counting=False)

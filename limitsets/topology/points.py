@@ -17,7 +17,7 @@ from limitsets.maps.kernels import on_side
 from limitsets.maps.stacks import point_of, size_of
 from limitsets.topology.bands import NOTHING, SET, begin_union, push_through, settle, stays_around
 from limitsets.topology.cells import fill_cells
-from limitsets.topology.orbits import CLOSES, INNER, averages, cycle_length, stays_somewhere, visits_all
+from limitsets.topology.orbits import CLOSES, INNER, averages, cycle_length, remaining, visits_all
 from limitsets.topology.pieces import find_pieces
 from limitsets.topology.records import (
     BANDS_JOIN,
@@ -33,7 +33,7 @@ from limitsets.topology.records import (
 from limitsets.topology.recurrence import find_components, shares
 from limitsets.topology.work import MOST_ATTRACTORS, Region, Work, work_for
 
-__all__ = ["topologies"]
+__all__ = ["region_of", "topologies"]
 
 # Cells and samples a side: from coarse to fine.
 LEVELS = ((300, 48), (1200, 192), (4800, 768), (16_384, 1536))
@@ -92,9 +92,10 @@ def _point(params: Any, decided: bool, r: Region, w: Work, t: Topologies, i: int
     for a in range(count):
         found = _attractor(params, a, r, scale, w, t, i)
         doubt = found if doubt == DECIDED else doubt
-    if doubt == DECIDED and stays_somewhere(params, sides, w.cells, w.components, w.starts):
+    if doubt == DECIDED and remaining(params, sides, w.cells, w.components, w.starts) > 0:
         x, side = w.starts.x[0], w.starts.side[0]
-        doubt = STAYING if stays_around(params, x, side, scale, r, w.pieces, w.unions) else DECIDED
+        if stays_around(params, x, side, scale, r, w.pieces, w.cells, w.components, w.unions):
+            doubt = STAYING
     sure = shares(r, count, w.pieces.to, w.cells, w.components, w.split)
     t.leaves[i], t.collapses[i] = w.split[0], w.split[1]
     for a in range(MOST_ATTRACTORS):
@@ -172,7 +173,9 @@ def topologies(
             "a map of one dimension with image_on",
             "register image_on: one step on a forced branch; for more dimensions ask transitions and attractors",
         )
-    region = _region(lo, hi, anchor, n)
+    region = region_of(lo, hi, anchor)
+    if len(region.lo) != n:
+        raise AnswerError("the rows of the domains", len(region.lo), str(n), "give a row for each point")
     decided = kind.has_margin or len(kind.branches) == 1
     found = empty(n, region.lo.shape[1])
     points = np.arange(n)
@@ -187,13 +190,14 @@ def topologies(
     return found
 
 
-def _region(lo: Any, hi: Any, anchor: Any, n: int) -> Region:
+def region_of(lo: Any, hi: Any, anchor: Any = None) -> Region:
+    """Read the domains of n points, arrays of shape (n, S)."""
     ends = [lo, hi, lo if anchor is None else anchor]
     region = Region(*(np.ascontiguousarray(values, dtype=np.float64) for values in ends))
     shapes = [values.shape for values in region]
-    if len(set(shapes)) != 1 or region.lo.ndim != 2 or len(region.lo) != n:
+    if len(set(shapes)) != 1 or region.lo.ndim != 2:
         raise AnswerError(
-            "the shapes of the domains", shapes, f"({n}, sides) each", "give a row for each point"
+            "the shapes of the domains", shapes, "(points, sides) each", "give a row for each point"
         )
     return region
 

@@ -158,6 +158,17 @@ def test_exits_share_the_starts_of_an_open_map():
             assert found.exits[name].share == pytest.approx(1.0 / 3.0, abs=0.02)
 
 
+def test_orbits_leave_the_domain_by_the_exit_of_its_cells():
+    """On [0, 0.7] an image beyond 0.7 leaves by the upper exit of the grid, the second."""
+    graph, attractors = setting(Gaps(2.0, 0.0), [(0.0, 0.7)], 20_011)
+    cells = ls.resilience.basin_stability(graph, attractors).exits
+    orbits = ls.resilience.basin_stability(graph, attractors, starts=4000).exits
+    assert cells["first"].hi < cells["second"].lo
+    for name in ("first", "second"):
+        assert cells[name].lo <= orbits[name].hi
+        assert orbits[name].lo <= cells[name].hi
+
+
 def test_an_outer_basin_leaves_out_what_lies_between_others():
     """Next to +1 only the middle and the upper basin meet: it is no outer cell of the lower one."""
     graph, attractors = setting(ThreeState(), [(-3.0, 3.0)], 600, "boxes")

@@ -1,0 +1,90 @@
+"""`limitsets atlas`: one or two quantities of a scene, varied, and what is asked at every point."""
+
+from __future__ import annotations
+
+from contextlib import nullcontext
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from limitsets.cli.output import Json, Scene, answer, opened, option, progress, saved, table
+
+if TYPE_CHECKING:
+    from limitsets.sweep import Atlas
+
+__all__ = ["atlas"]
+
+HELP_X = "What varies: throw.speed=120:180:1000, or with units throw.speed='120 deg/s:180 deg/s:1000'."
+HELP_TASK = "What is asked: a function that can be imported, of a scene."
+HELP_MARGIN = "Find the goal's margin at every point, by floats: throw.speed, or joint."
+HELP_OUT = "The store (Zarr), ./NAME-atlas.zarr by default; one that was begun is continued."
+HELP_CLUSTER = "Compute on a Dask cluster, by its scheduler's address: tcp://10.0.0.1:8786."
+HELP_CSV = "Write a table with a row for each point."
+
+
+def atlas(
+    scene: Scene,
+    x: Annotated[str, option("--x", "Q=LO:HI:N", HELP_X)],
+    y: Annotated[str | None, option("--y", "Q=LO:HI:N", "A second one; without it a line of points.")] = None,
+    variables: Annotated[
+        list[str] | None, option("--variables", "V,V", "Which answers; default: what the task gives.")
+    ] = None,
+    task: Annotated[str | None, option("--task", "MODULE:FUNCTION", HELP_TASK)] = None,
+    margin: Annotated[str | None, option("--margin", "Q", HELP_MARGIN)] = None,
+    reading: Annotated[
+        str, option("--reading", "R", "Of --margin: fixed (but unknown) or per-throw.")
+    ] = "fixed",
+    out: Annotated[Path | None, option("--out -o", "STORE", HELP_OUT)] = None,
+    workers: Annotated[int | None, option("--workers", "N", "Processes; default: one a core.", min=1)] = None,
+    cluster: Annotated[str | None, option("--cluster", "URL", HELP_CLUSTER)] = None,
+    csv: Annotated[Path | None, option("--csv", "FILE", HELP_CSV)] = None,
+    json: Json = False,
+) -> None:
+    """Vary one or two quantities of a scene, and keep what a task says at every point.
+
+    A run that was interrupted goes on when the same command is given again.
+    """
+    with progress() as tell, saved(csv) if csv is not None else nullcontext() as draft:
+        from limitsets.sweep import atlas as run
+
+        chosen, _ = opened(scene, None)
+        store = out or Path(f"{chosen.name}-atlas.zarr")
+        wanted = [name.strip() for words in variables or [] for name in words.split(",")]
+        found = run(
+            chosen,
+            x,
+            y,
+            task=task,
+            variables=wanted or None,
+            options=None if margin is None else {"margin": margin, "reading": reading},
+            store=store,
+            workers=workers,
+            cluster=cluster,
+            progress=tell,
+        )
+        if draft is not None:
+            found.to_dataframe().to_csv(draft, index=False)
+    answer(found if json else None, json, lambda: _text(found, csv))
+
+
+def _text(found: Atlas, csv: Path | None) -> None:
+    """Print what the answers range over, and where they are."""
+    import numpy as np
+
+    rows = []
+    for name, variable in found.dataset.data_vars.items():
+        values, unit = np.asarray(variable.values), variable.attrs.get("units", "")
+        if "flag_meanings" in variable.attrs:
+            codes = zip(variable.attrs["flag_meanings"].split(), variable.attrs["flag_values"], strict=True)
+            counts = [(word, int((values == code).sum())) for word, code in codes]
+            rows.append([name, ", ".join(f"{count} {word}" for word, count in counts if count), ""])
+        else:
+            good = values[np.isfinite(values)]
+            rows.append([name, f"{good.min():.9g} to {good.max():.9g}" if good.size else "none", unit])
+    table(["variable", "values", "unit"], rows)
+    points = found.dataset["status"].size
+    again = f", {found.kept} of its {found.kept + found.new} chunks by earlier runs" if found.kept else ""
+    typer.echo(f"{points} points{again}: {found.store}")
+    if csv is not None:
+        typer.echo(f"table: {csv}")

@@ -1,0 +1,15 @@
+"""Many points of a parameter space: a plan, a task, workers, and a store that grows in whole chunks.
+
+A plan says what is varied and what is asked (`plan`, `axes`, `subjects`).  A task answers for a chunk of the points
+(`tasks`, `work`).  Any executor of `concurrent.futures` runs the chunks (`executors`, `driving`), and one process, the
+driver, writes them to a Zarr store that can be continued (`store`).  `parameter_atlas` is the call that users make.
+`continuation` follows attractors along a curve instead.
+
+xarray, zarr, pandas and distributed are imported where they are used: the extras `atlas` and `cluster`.
+"""
+
+from limitsets.sweep.axes import Axis
+from limitsets.sweep.parameter_atlas import Atlas, atlas
+from limitsets.sweep.tasks import Block, Variable, block_task
+
+__all__ = ["Atlas", "Axis", "Block", "Variable", "atlas", "block_task"]

@@ -1,0 +1,286 @@
+"""The atlas: what a task says at every point of one or two axes, kept in a store that can be continued."""
+
+from __future__ import annotations
+
+import math
+import threading
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import Executor, ThreadPoolExecutor
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from limitsets.cells import as_domain
+from limitsets.errors import LimitsetsError
+from limitsets.files import as_plain
+from limitsets.maps import coerce, kind_of
+from limitsets.scene import Scene, load
+from limitsets.sweep.axes import Axis, axis_of
+from limitsets.sweep.driving import Progress, drive
+from limitsets.sweep.executors import Given, Processes, on_cluster, present_cores
+from limitsets.sweep.plan import Plan, chunk_shape, code_of
+from limitsets.sweep.store import CHECKSUM, Store, imported
+from limitsets.sweep.subjects import MapSubject, SceneSubject, Subject
+from limitsets.sweep.tasks import named, resolved
+
+if TYPE_CHECKING:
+    import pandas as pd
+    import xarray as xr
+
+__all__ = ["Atlas", "atlas"]
+
+TOPOLOGY = "limitsets.sweep.of_topology:topology"
+
+
+@dataclass(frozen=True, eq=False)
+class Atlas:
+    """What a task said at every point of a plan.
+
+    Attributes
+    ----------
+    dataset : xarray.Dataset
+        One variable for each answer, on the axes of the plan; codes have their names in attributes.  That of a store is
+        read when it is used.
+    store : Path or None
+        Where it is kept.
+    new, kept : int
+        How many chunks were computed now, and by earlier calls.
+    """
+
+    dataset: xr.Dataset
+    store: Path | None
+    new: int
+    kept: int
+
+    @property
+    def axes(self) -> tuple[str, ...]:
+        """The names of the quantities, the slowest first."""
+        return tuple(axis["name"] for axis in self.dataset.attrs["plan"]["axes"])
+
+    def to_dataframe(self) -> pd.DataFrame:
+        """Give a table with a row for each point, a column for each variable, and one for each entry of an array."""
+        pd = imported("pandas")
+        data, columns = self.dataset, {}
+        for name, variable in data.data_vars.items():
+            more = [dim for dim in variable.dims if dim not in self.axes]
+            for places in _entries([data.sizes[dim] for dim in more]):
+                label = f"{name}[{','.join(map(str, places))}]" if places else str(name)
+                columns[label] = variable.isel(dict(zip(more, places, strict=True))).values.ravel()
+        names = [str(axis) for axis in self.axes]
+        index = pd.MultiIndex.from_product([data[name].values for name in names], names=names)
+        return pd.DataFrame(columns, index=index).reset_index()
+
+    def to_json(self) -> dict[str, Any]:
+        """Give the document of docs/json.md: the scene, the axes, and every variable as nested lists."""
+        data, plan = self.dataset, self.dataset.attrs["plan"]
+        axes = [
+            {"name": name, "unit": data[name].attrs.get("units", ""), "values": as_plain(data[name].values)}
+            for name in self.axes
+        ]
+        variables = {str(name): _table(variable) for name, variable in data.data_vars.items()}
+        subject = {key: plan[key] for key in ("scene", "map", "parameters", "domain") if key in plan}
+        found = {
+            **subject,
+            "unit": data.attrs.get("unit_of_length", ""),
+            "axes": axes,
+            "variables": variables,
+        }
+        return found | {
+            "task": plan["task"],
+            "plan_hash": data.attrs["plan_hash"],
+            "versions": plan["versions"],
+        }
+
+
+def _entries(lengths: Sequence[int]) -> Iterator[tuple[int, ...]]:
+    if not lengths:
+        yield ()
+        return
+    for k in range(lengths[0]):
+        for rest in _entries(lengths[1:]):
+            yield (k, *rest)
+
+
+def _table(variable: xr.DataArray) -> dict[str, Any]:
+    attributes = variable.attrs
+    codes = dict(
+        zip(
+            attributes.get("flag_meanings", "").split(),
+            as_plain(attributes.get("flag_values", [])),
+            strict=True,
+        )
+    )
+    found = {
+        "dims": list(variable.dims),
+        "unit": attributes.get("units", ""),
+        "values": as_plain(variable.values),
+    }
+    return found | ({"codes": codes} if codes else {})
+
+
+def atlas(
+    subject: Any,
+    x: str | Axis,
+    y: str | Axis | None = None,
+    *,
+    task: str | Callable[..., Any] | None = None,
+    variables: Sequence[str] | None = None,
+    options: Mapping[str, Any] | None = None,
+    domain: Any = None,
+    chunk: Sequence[int] | None = None,
+    seed: int = 0,
+    store: str | Path | None = None,
+    executor: Executor | None = None,
+    cluster: str | None = None,
+    workers: int | None = None,
+    progress: Progress | None = None,
+) -> Atlas:
+    """Map one or two parameters of a scene, or of any map, to what a task says at each point.
+
+    Parameters
+    ----------
+    subject : Scene, str, or a map's parameters
+        What is varied: a scene or the name of one, or the parameters of a registered map.
+    x, y : str or Axis
+        ``"throw.speed=120:180:1000"``: a quantity of the scene or a field of the parameters, its ends, and how many
+        values.  The ends are in the unit in which the scene gives the quantity (speeds else in deg/s, lengths else in
+        that of the arm), or have units: ``"throw.speed=120 deg/s:180 deg/s:1000"``.  Without y: one parameter.
+    task : str or callable
+        What is asked of each point: an importable function, or ``"module:function"``.  It takes a scene (or a map's
+        parameters), and `seed` if it has such an argument, and returns numbers, or arrays of them, by name; or it is
+        registered for blocks of points (`limitsets.sweep.block_task`).  By default: the topology of the attractors.
+    variables : sequence of str, optional
+        Those that are wanted.
+    options : mapping, optional
+        Keyword arguments of the task.
+    domain : Domain or array_like, optional
+        Of a map, for tasks that need one; see `limitsets.grid`.
+    chunk : sequence of int, optional
+        Points of a chunk along y and x (or x); chosen by the number of points otherwise.
+    seed : int
+        Of all random numbers; each point has its own by its number.
+    store : str or Path, optional
+        A folder for the results.  If it holds a part of them already, only the rest is computed.
+    executor : concurrent.futures.Executor, optional
+        It computes the chunks; processes on this machine otherwise.
+    cluster : str, optional
+        Instead: the address of a Dask scheduler.
+    workers : int, optional
+        How many processes, as many as there are cores otherwise.
+    progress : callable, optional
+        Told ``(step, done, of)``.
+
+    Returns
+    -------
+    Atlas
+
+    Raises
+    ------
+    LimitsetsError
+        For an unknown quantity or variable, a task that cannot be imported or fails, a store of another plan.
+
+    Notes
+    -----
+    Results do not depend on the executor, the number of workers, or the order in which chunks are done.
+
+    Examples
+    --------
+    >>> import limitsets as ls
+    >>> task = "limitsets.sweep.examples:critical_points"
+    >>> found = ls.atlas("paper-designed", "throw.kappa=25.3778518:26.3778518:2", task=task)
+    >>> found.dataset.critical_point.values[0].round(5).tolist()  # the speed that the paper designed
+    [10.0, 10.0, 20.0]
+    """
+    plan = plan_of(
+        subject, x, y, task=task, variables=variables, options=options, domain=domain, chunk=chunk, seed=seed
+    )
+    path = None if store is None else Path(store)
+    imported("xarray")
+    held = Store(plan, path)
+    kept, of = len(held.done), math.prod(plan.chunks)
+    if kept < of:
+        with _pool(plan, of - kept, executor, cluster, workers) as pool:
+            drive(plan, held, pool, progress)
+    return Atlas(opened(held.group.store), path, of - kept, kept)
+
+
+def opened(store: Any) -> xr.Dataset:
+    """Open what a store holds, without the marks of its chunks."""
+    found = imported("xarray").open_zarr(store, chunks=None, consolidated=False, decode_timedelta=False)
+    return found.drop_vars(CHECKSUM)  # type: ignore[no-any-return]
+
+
+def plan_of(
+    subject: Any,
+    x: str | Axis,
+    y: str | Axis | None = None,
+    *,
+    task: str | Callable[..., Any] | None = None,
+    variables: Sequence[str] | None = None,
+    options: Mapping[str, Any] | None = None,
+    domain: Any = None,
+    chunk: Sequence[int] | None = None,
+    seed: int = 0,
+) -> Plan:
+    """Make the plan of an atlas, and refuse one that cannot be carried out (`atlas`)."""
+    chosen = _subject(subject, domain)
+    axes = tuple(axis_of(each, chosen.unit_of) for each in (y, x) if each is not None)
+    name = named(TOPOLOGY if task is None else task)
+    resolved(name)
+    shape = tuple(axis.values.size for axis in axes)
+    parts = chunk_shape(shape, name) if chunk is None else tuple(int(n) for n in chunk)
+    if len(parts) != len(shape) or min(parts) < 1:
+        raise LimitsetsError("the chunk", parts, f"{len(shape)} numbers from 1", "give one for each axis")
+    parts = tuple(min(step, n) for step, n in zip(parts, shape, strict=True))
+    wanted = None if variables is None else tuple(variables)
+    plan = Plan(chosen, axes, name, dict(options or {}), wanted, parts, code_of(chosen, name), seed)
+    plan.require()
+    return plan
+
+
+def _subject(subject: Any, domain: Any) -> Subject:
+    if isinstance(subject, str | Path):
+        subject = load(subject)
+    if isinstance(subject, Scene):
+        if domain is not None:
+            raise LimitsetsError(
+                "the domain", "given", "none beside a scene", "a scene has one: leave it out"
+            )
+        return SceneSubject(subject)
+    kind_of(subject)
+    return MapSubject(coerce(subject), None if domain is None else as_domain(domain))
+
+
+@contextmanager
+def _pool(
+    plan: Plan, chunks: int, executor: Executor | None, cluster: str | None, workers: int | None
+) -> Iterator[Given]:
+    """Choose where the chunks are computed."""
+    if (executor is not None) + (cluster is not None) + (workers is not None) > 1:
+        raise LimitsetsError("the workers", "given twice", "executor, cluster or workers", "give one of them")
+    if workers is not None and workers < 1:
+        raise LimitsetsError("the number of workers", workers, "1 or more", "correct it")
+    if executor is not None:
+        yield Given(executor)
+    elif cluster is not None:
+        with on_cluster(cluster) as pool:
+            yield pool
+    elif chunks == 1 and threading.current_thread() is threading.main_thread():
+        with ThreadPoolExecutor(1) as here:  # starting a process takes longer than most single chunks
+            yield Given(here)
+    else:
+        _require_importable(plan)
+        yield Processes(min(workers or present_cores(), chunks))
+
+
+def _require_importable(plan: Plan) -> None:
+    """Refuse what stands in the script itself: processes cannot import it by its name."""
+    modules = {plan.task.partition(":")[0]}
+    if isinstance(plan.subject, MapSubject):
+        modules.add(type(plan.subject.params).__module__)
+    if "__main__" in modules:
+        raise LimitsetsError(
+            "the task or the map", "one of the script itself", "one of a file that other processes import",
+            "move it to a file, or pass executor=concurrent.futures.ThreadPoolExecutor(1)",
+        )  # fmt: skip

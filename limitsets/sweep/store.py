@@ -1,0 +1,240 @@
+"""The store of a plan: a Zarr group (format 3) that xarray opens, written in whole chunks by one process.
+
+A chunk counts as done when the checksum of its data stands in the array `chunk_checksum`.  The checksum is written
+after the data, in a file of its own that is replaced whole, and it is compared with the data when a store is continued:
+a chunk that was cut off, by whatever (a killed driver, a full disk, power), is computed once more.
+"""
+
+from __future__ import annotations
+
+import math
+import zlib
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from limitsets.errors import LimitsetsError
+from limitsets.files import replaced
+from limitsets.sweep.plan import Plan, differences
+from limitsets.sweep.subjects import SceneSubject
+
+if TYPE_CHECKING:
+    import zarr
+
+    from limitsets.sweep.tasks import Variable
+    from limitsets.sweep.work import Answer
+
+__all__ = ["CHECKSUM", "Store", "imported"]
+
+CHECKSUM = "chunk_checksum"
+_REMEDY = "name another store, or remove this one"
+_MOST_SHOWN = 3
+
+
+def imported(module: str) -> Any:
+    """Import a library of the extra `atlas`, or say in one line how to get it."""
+    from importlib import import_module
+
+    try:
+        return import_module(module)
+    except ImportError:
+        extra = "cluster" if module == "distributed" else "atlas"
+        raise LimitsetsError(
+            f"the library {module}", "missing", f"the extra {extra}", f"pip install 'limitsets[{extra}]'"
+        ) from None
+
+
+class Store:
+    """The results of a plan.
+
+    Parameters
+    ----------
+    plan : Plan
+        Whose results.
+    path : Path or None
+        A folder, made if there is none; None keeps the results in memory.
+
+    Raises
+    ------
+    LimitsetsError
+        The folder holds something else, or the results of another plan: with what differs.
+    """
+
+    def __init__(self, plan: Plan, path: Path | None) -> None:
+        self.plan, self.path = plan, path
+        library = imported("zarr")
+        if path is None:
+            self.group: zarr.Group = library.create_group(library.storage.MemoryStore(), zarr_format=3)
+            self._begin()
+        elif path.is_dir() and any(path.iterdir()):
+            self.group = self._opened(library)
+        else:
+            with self._written(), replaced(path.parent) as draft:
+                if path.is_dir():
+                    path.rmdir()  # it is empty
+                self.group = library.create_group(str(draft / path.name), zarr_format=3)
+                self._begin()
+            self.group = self._opened(library)
+        self.arrays: dict[str, Any] = dict(self.group.arrays())
+        for axis in plan.axes:
+            del self.arrays[axis.name]
+        self.marks = self.arrays.pop(CHECKSUM)
+        self.done = {number for number in range(math.prod(plan.chunks)) if self._is_done(number)}
+
+    def _begin(self) -> None:
+        """Write what a store holds before its first chunk."""
+        plan = self.plan
+        self.group.attrs.update(_attributes(plan))
+        for axis in plan.axes:
+            self._add(axis.name, axis.values, (axis.name,), {"units": axis.unit} if axis.unit else {})
+        dims = tuple(f"chunk of {axis.name}" for axis in plan.axes)
+        about: dict[str, Any] = {"long_name": "CRC-32 of the chunk's data; 0 where the chunk is not done"}
+        self.group.create_array(
+            CHECKSUM, shape=plan.chunks, chunks=tuple(1 for _ in dims), dtype="uint32", fill_value=0,
+            dimension_names=dims, attributes=about,
+        )  # fmt: skip
+
+    def _add(
+        self, name: str, values: npt.NDArray[Any], dims: tuple[str, ...], attributes: dict[str, Any]
+    ) -> None:
+        array = self.group.create_array(
+            name, shape=values.shape, chunks=values.shape, dtype=values.dtype, dimension_names=dims,
+            attributes=attributes,
+        )  # fmt: skip
+        array[...] = values
+
+    def _opened(self, library: Any) -> zarr.Group:
+        """Open a store of this very plan."""
+        try:
+            group = library.open_group(str(self.path), mode="r+", zarr_format=3, use_consolidated=False)
+            theirs = dict(group.attrs)["plan"]
+            dict(group.arrays())[CHECKSUM]
+        except (OSError, ValueError, KeyError, TypeError) as error:
+            raise LimitsetsError(
+                "the store", str(self.path), "a new folder, or a store that limitsets atlas began",
+                f"it is none, or damaged ({type(error).__name__}): {_REMEDY}",
+            ) from None  # fmt: skip
+        wrong = list(differences(self.plan.record, theirs))
+        wrong = [each for each in wrong if not each[0].endswith(".sha256")] or wrong
+        if wrong:
+            words = [f"{name} is {_short(there)} there, {_short(here)} here" for name, here, there in wrong]
+            shown = "; ".join(words[:_MOST_SHOWN])
+            more = f" and {len(wrong) - _MOST_SHOWN} more" if len(wrong) > _MOST_SHOWN else ""
+            raise LimitsetsError(
+                f"the store {self.path}",
+                "that of another plan",
+                "one of the same plan",
+                f"{shown}{more}; {_REMEDY}",
+            )
+        assert self.path is not None
+        for left in self.path.rglob("*.partial"):  # by a driver that was killed while it wrote
+            left.unlink(missing_ok=True)
+        return group  # type: ignore[no-any-return]
+
+    def _is_done(self, number: int) -> bool:
+        """Whether the data of a chunk are those that were written."""
+        region, found = self.plan.region(number), {}
+        try:
+            mark = int(self.marks[self.plan.place(number)])
+            if mark == 0:
+                return False
+            for name, array in self.arrays.items():
+                values = np.asarray(array[region])
+                if not _is(values, array.fill_value):
+                    found[name] = values
+        except (OSError, ValueError, RuntimeError):  # what codecs make of bytes that were cut off
+            return False
+        return checksum(found) == mark
+
+    def write(self, answer: Answer) -> None:
+        """Write the answers of a chunk, and then that it is done."""
+        region, found = self.plan.region(answer.number), {}
+        with self._written():
+            for name, (variable, values) in answer.found.items():
+                self._array(name, variable)[region] = values
+                if not variable.is_empty(values):
+                    found[name] = values
+            self.marks[self.plan.place(answer.number)] = checksum(found)
+        self.done.add(answer.number)
+
+    def _array(self, name: str, variable: Variable) -> Any:
+        """Return the array of a variable, made when its first chunk comes."""
+        shape = (*self.plan.shape, *(n for _, n in variable.dims))
+        if name not in self.arrays:
+            self.arrays[name] = self.group.create_array(
+                name,
+                shape=shape,
+                chunks=(*self.plan.chunk, *(max(n, 1) for _, n in variable.dims)),
+                dtype=variable.dtype,
+                fill_value=variable.empty,
+                dimension_names=(*(axis.name for axis in self.plan.axes), *(dim for dim, _ in variable.dims)),
+                attributes=_described(variable, self.plan.subject.unit),
+            )
+        if self.arrays[name].shape != shape:
+            raise LimitsetsError(
+                f"the variable {name}", shape, f"{self.arrays[name].shape}, as at other points",
+                "let the task return arrays of one shape",
+            )  # fmt: skip
+        return self.arrays[name]
+
+    @contextmanager
+    def _written(self) -> Iterator[None]:
+        """Say of a failed write what it means."""
+        try:
+            yield
+        except OSError as error:
+            raise LimitsetsError(
+                "the store", str(self.path), "a place that can be written",
+                f"it could not be: {error.strerror or error}; what is done is kept, the same call does the rest",
+            ) from error  # fmt: skip
+
+
+def checksum(found: Mapping[str, npt.NDArray[Any]]) -> int:
+    """Return a checksum of arrays by name, never 0."""
+    total = 0
+    for name in sorted(found):
+        values = found[name]
+        total = zlib.crc32(name.encode(), total)
+        total = zlib.crc32(
+            np.ascontiguousarray(values).astype(values.dtype.newbyteorder("<")).tobytes(), total
+        )
+    return total or 1
+
+
+def _is(values: npt.NDArray[Any], fill: Any) -> bool:
+    return bool((np.isnan(values) if values.dtype.kind == "f" else values == fill).all())
+
+
+def _short(value: Any) -> str:
+    text = repr(value)
+    return text if len(text) <= 80 else f"{text[:77]}..."
+
+
+def _described(variable: Variable, length: str) -> dict[str, Any]:
+    """Return the attributes of a variable; codes as the CF conventions have them."""
+    found: dict[str, Any] = {"long_name": variable.about} if variable.about else {}
+    unit = length if variable.unit == "length" else variable.unit
+    if unit:
+        found["units"] = unit
+    if variable.codes:
+        found["flag_values"] = list(variable.codes.values())
+        found["flag_meanings"] = " ".join(variable.codes)
+    return found
+
+
+def _attributes(plan: Plan) -> dict[str, Any]:
+    """Return the attributes of a store."""
+    found: dict[str, Any] = {
+        "title": f"atlas of {plan.subject.title}",
+        "plan_hash": plan.digest,
+        "plan": plan.record,
+    }
+    if isinstance(plan.subject, SceneSubject):
+        from limitsets.scene import dump
+
+        found |= {"scene": dump(plan.subject.scene), "unit_of_length": plan.subject.unit}
+    return found | {"versions": dict(plan.code["versions"])}

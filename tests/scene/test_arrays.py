@@ -1,0 +1,174 @@
+"""The numbers of many scenes at once against those of each scene alone."""
+
+import contextlib
+
+import numpy as np
+import pytest
+
+import limitsets as ls
+from limitsets.errors import SceneError
+from limitsets.scene import Scene
+from limitsets.scene.arrays import throw_stack
+from tests.scene.four_gon import FOUR_GON
+
+FIELDS = ("kappa", "surface_height", "arm_length", "radius_of_gyration", "a", "d", "length", "corner")
+
+# What varies, and between which values: far enough that many points cannot be.
+PAPER = {
+    "throw.speed": (-0.3, 4.0),
+    "part.sides[1]": (0.5, 13.0),
+    "part.mass.center.along": (-0.5, 7.0),
+    "part.mass.center.above": (-0.1, 2.5),
+    "part.mass.radius_of_gyration": (-0.1, 3.0),
+    "arm.surface_height": (-3.0, 1.0),
+    "arm.length": (3.0, 40.0),
+    "gravity.tilt": (-0.1, 1.7),
+}
+PLATE = {
+    "throw.kappa": (-5.0, 300.0),
+    "part.vertices[0].x": (-30.0, 60.0),
+    "part.vertices[2].y": (-80.0, 10.0),
+    "part.mass.points[1].x": (-15.0, 12.0),
+    "part.mass.points[0].mass": (-1e-4, 2e-2),
+    "arm.length": (20.0, 500.0),
+}
+THICK = FOUR_GON | {
+    "throw": {"speed": "170 deg/s"},
+    "gravity": {"tilt": "25 deg"},
+    "part": {
+        "sides": ["59 mm", "41 mm", "67 mm"],
+        "mass": {
+            "plate_density": "7850 kg/m^3",
+            "plate_thickness": "2 mm",
+            "points": [{"x": "21 mm", "y": "9 mm", "mass": "11 g"}],
+        },
+    },
+}
+BY_SIDES = {
+    "throw.speed": (1.0, 5.0),
+    "part.sides[0]": (20.0, 110.0),
+    "part.sides[2]": (20.0, 110.0),
+    "part.mass.points[0].y": (-3.0, 40.0),
+}
+SCENES = {
+    "whole": (None, PAPER),
+    "designed": ("paper-designed", PAPER),
+    "small angle": ("paper-initial-small-angle", PAPER),
+    "plate": (FOUR_GON, PLATE),
+    "thick plate": (THICK, BY_SIDES),
+}
+
+
+def scene_of(given, whole):
+    if isinstance(given, str):
+        return ls.load(given)
+    return Scene.of(whole if given is None else given, None)
+
+
+def compared(scene, values):
+    """Count the possible points; each must be the scene's own numbers, each other one refused."""
+    found = throw_stack(scene, values)
+    count = found.possible.size
+    for k in range(count):
+        one = {name: float(each[k]) for name, each in values.items()}
+        alone = None
+        with contextlib.suppress(SceneError):
+            alone = scene.with_values(one)
+        assert found.possible[k] == (alone is not None), one
+        bare, domain = (alone or scene).bare_map, None if alone is None else alone.domain
+        for name in FIELDS:
+            assert np.array_equal(getattr(found.params, name)[k], getattr(bare, name)), (name, one)
+        if domain is not None:
+            for ours, theirs in (
+                (found.lo, domain.lo[:, 0]),
+                (found.hi, domain.hi[:, 0]),
+                (found.anchor, domain.anchor),
+            ):
+                assert np.array_equal(ours[k], theirs)
+    return int(found.possible.sum())
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_each_point_is_the_scene_with_these_values(name, whole):
+    given, ranges = SCENES[name]
+    whole["gravity"], whole["goal"]["oriented_beyond"]["x"] = {"tilt": "30 deg"}, "6 in"
+    scene, rng = scene_of(given, whole), np.random.default_rng(12)
+    possible = 0
+    for quantity, (lo, hi) in ranges.items():  # one at a time: most points can be
+        if "tilt" in quantity and "kappa" in scene.text["throw"]:
+            continue
+        possible += compared(scene, {quantity: rng.uniform(lo, hi, 12)})
+    assert possible > 4 * len(ranges)
+
+
+@pytest.mark.sweep
+@pytest.mark.parametrize("name", SCENES)
+def test_random_points_in_all_quantities_at_once(name, whole):
+    given, ranges = SCENES[name]
+    scene, rng = scene_of(given, whole), np.random.default_rng(13)
+    for _ in range(40):
+        names = rng.choice(list(ranges), size=3, replace=False)
+        if "gravity.tilt" in names and "throw.speed" not in names and "kappa" in scene.text["throw"]:
+            continue
+        middle = {quantity: rng.uniform(0.25, 0.6, 30) for quantity in names}
+        compared(
+            scene, {q: lo + share * (hi - lo) for (q, share) in middle.items() for lo, hi in [ranges[q]]}
+        )
+
+
+def test_what_is_stacked_has_one_row_per_point_and_no_holes():
+    found = throw_stack(ls.load("paper-designed"), {"arm.surface_height": np.linspace(-1, 0.2, 5)})
+    arrays = [
+        found.params.a,
+        found.params.corner,
+        found.lo,
+        found.params.kappa,
+        found.params.flight.full_turn,
+    ]
+    assert [each.shape for each in arrays] == [(5, 3), (5, 3), (5, 3), (5,), (5,)]
+    assert all(each.flags.c_contiguous and each.dtype == np.float64 for each in arrays)
+
+
+NAN, INF = float("nan"), float("inf")
+
+
+@pytest.mark.parametrize("value", [NAN, INF, -INF, 0.0, 1e-13, -1.0, 1e13])
+def test_numbers_that_no_scene_holds_are_flagged(value):
+    found = throw_stack(ls.load("paper-designed"), {"part.mass.radius_of_gyration": [1.25, value]})
+    assert found.possible.tolist() == [True, False]
+    assert np.isfinite(found.params.radius_of_gyration).all()
+
+
+def test_an_arm_that_ends_before_the_goal_is_no_scene():
+    assert throw_stack(ls.load("paper-designed"), {"arm.length": [20.0, 20.5]}).possible.tolist() == [
+        False,
+        True,
+    ]
+
+
+@pytest.mark.parametrize(
+    ("quantity", "words"),
+    [
+        ("throw.sped", "did you mean 'throw.speed'"),
+        ("landing.x", "noise of landings only"),
+        ("part.vertices[0].x", "this scene does not give it"),
+        ("part.sides[3]", "this scene does not give it"),
+        ("gravity.tilt", "the throw is given by kappa"),
+    ],
+)
+def test_quantities_that_cannot_vary_are_refused(quantity, words):
+    with pytest.raises(SceneError, match=words.replace("[", r"\[")):
+        throw_stack(ls.load("paper-designed"), {quantity: [1.0]})
+
+
+def test_a_speed_needs_gravity():
+    scene = Scene.of(FOUR_GON, None)
+    with pytest.raises(SceneError, match="add \\[gravity\\]"):
+        throw_stack(scene, {"throw.speed": [2.0]})
+    assert throw_stack(scene, {"throw.speed": [2.0], "gravity.tilt": [0.5]}).possible.tolist() == [True]
+
+
+def test_scenes_with_effects_are_refused(whole):
+    whole["effects"] = {"landing": True}
+    with pytest.raises(SceneError, match=r"the minimal model.*leave \[effects\] out"):
+        throw_stack(Scene.of(whole, None), {"throw.speed": [2.0]})

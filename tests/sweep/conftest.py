@@ -1,0 +1,13 @@
+"""The store that nothing interrupted, computed once."""
+
+import pytest
+
+from tests.sweep.stores import bytes_of, run
+
+
+@pytest.fixture(scope="session")
+def whole(tmp_path_factory):
+    """Every file of the store that nothing interrupted."""
+    store = tmp_path_factory.mktemp("whole") / "whole.zarr"
+    run(store)
+    return bytes_of(store)

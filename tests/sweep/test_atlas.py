@@ -1,0 +1,471 @@
+"""What an atlas holds: exact axes, the task's answers, the same bytes however it was computed."""
+
+import math
+import subprocess
+import sys
+from concurrent.futures import ThreadPoolExecutor
+from fractions import Fraction
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import limitsets as ls
+from limitsets import maps
+from limitsets.errors import LimitsetsError, SceneError
+from limitsets.sweep import Axis, atlas
+from limitsets.sweep.axes import axis_of
+from limitsets.sweep.plan import chunk_shape
+from limitsets.sweep.subjects import SceneSubject
+from tests.sweep.stores import Shuffled, bytes_of, run
+from tests.sweep.tasks_of_tests import TASK, X, Y
+
+ROOT = Path(__file__).resolve().parents[2]
+BLOCKS = "tests.sweep.tasks_of_tests:in_blocks"
+DESIGNED = ls.load("paper-designed")
+
+
+# ---------------------------------------------------------------- axes
+
+
+def test_values_of_an_axis_are_the_nearest_floats_to_exact_fractions():
+    axis = axis_of("arm.surface_height=-1:0.2:1001", SceneSubject(DESIGNED).unit_of)
+    exact = [Fraction(-1) + Fraction(12, 10) * k / 1000 for k in range(1001)]
+    assert axis.values.tolist() == [float(each) for each in exact]
+    assert axis.unit == "in"
+
+
+@pytest.mark.parametrize(
+    ("text", "unit", "second"),
+    [
+        ("throw.speed=120:180:7", "deg/s", math.radians(130)),
+        ("throw.speed=20 rpm:30 rpm:11", "rpm", 21 * math.pi / 30),
+        ("throw.speed='2 rad/s':'3 rad/s':11", "rad/s", 2.1),
+        ("arm.length=70 cm:80 cm:11", "cm", 71 / 2.54),
+        ("part.sides[1]=3:4:11", "in", 3.1),
+        ("gravity.tilt=20:30:11", "deg", math.radians(21)),
+        ("gravity.acceleration=150:160:11", "in/s^2", 151),
+    ],
+)
+def test_axes_are_read_in_the_unit_in_which_people_read_the_quantity(text, unit, second):
+    subject = SceneSubject(DESIGNED)
+    axis = axis_of(text, subject.unit_of)
+    assert axis.unit == unit
+    assert subject.in_base(axis)[1] == pytest.approx(second, rel=1e-15)
+
+
+def test_the_unit_of_a_scene_in_millimetres_given_by_rpm():
+    text = (
+        ls.dump(DESIGNED)
+        .replace('kappa = "25.3778518 in"', 'speed = "25 rpm"')
+        .replace('"28 in"', '"711.2 mm"')
+    )
+    subject = SceneSubject(ls.load(text))
+    units = [subject.unit_of(name, None) for name in ("throw.speed", "arm.surface_height", "throw.kappa")]
+    assert units == ["rpm", "in", "mm"]
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "throw.speed", "throw.speed=1:2", "throw.speed=1:2:3:4", "throw.speed=2:1:5", "throw.speed=1:1:5",
+        "throw.speed=1:2:1", "throw.speed=1:2:0", "throw.speed=1:2:-5", "throw.speed=1:2:2.5", "throw.speed=1:x:3",
+        "throw.speed=1:2 deg/s:3", "throw.speed=1 deg/s:2 rad/s:3", "throw.speed=1deg/s:2deg/s:3",
+        "throw.speed=1 in:2 in:3", "throw.speed=nan:2:3", "throw.speed=1:2:99999999", "speed=1:2:3", "landing.x=1:2:3",
+    ],
+)  # fmt: skip
+def test_axes_that_cannot_be_are_refused(text):
+    with pytest.raises(LimitsetsError, match="allowed: "):
+        atlas("paper-designed", text, task=TASK)
+
+
+def test_each_point_has_the_scene_that_its_coordinates_write():
+    found = run(None).dataset
+    speed, height = found["throw.speed"].values, found["arm.surface_height"].values
+    for j, k in ((0, 20), (4, 13), (8, 17)):
+        given = {"throw.speed": f"{speed[k]!r} deg/s", "arm.surface_height": f"{height[j]!r} in"}
+        alone = DESIGNED.with_values(
+            {name: each.replace("np.float64(", "").replace(")", "") for name, each in given.items()}
+        )
+        assert found.kappa.values[j, k] == alone.kappa
+        assert np.array_equal(found.feet.values[j, k], alone.sides.a + alone.surface_height)
+
+
+# ---------------------------------------------------------------- points and variables
+
+
+def test_points_without_a_scene_or_an_answer_have_a_status_and_no_numbers():
+    found = run(None).dataset
+    # speeds of 0 and below are none; kappa = g/w^2 is above 400 in below 0.695 rad/s
+    speed = np.radians(found["throw.speed"].values)
+    wanted = np.where(speed <= 0, 1, np.where(speed**2 < 193.045 / 400, 2, 0))
+    assert np.array_equal(found.status.values, np.broadcast_to(wanted, found.status.shape))
+    assert np.array_equal(np.isfinite(found.kappa.values), found.status.values == 0)
+    codes = dict(
+        zip(found.status.attrs["flag_meanings"].split(), found.status.attrs["flag_values"], strict=True)
+    )
+    assert codes == {"computed": 0, "impossible": 1, "refused": 2}
+    assert np.array_equal(
+        np.isnan(found.height.values),
+        (found.status.values != 0) | (found["arm.surface_height"].values[:, None] > 0),
+    )
+
+
+def test_seeds_depend_on_the_number_of_the_point_alone():
+    found = run(None).dataset.drawn.values
+    other = atlas("paper-designed", X, Y, task=TASK, chunk=(9, 21)).dataset.drawn.values
+    good = np.isfinite(found)
+    assert np.array_equal(found, other, equal_nan=True)
+    assert np.unique(found[good]).size == good.sum()
+    assert (found[good] != run(None, seed=1).dataset.drawn.values[good]).all()
+
+
+def test_a_block_task_gives_what_single_scenes_give():
+    blocks = atlas(
+        "paper-designed", X, Y, task=BLOCKS, chunk=(2, 4), variables=["kappa", "feet", "sign", "dear"]
+    )
+    single, found = run(None).dataset, blocks.dataset
+    good = single.status.values == 0
+    assert np.array_equal(found.kappa.values[good], single.kappa.values[good])
+    assert np.array_equal(found.feet.values[good], single.feet.values[good])
+    possible = found.status.values == 0
+    assert np.array_equal(possible, single.status.values != 1)
+    assert np.isfinite(found.kappa.values[possible]).all()
+    assert np.isnan(found.kappa.values[~possible]).all()
+    assert (found.dear.values[possible] == math.pi).all()
+    assert set(found.sign.values[~possible].tolist()) == {-1}
+    assert found.sign.dtype == np.int8
+    assert found.feet.dims == ("arm.surface_height", "throw.speed", "side")
+    assert found.kappa.attrs == {"units": "in", "long_name": "gravity over the squared speed"}
+
+
+def test_variables_are_chosen_and_options_passed():
+    chosen = atlas("paper-designed", X, task=BLOCKS, variables=["kappa"], options={"power": 2}).dataset
+    assert set(chosen.data_vars) == {"kappa", "status"}
+    assert "dear" not in atlas("paper-designed", X, task=BLOCKS).dataset
+    plain = atlas("paper-designed", X, task=BLOCKS).dataset
+    assert np.array_equal(chosen.kappa.values, plain.kappa.values**2, equal_nan=True)
+    assert set(run(None, variables=["feet"]).dataset.data_vars) == {"feet", "status"}
+
+
+def test_one_axis_alone_and_values_of_its_own():
+    axis = Axis("throw.speed", [150.0, 158.02, 170.5], "deg/s")
+    found = atlas("paper-designed", axis, task=BLOCKS).dataset
+    assert found.kappa.dims == ("throw.speed",)
+    assert found.kappa.values == pytest.approx(
+        [193.045 / math.radians(w) ** 2 for w in (150, 158.02, 170.5)], rel=1e-14
+    )
+
+
+def test_any_registered_map(tmp_path):
+    task = "tests.sweep.tasks_of_tests:of_map"
+    found = atlas(maps.Logistic(4), "r=2:4:5", task=task, options={"factor": 2.0}, store=tmp_path / "s.zarr")
+    assert found.dataset.fixed_point.values == pytest.approx([1.0, 1.2, 4 / 3, 10 / 7, 1.5])
+    assert found.dataset.attrs["plan"]["parameters"] == {"r": 4.0}
+    record = found.to_json()
+    assert (record["map"], record["parameters"]) == ("limitsets.maps.textbook.logistic:Logistic", {"r": 4.0})
+    with pytest.raises(LimitsetsError, match=r"the parameter is 's'.*field"):
+        atlas(maps.Logistic(4), "s=2:4:5", task=task)
+    with pytest.raises(LimitsetsError, match="parameters of a map have none"):
+        atlas(maps.Logistic(4), "r=2 in:4 in:5", task=task)
+    with pytest.raises(LimitsetsError, match="pass domain="):
+        atlas(maps.Logistic(4), "r=2:4:5", task=BLOCKS)
+
+
+def test_fields_of_sides_and_of_inner_tuples_vary_too():
+    """A throw map is a map as well; its points are those of stacked scenes."""
+    given = DESIGNED.bare_map
+    found = atlas(
+        given, "a[1]=1:2:3", "radius_of_gyration=1:2:3", domain=DESIGNED.domain, task=BLOCKS
+    ).dataset
+    assert found.feet.values[1, 2, 1] == 2.0 + given.surface_height
+    assert found.feet.values[1, 2, 0] == given.a[0] + given.surface_height
+    assert (found.kappa.values == given.kappa).all()
+    with pytest.raises(LimitsetsError, match="it would be both"):
+        atlas(given, "kappa=20:30:3", domain=DESIGNED.domain, task=BLOCKS)
+
+
+def test_the_default_task_tells_the_topology_of_the_designed_feeder():
+    """Against cells and critical orbits (`ls.attractors`, `ls.limit_set`), and the threshold of `ls.analyse`."""
+    found = atlas("paper-designed", "throw.kappa=25.3778518:25.3778518:1").dataset.isel({"throw.kappa": 0})
+    graph = ls.transitions(DESIGNED.map, ls.grid(DESIGNED.domain, cells=1024))
+    (attractor,) = ls.attractors(graph)
+    extents = ls.limit_set(graph, attractor).extents
+    assert (int(found.attractors), int(found.undecided), int(found.leaves)) == (1, 0, 0)
+    assert tuple(found.flip_order.values[0]) == attractor.flip_order
+    assert found.bands.values[0].tolist() == [len(extents[side]) for side in range(3)]
+    assert found.reach.values[0] == pytest.approx([extents[side][-1][1] for side in range(3)], abs=1e-8)
+    assert float(found.threshold) == pytest.approx(max(extents[side][-1][1] for side in (0, 1)), abs=1e-8)
+
+
+# ---------------------------------------------------------------- the same, however it is computed
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_the_order_of_completion_does_not_show(seed, tmp_path, whole):
+    run(tmp_path / "s.zarr", executor=Shuffled(seed))
+    assert bytes_of(tmp_path / "s.zarr") == whole
+
+
+@pytest.mark.parametrize("workers", [1, 3])
+def test_the_number_of_processes_does_not_show(workers, tmp_path, whole):
+    run(tmp_path / "s.zarr", workers=workers)
+    assert bytes_of(tmp_path / "s.zarr") == whole
+
+
+@pytest.mark.sweep
+def test_a_dask_cluster_of_separate_processes_gives_the_same_store(tmp_path, whole):
+    from distributed import LocalCluster
+
+    options = {"processes": True, "threads_per_worker": 1, "dashboard_address": None}
+    with LocalCluster(n_workers=2, local_directory=str(tmp_path / "dask"), **options) as cluster:
+        run(tmp_path / "s.zarr", cluster=cluster.scheduler_address)
+    assert bytes_of(tmp_path / "s.zarr") == whole
+
+
+def test_a_cluster_that_is_not_there_is_named():
+    with pytest.raises(LimitsetsError, match="address of a Dask scheduler"):
+        run(None, cluster="tcp//nowhere")
+
+
+def test_a_store_that_is_done_is_read_and_not_computed(tmp_path, whole):
+    run(tmp_path / "s.zarr")
+    again = run(tmp_path / "s.zarr", executor=ThreadPoolExecutor(0 + 1))
+    assert (again.new, again.kept) == (0, 21)
+    assert bytes_of(tmp_path / "s.zarr") == whole
+    assert again.dataset.identical(run(None).dataset)
+
+
+def test_xarray_opens_a_store_by_itself(tmp_path):
+    run(tmp_path / "s.zarr")
+    with xr.open_zarr(tmp_path / "s.zarr", consolidated=False) as found:
+        assert found.kappa.sel({"throw.speed": 150.0, "arm.surface_height": -1.0}) > 0
+        assert ls.load(found.attrs["scene"]) == DESIGNED
+        assert found.attrs["plan_hash"] == run(None).dataset.attrs["plan_hash"]
+        assert set(found.attrs["versions"]) == {"limitsets", "numpy", "numba"}
+
+
+CHANGES = {
+    "scene": ({"subject": "paper-initial"}, r"scene\.name is 'paper-designed' there, 'paper-initial' here"),
+    "value": (
+        {"subject": DESIGNED.with_values({"arm.length": 30})},
+        r"scene\.arm\.length is '28 in' there, '30.0 in' here",
+    ),
+    "axis": ({"y": "arm.surface_height=-1:0.1:10"}, r"axes\[0\]\.count is 9 there, 10 here"),
+    "task": ({"task": BLOCKS}, "task is 'tests.sweep.tasks_of_tests:numbers' there"),
+    "options": ({"options": {"pause": 0.0}}, r"options\.pause is None there, 0.0 here"),
+    "seed": ({"seed": 1}, "seed is 0 there, 1 here"),
+    "chunk": ({"chunk": (4, 4)}, r"chunk\[0\] is 3 there, 4 here"),
+    "variables": ({"variables": ["kappa"]}, r"variables is None there, \['kappa'\] here"),
+}
+
+
+@pytest.mark.parametrize("name", CHANGES)
+def test_a_store_of_another_plan_is_refused_with_what_differs(name, tmp_path, whole):
+    change, words = CHANGES[name]
+    run(tmp_path / "s.zarr")
+    given = {"subject": "paper-designed", "x": X, "y": Y, "task": TASK, "chunk": (3, 3)} | change
+    with pytest.raises(LimitsetsError, match=words):
+        atlas(store=tmp_path / "s.zarr", **given)
+    assert bytes_of(tmp_path / "s.zarr") == whole
+
+
+def test_a_store_of_another_version_or_of_an_edited_task_is_refused(tmp_path, monkeypatch):
+    run(tmp_path / "s.zarr")
+    with monkeypatch.context() as patch:
+        patch.setattr("limitsets.sweep.plan.version", lambda package: f"{package} of tomorrow")
+        with pytest.raises(
+            LimitsetsError, match=r"versions\.limitsets is '.*' there, 'limitsets of tomorrow' here"
+        ):
+            run(tmp_path / "s.zarr")
+    with monkeypatch.context() as patch:
+        patch.setattr("limitsets.sweep.plan.source_of", lambda module: {module: "edited"})
+        with pytest.raises(
+            LimitsetsError, match=r"sources\.tests\.sweep\.tasks_of_tests is '.*' there, 'edited' here"
+        ):
+            run(tmp_path / "s.zarr")
+
+
+def test_a_worker_with_other_code_refuses_to_work(monkeypatch):
+    from limitsets.sweep.parameter_atlas import plan_of
+    from limitsets.sweep.work import answer
+
+    plan = plan_of("paper-designed", X, task=TASK)
+    monkeypatch.setattr("limitsets.sweep.plan.version", lambda package: "0.0")
+    with pytest.raises(LimitsetsError, match=r"versions\.limitsets of a worker is '0\.0'"):
+        answer(plan, 0)
+
+
+@pytest.mark.parametrize("what", ["file", "folder", "other zarr"])
+def test_what_is_no_store_is_not_touched(what, tmp_path):
+    place = tmp_path / "s.zarr"
+    if what == "file":
+        place.write_text("a letter")
+    elif what == "folder":
+        place.mkdir()
+        (place / "letter").write_text("a letter")
+    else:
+        xr.Dataset({"a": ("x", [1.0])}).to_zarr(place, consolidated=False)
+    before = place.read_bytes() if what == "file" else bytes_of(place)
+    with pytest.raises(LimitsetsError):
+        run(place)
+    assert (place.read_bytes() if what == "file" else bytes_of(place)) == before
+
+
+# ---------------------------------------------------------------- tasks that cannot be asked
+
+
+TASKS = {
+    "nowhere": ("no.such.module:function", "No module named"),
+    "no function": ("math:nothing", "nothing"),
+    "no callable": ("math:pi", "it is none"),
+    "no name": ("math", "module:function"),
+    "lambda": (lambda scene: {}, "workers import it by its name"),
+    "failing": ("tests.sweep.tasks_of_tests:failing", r"ZeroDivisionError.*arm\.surface_height -0\.5"),
+    "uneven": ("tests.sweep.tasks_of_tests:uneven", "one shape"),
+    "no numbers": ("limitsets.scene:dump", "returns is 'str'; allowed: a dict"),
+}
+
+
+@pytest.mark.parametrize("name", TASKS)
+def test_tasks_that_cannot_be_asked_are_refused(name):
+    task, words = TASKS[name]
+    with pytest.raises(LimitsetsError, match=words):
+        atlas("paper-designed", "arm.surface_height=-1:0:5", task=task, chunk=(5,))
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"variables": ["nothing"], "task": BLOCKS}, "the variable is 'nothing'; allowed: kappa"),
+        ({"variables": ["nothing"], "task": TASK}, "returns as nothing is 'missing'"),
+        ({"y": X, "task": TASK}, "name each once"),
+        ({"chunk": (3, 3), "task": TASK}, "give one for each axis"),
+        ({"chunk": (0,), "task": TASK}, "numbers from 1"),
+        ({"workers": 0, "task": TASK}, "1 or more"),
+        ({"workers": 2, "cluster": "tcp://", "task": TASK}, "give one of them"),
+        ({"options": {"pause": {1, 2}}, "task": TASK}, "numbers, text, lists and tables"),
+        ({"domain": [(0, 1)], "task": TASK}, "a scene has one"),
+    ],
+)
+def test_other_things_that_cannot_be_are_refused(options, words):
+    with pytest.raises(LimitsetsError, match=words):
+        atlas("paper-designed", X, **options)
+
+
+def test_gravity_does_not_vary_in_blocks_where_the_throw_is_given_by_kappa():
+    with pytest.raises(SceneError, match=r"give throw\.speed"):
+        atlas("paper-designed", "gravity.tilt=20:30:3", task=BLOCKS)
+
+
+def test_what_stands_in_a_script_is_not_sent_to_processes():
+    code = f"""
+    import sys; sys.path.insert(0, {str(ROOT)!r})
+    from concurrent.futures import ThreadPoolExecutor
+    import limitsets as ls
+    def here(scene):
+        return {{"kappa": scene.kappa}}
+    try:
+        ls.atlas("paper-designed", {X!r}, task=here, workers=2)
+    except ls.errors.LimitsetsError as error:
+        print(error)
+    with ThreadPoolExecutor(1) as pool:
+        print(ls.atlas("paper-designed", {X!r}, task=here, executor=pool).dataset.sizes["throw.speed"])
+    """
+    lines = python(code).splitlines()
+    assert "move it to a file, or pass executor=concurrent.futures.ThreadPoolExecutor(1)" in lines[0]
+    assert lines[1] == "21"
+
+
+def test_a_script_without_a_guard_may_start_processes(tmp_path):
+    script = tmp_path / "script.py"
+    script.write_text(
+        f"import sys; sys.path.insert(0, {str(ROOT)!r})\nimport limitsets as ls\n"
+        f"found = ls.atlas('paper-designed', {X!r}, task={TASK!r}, chunk=[4], workers=2)\n"
+        "print(found.new, sys.modules['__main__'].__file__ == __file__)\n"
+    )
+    done = subprocess.run([sys.executable, str(script)], capture_output=True, text=True, check=False)
+    assert (done.stdout, done.stderr) == ("6 True\n", "")
+
+
+# ---------------------------------------------------------------- tables, chunks, libraries
+
+
+def test_a_table_has_a_row_for_each_point():
+    found = run(None)
+    table, data = found.to_dataframe(), found.dataset
+    assert list(table.columns[:2]) == ["arm.surface_height", "throw.speed"]
+    assert {"kappa", "feet[0]", "feet[1]", "feet[2]", "status"} < set(table.columns)
+    row = table[(table["throw.speed"] == 150.0) & (table["arm.surface_height"] == -1.0)].iloc[0]
+    one = data.sel({"throw.speed": 150.0, "arm.surface_height": -1.0})
+    assert len(table) == 9 * 21
+    assert [row["kappa"], row["feet[1]"]] == [float(one.kappa), float(one.feet[1])]
+
+
+def test_json_has_everything_and_no_nan():
+    import json
+
+    from limitsets.files import as_json
+
+    record = json.loads(as_json(run(None)))
+    assert list(record) == ["scene", "unit", "axes", "variables", "task", "plan_hash", "versions"]
+    assert record["axes"][1]["values"][20] == 180.0
+    assert record["variables"]["kappa"]["values"][0][0] is None
+    assert record["variables"]["status"]["codes"] == {"computed": 0, "impossible": 1, "refused": 2}
+    assert record["variables"]["feet"]["dims"] == ["arm.surface_height", "throw.speed", "feet_0"]
+
+
+@pytest.mark.parametrize(
+    ("shape", "task", "chunk"),
+    [
+        ((1000, 1000), BLOCKS, (100, 100)),
+        ((1_000_000,), BLOCKS, (10_000,)),
+        ((3, 1_000_000), BLOCKS, (3, 3323)),
+        ((30, 30), BLOCKS, (30, 30)),
+        ((1000, 1000), TASK, (8, 8)),
+        ((1,), TASK, (1,)),
+    ],
+)
+def test_chunks_are_about_square_and_of_one_size(shape, task, chunk):
+    assert chunk_shape(shape, task) == chunk
+
+
+def python(code, *flags):
+    """Run code in a new interpreter, in this checkout."""
+    import textwrap
+
+    command = [sys.executable, "-W", "error", *flags, "-c", textwrap.dedent(code)]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+HEAVY = {"xarray", "zarr", "pandas", "pyarrow", "dask", "distributed"}
+
+
+@pytest.mark.parametrize(
+    "code",
+    ["import limitsets", "import limitsets.sweep", "import limitsets.cli; limitsets.cli.main(['--help'])"],
+)
+def test_what_is_no_atlas_loads_none_of_its_libraries(code):
+    loaded = python(f"import sys\n{code}\nprint(*sys.modules)").split()
+    assert "limitsets" in loaded
+    assert not HEAVY & set(loaded)
+
+
+def test_an_analysis_loads_none_of_them(tmp_path):
+    words = ["analyse", "paper-designed", "--cells", "64", "--out", str(tmp_path / "a"), "--json"]
+    code = f"import sys, limitsets.cli\nlimitsets.cli.main({words})\nprint('loaded', *sys.modules)"
+    assert not HEAVY & set(python(code).rpartition("loaded ")[2].split())
+
+
+@pytest.mark.parametrize("library", ["zarr", "xarray"])
+def test_without_the_extra_one_line_says_how_to_get_it(library):
+    words = ["atlas", "paper-designed", "--x", X, "--task", TASK]
+    code = f"import sys\nsys.modules[{library!r}] = None\nimport limitsets.cli\nprint(limitsets.cli.main({words}))"
+    done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=False)
+    assert done.stdout == "2\n"
+    assert done.stderr.splitlines() == [
+        f"limitsets: the library {library} is 'missing'; allowed: the extra atlas; pip install 'limitsets[atlas]'"
+    ]

@@ -1,0 +1,216 @@
+"""Runs that are killed, and disks that are full: what is computed afterwards is what an undisturbed run gives."""
+
+import errno
+import os
+import random
+import signal
+import subprocess
+import sys
+import threading
+import time
+from contextlib import contextmanager
+from pathlib import Path
+
+import psutil
+import pytest
+from zarr.storage import _local
+
+from limitsets.errors import LimitsetsError
+from limitsets.sweep import atlas
+from tests.sweep.stores import bytes_of, run
+
+ROOT = Path(__file__).resolve().parents[2]
+FEW, MANY = range(2), range(2, 20)
+SEEDS = [*FEW, *(pytest.param(k, marks=pytest.mark.sweep) for k in MANY)]
+
+
+def workers_of(process):
+    """The processes that compute: children of the server that a driver starts, not of the driver."""
+    found = []
+    for child in psutil.Process(process).children():
+        try:
+            found += child.children()
+        except psutil.NoSuchProcess:
+            continue
+    return found
+
+
+def marks_of(store):
+    """How many chunks a store counts as done."""
+    place = store / "chunk_checksum" / "c"
+    return sum(len(list(row.iterdir())) for row in place.iterdir()) if place.exists() else 0
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_a_killed_worker_costs_nothing_but_time(seed, tmp_path, whole):
+    rng, killed, store = random.Random(seed), [], tmp_path / "s.zarr"
+    chunks = rng.randrange(20)  # of 21
+
+    def kill():
+        deadline = time.monotonic() + 60
+        while not killed and time.monotonic() < deadline:
+            found = workers_of(os.getpid())
+            if found and marks_of(store) >= chunks:
+                time.sleep(rng.uniform(0.0, 0.03))
+                victim = rng.choice(found)
+                victim.kill()
+                killed.append(victim.pid)
+            time.sleep(0.001)
+
+    killer = threading.Thread(target=kill)
+    killer.start()
+    found = run(store, workers=2)
+    killer.join()
+    assert killed
+    assert found.new == 21
+    assert bytes_of(store) == whole
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_a_killed_driver_is_continued_and_leaves_no_workers(seed, tmp_path, whole):
+    store, rng = tmp_path / "s.zarr", random.Random(seed)
+    for chunks in sorted(rng.randrange(20) for _ in range(2)):  # the second one kills a run that continues
+        command = [sys.executable, "-m", "tests.sweep.tasks_of_tests", str(store)]
+        driver = subprocess.Popen(command, cwd=ROOT, start_new_session=True)
+        wait_for_work(driver, store)
+        while marks_of(store) < chunks:
+            time.sleep(0.001)
+        time.sleep(rng.uniform(0.0, 0.03))
+        workers = workers_of(driver.pid) if driver.poll() is None else []
+        driver.kill()
+        driver.wait()
+        gone, left = psutil.wait_procs(workers, timeout=30)
+        assert not left
+        assert len(gone) == len(workers)
+    run(store)
+    assert bytes_of(store) == whole
+
+
+def wait_for_work(driver, store):
+    """Wait until a driver has begun its store and its workers."""
+    deadline = time.monotonic() + 120
+    while time.monotonic() < deadline and driver.poll() is None:
+        if (store / "zarr.json").exists() and workers_of(driver.pid):
+            return
+        time.sleep(0.01)
+    assert driver.poll() == 0, "it neither works nor is done"
+
+
+@contextmanager
+def full_after(monkeypatch, writes, *, torn=False):
+    """Let a disk be full after so many files; a torn one has half a file's bytes in place of the whole file."""
+    real, left = _local._put, [writes]
+
+    def put(path, value, exclusive=False):
+        left[0] -= 1
+        if left[0] >= 0:
+            return real(path, value, exclusive=exclusive)
+        if torn and path.name != "zarr.json":
+            half = bytes(value.as_buffer_like())
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_bytes(half[: len(half) // 2])
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(_local, "_put", put)
+        yield
+
+
+def said_of(store):
+    """Run, and return what a full disk is answered with; None where it did not fill up."""
+    try:
+        run(store)
+    except LimitsetsError as refusal:
+        words = str(refusal)
+    else:
+        return None
+    assert "No space left on device; what is done is kept, the same call does the rest" in words
+    return words
+
+
+@pytest.mark.parametrize("torn", [False, True])
+@pytest.mark.parametrize("seed", SEEDS)
+def test_a_full_disk_is_said_in_one_line_and_continued(seed, torn, tmp_path, whole, monkeypatch):
+    store, rng = tmp_path / "s.zarr", random.Random(seed)
+    writes = 40  # more than a store's first files
+    while True:
+        with full_after(monkeypatch, rng.randint(writes, 60), torn=torn):
+            if said_of(store) is None:
+                break
+        writes = 10
+    run(store)
+    assert {name for name in bytes_of(store) if name.endswith(".partial")} == set()
+    assert bytes_of(store) == whole
+
+
+@pytest.mark.parametrize("writes", range(0, 24, 3))
+def test_a_disk_that_is_full_from_the_start_leaves_no_half_store(writes, tmp_path, whole, monkeypatch):
+    store = tmp_path / "s.zarr"
+    with full_after(monkeypatch, writes), pytest.raises(LimitsetsError, match="No space left"):
+        run(store)
+    run(store)
+    assert bytes_of(store) == whole
+    assert [path.name for path in tmp_path.iterdir()] == ["s.zarr"]
+
+
+def mounted(place, size):
+    """Mount a small file system; False where this process may not."""
+    command = ["mount", "-t", "tmpfs", "-o", f"size={size}", "tmpfs", str(place)]
+    return subprocess.run(command, capture_output=True, check=False).returncode == 0
+
+
+if hasattr(os, "geteuid") and os.geteuid() == 0:
+
+    @pytest.mark.sweep
+    @pytest.mark.parametrize("pages", range(25, 45))
+    def test_a_file_system_that_is_full_is_continued_when_it_is_larger(pages, tmp_path, whole):
+        place = tmp_path / "small"
+        place.mkdir()
+        if not mounted(place, pages * 4096):
+            return  # root of a container that may mount nothing
+        try:
+            with pytest.raises(LimitsetsError, match="No space left on device"):
+                run(place / "s.zarr")
+            subprocess.run(["mount", "-o", "remount,size=4m", str(place)], check=True)
+            run(place / "s.zarr")
+            assert bytes_of(place / "s.zarr") == whole
+        finally:
+            subprocess.run(["umount", str(place)], check=True)
+
+
+def test_chunks_that_were_damaged_are_computed_again(tmp_path, whole):
+    store = tmp_path / "s.zarr"
+    run(store)
+    (store / "kappa" / "c" / "1" / "4").write_bytes(b"no such bytes")
+    (store / "feet" / "c" / "2" / "3" / "0").unlink()
+    found = run(store)
+    assert (found.new, found.kept) == (2, 19)
+    assert bytes_of(store) == whole
+
+
+def test_a_chunk_that_always_kills_its_worker_is_named(tmp_path):
+    axes = ("throw.speed=150:160:4", "arm.surface_height=-1:0:5")
+    task = "tests.sweep.tasks_of_tests:deadly"
+    with pytest.raises(
+        LimitsetsError, match=r"killed 3 times by one chunk.*arm\.surface_height -0\.5 in, throw\.speed 150"
+    ):
+        atlas("paper-designed", *axes, task=task, chunk=(1, 4), store=tmp_path / "s.zarr", workers=2)
+    with pytest.raises(LimitsetsError, match="killed 3 times"):
+        atlas("paper-designed", *axes, task=task, chunk=(1, 4), store=tmp_path / "s.zarr", workers=2)
+
+
+def test_ctrl_c_ends_the_workers_and_keeps_what_is_done(tmp_path, whole):
+    store = tmp_path / "s.zarr"
+    command = [sys.executable, "-m", "tests.sweep.tasks_of_tests", str(store)]
+    driver = subprocess.Popen(command, cwd=ROOT, start_new_session=True, stderr=subprocess.PIPE)
+    wait_for_work(driver, store)
+    while driver.poll() is None and marks_of(store) < 3:
+        time.sleep(0.01)
+    workers = workers_of(driver.pid)
+    os.killpg(driver.pid, signal.SIGINT)  # as a terminal does: to all of them
+    _, said = driver.communicate(timeout=60)
+    assert b"KeyboardInterrupt" in said
+    assert said.count(b"Traceback") == 1  # the driver's own; workers say nothing
+    assert not psutil.wait_procs(workers, timeout=30)[1]
+    assert run(store).kept >= 3
+    assert bytes_of(store) == whole
