@@ -18,7 +18,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:  # each from the file that holds it: most rooms have a file of the same name
-    from limitsets import engine, interval, maps, plot
+    from limitsets import engine, interval, maps, plot, resilience
     from limitsets.analysis import analyse
     from limitsets.auditing import audit
     from limitsets.cells import grid
@@ -68,6 +68,7 @@ _ROOMS = {
     "plot": "plot",
     "recheck": "proofs.confirm",
     "register": "maps",
+    "resilience": "resilience",
     "robust_design": "inverse",
     "robustness": "robust.sheet.sheet_run",
     "scenes": "scene",
@@ -99,6 +100,7 @@ __all__ = [
     "plot",
     "recheck",
     "register",
+    "resilience",
     "robust_design",
     "robustness",
     "scenes",

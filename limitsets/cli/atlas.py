@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -16,6 +17,7 @@ __all__ = ["atlas"]
 
 HELP_X = "What varies: throw.speed=120:180:1000, or with units throw.speed='120 deg/s:180 deg/s:1000'."
 HELP_TASK = "What is asked: a function that can be imported, of a scene."
+HELP_MARGIN = "Find the goal's margin at every point, by floats: throw.speed, or joint."
 HELP_OUT = "The store (Zarr), ./NAME-atlas.zarr by default; one that was begun is continued."
 HELP_CLUSTER = "Compute on a Dask cluster, by its scheduler's address: tcp://10.0.0.1:8786."
 HELP_CSV = "Write a table with a row for each point."
@@ -29,6 +31,10 @@ def atlas(
         list[str] | None, option("--variables", "V,V", "Which answers; default: what the task gives.")
     ] = None,
     task: Annotated[str | None, option("--task", "MODULE:FUNCTION", HELP_TASK)] = None,
+    margin: Annotated[str | None, option("--margin", "Q", HELP_MARGIN)] = None,
+    reading: Annotated[
+        str, option("--reading", "R", "Of --margin: fixed (but unknown) or per-throw.")
+    ] = "fixed",
     out: Annotated[Path | None, option("--out -o", "STORE", HELP_OUT)] = None,
     workers: Annotated[int | None, option("--workers", "N", "Processes; default: one a core.", min=1)] = None,
     cluster: Annotated[str | None, option("--cluster", "URL", HELP_CLUSTER)] = None,
@@ -39,7 +45,7 @@ def atlas(
 
     A run that was interrupted goes on when the same command is given again.
     """
-    with progress() as tell:
+    with progress() as tell, saved(csv) if csv is not None else nullcontext() as draft:
         from limitsets.sweep import atlas as run
 
         chosen, _ = opened(scene, None)
@@ -51,14 +57,14 @@ def atlas(
             y,
             task=task,
             variables=wanted or None,
+            options=None if margin is None else {"margin": margin, "reading": reading},
             store=store,
             workers=workers,
             cluster=cluster,
             progress=tell,
         )
-        if csv is not None:
-            with saved(csv) as draft:
-                found.to_dataframe().to_csv(draft, index=False)
+        if draft is not None:
+            found.to_dataframe().to_csv(draft, index=False)
     answer(found if json else None, json, lambda: _text(found, csv))
 
 

@@ -6,10 +6,12 @@ import contextlib
 import multiprocessing
 import os
 import signal
+import sys
 import threading
 from collections.abc import Callable, Iterator
 from concurrent.futures import Executor, Future, ProcessPoolExecutor
 from contextlib import contextmanager
+from types import ModuleType
 from typing import Any
 
 from limitsets.errors import LimitsetsError
@@ -73,6 +75,11 @@ class Processes(Given):
         self.heard, self.alive = context.Pipe(duplex=False)
         return ProcessPoolExecutor(self.workers, context, initializer=_begin, initargs=(self.heard,))
 
+    def submit(self, function: Callable[..., Any], *arguments: Any) -> Future[Any]:
+        """Begin to compute something; processes are started here as they are needed."""
+        with _no_script():
+            return super().submit(function, *arguments)
+
     def restart(self) -> None:
         """Start new processes in place of those of which one died."""
         self.abandon()
@@ -91,6 +98,20 @@ class Processes(Given):
     def _closed(self) -> None:
         self.alive.close()
         self.heard.close()
+
+
+@contextmanager
+def _no_script() -> Iterator[None]:
+    """Start processes that do not run the script that started them: tasks never stand in it.
+
+    Python would import it in each, which begins the sweep again unless the script has a guard.
+    """
+    script = sys.modules["__main__"]
+    sys.modules["__main__"] = ModuleType("__main__")
+    try:
+        yield
+    finally:
+        sys.modules["__main__"] = script
 
 
 def _begin(heard: Any) -> None:

@@ -182,8 +182,7 @@ def atlas(
 
     Notes
     -----
-    Results do not depend on the executor, the number of workers, or the order in which chunks are done.  Processes
-    import the script that starts them: a script keeps the call below ``if __name__ == "__main__":``.
+    Results do not depend on the executor, the number of workers, or the order in which chunks are done.
 
     Examples
     --------
