@@ -84,16 +84,17 @@ def of_kind(found, kind):
     return [event for event in found.events if event.kind == kind]
 
 
+def of_top(r, count):
+    """F^count(1/2) of the logistic map."""
+    x = mp.mpf(1) / 2
+    for _ in range(count):
+        x = r * x * (1 - x)
+    return x
+
+
 def window_end():
     """r where F^3(c) falls on the unstable 3-cycle: F^6(c) = F^9(c), at 40 digits."""
-
-    def image(r, count):
-        x = mp.mpf(1) / 2
-        for _ in range(count):
-            x = r * x * (1 - x)
-        return x
-
-    return float(mp.findroot(lambda r: image(r, 6) - image(r, 9), (3.8567, 3.8569)))
+    return float(mp.findroot(lambda r: of_top(r, 6) - of_top(r, 9), (3.8567, 3.8569)))
 
 
 MERGING = float(max(np.roots([1.0, -2.0, -4.0, -8.0]).real))  # F^3(c) = 1 - 1/r
@@ -137,6 +138,15 @@ def test_bands_of_the_logistic_map_in_closed_form():
             assert abs(lo - r * (r / 4.0) * (1.0 - r / 4.0)) < 1e-12
 
 
+@pytest.mark.parametrize("period", [6, 7, 8])
+def test_long_transients_hide_no_cycle(period):
+    """The last superstable cycle below r = 4: most orbits wander for thousands of steps before they come to it."""
+    guess = 4.0 - 10.0 / 4.0**period
+    r = float(mp.findroot(lambda r: of_top(r, period) - mp.mpf(1) / 2, (guess, guess + 1e-3 / 4.0**period)))
+    found = ls.continuation(maps.Logistic(3.0), lambda t: {"r": r}, steps=1)
+    assert [state.period for states in found.attractors for state in states.values()] == [period] * 2
+
+
 def test_an_attractor_leaves_at_four():
     found = ls.continuation(maps.Logistic(3.0), {"r": (3.9999, 4.0001)}, steps=3)
     (death,) = of_kind(found, "death")
@@ -163,6 +173,7 @@ def test_two_attractors_merge_and_split():
     assert abs(middle(event, "r") - 1.0) < 5e-9
 
 
+@pytest.mark.sweep
 def test_the_first_tongue_of_the_circle_map_ends():
     found = ls.continuation(maps.Circle(0.0, 0.5), {"omega": (0.078, 0.081)}, steps=3)
     first = found.events[0]
