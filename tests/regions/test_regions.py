@@ -342,6 +342,10 @@ FORGERIES = {
     "a region of its own": lambda f: set_at(f, "region", 1, 1),
     "a factor near the joint is too large": lambda f: set_at(f, "joint", (0, 0), 1.5),
     "a factor is no number": lambda f: set_at(f, "joint", (0, 0), np.nan),
+    "a grid that is none": lambda f: set_at(f, "grid", 0, -7),
+    "a border that is none": lambda f: set_at(f, "cells", (0, 0), -1),
+    "a block of no cell": lambda f: set_at(f, "blocks", (0, 0), 10_000),
+    "a code that is none": lambda f: set_at(f, "goal", 0, 3),
     "noise": lambda f: f.header.__setitem__("noise", {"throw.speed": "1 %"}),
     "one more array": lambda f: f.arrays.__setitem__("edges.9.0", np.arange(3.0)),
 }  # fmt: skip
