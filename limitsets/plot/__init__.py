@@ -9,6 +9,7 @@ with the object interface.  A file never has the name of a function of the room:
 import of that file `plot.map` would be a module.
 """
 
+from limitsets.plot.atlas_maps import atlas
 from limitsets.plot.audit_strips import audit
 from limitsets.plot.basin import basins
 from limitsets.plot.counterexamples import counterexample
@@ -22,6 +23,7 @@ from limitsets.plot.morse_graphs import morse
 from limitsets.plot.noise import noise_arrivals, noise_density, noise_levels
 
 __all__ = [
+    "atlas",
     "audit",
     "basins",
     "counterexample",

@@ -9,8 +9,9 @@ import numpy as np
 import numpy.typing as npt
 
 from limitsets.goals import OrientedBeyond, Reaches
+from limitsets.sweep.classes import classes
 from limitsets.sweep.subjects import SceneSubject, Subject
-from limitsets.sweep.tasks import Block, Variable, block_task
+from limitsets.sweep.tasks import Block, Coded, Variable, block_task
 from limitsets.topology import DOUBTS, topologies
 from limitsets.topology.records import BANDS_JOIN, DECIDED, MOVING, NOT_ONE, STAYING, TOO_FINE, UNSURE_EXIT
 from limitsets.topology.work import MOST_ATTRACTORS
@@ -38,6 +39,7 @@ def _variables(subject: Subject, throws: int = THROWS) -> Mapping[str, Variable]
     found = {
         "attractors": Variable("int8", about="how many attractors"),
         "undecided": Variable("int8", codes=_CODES, about=doubts),
+        "class": Variable("int64", about="hash of the class's name, the same in every atlas; 0: undecided"),
         "bands": Variable("int16", sides, about="intervals of the attractor on each side", fill=0),
         "flip_order": Variable("int8", sides, about="sides in cyclic order, then -1; all -2: it changes"),
         "jogs_min": Variable("int32", sides, about="fewest throws of one visit that stay on the side"),
@@ -58,7 +60,7 @@ def _variables(subject: Subject, throws: int = THROWS) -> Mapping[str, Variable]
 
 
 @block_task(_variables)
-def topology(block: Block, throws: int = THROWS) -> dict[str, npt.NDArray[Any]]:
+def topology(block: Block, throws: int = THROWS) -> dict[str, npt.NDArray[Any] | Coded]:
     """Find the topology of the attractors at every point; where it is undecided, nothing else is said.
 
     Flips per throw and the Lyapunov exponent are averaged over `throws` throws, if they are wanted.
@@ -72,10 +74,14 @@ def topology(block: Block, throws: int = THROWS) -> dict[str, npt.NDArray[Any]]:
         found["threshold"] = _threshold(goal, told.reach)
     decided = told.undecided == DECIDED
     variables = _variables(block.subject)
-    return {
+    answers: dict[str, npt.NDArray[Any] | Coded] = {
         name: found[name] if name == "undecided" else _kept(found[name], decided, variables[name].empty)
-        for name in block.wanted
+        for name in block.wanted - {"class"}
     }
+    if "class" in block.wanted:
+        numbers, names = classes(told)
+        answers["class"] = Coded(numbers, {name: number for number, name in names.items()})
+    return answers
 
 
 def _kept(values: npt.NDArray[Any], decided: npt.NDArray[np.bool_], empty: float) -> npt.NDArray[Any]:
