@@ -30,6 +30,8 @@ The files follow docs/certificates.md, and each imports only from those before i
     end_points   end points of the limit set                                      10 to 12
     orbits       periodic orbits                                                  13
     refutations  orbits that refute a goal                                        "Refutations"
+    region       one cell of a plane of parameters                                "Regions"
+    plane        a plane of parameters in cells, and its regions
     claims       the claims of a file, and what each needs
     report       a file from first to last, and the report about it
     main         the command line

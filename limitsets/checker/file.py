@@ -91,7 +91,7 @@ def parse_json(raw: bytes) -> dict[str, Any]:
 
 
 NPY = re.compile(
-    rb"\{'descr': '([<|][fi][148])', 'fortran_order': False, 'shape': \(([0-9]{1,10}),(?: ([0-9]{1,2}))?\), \} *\n"
+    rb"\{'descr': '([<|][fi][1248])', 'fortran_order': False, 'shape': \(([0-9]{1,10}),(?: ([0-9]{1,2}))?\), \} *\n"
 )
 
 

@@ -19,6 +19,18 @@ from .claims import check_box_claims, read_claims, statement_of
 from .file import Cells, open_certificate, read_cells
 from .goals import content_of_goal, goal_of_scene
 from .model import FORMULAS
+from .plane import (
+    Plane,
+    area_shares,
+    check_codes,
+    check_plane_cells,
+    check_regions,
+    holds_plane,
+    name_of_cell,
+    plane_in_words,
+    raster_of,
+    read_plane,
+)
 from .scene import Scene, check_parameters, check_tolerance, over_halves, quantities, read_scene
 from .starts import ATTRACTING, first_version_starts, shares
 from .texts import KINDS, BadFileError, plain, quantity, require, rows, table
@@ -49,6 +61,7 @@ class Report:
     share: float | None = None
     explained: float | None = None
     open: float | None = None
+    area: dict[str, float] | None = None  # of a plane: the shares that are proved, refuted and undecided
     statement: list[str] = field(default_factory=list)
     parameters: dict[str, str] = field(default_factory=dict)
     relied_on: list[str] = field(default_factory=list)
@@ -74,8 +87,8 @@ class Certificate:
     unknown: list[tuple[str, str, str]]  # and those that cannot
 
 
-def read_certificate(path: str | os.PathLike[str]) -> Certificate:
-    """Read a file; raises BadFileError."""
+def open_and_look(path: str | os.PathLike[str]) -> tuple[dict[str, Any], dict[str, memoryview]]:
+    """Open a file, and see that it is a certificate of this map; raises BadFileError."""
     header, entries = open_certificate(path)
     needed = "format version map noise boxes claims arrays tolerance"
     table(header, "header.json", needed, "state producer")
@@ -85,7 +98,12 @@ def read_certificate(path: str | os.PathLike[str]) -> Certificate:
     the_map = table(header["map"], "map", "name version flight flip", "formulas")
     first = type(the_map["version"]) is int and the_map["version"] == 1
     require(the_map["name"] == "throw" and first, "the map is not throw, version 1")
-    model = (the_map["flight"], the_map["flip"])
+    return header, entries
+
+
+def read_certificate(header: dict[str, Any], entries: dict[str, memoryview]) -> Certificate:
+    """Read the content of a file; raises BadFileError."""
+    version, model = header["version"], (header["map"]["flight"], header["map"]["flip"])
     boxes = rows(header["boxes"], "boxes", 1, 5_000)
     prefixes = [table(b, "a box", "scene parameters prefix")["prefix"] for b in boxes]
     named = all(isinstance(p, str) and re.fullmatch(r"[0-9]{1,6}\.", p) for p in prefixes)
@@ -152,7 +170,11 @@ def check_certificate(
     path: str | os.PathLike[str], workers: int, progress: Callable[[int, int], None] | None, report: Report
 ) -> None:
     """Fill in the report; raises BadFileError."""
-    file = read_certificate(path)
+    header, entries = open_and_look(path)
+    if holds_plane(header):
+        recheck_plane(read_plane(header, entries), header, workers, progress, report)
+        return
+    file = read_certificate(header, entries)
     gap = describe(report, file)
     own = goal_of_scene(file.raw[0], len(file.scenes[0].sides))
     failed = failed_at_once(file, gap, own)
@@ -167,16 +189,40 @@ def check_certificate(
     conclude(report, file, failed, own)
 
 
+def recheck_plane(
+    plane: Plane,
+    header: dict[str, Any],
+    workers: int,
+    progress: Callable[[int, int], None] | None,
+    report: Report,
+) -> None:
+    """Check regions of a plane, and fill in the report."""
+    model = plane.raw["model"]["flight"], plane.raw["model"]["flip"]
+    require(model == (header["map"]["flight"], header["map"]["flip"]), "map and scene name different models")
+    tell_model(report, model)
+    for name, value in quantities(plane.raw):
+        report.parameters[plain(name)] = value_in_words(value, name)
+    report.parameters |= {axis.name: axis.between(0, len(axis.texts) - 1) for axis in plane.axes}
+    report.parameters["noise (at every throw)"] = "none"
+    report.cells = int(plane.first[-1])
+    goal = goal_of_scene(plane.raw, plane.n_sides)
+    raster, bad = raster_of(plane)
+    bad = bad or check_codes(plane, goal is not None)
+    if not bad:
+        cell, why = check_plane_cells(plane, workers, progress)
+        bad = f"{name_of_cell(plane, cell)}: {why}" if why else check_regions(plane, raster)
+    if not bad:
+        report.statement = plane_in_words(plane, goal)
+        undecided, proved, refuted = (float(share) for share in area_shares(plane))
+        report.area = {"proved": proved, "refuted": refuted, "undecided": undecided}
+    report.verdict = "failed" if bad else "proved"
+    report.claims = [("region", report.verdict, bad)]
+    report.reason = f"region: {bad}" if bad else ""
+
+
 def describe(report: Report, file: Certificate) -> str:
     """Say what the certificate relies on, and for which scenes; return "" or the gap in its tolerance."""
-    flight, flip = file.model
-    kind = "exact" if flight == "exact" else "small"
-    report.relied_on.append(f"the formulas of the map throw, version 1, flight {flight}, flip {flip}")
-    for key in ("always", flight, kind, f"{kind} {flip}"):
-        report.relied_on += [line for line in FORMULAS[key] if line not in report.relied_on]
-    report.relied_on.append(
-        f"the ball arithmetic of python-flint {flint.__version__} (Arb), numpy and Python"
-    )
+    tell_model(report, file.model)
     for name, value in quantities(file.raw[0]):
         report.parameters[plain(name)] = value_in_words(value, name)
     ranges, gap = check_tolerance(file.raw, file.tolerance)
@@ -187,6 +233,18 @@ def describe(report: Report, file: Certificate) -> str:
     report.parameters["noise (at every throw)"] = noise
     report.cells = sum(len(c.side) for c in file.cells)
     return gap
+
+
+def tell_model(report: Report, model: tuple[str, str]) -> None:
+    """Say on what formulas and on what arithmetic the report relies."""
+    flight, flip = model
+    kind = "exact" if flight == "exact" else "small"
+    report.relied_on.append(f"the formulas of the map throw, version 1, flight {flight}, flip {flip}")
+    for key in ("always", flight, kind, f"{kind} {flip}"):
+        report.relied_on += [line for line in FORMULAS[key] if line not in report.relied_on]
+    report.relied_on.append(
+        f"the ball arithmetic of python-flint {flint.__version__} (Arb), numpy and Python"
+    )
 
 
 def failed_at_once(file: Certificate, gap: str, own: dict[str, Any] | None) -> dict[str, str]:

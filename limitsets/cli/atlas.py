@@ -18,6 +18,7 @@ __all__ = ["atlas"]
 
 HELP_X = "What varies: throw.speed=120:180:1000, or with units throw.speed='120 deg/s:180 deg/s:1000'."
 HELP_TASK = "What is asked: a function that can be imported, of a scene."
+HELP_MARGIN = "Find the goal's margin at every point, by floats: throw.speed, or joint."
 HELP_OUT = "The store (Zarr), ./NAME-atlas.zarr by default; one that was begun is continued."
 HELP_CLUSTER = "Compute on a Dask cluster, by its scheduler's address: tcp://10.0.0.1:8786."
 HELP_REFINE = "Compute a coarse grid, then only points near boundaries of classes; fill the rest."
@@ -42,6 +43,10 @@ def atlas(
         list[str] | None, option("--variables", "V,V", "Which answers; default: what the task gives.")
     ] = None,
     task: Annotated[str | None, option("--task", "MODULE:FUNCTION", HELP_TASK)] = None,
+    margin: Annotated[str | None, option("--margin", "Q", HELP_MARGIN)] = None,
+    reading: Annotated[
+        str, option("--reading", "R", "Of --margin: fixed (but unknown) or per-throw.")
+    ] = "fixed",
     out: Annotated[Path | None, option("--out -o", "STORE", HELP_OUT)] = None,
     workers: Annotated[int | None, option("--workers", "N", "Processes; default: one a core.", min=1)] = None,
     cluster: Annotated[str | None, option("--cluster", "URL", HELP_CLUSTER)] = None,
@@ -67,6 +72,7 @@ def atlas(
             y,
             task=task,
             variables=wanted or None,
+            options=None if margin is None else {"margin": margin, "reading": reading},
             refine=refine,
             coarse=coarse,
             store=store,

@@ -12,6 +12,7 @@ import of that file `plot.map` would be a module.
 from limitsets.plot.atlas_maps import atlas
 from limitsets.plot.audit_strips import audit
 from limitsets.plot.basin import basins
+from limitsets.plot.bifurcations import bifurcation
 from limitsets.plot.counterexamples import counterexample
 from limitsets.plot.designs import design
 from limitsets.plot.flights import flight
@@ -26,6 +27,7 @@ __all__ = [
     "atlas",
     "audit",
     "basins",
+    "bifurcation",
     "counterexample",
     "design",
     "flight",

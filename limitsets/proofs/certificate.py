@@ -26,7 +26,7 @@ from limitsets.proofs.cover import Cover, targets
 from limitsets.scene.units import spelled_plainly
 from limitsets.thrower import Energy, Exact, Signed, SmallAngle, SmallAngle2
 
-__all__ = ["FORMAT", "VERSION", "arrays_of", "write"]
+__all__ = ["arrays_of", "pack", "tidy", "write"]
 
 FORMAT, VERSION = "limitsets-proof", 2
 
@@ -102,12 +102,12 @@ def _parameters(found: Cover) -> dict[str, Any]:
     }
 
 
-def _tidy(table: Any) -> Any:
-    """Write the texts of a scene with single blanks."""
+def tidy(table: Any) -> Any:
+    """Write the texts of a scene with single blanks, as a certificate has them."""
     if isinstance(table, Mapping):
-        return {key: _tidy(value) for key, value in table.items()}
+        return {key: tidy(value) for key, value in table.items()}
     if isinstance(table, list):
-        return [_tidy(value) for value in table]
+        return [tidy(value) for value in table]
     return " ".join(table.split()) if isinstance(table, str) else table
 
 
@@ -160,25 +160,64 @@ def write(
         arrays |= arrays_of(proof, f"{number}.")
         found = proof.cover
         # what is left of the effects here is a spread; a scene may leave the model to its defaults
-        scene = {word: _tidy(table) for word, table in found.box.scene.items() if word != "effects"}
+        scene = {word: tidy(table) for word, table in found.box.scene.items() if word != "effects"}
         scene["model"] = _model(found)
         if found.box.scene.get("effects", {}).get("spread"):
             scene["effects"] = {"spread": found.box.scene["effects"]["spread"]}
         boxes.append({"scene": scene, "parameters": _parameters(found), "prefix": f"{number}."})
     header = {
-        "format": FORMAT,
-        "version": VERSION,
-        "map": {
-            "name": "throw",
-            "version": 1,
-            **_model(proofs[0].cover),
-            "formulas": FORMULAS,
-        },
-        "state": f"x [{unit}]: centre of mass along the arm; side: the one the part rests on, in flip order",
+        "map": _model(proofs[0].cover),
         "noise": spelled_plainly(noise) if noise else None,
         "tolerance": spelled_plainly(tolerance) if tolerance else None,
         "boxes": spelled_plainly(boxes),
         "claims": spelled_plainly([{"claim": each["claim"], "section": each["section"]} for each in claims]),
+        "producer": dict(producer),
+    }
+    verdicts = {each["claim"]: each.get("verdict", "proved") for each in claims}
+    return pack(path, header, arrays, unit, verdicts if recheck else None, workers)
+
+
+def pack(
+    path: str | Path,
+    header: Mapping[str, Any],
+    arrays: Mapping[str, NDArray[Any]],
+    unit: str,
+    verdicts: Mapping[str, str] | None,
+    workers: int | None = 1,
+) -> float | None:
+    """Write header and arrays, replacing an older file whole.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file.
+    header : mapping
+        What it says besides format, state and arrays; of the map flight and flip.
+    arrays : mapping of str to ndarray
+        By name.
+    unit : str
+        Unit of length.
+    verdicts : mapping of str to str, optional
+        What the checker has to find of each claim before the file gets its name; without it nothing is checked.
+    workers : int, optional
+        Processes that check it, None for all processors.
+
+    Returns
+    -------
+    float or None
+        Seconds that the check took.
+
+    Raises
+    ------
+    DeniedError
+        The checker does not confirm it: it is kept as NAME.denied.zip.
+    """
+    whole = {
+        "format": FORMAT,
+        "version": VERSION,
+        **header,
+        "map": {"name": "throw", "version": 1, **header["map"], "formulas": FORMULAS},
+        "state": f"x [{unit}]: centre of mass along the arm; side: the one the part rests on, in flip order",
         "arrays": {
             name: {
                 "sha256": hashlib.sha256(value.tobytes()).hexdigest(),
@@ -187,7 +226,6 @@ def write(
             }
             for name, value in arrays.items()
         },
-        "producer": dict(producer),
     }
     packed = io.BytesIO()
     np.savez(packed, **arrays)  # type: ignore[arg-type]  # arrays by name
@@ -195,11 +233,10 @@ def write(
     with replaced(target.parent) as draft:
         written = draft / target.name
         with zipfile.ZipFile(written, "w", zipfile.ZIP_STORED) as file:
-            file.writestr("header.json", json.dumps(header, indent=1))
+            file.writestr("header.json", json.dumps(whole, indent=1))
             file.writestr("arrays.npz", packed.getvalue())
-        if recheck:
+        if verdicts is not None:
             kept = target.with_name(target.name.removesuffix(".zip").removesuffix(".proof") + ".denied.zip")
-            verdicts = {each["claim"]: each.get("verdict", "proved") for each in claims}
             try:
                 seconds = require_confirmed(written, kept, verdicts, workers)
             except DeniedError as error:

@@ -78,6 +78,8 @@ class Block(NamedTuple):
         The variables asked for.
     subject : SceneSubject or MapSubject
         What is varied.
+    values : mapping of str to ndarray, shape (n,)
+        Of the axes, in the units of the scene.
     """
 
     points: Points
@@ -85,6 +87,7 @@ class Block(NamedTuple):
     seed: int
     wanted: frozenset[str]
     subject: Any
+    values: Mapping[str, npt.NDArray[np.float64]]
 
 
 class Coded(NamedTuple):

@@ -127,7 +127,8 @@ def _block(
     points, variables = plan.subject.points(values), variables_of(plan, task)
     good = np.flatnonzero(points.possible)
     kept = points if good.size == numbers.size else type(points)(*(chosen(each, good) for each in points))
-    block = Block(kept, numbers[good], plan.seed, frozenset(variables), plan.subject)
+    varied = {name: each[good] for name, each in values.items()}
+    block = Block(kept, numbers[good], plan.seed, frozenset(variables), plan.subject, varied)
     given = task.function(block, **plan.options) if good.size else {}
     found: Found = {}
     for name, variable in variables.items():

@@ -33,7 +33,7 @@ from limitsets.topology.records import (
 from limitsets.topology.recurrence import find_components, shares
 from limitsets.topology.work import MOST_ATTRACTORS, Region, Work, work_for
 
-__all__ = ["topologies"]
+__all__ = ["region_of", "topologies"]
 
 # Cells and samples a side: from coarse to fine.
 LEVELS = ((300, 48), (1200, 192), (4800, 768), (16_384, 1536))
@@ -173,7 +173,9 @@ def topologies(
             "a map of one dimension with image_on",
             "register image_on: one step on a forced branch; for more dimensions ask transitions and attractors",
         )
-    region = _region(lo, hi, anchor, n)
+    region = region_of(lo, hi, anchor)
+    if len(region.lo) != n:
+        raise AnswerError("the rows of the domains", len(region.lo), str(n), "give a row for each point")
     decided = kind.has_margin or len(kind.branches) == 1
     found = empty(n, region.lo.shape[1])
     points = np.arange(n)
@@ -188,13 +190,14 @@ def topologies(
     return found
 
 
-def _region(lo: Any, hi: Any, anchor: Any, n: int) -> Region:
+def region_of(lo: Any, hi: Any, anchor: Any = None) -> Region:
+    """Read the domains of n points, arrays of shape (n, S)."""
     ends = [lo, hi, lo if anchor is None else anchor]
     region = Region(*(np.ascontiguousarray(values, dtype=np.float64) for values in ends))
     shapes = [values.shape for values in region]
-    if len(set(shapes)) != 1 or region.lo.ndim != 2 or len(region.lo) != n:
+    if len(set(shapes)) != 1 or region.lo.ndim != 2:
         raise AnswerError(
-            "the shapes of the domains", shapes, f"({n}, sides) each", "give a row for each point"
+            "the shapes of the domains", shapes, "(points, sides) each", "give a row for each point"
         )
     return region
 

@@ -1,0 +1,346 @@
+"""A plane of two quantities in cells: how its file is read, that the cells cover it, and which cells are one region.
+
+docs/certificates.md, "Regions".
+"""
+
+import copy
+import itertools
+import re
+from collections.abc import Callable, Iterator
+from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
+from fractions import Fraction
+from multiprocessing import get_context
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from .balls import Array
+from .cells import SMALL, deaf_children
+from .file import read_array
+from .region import GOAL_PROVED, GOAL_REFUTED, Claimed, check_region_cell, start_region_worker
+from .scene import quantities, read_scene
+from .texts import KINDS, Quantity, plain, quantity, require, rows, table
+
+STARTS_WORDS = ("every", "almost-every", "from", "cells")  # the codes of the array `starts`
+MOST_BORDERS = 4_097
+MOST_CELLS = 1 << 20
+WHOLE = {"<i2": 2, "<i4": 4}
+FLAT: dict[str, tuple[str, int, int]] = {  # one row for each cell of parameters: type, columns, columns for each side
+    "cells": ("<i4", 4, 0), "goal": ("|i1", 1, 0), "region": ("<i4", 1, 0), "grid": ("<i4", 1, 0),
+    "starts": ("|i1", 1, 0), "from": ("<f8", 0, 1), "near": ("|i1", 1, 0), "joint": ("<f8", 0, 3),
+    "counts": ("<i4", 3, 0),
+}  # fmt: skip
+TALL = ("jog", "flip", "rank", "component", "phi")  # one row for each cell of the arm
+
+
+class Axis(NamedTuple):
+    """One of the two quantities, and the borders of the smallest cells: as written, and exact."""
+
+    name: str
+    texts: list[str]
+    values: list[Quantity]
+
+    def between(self, low: int, high: int) -> str:
+        """Name a range of it, for people."""
+        return f"{self.name} in [{self.values[low]}, {self.values[high]}]"
+
+
+class Plane(NamedTuple):
+    """The content of a file: read, and not yet believed."""
+
+    raw: dict[str, Any]
+    axes: list[Axis]
+    n_sides: int
+    flat: dict[str, Array]
+    tall: dict[str, Array]
+    grids: list[list[Array]]
+    first: Array  # where the rows of each cell of parameters begin in `tall`; at the end the number of all
+    blocks: Array
+    chain: Array
+    ends: Array
+
+
+def holds_plane(header: dict[str, Any]) -> bool:
+    """Whether a file claims regions of a plane."""
+    claims = header.get("claims")
+    return isinstance(claims, list) and any(
+        isinstance(c, dict) and c.get("claim") == "region" for c in claims
+    )
+
+
+def read_plane(header: dict[str, Any], entries: dict[str, memoryview]) -> Plane:
+    """Read a file; raises BadFileError."""
+    (claim,) = rows(header["claims"], "claims of a plane", 1, 1)
+    table(claim, "a claim", "claim section")
+    section = table(claim["section"], "section of region", "scene axes")
+    alone = header["boxes"] == [] and header["noise"] is None and header["tolerance"] is None
+    require(alone, "a plane has no boxes, no noise and no tolerance")
+    raw = section["scene"]
+    n_sides = len(read_scene(raw, None).sides)
+    axes = [read_axis(one, raw) for one in rows(section["axes"], "axes", 2, 2)]
+    require(axes[0].name != axes[1].name, "both axes are the same quantity")
+    said, read = header["arrays"], set[str]()
+    require(isinstance(said, dict), "arrays is not an object")
+
+    def array(name: str, dtype: str, columns: int) -> Array:
+        require(f"{name}.npy" in entries, f"array {plain(name)} is missing")
+        read.add(name)
+        return read_array(entries[f"{name}.npy"], name, dtype, columns, said.get(name))
+
+    def either(name: str, columns: int) -> Array:
+        described = said.get(name)
+        dtype = described.get("dtype") if isinstance(described, dict) else None
+        require(dtype in WHOLE, f"array {name} does not hold whole numbers")
+        return array(name, str(dtype), columns)
+
+    flat = {name: array(name, dtype, n + each * n_sides) for name, (dtype, n, each) in FLAT.items()}
+    n = len(flat["cells"])
+    require(
+        0 < n <= MOST_CELLS and all(len(each) == n for each in flat.values()), "the cells are not alike many"
+    )
+    grids = [
+        [array(f"edges.{g}.{i}", "<f8", 1) for i in range(n_sides)]
+        for g in range(int(flat["grid"].max(initial=-1)) + 1)
+    ]
+    require(all(len(e) >= 2 for grid in grids for e in grid), "a side has no cells")
+    tall = {name: either(name, 2 if name in ("jog", "flip") else 1) for name in TALL[:-1]}
+    tall["phi"] = array("phi", "<f4", 2)
+    sizes = np.array([sum(len(e) - 1 for e in grid) for grid in grids] + [0], dtype=np.int64)
+    first = np.concatenate([[0], np.cumsum(sizes[flat["grid"]])])
+    require(
+        all(len(each) == first[-1] for each in tall.values()), "the arrays do not fit the cells of the arm"
+    )
+    blocks, chain = array("blocks", "<i4", 3 + 3 * n_sides), array("chain", "<i4", 3)
+    ends = array("chain.ends", "<f8", 2)
+    require(len(ends) == len(chain), "the arrays of the orbits do not fit")
+    require(
+        read == set(said) and {f"{name}.npy" for name in read} == set(entries), "there are other arrays too"
+    )
+    return Plane(raw, axes, n_sides, flat, tall, grids, first, blocks, chain, ends)
+
+
+def read_axis(value: object, raw: dict[str, Any]) -> Axis:
+    """Read a quantity with its borders, which ascend."""
+    axis = table(value, "an axis", "quantity borders")
+    name = axis["quantity"]
+    require(isinstance(name, str) and name in dict(quantities(raw)), "an axis is not a quantity of the scene")
+    texts = rows(axis["borders"], "borders", 2, MOST_BORDERS)
+    values = [quantity(text, KINDS, name) for text in texts]
+    alike = len({(q.pi, q.unit) for q in values}) == 1 and all(q.lo == q.hi for q in values)
+    ascending = all(a.lo < b.lo for a, b in itertools.pairwise(values))
+    require(alike and ascending, f"the borders of {plain(name)} do not ascend in one unit")
+    return Axis(plain(name), texts, values)
+
+
+def raster_of(plane: Plane) -> tuple[Array, str]:
+    """Spread the numbers of the cells over the smallest cells; "" or why the cells do not cover the plane once."""
+    shape = tuple(len(axis.texts) - 1 for axis in plane.axes)
+    raster, index = np.full(shape, -1, dtype=np.int64), plane.flat["cells"]
+    right = (index >= 0) & (index <= np.array([shape[0], shape[0], shape[1], shape[1]]))
+    if not right.all() or not ((index[:, 0] < index[:, 1]) & (index[:, 2] < index[:, 3])).all():
+        return raster, "the borders of a cell are not such"
+    for k, (a, b, c, d) in enumerate(index.tolist()):
+        if (raster[a:b, c:d] >= 0).any():
+            return raster, f"cell {k} lies over another one"
+        raster[a:b, c:d] = k
+    return raster, "" if (raster >= 0).all() else "the cells leave a gap"
+
+
+def check_codes(plane: Plane, has_goal: bool) -> str:
+    """Check that codes are codes, and that blocks and orbits belong to cells; "" or the reason."""
+    f, n = plane.flat, len(plane.flat["cells"])
+    for name, least, most in (
+        ("goal", 0, 2),
+        ("starts", 0, 3),
+        ("near", 0, 1),
+        ("grid", -1, len(plane.grids) - 1),
+    ):
+        if not ((f[name] >= least) & (f[name] <= most)).all():
+            return f"array {name} holds a code that is none"
+    if not has_goal and (f["goal"] == GOAL_REFUTED).any():
+        return "a goal is refuted, but the scene has none"
+    for name, owner in (("blocks", plane.blocks[:, 0]), ("chain", plane.chain[:, 0])):
+        if not ((owner >= 0) & (owner < n)).all() or (np.diff(owner) < 0).any():
+            return f"array {name} is not in the order of the cells"
+    return ""
+
+
+def claims_of_cells(plane: Plane) -> Iterator[Claimed]:
+    """Put together, cell by cell, what is claimed of it."""
+    f = plane.flat
+    at = np.arange(len(f["cells"]) + 1)
+    blocks, chain = np.searchsorted(plane.blocks[:, 0], at), np.searchsorted(plane.chain[:, 0], at)
+    for k, (a, b, c, d) in enumerate(f["cells"].tolist()):
+        raw = copy.deepcopy(plane.raw)
+        for axis, low, high in ((plane.axes[0], a, b), (plane.axes[1], c, d)):
+            put_at(raw, axis.name, [axis.texts[low], axis.texts[high]])
+        rows_of = slice(int(plane.first[k]), int(plane.first[k + 1]))
+        grid, orbit = int(f["grid"][k]), slice(chain[k], chain[k + 1])
+        yield Claimed(
+            raw,
+            int(f["goal"][k]),
+            plane.grids[grid] if grid >= 0 else None,
+            {name: each[rows_of] for name, each in plane.tall.items()},
+            STARTS_WORDS[int(f["starts"][k])],
+            f["from"][k].tolist(),
+            f["joint"][k].reshape(-1, 3).tolist() if f["near"][k] else None,
+            f["counts"][k].tolist(),
+            plane.blocks[blocks[k] : blocks[k + 1], 1:].tolist(),
+            plane.chain[orbit, 1:].tolist(),
+            plane.ends[orbit].tolist(),
+        )
+
+
+def put_at(tree: Any, name: str, value: object) -> None:
+    """Write a value into a scene, under the name of a quantity that it has."""
+    words = re.findall(r"[^.\[\]]+", name)
+    for k, word in enumerate(words):
+        at = word if isinstance(tree, dict) else int({"x": "0", "y": "1"}.get(word, word))
+        if k == len(words) - 1:
+            tree[at] = value
+        else:
+            tree = tree[at]
+
+
+def check_plane_cells(
+    plane: Plane, workers: int, progress: Callable[[int, int], None] | None
+) -> tuple[int, str]:
+    """Return the number of the first cell of parameters that is not proved, and the reason; -1 and "" if all are."""
+    work = int(plane.first[-1])
+    some = workers > 1 and work > SMALL
+    pool = ProcessPoolExecutor(workers, get_context("spawn"), start_region_worker) if some else None
+    try:
+        with deaf_children():
+            found = (
+                map(check_region_cell, claims_of_cells(plane))
+                if pool is None
+                else pool.map(check_region_cell, claims_of_cells(plane), chunksize=4)
+            )
+        for k, bad in enumerate(found):
+            if bad:
+                return k, bad
+            if progress is not None:
+                progress(int(plane.first[k + 1]), work)
+    except BrokenProcessPool:  # they cannot be started here, as in a script without a main guard
+        return check_plane_cells(plane, 1, progress)
+    finally:
+        if pool is not None:
+            pool.shutdown(cancel_futures=True)
+    return -1, ""
+
+
+def name_of_cell(plane: Plane, k: int) -> str:
+    """Name a cell of parameters, for people."""
+    a, b, c, d = plane.flat["cells"][k].tolist()
+    return f"{plane.axes[0].between(a, b)}, {plane.axes[1].between(c, d)}"
+
+
+# ------------------------------------------------------------------------------------------------- regions
+
+
+def check_regions(plane: Plane, raster: Array) -> str:
+    """Check the numbers of the regions: cells with a common face are of one only where blocks correspond."""
+    n, grid = len(plane.flat["cells"]), plane.flat["grid"]
+    root = list(range(n))
+
+    def top(k: int) -> int:
+        while root[k] != k:
+            root[k] = root[root[k]]
+            k = root[k]
+        return k
+
+    for one, other in ((raster[:-1], raster[1:]), (raster[:, :-1], raster[:, 1:])):
+        pairs = np.unique(np.stack([one.ravel(), other.ravel()], axis=1), axis=0)
+        for i, j in pairs.tolist():
+            if (
+                i != j
+                and grid[i] >= 0
+                and grid[j] >= 0
+                and top(i) != top(j)
+                and blocks_correspond(plane, i, j)
+            ):
+                root[max(top(i), top(j))] = min(top(i), top(j))
+    numbers: dict[int, int] = {}
+    mine = [numbers.setdefault(top(k), len(numbers)) if grid[k] >= 0 else -1 for k in range(n)]
+    wrong = np.flatnonzero(plane.flat["region"] != mine)
+    return f"cell {wrong[0]}: its region is not {plane.flat['region'][wrong[0]]}" if wrong.size else ""
+
+
+def blocks_correspond(plane: Plane, i: int, j: int) -> bool:
+    """Whether the blocks of two cells intersect one to one, and lie among the starts that come to the other's."""
+    one, other = (slice(int(plane.first[k]), int(plane.first[k + 1])) for k in (i, j))
+    here, there = common_cells(plane, i, j)
+    a, b = plane.tall["component"][one], plane.tall["component"][other]
+    ranks = plane.tall["rank"][one], plane.tall["rank"][other]
+    if a.max(initial=-1) != b.max(initial=-1):
+        return False
+    inside = (here >= 0) & (there >= 0)
+    for mine, own, into, rank in ((a, here, there, ranks[1]), (b, there, here, ranks[0])):
+        held = (own >= 0) & (mine[np.maximum(own, 0)] >= 0)
+        if not (inside[held].all() and (rank[into[held]] >= 0).all()):
+            return False
+    pair = np.stack([a[here[inside]], b[there[inside]]], axis=1)
+    met = np.unique(pair[(pair >= 0).all(axis=1)], axis=0)
+    blocks = int(a.max(initial=-1)) + 1
+    return blocks > 0 and all(sorted(column) == list(range(blocks)) for column in met.T.tolist())
+
+
+def common_cells(plane: Plane, i: int, j: int) -> tuple[Array, Array]:
+    """Cut the arm at the borders of both grids: the cell of each grid in which a piece lies, -1 outside."""
+    found: list[list[Array]] = [[], []]
+    starts = [0, 0]
+    grids = [plane.grids[int(plane.flat["grid"][k])] for k in (i, j)]
+    for side in range(plane.n_sides):
+        cuts = np.union1d(grids[0][side], grids[1][side])
+        for own, grid in enumerate(grids):
+            edges = grid[side]
+            at = np.searchsorted(edges, cuts[:-1], side="right") - 1
+            inside = (at >= 0) & (at < len(edges) - 1)
+            found[own].append(np.where(inside, starts[own] + at, -1))
+            starts[own] += len(edges) - 1
+    return np.concatenate(found[0]), np.concatenate(found[1])
+
+
+def area_shares(plane: Plane) -> tuple[Fraction, Fraction, Fraction]:
+    """Return the shares of the plane's area, exactly: undecided, proved, refuted."""
+    sums = [Fraction(0)] * 3
+    ends = [[q.lo for q in axis.values] for axis in plane.axes]
+    for (a, b, c, d), code in zip(plane.flat["cells"].tolist(), plane.flat["goal"].tolist(), strict=True):
+        sums[code] += (ends[0][b] - ends[0][a]) * (ends[1][d] - ends[1][c])
+    total = sum(sums)
+    return sums[0] / total, sums[1] / total, sums[2] / total
+
+
+def plane_in_words(plane: Plane, goal: dict[str, Any] | None) -> list[str]:
+    """Put the claim in words, with what was checked."""
+    undecided, proved, refuted = (f"{float(100 * share):.6g} %" for share in area_shares(plane))
+    f = plane.flat
+    what = "starts come to attracting blocks" if goal is None else "the scene's goal is proved"
+    against = "" if goal is None else f" refuted on {refuted}, by a periodic orbit that violates it;"
+    lines = [
+        f"region: {name_of_whole(plane)}, in {len(f['cells'])} cells of parameters, each for every parameter in it:",
+        f"    {what} on {proved} of the area;{against} undecided on {undecided}",
+    ]
+    said = (
+        "every start comes",
+        "almost every start comes",
+        "starts from some x on, of 99 % of the arm or more, come",
+    )
+    for kind, words in enumerate(said):
+        number = int(((f["starts"] == kind) & (f["goal"] == GOAL_PROVED)).sum())
+        lines += [f"    in {number} of the proved cells {words} to the blocks"] if number else []
+    if goal is not None and goal["kind"] == "reaches" and not goal["every"]:
+        lines.append(
+            "    the goal speaks of almost every orbit: it is proved but for starts of total length zero"
+        )
+    counts = np.bincount(plane.blocks[:, 0], minlength=len(f["cells"]))
+    least, number = int(counts.min()), int(f["region"].max()) + 1
+    joined = "in which attracting blocks of neighbours correspond one to one"
+    lines.append(f"    in each cell at least {least} attracting blocks; {number} regions, {joined}")
+    return lines
+
+
+def name_of_whole(plane: Plane) -> str:
+    """Name the plane, for people."""
+    return ", ".join(axis.between(0, len(axis.texts) - 1) for axis in plane.axes)

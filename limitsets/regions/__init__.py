@@ -1,0 +1,22 @@
+"""Certified regions: a plane of two quantities in cells, and of each cell a record that holds for all parameters in it.
+
+The record is that of a Conley-Morse database (Arai, Kalies, Kokubu, Mischaikow, Oka, Pilarczyk, SIAM J. Appl. Dyn.
+Syst. 8, 2009), for the throw: attracting blocks, the starts that come to them, the order of flips, the goal.
+"""
+
+from limitsets.regions.axes import Axis, evenly
+from limitsets.regions.picking import largest_square, roomiest
+from limitsets.regions.record import Block, Record, certify_cell
+from limitsets.regions.run import Regions, certified
+
+__all__ = [
+    "Axis",
+    "Block",
+    "Record",
+    "Regions",
+    "certified",
+    "certify_cell",
+    "evenly",
+    "largest_square",
+    "roomiest",
+]
