@@ -10,6 +10,7 @@ import of that file `plot.map` would be a module.
 """
 
 from limitsets.plot.atlas_maps import atlas
+from limitsets.plot.atlas_surfaces import atlas_surface
 from limitsets.plot.audit_strips import audit
 from limitsets.plot.basin import basins
 from limitsets.plot.bifurcations import bifurcation
@@ -25,6 +26,7 @@ from limitsets.plot.noise import noise_arrivals, noise_density, noise_levels
 
 __all__ = [
     "atlas",
+    "atlas_surface",
     "audit",
     "basins",
     "bifurcation",

@@ -15,12 +15,12 @@ import numpy as np
 import numpy.typing as npt
 from matplotlib.collections import LineCollection
 from matplotlib.colors import to_rgb
-from matplotlib.patches import Patch, PathPatch
-from matplotlib.path import Path
+from matplotlib.patches import Patch
 from scipy.ndimage import distance_transform_edt, label
 
 from limitsets.errors import AnswerError
 from limitsets.plot import style
+from limitsets.plot.atlas_frame import frame, hatched, mark, pixels, title_of
 from limitsets.sweep.classes import UNDECIDED, Entry, is_classified, legend, named_class, numbers_of
 
 if TYPE_CHECKING:
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
     from limitsets.sweep import Atlas
 
-__all__ = ["atlas", "edges", "frame", "look_of"]
+__all__ = ["atlas", "look_of"]
 
 # Paul Tol's light scheme, made for areas and colour-blind readers, without its orange; a cycle's face.
 FACES = ("#EEDD88", "#44BB99", "#77AADD", "#FFAABB", "#BBCC33", "#99DDFF", "#AAAA00")
@@ -130,11 +130,6 @@ def atlas(found: Atlas) -> Figure:
     return figure
 
 
-def title_of(found: Atlas) -> str:
-    """Name what is varied."""
-    return str(found.dataset.attrs.get("title", "")).removeprefix("atlas of ")
-
-
 def _percent(share: float) -> str:
     percent = 100.0 * share
     digits = ".0f" if percent >= 9.95 else ".1f" if percent >= 0.05 else ".1g"
@@ -147,41 +142,11 @@ def _words(number: int, entry: Entry) -> str:
     return "\n".join(lines).replace("\N{NO-BREAK SPACE}", " ")
 
 
-def frame(found: Atlas) -> tuple[Figure, Axes]:
-    """Make the figure of a map with its axes labelled: a strip where one quantity varies."""
-    data, names = found.dataset, found.axes
-    tall = 5.4 if len(names) == 2 else 2.6
-    figure, (axes,) = style.canvas(10.2, tall)
-    for name, put in zip(reversed(names), (axes.set_xlabel, axes.set_ylabel), strict=False):
-        unit = data[name].attrs.get("units", "")
-        put(f"{name} [{unit}]" if unit else name)
-    if len(names) == 1:
-        axes.set_yticks([])
-    axes.set_xlim(*edges(data[names[-1]].values)[[0, -1]])
-    axes.set_ylim(*(edges(data[names[0]].values)[[0, -1]] if len(names) == 2 else (0.0, 1.0)))
-    return figure, axes
-
-
-def edges(values: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
-    """Give the edges of pixels about values: half way between them."""
-    if values.size == 1:
-        return np.array([values[0] - 0.5, values[0] + 0.5])
-    middle = 0.5 * (values[1:] + values[:-1])
-    return np.concatenate([[2 * values[0] - middle[0]], middle, [2 * values[-1] - middle[-1]]])
-
-
-def _pixels(found: Atlas) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
-    """Edges of the pixels along x and along y."""
-    data, names = found.dataset, found.axes
-    across = edges(data[names[-1]].values)
-    return across, edges(data[names[0]].values) if len(names) == 2 else np.array([0.0, 1.0])
-
-
 def _paint(
     axes: Axes, found: Atlas, rows: npt.NDArray[np.int64], looks: Mapping[int, dict[str, Any]]
 ) -> None:
     """Paint the classes, their hatches, and lines between them."""
-    x, y = _pixels(found)
+    x, y = pixels(found)
     picture = np.ones((*rows.shape, 3))
     for number, look in looks.items():
         picture[rows == number] = to_rgb(look["facecolor"])
@@ -202,31 +167,6 @@ def _paint(
         )
 
 
-def hatched(
-    axes: Axes,
-    x: npt.NDArray[np.float64],
-    y: npt.NDArray[np.float64],
-    where: npt.NDArray[np.bool_],
-    hatch: str,
-) -> None:
-    """Hatch pixels, given their edges."""
-    if not where.any():
-        return
-    # a box for each row of neighbours: contours would cut the corners of pixels
-    vertices: list[tuple[float, float]] = []
-    for i, row in enumerate(where):
-        ends = np.flatnonzero(np.diff(np.concatenate([[False], row, [False]]).astype(np.int8)))
-        for a, b in zip(ends[::2].tolist(), ends[1::2].tolist(), strict=True):
-            vertices += [(x[a], y[i]), (x[b], y[i]), (x[b], y[i + 1]), (x[a], y[i + 1]), (x[a], y[i])]
-    codes = [Path.MOVETO, Path.LINETO, Path.LINETO, Path.LINETO, Path.CLOSEPOLY] * (len(vertices) // 5)
-    axes.add_patch(
-        PathPatch(
-            Path(vertices, codes), facecolor="none", edgecolor=style.INK, hatch=hatch, lw=0.0, zorder=2, alpha=0.55,
-            hatch_linewidth=0.5,
-        )
-    )  # fmt: skip
-
-
 def _label(axes: Axes, found: Atlas, where: npt.NDArray[np.bool_], words: str) -> None:
     """Write the number of a class into its largest region, as far from the region's edge as can be."""
     if len(found.axes) == 1:
@@ -239,43 +179,7 @@ def _label(axes: Axes, found: Atlas, where: npt.NDArray[np.bool_], words: str) -
     i, j = np.unravel_index(room.argmax(), room.shape)
     if room[i, j] < max(ROOM * min(where.shape), 1.5):
         return
-    x = found.dataset[found.axes[-1]].values[j]
-    y = found.dataset[found.axes[0]].values[i] if len(found.axes) == 2 else 0.5
+    x = float(found.dataset[found.axes[-1]].values[j])
+    y = float(found.dataset[found.axes[0]].values[i]) if len(found.axes) == 2 else 0.5
     box = {"boxstyle": "circle,pad=0.22", "fc": "white", "ec": style.INK, "lw": 0.5, "alpha": 0.92}
     axes.text(x, y, words, ha="center", va="center", fontsize=style.SMALL, bbox=box, zorder=5, gid="number")
-
-
-def mark(axes: Axes, found: Atlas) -> list[Any]:
-    """Mark the scene or map itself, if it lies in the window; the entry of a legend."""
-    values = [_value_of(found, name) for name in found.axes]
-    for name, value in zip(found.axes, values, strict=True):
-        given = found.dataset[name].values
-        if value is None or not given[0] <= value <= given[-1]:
-            return []
-    look: dict[str, Any] = {
-        "marker": "*",
-        "ms": 13.0,
-        "mfc": "white",
-        "mec": style.INK,
-        "mew": 1.0,
-        "ls": "none",
-    }
-    x, y = values[-1], values[0] if len(values) == 2 else 0.5
-    axes.plot([x], [y], zorder=6, gid="design", **look)
-    numbers = ", ".join(f"{value:.6g}" for value in reversed(values))
-    return [style.key(f"{title_of(found)}: {numbers}", **look)]
-
-
-def _value_of(found: Atlas, name: str) -> float | None:
-    """Return the value of a quantity in the scene or map that is varied, in the unit of its axis."""
-    data, plan = found.dataset, found.dataset.attrs["plan"]
-    if "scene" not in plan:
-        value = plan.get("parameters", {}).get(name)
-        return float(value) if isinstance(value, int | float) else None
-    from limitsets.scene import load
-    from limitsets.scene.quantities import base_unit, find
-    from limitsets.scene.units import exact_factor
-
-    scene = load(data.attrs["scene"])
-    base = base_unit(find(name).dimension, scene.unit)
-    return scene.value(name) / float(exact_factor(data[name].attrs.get("units", ""), base))
