@@ -15,9 +15,10 @@ from limitsets.maps.stacks import point_of
 from limitsets.sets import limit_set_of
 from limitsets.sets.entropy import topological_entropy
 from limitsets.sweep.checking import ABOUT, CODES, NOT_CHECKED, checks
+from limitsets.sweep.classes import classes
 from limitsets.sweep.float_margins import float_margins, threshold_of, unit_of_margin
 from limitsets.sweep.subjects import SceneSubject, Subject
-from limitsets.sweep.tasks import Block, Variable, block_task
+from limitsets.sweep.tasks import Block, Coded, Variable, block_task
 from limitsets.topology import DOUBTS, Topologies, topologies
 from limitsets.topology.records import BANDS_JOIN, DECIDED, MOVING, NOT_ONE, STAYING, TOO_FINE, UNSURE_EXIT
 from limitsets.topology.work import MOST_ATTRACTORS
@@ -48,6 +49,7 @@ def _variables(
         "attractors": Variable("int8", about="how many attractors"),
         "undecided": Variable("int8", codes=_CODES, about=doubts),
         "checked": Variable("int8", codes=CODES, about=ABOUT, fill=NOT_CHECKED),
+        "class": Variable("int64", about="hash of the class's name, the same in every atlas; 0: undecided"),
         "bands": Variable("int16", sides, about="intervals of the attractor on each side", fill=0),
         "flip_order": Variable("int8", sides, about="sides in cyclic order, then -1; all -2: it changes"),
         "jogs_min": Variable("int32", sides, about="fewest throws of one visit that stay on the side"),
@@ -78,7 +80,7 @@ def _variables(
 @block_task(_variables)
 def topology(
     block: Block, throws: int = THROWS, margin: str | None = None, reading: str = "fixed"
-) -> dict[str, npt.NDArray[Any]]:
+) -> dict[str, npt.NDArray[Any] | Coded]:
     """Find the topology of the attractors at every point; where it is undecided, nothing else is said.
 
     Flips per throw and the Lyapunov exponent are averaged over `throws` throws, if they are wanted.  `margin` names a
@@ -100,12 +102,16 @@ def topology(
         found["checked"] = checks(block, told)
     decided = told.undecided == DECIDED
     variables = _variables(block.subject, throws, margin, reading)
-    return {
+    answers: dict[str, npt.NDArray[Any] | Coded] = {
         name: found[name]
         if name in ("undecided", "checked")
         else _kept(found[name], decided, variables[name].empty)
-        for name in block.wanted
+        for name in block.wanted - {"class"}
     }
+    if "class" in block.wanted:
+        numbers, names = classes(told)
+        answers["class"] = Coded(numbers, {name: number for number, name in names.items()})
+    return answers
 
 
 def _kept(values: npt.NDArray[Any], decided: npt.NDArray[np.bool_], empty: float) -> npt.NDArray[Any]:
