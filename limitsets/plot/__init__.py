@@ -9,6 +9,8 @@ with the object interface.  A file never has the name of a function of the room:
 import of that file `plot.map` would be a module.
 """
 
+from limitsets.plot.atlas_maps import atlas
+from limitsets.plot.atlas_surfaces import atlas_surface
 from limitsets.plot.audit_strips import audit
 from limitsets.plot.basin import basins
 from limitsets.plot.bifurcations import bifurcation
@@ -23,6 +25,8 @@ from limitsets.plot.morse_graphs import morse
 from limitsets.plot.noise import noise_arrivals, noise_density, noise_levels
 
 __all__ = [
+    "atlas",
+    "atlas_surface",
     "audit",
     "basins",
     "bifurcation",

@@ -17,7 +17,7 @@ import numpy.typing as npt
 from limitsets.errors import LimitsetsError
 from limitsets.sweep.subjects import Points
 
-__all__ = ["Block", "BlockTask", "Variable", "block_task", "named", "registered", "resolved"]
+__all__ = ["Block", "BlockTask", "Coded", "Variable", "block_task", "named", "registered", "resolved"]
 
 Task = TypeVar("Task", bound=Callable[..., Any])
 
@@ -90,10 +90,17 @@ class Block(NamedTuple):
     values: Mapping[str, npt.NDArray[np.float64]]
 
 
+class Coded(NamedTuple):
+    """Codes at n points whose names are known only when they are met, and these names."""
+
+    values: npt.NDArray[Any]
+    codes: Mapping[str, int]
+
+
 class BlockTask(NamedTuple):
     """A registered block task: the function, and its variables for a subject."""
 
-    function: Callable[..., Mapping[str, npt.NDArray[Any]]]
+    function: Callable[..., Mapping[str, npt.NDArray[Any] | Coded]]
     variables: Callable[..., Mapping[str, Variable]]
 
 
