@@ -350,6 +350,7 @@ def test_progress_is_told():
         (Kink(), lambda t: {"mu": 1.0} if t < 1.0 else {"left": 0.5}, {"domain": [(-2.0, 2.0)]}, AnswerError),
         (Kink(), {"mu": (-1.0, 1.0)}, {}, MapError),
         ("paper-designed", {"throw.sped": (1.0, 2.0)}, {}, SceneError),
+        ("paper-designed", {"throw.speed": (2.6, 2.7)}, {"domain": LINE}, AnswerError),
         ("paper-designed", {"throw.speed": ("1 in", "2 in")}, {}, SceneError),
     ],
 )

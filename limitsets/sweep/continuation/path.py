@@ -185,6 +185,8 @@ def _of_map(params: Any, path: Curve, domain: Any) -> Path:
 
 def read_path(subject: Any, path: Curve, domain: Any) -> Path:
     """Read a path of a scene, or of a map; AnswerError for what is none."""
+    if isinstance(subject, Scene) and domain is not None:
+        raise AnswerError("the domain", domain, "None: a scene has its own", "leave it out")
     found = _of_scene(subject, path) if isinstance(subject, Scene) else _of_map(subject, path, domain)
     names = set(found.at(0.0).values)
 
