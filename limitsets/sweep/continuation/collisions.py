@@ -6,8 +6,9 @@ forced, and so is its distance from a critical point c'.  A change of sign of th
 (Brent's method); it counts if on both sides of the root the map itself takes these branches, further from every change
 of branch than rounding reaches, and the point is an end of the attractor on one side of the root or both.
 
-The same is done for exits and the ends of the domain, where an attractor begins to leave.  Critical points across which the map is smooth (the top of the logistic map, which only names two branches) are no
-borders: nothing happens where an end passes them.
+The same is done for exits and the ends of the domain, where an attractor begins to leave.  Critical points across which
+the map is smooth (the top of the logistic map, which only names two branches) are no borders: nothing happens where an
+end passes them.
 """
 
 from __future__ import annotations
