@@ -99,6 +99,7 @@ def read_plane(header: dict[str, Any], entries: dict[str, memoryview]) -> Plane:
     require(
         0 < n <= MOST_CELLS and all(len(each) == n for each in flat.values()), "the cells are not alike many"
     )
+    require(bool((flat["grid"] >= -1).all()), "array grid holds a number that is none")
     grids = [
         [array(f"edges.{g}.{i}", "<f8", 1) for i in range(n_sides)]
         for g in range(int(flat["grid"].max(initial=-1)) + 1)
@@ -154,7 +155,6 @@ def check_codes(plane: Plane, has_goal: bool) -> str:
         ("goal", 0, 2),
         ("starts", 0, 3),
         ("near", 0, 1),
-        ("grid", -1, len(plane.grids) - 1),
     ):
         if not ((f[name] >= least) & (f[name] <= most)).all():
             return f"array {name} holds a code that is none"
@@ -330,6 +330,11 @@ def plane_in_words(plane: Plane, goal: dict[str, Any] | None) -> list[str]:
     for kind, words in enumerate(said):
         number = int(((f["starts"] == kind) & (f["goal"] == GOAL_PROVED)).sum())
         lines += [f"    in {number} of the proved cells {words} to the blocks"] if number else []
+    twice = int(((f["counts"][:, 1] == 2) & (f["goal"] == GOAL_PROVED)).sum())
+    if goal is not None and goal["kind"] == "oriented_beyond" and twice:
+        lines.append(
+            f"    in {twice} of them the goal holds after two throws with the same parameters in the blocks"
+        )
     if goal is not None and goal["kind"] == "reaches" and not goal["every"]:
         lines.append(
             "    the goal speaks of almost every orbit: it is proved but for starts of total length zero"

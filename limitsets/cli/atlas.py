@@ -13,12 +13,14 @@ from limitsets.cli.output import Json, Scene, answer, opened, option, progress, 
 
 if TYPE_CHECKING:
     from limitsets.sweep import Atlas
+    from limitsets.sweep.driving import Progress
 
 __all__ = ["atlas"]
 
 HELP_X = "What varies: throw.speed=120:180:1000, or with units throw.speed='120 deg/s:180 deg/s:1000'."
-HELP_TASK = "What is asked: a function that can be imported, of a scene."
+HELP_TASK = "What is asked: a function of a scene; by default the topology of the attractors."
 HELP_MARGIN = "Find the goal's margin at every point, by floats: throw.speed, or joint."
+HELP_CERTIFY = "Prove what holds in each cell of the window; writes NAME-regions.proof.zip."
 HELP_OUT = "The store (Zarr), ./NAME-atlas.zarr by default; one that was begun is continued."
 HELP_CLUSTER = "Compute on a Dask cluster, by its scheduler's address: tcp://10.0.0.1:8786."
 HELP_REFINE = "Compute a coarse grid, then only points near boundaries of classes; fill the rest."
@@ -47,6 +49,7 @@ def atlas(
     reading: Annotated[
         str, option("--reading", "R", "Of --margin: fixed (but unknown) or per-throw.")
     ] = "fixed",
+    certify: Annotated[bool, typer.Option("--certify", help=HELP_CERTIFY)] = False,
     out: Annotated[Path | None, option("--out -o", "STORE", HELP_OUT)] = None,
     workers: Annotated[int | None, option("--workers", "N", "Processes; default: one a core.", min=1)] = None,
     cluster: Annotated[str | None, option("--cluster", "URL", HELP_CLUSTER)] = None,
@@ -84,7 +87,24 @@ def atlas(
             found.to_dataframe().to_csv(draft, index=False)
         picture = store.with_name(f"{store.name.removesuffix('.zarr')}.{form}")
         drawn = _draw(found, picture)
+        proof = Path(f"{chosen.name}-regions.proof.zip") if certify else None
+        shares = _certified(found, proof, workers, tell) if proof is not None else {}
     answer(found if json else None, json, lambda: _text(found, csv, picture if drawn else None))
+    if proof is not None and not json:
+        said = ", ".join(f"{100 * share:.2f} % {word}" for word, share in shares.items())
+        typer.echo(f"regions: {said}: {proof}")
+
+
+def _certified(found: Atlas, file: Path, workers: int | None, tell: Progress) -> dict[str, float]:
+    """Prove the cells on processes, and write the certificate; shares of the window by what is proved."""
+    from concurrent.futures import ProcessPoolExecutor
+    from multiprocessing import get_context
+
+    with ProcessPoolExecutor(workers, get_context("spawn")) as pool:
+        regions = found.certify(executor=pool, progress=tell)
+    tell("certificate", 0, 1)
+    regions.save(file, workers=workers)
+    return regions.shares()
 
 
 def _draw(found: Atlas, file: Path) -> bool:

@@ -4,14 +4,14 @@ The record is that of a Conley-Morse database (Arai, Kalies, Kokubu, Mischaikow,
 Syst. 8, 2009), for the throw: attracting blocks, the starts that come to them, the order of flips, the goal.
 """
 
-from limitsets.regions.axes import Axis, evenly
+from limitsets.regions.axes import CellAxis, evenly
 from limitsets.regions.picking import largest_square, roomiest
 from limitsets.regions.record import Block, Record, certify_cell
 from limitsets.regions.run import Regions, certified
 
 __all__ = [
-    "Axis",
     "Block",
+    "CellAxis",
     "Record",
     "Regions",
     "certified",

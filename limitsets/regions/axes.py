@@ -13,11 +13,11 @@ from limitsets.scene import Scene
 from limitsets.scene.quantities import NOISE_ONLY, find
 from limitsets.scene.units import parse
 
-__all__ = ["Axis", "evenly"]
+__all__ = ["CellAxis", "evenly"]
 
 
 @dataclass(frozen=True)
-class Axis:
+class CellAxis:
     """A quantity and the borders of the cells along it.
 
     Attributes
@@ -35,7 +35,7 @@ class Axis:
     borders: tuple[Fraction, ...]
 
     @classmethod
-    def of(cls, quantity: str, borders: Sequence[str]) -> Axis:
+    def of(cls, quantity: str, borders: Sequence[str]) -> CellAxis:
         """Read the borders: decimals with one unit, ascending.
 
         Raises
@@ -59,13 +59,26 @@ class Axis:
             )
         return cls(quantity, units.pop(), values)
 
-    def refined(self, depth: int) -> Axis:
+    @classmethod
+    def about(cls, quantity: str, points: Sequence[float], unit: str) -> CellAxis:
+        """Cut where two points of an atlas meet half way, to the 12th place; the first and the last point are ends.
+
+        Examples
+        --------
+        >>> CellAxis.about("throw.speed", [150.0, 151.0, 152.0], "deg/s").borders[1:3]
+        (Fraction(301, 2), Fraction(303, 2))
+        """
+        halfway = [0.5 * (a + b) for a, b in pairwise(points)]
+        values = [_short(Fraction(x)) for x in (points[0], *halfway, points[-1])]
+        return cls.of(quantity, [f"{_decimal(value)} {unit}" for value in values])
+
+    def refined(self, depth: int) -> CellAxis:
         """Halve every cell so many times."""
         borders = self.borders
         for _ in range(depth):
             middles = [(a + b) / 2 for a, b in pairwise(borders)]
             borders = tuple(sorted([*borders, *middles]))
-        return Axis(self.quantity, self.unit, borders)
+        return CellAxis(self.quantity, self.unit, borders)
 
     def text(self, number: int) -> str:
         """Write one border, exactly."""
@@ -76,7 +89,7 @@ class Axis:
         return [float(b - a) for a, b in pairwise(self.borders)]
 
 
-def evenly(quantity: str, first: str, last: str, cells: int) -> Axis:
+def evenly(quantity: str, first: str, last: str, cells: int) -> CellAxis:
     """Cut a range of a quantity into cells of equal width, to the 12th place behind the comma.
 
     Examples
@@ -85,11 +98,14 @@ def evenly(quantity: str, first: str, last: str, cells: int) -> Axis:
     >>> speed.text(0), speed.text(1)
     ('150 deg/s', '150.25 deg/s')
     """
-    ends = Axis.of(quantity, [first, last])
+    ends = CellAxis.of(quantity, [first, last])
     low, high = ends.borders
-    scale = 10**12
-    borders = [Fraction(round((low + (high - low) * k / cells) * scale), scale) for k in range(1, cells)]
-    return Axis.of(quantity, [f"{_decimal(value)} {ends.unit}" for value in (low, *borders, high)])
+    borders = [_short(low + (high - low) * k / cells) for k in range(1, cells)]
+    return CellAxis.of(quantity, [f"{_decimal(value)} {ends.unit}" for value in (low, *borders, high)])
+
+
+def _short(value: Fraction) -> Fraction:
+    return Fraction(round(value * 10**12), 10**12)
 
 
 def _decimal(value: Fraction) -> str:
@@ -104,7 +120,7 @@ def _decimal(value: Fraction) -> str:
     return f"-{text}" if value < 0 else text
 
 
-def placed(scene: Scene, axes: Sequence[Axis]) -> Scene:
+def placed(scene: Scene, axes: Sequence[CellAxis]) -> Scene:
     """Write the scene in the quantities of the axes, each at its first border, so that a cell can stand in its place.
 
     Raises

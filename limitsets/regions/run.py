@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from limitsets.regions.axes import Axis, placed
+from limitsets.regions.axes import CellAxis, placed
 from limitsets.regions.gluing import regions
 from limitsets.regions.record import CELLS, Record, certify_cell
 from limitsets.regions.writing import write
@@ -36,7 +36,7 @@ class Regions:
     ----------
     scene : Scene
         The scene, written in the quantities of the axes.
-    axes : tuple of Axis
+    axes : tuple of CellAxis
         The two quantities with the borders of the smallest cells: those of all cells are among them.
     index : ndarray of int32, shape (n, 4)
         Per cell the numbers of its borders: low and high along the first axis, low and high along the second.
@@ -50,7 +50,7 @@ class Regions:
     """
 
     scene: Scene
-    axes: tuple[Axis, Axis]
+    axes: tuple[CellAxis, CellAxis]
     index: Index
     records: tuple[Record, ...]
     code: NDArray[np.int8]
@@ -65,6 +65,11 @@ class Regions:
             sides.append(at[self.index[:, 2 * k + 1]] - at[self.index[:, 2 * k]])
         product: NDArray[np.float64] = sides[0] * sides[1]
         return product
+
+    @property
+    def blocks(self) -> NDArray[np.int64]:
+        """Number of attracting blocks of each cell, shape (n,): there are at least so many attractors."""
+        return np.array([len(record.blocks) for record in self.records], dtype=np.int64)
 
     def shares(self) -> dict[str, float]:
         """Shares of the plane's area that are proved, refuted and undecided: together 1."""
@@ -93,7 +98,7 @@ class Regions:
         return write(path, self.scene, self.axes, arrays, self.records, recheck=recheck, workers=workers)
 
 
-def _spread(axes: Sequence[Axis], index: Index, values: NDArray[Any]) -> NDArray[Any]:
+def _spread(axes: Sequence[CellAxis], index: Index, values: NDArray[Any]) -> NDArray[Any]:
     out = np.zeros(tuple(len(axis.borders) - 1 for axis in axes), dtype=values.dtype)
     for (a, b, c, d), value in zip(index.tolist(), values, strict=True):
         out[a:b, c:d] = value
@@ -102,8 +107,8 @@ def _spread(axes: Sequence[Axis], index: Index, values: NDArray[Any]) -> NDArray
 
 def certified(
     scene: Scene | str | Path,
-    x: Axis,
-    y: Axis,
+    x: CellAxis,
+    y: CellAxis,
     *,
     depth: int = 2,
     cells: Sequence[int] = CELLS,
@@ -116,7 +121,7 @@ def certified(
     ----------
     scene : Scene, str or Path
         The scene, without effects; its goal is what is proved or refuted.
-    x, y : Axis
+    x, y : CellAxis
         The quantities and the borders of the cells (`limitsets.regions.evenly`).
     depth : int
         How often a cell is halved along both axes while it is undecided.
@@ -175,7 +180,7 @@ def certified(
     return Regions(loaded, fine, index, records, code, region)
 
 
-def _one(scene: Scene, axes: tuple[Axis, Axis], cells: tuple[int, ...], at: Iterable[int]) -> Record:
+def _one(scene: Scene, axes: tuple[CellAxis, CellAxis], cells: tuple[int, ...], at: Iterable[int]) -> Record:
     """Certify the cell between the borders of these numbers."""
     a, b, c, d = at
     x, y = axes

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from limitsets.errors import AnswerError
 from limitsets.proofs.certificate import pack, tidy
 from limitsets.proofs.goals import rechecked
-from limitsets.regions.axes import Axis
+from limitsets.regions.axes import CellAxis
 from limitsets.regions.record import Record
 from limitsets.scene import Scene
 from limitsets.scene.units import spelled_plainly
@@ -35,7 +35,7 @@ LAST = np.nextafter(np.float32(2.0 * math.pi), np.float32(0.0))  # within a full
 def write(
     path: str | Path,
     scene: Scene,
-    axes: Sequence[Axis],
+    axes: Sequence[CellAxis],
     arrays: Arrays,
     records: Sequence[Record],
     *,

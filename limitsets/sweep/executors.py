@@ -17,7 +17,7 @@ from typing import Any
 from limitsets.errors import LimitsetsError
 from limitsets.sweep.store import imported
 
-__all__ = ["Given", "Processes", "on_cluster", "present_cores"]
+__all__ = ["Given", "Here", "Processes", "on_cluster", "present_cores"]
 
 # Chunks that wait beside those that are computed: enough that no worker ever waits for the driver.
 _WAITING = 2
@@ -57,6 +57,19 @@ class Given:
         """Leave it as it is."""
 
     abandon = end
+
+
+class Here(Executor):
+    """Computes in this thread what it is given, at once: Ctrl-C ends it."""
+
+    def submit(self, function: Callable[..., Any], /, *arguments: Any, **options: Any) -> Future[Any]:
+        """Compute something, and return that it is done."""
+        done: Future[Any] = Future()
+        try:
+            done.set_result(function(*arguments, **options))
+        except Exception as error:  # noqa: BLE001 - whoever asks for the result gets it
+            done.set_exception(error)
+        return done
 
 
 class Processes(Given):

@@ -8,13 +8,18 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from limitsets.cells import Domain
 from limitsets.errors import AnswerError
 from limitsets.goals import OrientedBeyond, Reaches
+from limitsets.maps.stacks import point_of
+from limitsets.sets import limit_set_of
+from limitsets.sets.entropy import topological_entropy
+from limitsets.sweep.checking import ABOUT, CODES, NOT_CHECKED, checks
 from limitsets.sweep.classes import classes
 from limitsets.sweep.float_margins import float_margins, threshold_of, unit_of_margin
 from limitsets.sweep.subjects import SceneSubject, Subject
 from limitsets.sweep.tasks import Block, Coded, Variable, block_task
-from limitsets.topology import DOUBTS, topologies
+from limitsets.topology import DOUBTS, Topologies, topologies
 from limitsets.topology.records import BANDS_JOIN, DECIDED, MOVING, NOT_ONE, STAYING, TOO_FINE, UNSURE_EXIT
 from limitsets.topology.work import MOST_ATTRACTORS
 
@@ -43,6 +48,7 @@ def _variables(
     found = {
         "attractors": Variable("int8", about="how many attractors"),
         "undecided": Variable("int8", codes=_CODES, about=doubts),
+        "checked": Variable("int8", codes=CODES, about=ABOUT, fill=NOT_CHECKED),
         "class": Variable("int64", about="hash of the class's name, the same in every atlas; 0: undecided"),
         "bands": Variable("int16", sides, about="intervals of the attractor on each side", fill=0),
         "flip_order": Variable("int8", sides, about="sides in cyclic order, then -1; all -2: it changes"),
@@ -57,6 +63,9 @@ def _variables(
         "flips_per_throw": Variable(dims=each, about="mean along one orbit", default=False),
         "lyapunov": Variable(dims=each, about="Lyapunov exponent per throw", default=False),
         "lyapunov_error": Variable(dims=each, about="its standard error", default=False),
+        "entropy": Variable(
+            dims=each, about="topological entropy per throw; about a second a point", default=False
+        ),
     }
     if _goal_of(subject) is not None:
         found["threshold"] = Variable(unit="length", about="where the goal begins or ceases to hold")
@@ -87,10 +96,16 @@ def topology(
         found["threshold"] = _threshold(goal, told.reach)
     if "margin" in block.wanted and margin is not None:
         found["margin"] = float_margins(block.subject.scene, block.values, told, margin, reading)
+    if "entropy" in block.wanted:
+        found["entropy"] = _entropies(block, told)
+    if "checked" in block.wanted:
+        found["checked"] = checks(block, told)
     decided = told.undecided == DECIDED
     variables = _variables(block.subject, throws, margin, reading)
     answers: dict[str, npt.NDArray[Any] | Coded] = {
-        name: found[name] if name == "undecided" else _kept(found[name], decided, variables[name].empty)
+        name: found[name]
+        if name in ("undecided", "checked")
+        else _kept(found[name], decided, variables[name].empty)
         for name in block.wanted - {"class"}
     }
     if "class" in block.wanted:
@@ -101,6 +116,23 @@ def topology(
 
 def _kept(values: npt.NDArray[Any], decided: npt.NDArray[np.bool_], empty: float) -> npt.NDArray[Any]:
     return np.where(decided.reshape(-1, *[1] * (values.ndim - 1)), values, empty)
+
+
+def _entropies(block: Block, told: Topologies) -> npt.NDArray[np.float64]:
+    """Topological entropy of every attractor, from its bands."""
+    found = np.full(told.period.shape, np.nan)
+    for k, a in zip(*np.nonzero(told.period >= 0), strict=True):
+        if told.undecided[k] != DECIDED:
+            continue
+        points = block.points
+        anchor = None if points.anchor is None else points.anchor[k]
+        domain = Domain(points.lo[k][:, None], points.hi[k][:, None], anchor)
+        sides = np.flatnonzero(told.bands[k, a] > 0)
+        hulls = {int(s): [(told.lowest[k, a, s], told.reach[k, a, s])] for s in sides}
+        params = point_of(points.params, k)
+        bands = limit_set_of(params, hulls, domain, tolerance=1e-11).extents
+        found[k, a] = topological_entropy(params, bands, domain)
+    return found
 
 
 def _goal_of(subject: Subject) -> OrientedBeyond | Reaches | None:

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import math
-import threading
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import Executor, ThreadPoolExecutor
+from concurrent.futures import Executor
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,7 +18,7 @@ from limitsets.scene import Scene, load
 from limitsets.sweep.axes import Axis, axis_of
 from limitsets.sweep.boundaries import STEP
 from limitsets.sweep.driving import Progress, drive
-from limitsets.sweep.executors import Given, Processes, on_cluster, present_cores
+from limitsets.sweep.executors import Given, Here, Processes, on_cluster, present_cores
 from limitsets.sweep.plan import Plan, chunk_shape, code_of
 from limitsets.sweep.store import CHECKSUM, Store, imported
 from limitsets.sweep.subjects import MapSubject, SceneSubject, Subject
@@ -28,6 +27,8 @@ from limitsets.sweep.tasks import named, resolved
 if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
+
+    from limitsets.regions import Regions
 
 __all__ = ["Atlas", "atlas"]
 
@@ -92,6 +93,54 @@ class Atlas:
             "plan_hash": data.attrs["plan_hash"],
             "versions": plan["versions"],
         }
+
+    def certify(
+        self, *, depth: int = 2, executor: Executor | None = None, progress: Progress | None = None
+    ) -> Regions:
+        """Cut the window into as many cells as there are points, and prove of each what holds for all its parameters.
+
+        Parameters
+        ----------
+        depth : int
+            How often a cell is halved along both axes while it is undecided.
+        executor : concurrent.futures.Executor, optional
+            Where the cells are done; here by default.
+        progress : callable, optional
+            Told ``(step, done, of)``.
+
+        Returns
+        -------
+        Regions
+            Codes, regions and a certificate to save (`limitsets.regions.certified`).
+
+        Raises
+        ------
+        LimitsetsError
+            For an atlas of a map, or along one axis.
+
+        Examples
+        --------
+        >>> import limitsets as ls
+        >>> task = "limitsets.sweep.examples:critical_points"
+        >>> x, y = "throw.speed=157 deg/s:158 deg/s:2", "arm.surface_height=-0.2:-0.15:2"
+        >>> found = ls.atlas("paper-designed", x, y, task=task)
+        >>> found.certify().shares()["proved"]
+        1.0
+        """
+        from limitsets.regions import certified, evenly  # lazily: an atlas without proofs does not load them
+
+        plan = self.dataset.attrs["plan"]
+        if "scene" not in plan or len(self.axes) != 2:
+            raise LimitsetsError(
+                "the atlas", f"of {len(self.axes)} axes", "an atlas of a scene with two axes", "give x and y"
+            )
+        axes = []
+        for name in reversed(self.axes):  # x first
+            values, unit = self.dataset[name].values, self.dataset[name].attrs["units"]
+            first, last = (f"{float(each)!r} {unit}" for each in (values[0], values[-1]))
+            axes.append(evenly(name, first, last, values.size))
+        x, y = axes
+        return certified(load(plan["scene"]), x, y, depth=depth, executor=executor, progress=progress)
 
 
 def _entries(lengths: Sequence[int]) -> Iterator[tuple[int, ...]]:
@@ -281,9 +330,8 @@ def _pool(
     elif cluster is not None:
         with on_cluster(cluster) as pool:
             yield pool
-    elif chunks == 1 and threading.current_thread() is threading.main_thread():
-        with ThreadPoolExecutor(1) as here:  # starting a process takes longer than most single chunks
-            yield Given(here)
+    elif chunks == 1:  # to start a process takes longer than most single chunks
+        yield Given(Here(), 1)
     else:
         _require_importable(plan)
         yield Processes(min(workers or present_cores(), chunks))

@@ -14,8 +14,8 @@ import limitsets as ls
 from limitsets.errors import AnswerError
 from limitsets.maps import images, orbit
 from limitsets.regions import (
-    Axis,
     Block,
+    CellAxis,
     Record,
     Regions,
     certified,
@@ -34,7 +34,7 @@ X = 20.0
 @pytest.fixture(scope="module")
 def plane():
     """Part of the border between feeders that have the goal and feeders that do not."""
-    speed = Axis.of(
+    speed = CellAxis.of(
         "throw.speed", ["155 deg/s", "155.25 deg/s", "155.5 deg/s", "158.25 deg/s", "158.5 deg/s"]
     )
     height = evenly("arm.surface_height", "-0.22 in", "-0.2 in", 2)
@@ -342,6 +342,10 @@ FORGERIES = {
     "a region of its own": lambda f: set_at(f, "region", 1, 1),
     "a factor near the joint is too large": lambda f: set_at(f, "joint", (0, 0), 1.5),
     "a factor is no number": lambda f: set_at(f, "joint", (0, 0), np.nan),
+    "a grid that is none": lambda f: set_at(f, "grid", 0, -7),
+    "a border that is none": lambda f: set_at(f, "cells", (0, 0), -1),
+    "a block of no cell": lambda f: set_at(f, "blocks", (0, 0), 10_000),
+    "a code that is none": lambda f: set_at(f, "goal", 0, 3),
     "noise": lambda f: f.header.__setitem__("noise", {"throw.speed": "1 %"}),
     "one more array": lambda f: f.arrays.__setitem__("edges.9.0", np.arange(3.0)),
 }  # fmt: skip
@@ -377,7 +381,7 @@ def test_an_unspoiled_copy_is_confirmed(files, tmp_path):
 )
 def test_borders_ascend_in_one_unit(borders):
     with pytest.raises(AnswerError, match=r"borders of throw\.speed"):
-        Axis.of("throw.speed", borders)
+        CellAxis.of("throw.speed", borders)
 
 
 def test_effects_and_axes_that_are_one_are_refused():

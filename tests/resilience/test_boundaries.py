@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import limitsets as ls
+from limitsets.resilience import uncertainty
 from tests.maps_of_tests import Contraction, ThreeState, TwoState
 from tests.resilience.maps_with_basins import Gaps, Sheet, Turnstile, Wall
 from tests.resilience.test_shares import CUBIC, TWO_SIDES, setting
@@ -52,6 +53,13 @@ def test_an_open_map_in_the_plane_has_the_same_exponent_along_its_steep_axis():
     """Starts apart along x_1 come to the same exit: the mean over both axes is half, with the same exponent."""
     found = ls.resilience.uncertainty_exponent(*setting(Sheet(2.0, 0.0), UNIT * 2, (2003, 410)))
     assert found.boundary_dimension == pytest.approx(1.0 + math.log(3) / math.log(5), abs=0.05)
+
+
+def test_starts_beside_undecided_ones_are_left_out():
+    """Of five starts in a row the middle one is undecided: the two beside it are left out, the others agree."""
+    row, label = ls.grid([(0.0, 1.0)], cells=5), np.array([0, 0, ls.maps.UNDECIDED, 1, 1])
+    assert uncertainty._uncertain(row, label, 1) == 0.0
+    assert uncertainty._uncertain(row, label, 3) == 1.0  # 0 with 3, 1 with 4
 
 
 def test_starts_on_their_way_are_told_and_left_out():
@@ -112,6 +120,7 @@ def test_fatal_shocks_of_the_cubic_map(method, x, shock):
     assert found.lo <= abs(shock) <= found.hi < found.lo + 3e-3
     assert found.shock[0] == pytest.approx(shock, abs=1e-3)
     assert found.how == ("proved" if method else "cells")
+    assert method or found.hi - found.lo >= 4.0 * 3.0 / 9000  # two cells at either end
     assert {found.basin, found.into} == {0, 1}
 
 

@@ -73,6 +73,7 @@ def test_proved_brackets_of_entropies_hold_the_exact_ones(lo, hi):
     assert whole.lo <= values.mean() <= whole.hi
     assert border.lo <= values[values > 0.0].mean() <= border.hi
     assert whole.hi - whole.lo < 0.02
+    assert lo > -1.5 or border.hi > LN2  # an orbit may stay at 0, in no basin
 
 
 def test_the_bracket_is_that_of_all_allotments():
@@ -140,6 +141,12 @@ def test_every_start_leaves_an_open_map_but_for_a_cantor_set():
     assert found.exits["undefined"].hi == 0.0
 
 
+def test_cells_that_come_back_and_leave_may_do_either():
+    """Of three cells all are recurrent, and the middle one leaves as well."""
+    found = ls.resilience.basin_stability(*setting(Tent(3.0), [(0.0, 1.0)], 3, "boxes"))
+    assert (found.exits["outside"].lo, found.exits["outside"].hi) == (0.0, 1.0)
+
+
 def test_exits_share_the_starts_of_an_open_map():
     graph, attractors = setting(Gaps(3.0, 0.0), [(0.0, 1.0)], 20_011)
     for found in (
@@ -149,6 +156,17 @@ def test_exits_share_the_starts_of_an_open_map():
         for name in ("first", "second", "third"):
             assert found.exits[name].lo <= 1.0 / 3.0 <= found.exits[name].hi
             assert found.exits[name].share == pytest.approx(1.0 / 3.0, abs=0.02)
+
+
+def test_orbits_leave_the_domain_by_the_exit_of_its_cells():
+    """On [0, 0.7] an image beyond 0.7 leaves by the upper exit of the grid, the second."""
+    graph, attractors = setting(Gaps(2.0, 0.0), [(0.0, 0.7)], 20_011)
+    cells = ls.resilience.basin_stability(graph, attractors).exits
+    orbits = ls.resilience.basin_stability(graph, attractors, starts=4000).exits
+    assert cells["first"].hi < cells["second"].lo
+    for name in ("first", "second"):
+        assert cells[name].lo <= orbits[name].hi
+        assert orbits[name].lo <= cells[name].hi
 
 
 def test_an_outer_basin_leaves_out_what_lies_between_others():
@@ -186,6 +204,9 @@ def test_shares_and_entropy_in_space():
     assert found.attractors[0].lo <= 0.65 <= found.attractors[0].hi
     border = ls.resilience.boundary_basin_entropy(graph, attractors, box=20)
     assert border.boxes == 4
+    assert (
+        border.hi <= LN2 + 1e-9
+    )  # the undecided cells lead to one of the two at once: nothing stays elsewhere
     assert border.value == pytest.approx(binary(0.3), abs=0.05)
 
 

@@ -186,4 +186,15 @@ def _of_map(params: Any, path: Curve, domain: Any) -> Path:
 def read_path(subject: Any, path: Curve, domain: Any) -> Path:
     """Read a path of a scene, or of a map; AnswerError for what is none."""
     found = _of_scene(subject, path) if isinstance(subject, Scene) else _of_map(subject, path, domain)
-    return found._replace(at=lru_cache(maxsize=65_536)(found.at))  # a place remembers what was found there
+    names = set(found.at(0.0).values)
+
+    def at(t: float) -> Place:
+        place = found.at(t)
+        if set(place.values) != names:
+            allowed = ", ".join(sorted(names))
+            raise AnswerError(
+                "the values of the path", sorted(place.values), allowed, "give the same for all t"
+            )
+        return place
+
+    return found._replace(at=lru_cache(maxsize=65_536)(at))  # a place remembers what was found there
