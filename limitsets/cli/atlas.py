@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from contextlib import nullcontext
 from enum import StrEnum
 from pathlib import Path
@@ -66,6 +67,8 @@ def atlas(
     with progress() as tell, saved(csv) if csv is not None else nullcontext() as draft:
         from limitsets.sweep import atlas as run
 
+        if task is not None:  # a file of the present folder is found, as `python -m` would find it
+            sys.path.insert(0, str(Path.cwd()))
         chosen, _ = opened(scene, None)
         store = out or Path(f"{chosen.name}-atlas.zarr")
         wanted = [name.strip() for words in variables or [] for name in words.split(",")]

@@ -180,8 +180,7 @@ def reaches(
     """
     kind = kind_of(point_of(stack, 0))
     out = np.empty((size_of(stack), region.lo.shape[1]))
-    near = (region.lo - region.bottom) / (region.hi - region.bottom)
-    one, two = (work_for(region.lo.shape[1], 1, SAMPLES, float(near.min())) for _ in range(2))
+    one, two = (work_for(region, 1, SAMPLES) for _ in range(2))
     decided = kind.has_margin or len(kind.branches) == 1
     beside = stack if other is None else other
     _reaches(stack, beside, other is not None, decided, region, points, known, one, two, out)

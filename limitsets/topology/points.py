@@ -180,7 +180,7 @@ def topologies(
     found = empty(n, region.lo.shape[1])
     points = np.arange(n)
     for cells, samples in levels:
-        _points(stack, points, decided, region, _work(region, cells, samples), found)
+        _points(stack, points, decided, region, work_for(region, cells, samples), found)
         points = np.flatnonzero(found.undecided != DECIDED)
         if points.size == 0:
             break
@@ -200,12 +200,6 @@ def region_of(lo: Any, hi: Any, anchor: Any = None) -> Region:
             "the shapes of the domains", shapes, "(points, sides) each", "give a row for each point"
         )
     return region
-
-
-def _work(region: Region, cells: int, samples: int) -> Work:
-    """Make scratch arrays for cells that shrink towards the anchor down to the least distance any point has from it."""
-    near = (region.lo - region.bottom) / (region.hi - region.bottom)
-    return work_for(region.lo.shape[1], cells, samples, float(near.min()))
 
 
 def _tidy(t: Topologies) -> None:

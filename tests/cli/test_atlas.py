@@ -3,6 +3,7 @@
 import csv
 import json
 import math
+import sys
 
 import pytest
 
@@ -26,6 +27,23 @@ def test_the_designed_critical_points_in_every_form(capfd, tmp_path):
     assert (code, err) == (0, "")
     assert "2 points, 1 of its 1 chunks by earlier runs: paper-designed-atlas.zarr" in out
     assert "2 computed" in out
+
+
+def test_a_task_in_a_file_of_the_present_folder(capfd, tmp_path, monkeypatch):
+    (tmp_path / "own_task_here.py").write_text("def twice(scene):\n    return {'twice': 2 * scene.kappa}\n")
+    monkeypatch.setattr(sys, "path", [place for place in sys.path if place not in ("", str(tmp_path))])
+    words = [
+        "atlas",
+        "paper-designed",
+        "--x",
+        "throw.kappa=25:30:9",
+        "--task",
+        "own_task_here:twice",
+        "--json",
+    ]
+    code, out, _ = run(capfd, *words, "--workers", "2")
+    assert code == 0
+    assert json.loads(out)["variables"]["twice"]["values"] == [50.0 + 1.25 * k for k in range(9)]
 
 
 def test_another_plan_in_the_same_place_is_bad_input(capfd):
