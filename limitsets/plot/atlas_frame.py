@@ -25,15 +25,13 @@ def title_of(found: Atlas) -> str:
     return str(found.dataset.attrs.get("title", "")).removeprefix("atlas of ")
 
 
-def frame(found: Atlas) -> tuple[Figure, Axes]:
-    """Make the figure of a map with its axes labelled: a strip where one quantity varies."""
+def frame(found: Atlas, tall: float = 0.0) -> tuple[Figure, Axes]:
+    """Make a figure with its axes labelled, flat where one quantity varies, but at least so tall [inches]."""
     names = found.axes
-    figure, (axes,) = style.canvas(10.2, 5.4 if len(names) == 2 else 2.6)
+    figure, (axes,) = style.canvas(10.2, max(5.4 if len(names) == 2 else 2.6, tall))
     axes.set_xlabel(_with_unit(found, names[-1]))
     if len(names) == 2:
         axes.set_ylabel(_with_unit(found, names[0]))
-    else:
-        axes.set_yticks([])
     x, y = pixels(found)
     axes.set_xlim(x[0], x[-1])
     axes.set_ylim(y[0], y[-1])
@@ -101,7 +99,7 @@ def mark(axes: Axes, found: Atlas) -> list[Any]:
         "mew": 1.0,
         "ls": "none",
     }
-    x, y = values[-1], values[0] if len(values) == 2 else 0.5
+    x, y = values[-1], values[0] if len(values) == 2 else 0.15
     axes.plot([x], [y], zorder=6, gid="design", **look)
     numbers = ", ".join(f"{value:.6g}" for value in reversed(values))
     return [style.key(f"{title_of(found)}: {numbers}", **look)]

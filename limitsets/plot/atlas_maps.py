@@ -32,10 +32,10 @@ if TYPE_CHECKING:
 __all__ = ["atlas", "look_of"]
 
 # Paul Tol's light scheme, made for areas and colour-blind readers, without its orange; a cycle's face.
-FACES = ("#EEDD88", "#44BB99", "#77AADD", "#FFAABB", "#BBCC33", "#99DDFF", "#AAAA00")
+FACES = ("#EEDD88", "#44BB99", "#77AADD", "#FFAABB", "#99DDFF", "#BBCC33", "#AAAA00")
 # Bands that no cycle is are darker by this share of ink; without an attractor these, by what every start does.
-DARKER = 0.18
-ALL_LEAVE, ALL_COLLAPSE, NEITHER_ALL = "#E58A4E", "#6A4C93", "#F3CDB0"
+DARKER = 0.16
+ALL_LEAVE, ALL_COLLAPSE, NEITHER_ALL = "#EE9A62", "#6A4C93", "#F6D9C4"
 DOUBT, DOUBT_HATCH = "#B4B4B4", "xxxx"
 LEAVE_HATCH, COLLAPSE_HATCH = "////", "...."
 MOST_LINES = 12
@@ -103,19 +103,23 @@ def atlas(found: Atlas) -> Figure:
     numbers, _ = numbers_of(data)
     entries = legend(data)
     looks = {each.number: look_of(each.number, each.name) for each in entries}
-    figure, axes = frame(found)
+    figure, axes = frame(found, 0.8 + 0.3 * min(len(entries), MOST_LINES + 2))
+    if len(found.axes) == 1:
+        axes.set_yticks([])
     rows = np.atleast_2d(numbers)
     _paint(axes, found, rows, looks)
-    for k, each in enumerate(entries[:MOST_LINES]):
+    doubt = [each for each in entries if each.number == UNDECIDED]
+    sure = entries[: len(entries) - len(doubt)]
+    lines, rest = sure[:MOST_LINES] + doubt, sure[MOST_LINES:]
+    for k, each in enumerate(lines):
         _label(axes, found, rows == each.number, str(k + 1))
     handles = [
         Patch(label=_words(k + 1, each), edgecolor=style.INK, lw=0.5, **looks[each.number])
-        for k, each in enumerate(entries[:MOST_LINES])
+        for k, each in enumerate(lines)
     ]
-    rest = entries[MOST_LINES:]
     if rest:
         share = _percent(sum(each.share for each in rest))
-        handles.append(Patch(label=f"{len(rest)} more classes ({share})", alpha=0.0))
+        handles.append(Patch(label=f"{len(rest)} other class{'es' * (len(rest) > 1)} ({share})", alpha=0.0))
     handles += mark(axes, found)
     figure.legend(
         handles=handles, loc="outside right upper", fontsize=style.SMALL, frameon=False, handlelength=2.4,

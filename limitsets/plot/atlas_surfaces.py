@@ -38,8 +38,6 @@ WORDS = {
     "reach": "largest x of the attractor",
     "jogs_max": "most jogs of a visit",
 }
-# Where a sign or the scene's goal changes the answer, a line.
-LEVELS = {"lyapunov": 0.0}
 
 
 def atlas_surface(found: Atlas, variable: str, side: int | None = None) -> Figure:
@@ -77,7 +75,7 @@ def atlas_surface(found: Atlas, variable: str, side: int | None = None) -> Figur
     unit = found.dataset[variable].attrs.get("units", "")
     words = WORDS.get(variable, found.dataset[variable].attrs.get("long_name", variable))
     words += ("" if side is None else f", side {side}") + (f" [{unit}]" if unit else "")
-    figure, axes = frame(found)
+    figure, axes = frame(found, 3.4)
     level = _level(found, variable)
     handles = _painted(figure, axes, found, values, words, level) if values.ndim == 2 else []
     if values.ndim == 1:
@@ -149,16 +147,16 @@ def _painted(
         if level is not None and values[there].min() < level[0] < values[there].max():
             xs, ys = (found.dataset[name].values for name in reversed(found.axes))
             axes.contour(
-                xs, ys, np.ma.masked_invalid(values), [level[0]], colors="white", linewidths=1.6, zorder=3
+                xs, ys, np.ma.masked_invalid(values), [level[0]], colors="white", linewidths=2.4, zorder=3
             )
             line = axes.contour(
-                xs, ys, np.ma.masked_invalid(values), [level[0]], colors=style.INK, linewidths=0.8, zorder=4
+                xs, ys, np.ma.masked_invalid(values), [level[0]], colors=style.INK, linewidths=1.1, zorder=4
             )
             line.set_gid("level")
             handles.append(style.key(level[1], color=style.INK, lw=0.9))
     if not there.all():
         handles.append(
-            Patch(label="no attractor, or undecided", fc=NOTHING, ec=style.INK, hatch=NOTHING_HATCH, lw=0.5)
+            Patch(label="none, or undecided", fc=NOTHING, ec=style.INK, hatch=NOTHING_HATCH, lw=0.5)
         )
     return handles
 
@@ -169,8 +167,6 @@ def _lined(
     """Draw a line against one quantity."""
     x = found.dataset[found.axes[0]].values
     axes.plot(x, values, color=style.JOG, lw=1.1, marker="." if x.size < 60 else "", gid="values")
-    axes.yaxis.set_tick_params(left=True)
-    axes.set_yticks(axes.get_yticks())
     axes.autoscale(axis="y")
     axes.set_ylabel(words)
     if level is None:

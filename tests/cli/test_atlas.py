@@ -86,3 +86,20 @@ def test_points_without_a_scene_are_counted(capfd):
     # at 10 deg/s kappa is 193.045/(pi/18)^2 = 6337 in: there is a scene
     assert status["values"] == [1, 1, 0]
     assert math.prod(status["codes"].values()) == 0
+
+
+@pytest.mark.parametrize(("form", "begins"), [("png", b"\x89PNG"), ("svg", b"<?xml"), ("pdf", b"%PDF")])
+def test_the_map_of_classes_lies_beside_the_store(form, begins, capfd, tmp_path):
+    speed = ["--x", "throw.speed=135:165:17", "--refine", "--variables", "class"]
+    code, out, _ = run(capfd, "atlas", "paper-designed", *speed, "--format", form, "-o", "here.zarr")
+    assert code == 0
+    assert f"figure: here.{form}" in out
+    assert (tmp_path / f"here.{form}").read_bytes().startswith(begins)
+    assert "level" in out  # some points are filled
+
+
+def test_a_task_without_classes_has_no_map(capfd, tmp_path):
+    code, out, _ = run(capfd, "atlas", "paper-designed", *KAPPA, "--task", TASK, "-o", "here.zarr")
+    assert code == 0
+    assert "figure" not in out
+    assert [path.name for path in tmp_path.glob("here*")] == ["here.zarr"]
