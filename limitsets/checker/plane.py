@@ -332,7 +332,9 @@ def plane_in_words(plane: Plane, goal: dict[str, Any] | None) -> list[str]:
         lines += [f"    in {number} of the proved cells {words} to the blocks"] if number else []
     twice = int(((f["counts"][:, 1] == 2) & (f["goal"] == GOAL_PROVED)).sum())
     if goal is not None and goal["kind"] == "oriented_beyond" and twice:
-        lines.append(f"    in {twice} of them the goal holds after two throws with the same parameters in the blocks")
+        lines.append(
+            f"    in {twice} of them the goal holds after two throws with the same parameters in the blocks"
+        )
     if goal is not None and goal["kind"] == "reaches" and not goal["every"]:
         lines.append(
             "    the goal speaks of almost every orbit: it is proved but for starts of total length zero"

@@ -113,9 +113,7 @@ def number_and_unit(text: str, kinds: str, where: str) -> tuple[Fraction, str]:
     """Read a text like `"5.75 in"`: the number in the basic unit of its kind, and the unit written."""
     words = text if len(text) <= LONGEST_TEXT else ""
     tidy = words == " ".join(words.split()) != ""
-    require(
-        tidy, f"{where}: {plain(text)} is not text of at most {LONGEST_TEXT} signs, with single blanks"
-    )
+    require(tidy, f"{where}: {plain(text)} is not text of at most {LONGEST_TEXT} signs, with single blanks")
     found = NUMBER.fullmatch(words)
     require(found is not None, f"{where}: {plain(text)} is not a decimal number and a unit")
     assert found is not None
