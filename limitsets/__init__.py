@@ -18,7 +18,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:  # each from the file that holds it: most rooms have a file of the same name
-    from limitsets import engine, interval, maps, plot
+    from limitsets import engine, interval, maps, plot, resilience
     from limitsets.analysis import analyse
     from limitsets.auditing import audit
     from limitsets.cells import grid
@@ -36,6 +36,7 @@ if TYPE_CHECKING:  # each from the file that holds it: most rooms have a file of
     from limitsets.sets.basins import basins
     from limitsets.sets.cycles import cycles
     from limitsets.sets.limit_set import limit_set
+    from limitsets.sweep.continuation import continuation
     from limitsets.sweep.parameter_atlas import atlas
 
 __version__ = "0.1.0"
@@ -49,6 +50,7 @@ _ROOMS = {
     "audit": "auditing",
     "basins": "sets.basins",
     "certify": "proofs.certify",
+    "continuation": "sweep.continuation",
     "critical_points": "maps",
     "cycles": "sets.cycles",
     "design": "inverse",
@@ -66,6 +68,7 @@ _ROOMS = {
     "plot": "plot",
     "recheck": "proofs.confirm",
     "register": "maps",
+    "resilience": "resilience",
     "robust_design": "inverse",
     "robustness": "robust.sheet.sheet_run",
     "scenes": "scene",
@@ -79,6 +82,7 @@ __all__ = [
     "audit",
     "basins",
     "certify",
+    "continuation",
     "critical_points",
     "cycles",
     "design",
@@ -96,6 +100,7 @@ __all__ = [
     "plot",
     "recheck",
     "register",
+    "resilience",
     "robust_design",
     "robustness",
     "scenes",

@@ -17,7 +17,7 @@ ROOT = Path(__file__).resolve().parents[1]
 PACKAGE = ROOT / "limitsets"
 SOURCES = sorted(PACKAGE.rglob("*.py"))
 LATE = ["numba", "scipy", "networkx", "matplotlib", "pint", "pydantic", "typer", "rich", "jinja2", "tomlkit"]
-LATE += ["pymunk"]
+LATE += ["pymunk", "xarray", "zarr", "pandas", "pyarrow", "dask", "distributed"]
 
 
 def run_python(code: str, cwd: Path = ROOT) -> str:

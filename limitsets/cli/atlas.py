@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import sys
+from contextlib import nullcontext
+from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -11,14 +14,28 @@ from limitsets.cli.output import Json, Scene, answer, opened, option, progress, 
 
 if TYPE_CHECKING:
     from limitsets.sweep import Atlas
+    from limitsets.sweep.driving import Progress
 
 __all__ = ["atlas"]
 
 HELP_X = "What varies: throw.speed=120:180:1000, or with units throw.speed='120 deg/s:180 deg/s:1000'."
-HELP_TASK = "What is asked: a function that can be imported, of a scene."
+HELP_TASK = "What is asked: a function of a scene; by default the topology of the attractors."
+HELP_MARGIN = "Find the goal's margin at every point, by floats: throw.speed, or joint."
+HELP_CERTIFY = "Prove what holds in each cell of the window; writes NAME-regions.proof.zip."
 HELP_OUT = "The store (Zarr), ./NAME-atlas.zarr by default; one that was begun is continued."
 HELP_CLUSTER = "Compute on a Dask cluster, by its scheduler's address: tcp://10.0.0.1:8786."
+HELP_REFINE = "Compute a coarse grid, then only points near boundaries of classes; fill the rest."
+HELP_COARSE = "With --refine: the coarse grid has every N-th point of each axis."
+HELP_FORMAT = "Of the picture beside the store, NAME-atlas.png: png, svg or pdf."
 HELP_CSV = "Write a table with a row for each point."
+
+
+class Form(StrEnum):
+    """Of a picture."""
+
+    PNG = "png"
+    SVG = "svg"
+    PDF = "pdf"
 
 
 def atlas(
@@ -29,9 +46,17 @@ def atlas(
         list[str] | None, option("--variables", "V,V", "Which answers; default: what the task gives.")
     ] = None,
     task: Annotated[str | None, option("--task", "MODULE:FUNCTION", HELP_TASK)] = None,
+    margin: Annotated[str | None, option("--margin", "Q", HELP_MARGIN)] = None,
+    reading: Annotated[
+        str, option("--reading", "R", "Of --margin: fixed (but unknown) or per-throw.")
+    ] = "fixed",
+    certify: Annotated[bool, typer.Option("--certify", help=HELP_CERTIFY)] = False,
     out: Annotated[Path | None, option("--out -o", "STORE", HELP_OUT)] = None,
     workers: Annotated[int | None, option("--workers", "N", "Processes; default: one a core.", min=1)] = None,
     cluster: Annotated[str | None, option("--cluster", "URL", HELP_CLUSTER)] = None,
+    refine: Annotated[bool, typer.Option("--refine", help=HELP_REFINE)] = False,
+    coarse: Annotated[int, option("--coarse", "N", HELP_COARSE, min=2)] = 8,
+    form: Annotated[Form, option("--format", "FORMAT", HELP_FORMAT)] = Form.PNG,
     csv: Annotated[Path | None, option("--csv", "FILE", HELP_CSV)] = None,
     json: Json = False,
 ) -> None:
@@ -39,9 +64,11 @@ def atlas(
 
     A run that was interrupted goes on when the same command is given again.
     """
-    with progress() as tell:
+    with progress() as tell, saved(csv) if csv is not None else nullcontext() as draft:
         from limitsets.sweep import atlas as run
 
+        if task is not None:  # a file of the present folder is found, as `python -m` would find it
+            sys.path.insert(0, str(Path.cwd()))
         chosen, _ = opened(scene, None)
         store = out or Path(f"{chosen.name}-atlas.zarr")
         wanted = [name.strip() for words in variables or [] for name in words.split(",")]
@@ -51,18 +78,53 @@ def atlas(
             y,
             task=task,
             variables=wanted or None,
+            options=None if margin is None else {"margin": margin, "reading": reading},
+            refine=refine,
+            coarse=coarse,
             store=store,
             workers=workers,
             cluster=cluster,
             progress=tell,
         )
-        if csv is not None:
-            with saved(csv) as draft:
-                found.to_dataframe().to_csv(draft, index=False)
-    answer(found if json else None, json, lambda: _text(found, csv))
+        if draft is not None:
+            found.to_dataframe().to_csv(draft, index=False)
+        picture = store.with_name(f"{store.name.removesuffix('.zarr')}.{form}")
+        drawn = _draw(found, picture)
+        proof = Path(f"{chosen.name}-regions.proof.zip") if certify else None
+        shares = _certified(found, proof, workers, tell) if proof is not None else {}
+    answer(found if json else None, json, lambda: _text(found, csv, picture if drawn else None))
+    if proof is not None and not json:
+        said = ", ".join(f"{100 * share:.2f} % {word}" for word, share in shares.items())
+        typer.echo(f"regions: {said}: {proof}")
 
 
-def _text(found: Atlas, csv: Path | None) -> None:
+def _certified(found: Atlas, file: Path, workers: int | None, tell: Progress) -> dict[str, float]:
+    """Prove the cells on processes, and write the certificate; shares of the window by what is proved."""
+    from concurrent.futures import ProcessPoolExecutor
+    from multiprocessing import get_context
+
+    with ProcessPoolExecutor(workers, get_context("spawn")) as pool:
+        regions = found.certify(executor=pool, progress=tell)
+    tell("certificate", 0, 1)
+    regions.save(file, workers=workers)
+    return regions.shares()
+
+
+def _draw(found: Atlas, file: Path) -> bool:
+    """Draw the classes, if the answers say them; whether they do."""
+    from limitsets.plot.atlas_maps import atlas as figure
+    from limitsets.report.writing import DPI
+    from limitsets.sweep.classes import is_classified
+
+    if not is_classified(found.dataset):
+        return False
+    drawn = figure(found)
+    with saved(file) as draft:
+        drawn.savefig(draft, dpi=DPI)
+    return True
+
+
+def _text(found: Atlas, csv: Path | None, picture: Path | None) -> None:
     """Print what the answers range over, and where they are."""
     import numpy as np
 
@@ -82,3 +144,5 @@ def _text(found: Atlas, csv: Path | None) -> None:
     typer.echo(f"{points} points{again}: {found.store}")
     if csv is not None:
         typer.echo(f"table: {csv}")
+    if picture is not None:
+        typer.echo(f"figure: {picture}")

@@ -45,6 +45,8 @@ class TransitionGraph:
         How the images were found; proved for "boxes", sampled otherwise.
     second_pass : float
         Share of the sampled states that the map's fast kernel could not vouch for.
+    upper : NamedTuple or None
+        The upper corner, where the images are those of a box of parameters with the lower corner `map`.
     """
 
     map: Any
@@ -52,6 +54,7 @@ class TransitionGraph:
     ranges: Ranges
     method: str
     second_pass: float = 0.0
+    upper: Any = None
     graph: dict[str, Any] = field(default_factory=dict)  # networkx: attributes of the graph
 
     __networkx_backend__ = "limitsets"

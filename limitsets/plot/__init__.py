@@ -9,8 +9,11 @@ with the object interface.  A file never has the name of a function of the room:
 import of that file `plot.map` would be a module.
 """
 
+from limitsets.plot.atlas_maps import atlas
+from limitsets.plot.atlas_surfaces import atlas_surface
 from limitsets.plot.audit_strips import audit
 from limitsets.plot.basin import basins
+from limitsets.plot.bifurcations import bifurcation
 from limitsets.plot.counterexamples import counterexample
 from limitsets.plot.designs import design
 from limitsets.plot.flights import flight
@@ -22,8 +25,11 @@ from limitsets.plot.morse_graphs import morse
 from limitsets.plot.noise import noise_arrivals, noise_density, noise_levels
 
 __all__ = [
+    "atlas",
+    "atlas_surface",
     "audit",
     "basins",
+    "bifurcation",
     "counterexample",
     "design",
     "flight",

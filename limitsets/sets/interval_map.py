@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from limitsets.maps.contract import kind_of
-from limitsets.maps.critical import Sides, margins
+from limitsets.maps.critical import SAMPLES, Sides, margins
 from limitsets.maps.forced import along
 from limitsets.maps.pieces import monotone_pieces
 from limitsets.sets.unions import BORDER, EPS, Track, TrackedInterval, Union, cut, merged
@@ -70,9 +70,11 @@ class IntervalMap:
         A one-dimensional map with `image_on`.
     domain : Domain
         What leaves it is dropped.
+    samples : int
+        As for `monotone_pieces`.
     """
 
-    def __init__(self, params: Any, domain: Sides) -> None:
+    def __init__(self, params: Any, domain: Sides, samples: int = SAMPLES) -> None:
         self.params = params
         self.bounds = [(float(domain.lo[side, 0]), float(domain.hi[side, 0])) for side in range(domain.sides)]
         self.pieces = {
@@ -84,7 +86,7 @@ class IntervalMap:
                 )
                 for piece in pieces
             ]
-            for side, pieces in monotone_pieces(params, domain).items()
+            for side, pieces in monotone_pieces(params, domain, samples=samples).items()
         }
 
     def _born(self, side: int, x: float, kind: str) -> Track:

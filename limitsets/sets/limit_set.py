@@ -26,7 +26,7 @@ from limitsets.sets.bottleneck import in_bottleneck
 from limitsets.sets.interval_map import IntervalMap
 from limitsets.sets.unions import Extents, Track, Union, read, same
 
-__all__ = ["End", "LimitSet", "Origin", "limit_set", "limit_set_of"]
+__all__ = ["End", "LimitSet", "Origin", "ends_of", "limit_set", "limit_set_of"]
 
 # Near a_i of the throw an orbit takes some 1200 throws to get away from 1e-9 of the arm; beyond this the map is no
 # longer expanding there and a set that still moves is said to move.
@@ -129,7 +129,8 @@ def _origin(names: tuple[str, ...], track: Track) -> Origin:
     return Origin(track.kind, track.side, track.start, tuple(reversed(branches)))
 
 
-def _ends(names: tuple[str, ...], union: Union) -> tuple[End, ...]:
+def ends_of(names: tuple[str, ...], union: Union) -> tuple[End, ...]:
+    """Give the ends of a union of intervals with their origins; `names` are those of the map's branches."""
     return tuple(
         End(side, end.x, which, _origin(names, end), end.error)
         for side, intervals in union.items()
@@ -210,7 +211,7 @@ def limit_set_of(
     converged = rested == 2 and not crept
     return LimitSet(
         {side: [(lo.x, hi.x) for lo, hi in intervals] for side, intervals in union.items()},
-        _ends(kind_of(params).branches, union),
+        ends_of(kind_of(params).branches, union),
         count,
         converged,
         leaves,

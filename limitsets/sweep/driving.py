@@ -41,7 +41,7 @@ class _Told:
         done, of = len(self.store.done), math.prod(self.plan.chunks)
         if done == of:
             return
-        words, seconds = "atlas, workers start", time.monotonic() - self.began
+        words, seconds = "atlas (a first run compiles: up to two minutes)", time.monotonic() - self.began
         if self.points and seconds > 0:
             rate = self.points / seconds
             left = (of - done) * seconds / (done - self.before)
@@ -69,13 +69,13 @@ def drive(plan: Plan, store: Store, pool: Given, progress: Progress | None = Non
     try:
         while todo or flight:
             lost: list[int] = []
+            told.tell()
             while todo and len(flight) < pool.window and not lost:
                 k = todo.popleft()
                 try:
                     flight[pool.submit(answer, plan, k)] = k
                 except BrokenExecutor:
                     lost.append(k)
-            told.tell()
             done, _ = wait(flight, timeout=_SECONDS, return_when=FIRST_COMPLETED)
             for future in done:
                 k = flight.pop(future)

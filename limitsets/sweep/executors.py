@@ -6,16 +6,18 @@ import contextlib
 import multiprocessing
 import os
 import signal
+import sys
 import threading
 from collections.abc import Callable, Iterator
 from concurrent.futures import Executor, Future, ProcessPoolExecutor
 from contextlib import contextmanager
+from types import ModuleType
 from typing import Any
 
 from limitsets.errors import LimitsetsError
 from limitsets.sweep.store import imported
 
-__all__ = ["Given", "Processes", "on_cluster", "present_cores"]
+__all__ = ["Given", "Here", "Processes", "on_cluster", "present_cores"]
 
 # Chunks that wait beside those that are computed: enough that no worker ever waits for the driver.
 _WAITING = 2
@@ -57,6 +59,19 @@ class Given:
     abandon = end
 
 
+class Here(Executor):
+    """Computes in this thread what it is given, at once: Ctrl-C ends it."""
+
+    def submit(self, function: Callable[..., Any], /, *arguments: Any, **options: Any) -> Future[Any]:
+        """Compute something, and return that it is done."""
+        done: Future[Any] = Future()
+        try:
+            done.set_result(function(*arguments, **options))
+        except Exception as error:  # noqa: BLE001 - whoever asks for the result gets it
+            done.set_exception(error)
+        return done
+
+
 class Processes(Given):
     """Processes on this machine, which end when the driver ends, however it ends."""
 
@@ -72,6 +87,11 @@ class Processes(Given):
             context.set_forkserver_preload(["limitsets.sweep.work"])
         self.heard, self.alive = context.Pipe(duplex=False)
         return ProcessPoolExecutor(self.workers, context, initializer=_begin, initargs=(self.heard,))
+
+    def submit(self, function: Callable[..., Any], *arguments: Any) -> Future[Any]:
+        """Begin to compute something; processes are started here as they are needed."""
+        with _no_script():
+            return super().submit(function, *arguments)
 
     def restart(self) -> None:
         """Start new processes in place of those of which one died."""
@@ -91,6 +111,20 @@ class Processes(Given):
     def _closed(self) -> None:
         self.alive.close()
         self.heard.close()
+
+
+@contextmanager
+def _no_script() -> Iterator[None]:
+    """Start processes that do not run the script that started them: tasks never stand in it.
+
+    Python would import it in each, which begins the sweep again unless the script has a guard.
+    """
+    script = sys.modules["__main__"]
+    sys.modules["__main__"] = ModuleType("__main__")
+    try:
+        yield
+    finally:
+        sys.modules["__main__"] = script
 
 
 def _begin(heard: Any) -> None:

@@ -8,10 +8,18 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from limitsets.cells import Domain
+from limitsets.errors import AnswerError
 from limitsets.goals import OrientedBeyond, Reaches
+from limitsets.maps.stacks import point_of
+from limitsets.sets import limit_set_of
+from limitsets.sets.entropy import topological_entropy
+from limitsets.sweep.checking import ABOUT, CODES, NOT_CHECKED, checks
+from limitsets.sweep.classes import classes
+from limitsets.sweep.float_margins import float_margins, threshold_of, unit_of_margin
 from limitsets.sweep.subjects import SceneSubject, Subject
-from limitsets.sweep.tasks import Block, Variable, block_task
-from limitsets.topology import DOUBTS, topologies
+from limitsets.sweep.tasks import Block, Coded, Variable, block_task
+from limitsets.topology import DOUBTS, Topologies, topologies
 from limitsets.topology.records import BANDS_JOIN, DECIDED, MOVING, NOT_ONE, STAYING, TOO_FINE, UNSURE_EXIT
 from limitsets.topology.work import MOST_ATTRACTORS
 
@@ -30,7 +38,9 @@ _AVERAGES = frozenset({"flips_per_throw", "lyapunov", "lyapunov_error"})
 THROWS = 10_000
 
 
-def _variables(subject: Subject, throws: int = THROWS) -> Mapping[str, Variable]:
+def _variables(
+    subject: Subject, throws: int = THROWS, margin: str | None = None, reading: str = "fixed"
+) -> Mapping[str, Variable]:
     """Return the variables, with as many sides as the subject has."""
     each = (("attractor", MOST_ATTRACTORS),)
     sides = (*each, ("side", subject.sides))
@@ -38,6 +48,8 @@ def _variables(subject: Subject, throws: int = THROWS) -> Mapping[str, Variable]
     found = {
         "attractors": Variable("int8", about="how many attractors"),
         "undecided": Variable("int8", codes=_CODES, about=doubts),
+        "checked": Variable("int8", codes=CODES, about=ABOUT, fill=NOT_CHECKED),
+        "class": Variable("int64", about="hash of the class's name, the same in every atlas; 0: undecided"),
         "bands": Variable("int16", sides, about="intervals of the attractor on each side", fill=0),
         "flip_order": Variable("int8", sides, about="sides in cyclic order, then -1; all -2: it changes"),
         "jogs_min": Variable("int32", sides, about="fewest throws of one visit that stay on the side"),
@@ -51,17 +63,29 @@ def _variables(subject: Subject, throws: int = THROWS) -> Mapping[str, Variable]
         "flips_per_throw": Variable(dims=each, about="mean along one orbit", default=False),
         "lyapunov": Variable(dims=each, about="Lyapunov exponent per throw", default=False),
         "lyapunov_error": Variable(dims=each, about="its standard error", default=False),
+        "entropy": Variable(
+            dims=each, about="topological entropy per throw; about a second a point", default=False
+        ),
     }
     if _goal_of(subject) is not None:
         found["threshold"] = Variable(unit="length", about="where the goal begins or ceases to hold")
+    if margin is not None:
+        if not isinstance(subject, SceneSubject):
+            raise AnswerError("the subject of a margin", subject.title, "a scene with a goal", "leave it out")
+        about = f"of the goal, for {margin}, {reading}, by floats"
+        found["margin"] = Variable(unit=unit_of_margin(subject.scene, margin, reading), about=about)
     return found
 
 
 @block_task(_variables)
-def topology(block: Block, throws: int = THROWS) -> dict[str, npt.NDArray[Any]]:
+def topology(
+    block: Block, throws: int = THROWS, margin: str | None = None, reading: str = "fixed"
+) -> dict[str, npt.NDArray[Any] | Coded]:
     """Find the topology of the attractors at every point; where it is undecided, nothing else is said.
 
-    Flips per throw and the Lyapunov exponent are averaged over `throws` throws, if they are wanted.
+    Flips per throw and the Lyapunov exponent are averaged over `throws` throws, if they are wanted.  `margin` names a
+    quantity (or "joint", the scene's tolerance) and `reading` how it deviates (`limitsets.margin`): the margin of the
+    scene's goal is found by floats then, in at most some 2 ms a point.
     """
     points = block.points
     asked = throws if block.wanted & _AVERAGES else 0
@@ -70,16 +94,45 @@ def topology(block: Block, throws: int = THROWS) -> dict[str, npt.NDArray[Any]]:
     goal = _goal_of(block.subject)
     if goal is not None:
         found["threshold"] = _threshold(goal, told.reach)
+    if "margin" in block.wanted and margin is not None:
+        found["margin"] = float_margins(block.subject.scene, block.values, told, margin, reading)
+    if "entropy" in block.wanted:
+        found["entropy"] = _entropies(block, told)
+    if "checked" in block.wanted:
+        found["checked"] = checks(block, told)
     decided = told.undecided == DECIDED
-    variables = _variables(block.subject)
-    return {
-        name: found[name] if name == "undecided" else _kept(found[name], decided, variables[name].empty)
-        for name in block.wanted
+    variables = _variables(block.subject, throws, margin, reading)
+    answers: dict[str, npt.NDArray[Any] | Coded] = {
+        name: found[name]
+        if name in ("undecided", "checked")
+        else _kept(found[name], decided, variables[name].empty)
+        for name in block.wanted - {"class"}
     }
+    if "class" in block.wanted:
+        numbers, names = classes(told)
+        answers["class"] = Coded(numbers, {name: number for number, name in names.items()})
+    return answers
 
 
 def _kept(values: npt.NDArray[Any], decided: npt.NDArray[np.bool_], empty: float) -> npt.NDArray[Any]:
     return np.where(decided.reshape(-1, *[1] * (values.ndim - 1)), values, empty)
+
+
+def _entropies(block: Block, told: Topologies) -> npt.NDArray[np.float64]:
+    """Topological entropy of every attractor, from its bands."""
+    found = np.full(told.period.shape, np.nan)
+    for k, a in zip(*np.nonzero(told.period >= 0), strict=True):
+        if told.undecided[k] != DECIDED:
+            continue
+        points = block.points
+        anchor = None if points.anchor is None else points.anchor[k]
+        domain = Domain(points.lo[k][:, None], points.hi[k][:, None], anchor)
+        sides = np.flatnonzero(told.bands[k, a] > 0)
+        hulls = {int(s): [(told.lowest[k, a, s], told.reach[k, a, s])] for s in sides}
+        params = point_of(points.params, k)
+        bands = limit_set_of(params, hulls, domain, tolerance=1e-11).extents
+        found[k, a] = topological_entropy(params, bands, domain)
+    return found
 
 
 def _goal_of(subject: Subject) -> OrientedBeyond | Reaches | None:
@@ -90,9 +143,6 @@ def _goal_of(subject: Subject) -> OrientedBeyond | Reaches | None:
 
 def _threshold(goal: OrientedBeyond | Reaches, reach: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
     """Return the threshold of the worst attractor (`Goal.worst`); nan where there is none."""
-    if isinstance(goal, OrientedBeyond):
-        found = np.delete(reach, goal.side, axis=2)
-        worst = np.fmax.reduce(np.fmax.reduce(found, axis=2), axis=1)
-    else:
-        worst = np.fmin.reduce(reach[:, :, goal.side], axis=1)
-    return np.asarray(worst)
+    worst = np.fmax if isinstance(goal, OrientedBeyond) else np.fmin
+    each = np.stack([threshold_of(goal, reach[:, a]) for a in range(reach.shape[1])])
+    return np.asarray(worst.reduce(each))

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import math
-import threading
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import Executor, ThreadPoolExecutor
+from concurrent.futures import Executor
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,8 +16,9 @@ from limitsets.files import as_plain
 from limitsets.maps import coerce, kind_of
 from limitsets.scene import Scene, load
 from limitsets.sweep.axes import Axis, axis_of
+from limitsets.sweep.boundaries import STEP
 from limitsets.sweep.driving import Progress, drive
-from limitsets.sweep.executors import Given, Processes, on_cluster, present_cores
+from limitsets.sweep.executors import Given, Here, Processes, on_cluster, present_cores
 from limitsets.sweep.plan import Plan, chunk_shape, code_of
 from limitsets.sweep.store import CHECKSUM, Store, imported
 from limitsets.sweep.subjects import MapSubject, SceneSubject, Subject
@@ -27,6 +27,8 @@ from limitsets.sweep.tasks import named, resolved
 if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
+
+    from limitsets.regions import Regions
 
 __all__ = ["Atlas", "atlas"]
 
@@ -92,6 +94,54 @@ class Atlas:
             "versions": plan["versions"],
         }
 
+    def certify(
+        self, *, depth: int = 2, executor: Executor | None = None, progress: Progress | None = None
+    ) -> Regions:
+        """Cut the window into as many cells as there are points, and prove of each what holds for all its parameters.
+
+        Parameters
+        ----------
+        depth : int
+            How often a cell is halved along both axes while it is undecided.
+        executor : concurrent.futures.Executor, optional
+            Where the cells are done; here by default.
+        progress : callable, optional
+            Told ``(step, done, of)``.
+
+        Returns
+        -------
+        Regions
+            Codes, regions and a certificate to save (`limitsets.regions.certified`).
+
+        Raises
+        ------
+        LimitsetsError
+            For an atlas of a map, or along one axis.
+
+        Examples
+        --------
+        >>> import limitsets as ls
+        >>> task = "limitsets.sweep.examples:critical_points"
+        >>> x, y = "throw.speed=157 deg/s:158 deg/s:2", "arm.surface_height=-0.2:-0.15:2"
+        >>> found = ls.atlas("paper-designed", x, y, task=task)
+        >>> found.certify().shares()["proved"]
+        1.0
+        """
+        from limitsets.regions import certified, evenly  # lazily: an atlas without proofs does not load them
+
+        plan = self.dataset.attrs["plan"]
+        if "scene" not in plan or len(self.axes) != 2:
+            raise LimitsetsError(
+                "the atlas", f"of {len(self.axes)} axes", "an atlas of a scene with two axes", "give x and y"
+            )
+        axes = []
+        for name in reversed(self.axes):  # x first
+            values, unit = self.dataset[name].values, self.dataset[name].attrs["units"]
+            first, last = (f"{float(each)!r} {unit}" for each in (values[0], values[-1]))
+            axes.append(evenly(name, first, last, values.size))
+        x, y = axes
+        return certified(load(plan["scene"]), x, y, depth=depth, executor=executor, progress=progress)
+
 
 def _entries(lengths: Sequence[int]) -> Iterator[tuple[int, ...]]:
     if not lengths:
@@ -130,6 +180,8 @@ def atlas(
     domain: Any = None,
     chunk: Sequence[int] | None = None,
     seed: int = 0,
+    refine: bool | str = False,
+    coarse: int = STEP,
     store: str | Path | None = None,
     executor: Executor | None = None,
     cluster: str | None = None,
@@ -160,6 +212,12 @@ def atlas(
         Points of a chunk along y and x (or x); chosen by the number of points otherwise.
     seed : int
         Of all random numbers; each point has its own by its number.
+    refine : bool or str
+        True: compute a coarse grid, and then only the points near boundaries of classes; the rest is filled from the
+        nearest computed corner and marked by `level` -1 (docs/atlas.md).  A name: of another variable than `class`
+        whose changes are the boundaries.
+    coarse : int
+        Step of the coarse grid, in points along each axis.
     store : str or Path, optional
         A folder for the results.  If it holds a part of them already, only the rest is computed.
     executor : concurrent.futures.Executor, optional
@@ -182,8 +240,7 @@ def atlas(
 
     Notes
     -----
-    Results do not depend on the executor, the number of workers, or the order in which chunks are done.  Processes
-    import the script that starts them: a script keeps the call below ``if __name__ == "__main__":``.
+    Results do not depend on the executor, the number of workers, or the order in which chunks are done.
 
     Examples
     --------
@@ -194,8 +251,9 @@ def atlas(
     [10.0, 10.0, 20.0]
     """
     plan = plan_of(
-        subject, x, y, task=task, variables=variables, options=options, domain=domain, chunk=chunk, seed=seed
-    )
+        subject, x, y, task=task, variables=variables, options=options, domain=domain, chunk=chunk, seed=seed,
+        refine=refine, coarse=coarse,
+    )  # fmt: skip
     path = None if store is None else Path(store)
     imported("xarray")
     held = Store(plan, path)
@@ -223,6 +281,8 @@ def plan_of(
     domain: Any = None,
     chunk: Sequence[int] | None = None,
     seed: int = 0,
+    refine: bool | str = False,
+    coarse: int = STEP,
 ) -> Plan:
     """Make the plan of an atlas, and refuse one that cannot be carried out (`atlas`)."""
     chosen = _subject(subject, domain)
@@ -234,8 +294,11 @@ def plan_of(
     if len(parts) != len(shape) or min(parts) < 1:
         raise LimitsetsError("the chunk", parts, f"{len(shape)} numbers from 1", "give one for each axis")
     parts = tuple(min(step, n) for step, n in zip(parts, shape, strict=True))
-    wanted = None if variables is None else tuple(variables)
-    plan = Plan(chosen, axes, name, dict(options or {}), wanted, parts, code_of(chosen, name), seed)
+    if refine and coarse < 2:
+        raise LimitsetsError("the step of the coarse grid", coarse, "2 or more", "correct it")
+    by = None if refine is False else ("class" if refine is True else refine, int(coarse))
+    wanted = None if variables is None else tuple(dict.fromkeys((*variables, *(by or ())[:1])))
+    plan = Plan(chosen, axes, name, dict(options or {}), wanted, parts, code_of(chosen, name), seed, by)
     plan.require()
     return plan
 
@@ -267,9 +330,8 @@ def _pool(
     elif cluster is not None:
         with on_cluster(cluster) as pool:
             yield pool
-    elif chunks == 1 and threading.current_thread() is threading.main_thread():
-        with ThreadPoolExecutor(1) as here:  # starting a process takes longer than most single chunks
-            yield Given(here)
+    elif chunks == 1:  # to start a process takes longer than most single chunks
+        yield Given(Here(), 1)
     else:
         _require_importable(plan)
         yield Processes(min(workers or present_cores(), chunks))

@@ -62,6 +62,8 @@ class Plan:
         Versions and digests of what it runs (`code_of`), as this process has them.
     seed : int
         Of all random numbers.
+    refine : (str, int) or None
+        Only points where this variable changes are computed, from a coarse grid of this step on; None: all are.
     """
 
     subject: Subject
@@ -72,6 +74,7 @@ class Plan:
     chunk: tuple[int, ...]
     code: Mapping[str, Mapping[str, str]]
     seed: int = 0
+    refine: tuple[str, int] | None = None
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -142,6 +145,7 @@ class Plan:
             "variables": None if self.variables is None else list(self.variables),
             "chunk": list(self.chunk),
             "seed": self.seed,
+            "refine": None if self.refine is None else list(self.refine),
             **self.code,
         }
 
@@ -162,7 +166,8 @@ class Plan:
             both = [name for name in names if name in known]
             if both:
                 raise LimitsetsError("the axis", both[0], "no variable of the task", "it would be both")
-            unknown = [name for name in self.variables or () if name not in known]
+            asked = (*(self.variables or ()), *(self.refine or ())[:1])
+            unknown = [name for name in asked if name not in known]
             if unknown:
                 raise LimitsetsError("the variable", unknown[0], ", ".join(known), "name some of these")
         try:

@@ -179,7 +179,22 @@ class Store:
                 f"the variable {name}", shape, f"{self.arrays[name].shape}, as at other points",
                 "let the task return arrays of one shape",
             )  # fmt: skip
+        self._name_codes(name, variable.codes)
         return self.arrays[name]
+
+    def _name_codes(self, name: str, codes: Mapping[str, int]) -> None:
+        """Add the names of codes that were not met before; in order, so that the last chunk written is not seen."""
+        attributes = self.arrays[name].attrs
+        words = attributes.get("flag_meanings", "").split()
+        known = dict(zip(words, attributes.get("flag_values", []), strict=True))
+        if codes.items() <= known.items():
+            return
+        both = known | dict(codes)
+        if len(set(both.values())) < len(both):
+            raise LimitsetsError(
+                f"the codes of {name}", both, "another code for each name", "give them other codes"
+            )
+        attributes.update(_flags(both))
 
     @contextmanager
     def _written(self) -> Iterator[None]:
@@ -220,10 +235,15 @@ def _described(variable: Variable, length: str) -> dict[str, Any]:
     unit = length if variable.unit == "length" else variable.unit
     if unit:
         found["units"] = unit
-    if variable.codes:
-        found["flag_values"] = list(variable.codes.values())
-        found["flag_meanings"] = " ".join(variable.codes)
-    return found
+    return found | (_flags(variable.codes) if variable.codes else {})
+
+
+def _flags(codes: Mapping[str, int]) -> dict[str, Any]:
+    ordered = sorted(codes.items(), key=lambda each: each[1])
+    return {
+        "flag_values": [code for _, code in ordered],
+        "flag_meanings": " ".join(name for name, _ in ordered),
+    }
 
 
 def _attributes(plan: Plan) -> dict[str, Any]:

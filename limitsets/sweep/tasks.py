@@ -17,7 +17,7 @@ import numpy.typing as npt
 from limitsets.errors import LimitsetsError
 from limitsets.sweep.subjects import Points
 
-__all__ = ["Block", "BlockTask", "Variable", "block_task", "named", "registered", "resolved"]
+__all__ = ["Block", "BlockTask", "Coded", "Variable", "block_task", "named", "registered", "resolved"]
 
 Task = TypeVar("Task", bound=Callable[..., Any])
 
@@ -78,6 +78,8 @@ class Block(NamedTuple):
         The variables asked for.
     subject : SceneSubject or MapSubject
         What is varied.
+    values : mapping of str to ndarray, shape (n,)
+        Of the axes, in the units of the scene.
     """
 
     points: Points
@@ -85,12 +87,20 @@ class Block(NamedTuple):
     seed: int
     wanted: frozenset[str]
     subject: Any
+    values: Mapping[str, npt.NDArray[np.float64]]
+
+
+class Coded(NamedTuple):
+    """Codes at n points whose names are known only when they are met, and these names."""
+
+    values: npt.NDArray[Any]
+    codes: Mapping[str, int]
 
 
 class BlockTask(NamedTuple):
     """A registered block task: the function, and its variables for a subject."""
 
-    function: Callable[..., Mapping[str, npt.NDArray[Any]]]
+    function: Callable[..., Mapping[str, npt.NDArray[Any] | Coded]]
     variables: Callable[..., Mapping[str, Variable]]
 
 

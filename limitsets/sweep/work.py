@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -11,12 +12,14 @@ import numpy.typing as npt
 
 from limitsets.errors import LimitsetsError
 from limitsets.maps.stacks import chosen
+from limitsets.sweep.boundaries import refined
 from limitsets.sweep.plan import Plan, require_same_code
-from limitsets.sweep.tasks import Block, BlockTask, Variable, registered, resolved
+from limitsets.sweep.tasks import Block, BlockTask, Coded, Variable, registered, resolved
 
 __all__ = ["STATUS", "Answer", "answer", "seed_of", "variables_of"]
 
 COMPUTED, IMPOSSIBLE, REFUSED = 0, 1, 2
+_OURS = ("status", "level")
 STATUS = Variable(
     dtype="int8",
     codes={"computed": COMPUTED, "impossible": IMPOSSIBLE, "refused": REFUSED},
@@ -24,11 +27,20 @@ STATUS = Variable(
 )
 
 
+LEVEL = Variable(
+    dtype="int8",
+    about="how often the coarse grid was halved to compute the point; -1: filled from the nearest corner of its cell",
+)
+
+Values = Mapping[str, npt.NDArray[np.float64]]
+Found = dict[str, tuple[Variable, npt.NDArray[Any]]]
+
+
 class Answer(NamedTuple):
     """The answers of one chunk: its number, and a variable and an array of the chunk's shape for each name."""
 
     number: int
-    found: dict[str, tuple[Variable, npt.NDArray[Any]]]
+    found: Found
 
 
 def answer(plan: Plan, number: int) -> Answer:
@@ -36,17 +48,63 @@ def answer(plan: Plan, number: int) -> Answer:
     require_same_code(plan)
     region = plan.region(number)
     shape = tuple(part.stop - part.start for part in region)
+    values, numbers = plan.values(region), plan.numbers(region)
+    if plan.refine is None:
+        found = _asked(plan, values, numbers)
+    else:
+        found = _refined(plan, shape, values, numbers)
+    return Answer(
+        number, {name: (v, each.reshape(*shape, *each.shape[1:])) for name, (v, each) in found.items()}
+    )
+
+
+def _asked(plan: Plan, values: Values, numbers: npt.NDArray[np.int64]) -> Found:
+    """Ask the task."""
     function = resolved(plan.task)
     task = registered(function)
-    values, numbers = plan.values(region), plan.numbers(region)
     if task is None:
         status, found = _single(plan, function, values, numbers)
     else:
         status, found = _block(plan, task, values, numbers)
-    found = {"status": (STATUS, status), **found}
-    return Answer(
-        number, {name: (v, each.reshape(*shape, *each.shape[1:])) for name, (v, each) in found.items()}
-    )
+    return {"status": (STATUS, status), **found}
+
+
+def _refined(plan: Plan, shape: tuple[int, ...], values: Values, numbers: npt.NDArray[np.int64]) -> Found:
+    """Ask the task where its answer changes, and fill the rest."""
+    name, step = plan.refine or ("", 1)
+    batches: list[Found] = []
+    seen: dict[bytes, int] = {}
+
+    def ask(points: npt.NDArray[np.int64]) -> npt.NDArray[np.int64]:
+        found = _asked(plan, {axis: each[points] for axis, each in values.items()}, numbers[points])
+        batches.append(found)
+        rows = [found[each][1].reshape(points.size, -1) for each in ("status", name) if each in found]
+        keys = zip(*([row.tobytes() for row in np.ascontiguousarray(part)] for part in rows), strict=True)
+        return np.array([seen.setdefault(b"".join(key), len(seen)) for key in keys], np.int64)
+
+    layout = refined(shape, step, ask)
+    found: Found = {"level": (LEVEL, layout.level)}
+    for each in dict.fromkeys(key for batch in batches for key in batch):
+        found[each] = _joined(plan, each, batches)
+        found[each] = (found[each][0], found[each][1][layout.source])
+    if name not in found and (found["status"][1] == COMPUTED).any():
+        raise _wrong(plan, name, "missing", "the variable by which the atlas is refined")
+    return found
+
+
+def _joined(plan: Plan, name: str, batches: list[Found]) -> tuple[Variable, npt.NDArray[Any]]:
+    """Put the answers of batches of points one behind the other."""
+    variables = [batch[name][0] for batch in batches if name in batch]
+    codes = {word: code for variable in variables for word, code in variable.codes.items()}
+    variable, parts = replace(variables[0], codes=codes), []
+    more = tuple(n for _, n in variable.dims)
+    for batch in batches:
+        size = (batch["status"][1].size, *more)
+        part = batch[name][1] if name in batch else np.full(size, variable.empty, variable.dtype)
+        if part.shape != size:
+            raise _wrong(plan, name, part.shape[1:], "one shape at all points")
+        parts.append(part)
+    return variable, np.concatenate(parts)
 
 
 def seed_of(plan: Plan, number: int) -> int:
@@ -62,26 +120,27 @@ def variables_of(plan: Plan, task: BlockTask) -> dict[str, Variable]:
     return {name: each for name, each in known.items() if name in plan.variables}
 
 
-Found = dict[str, tuple[Variable, npt.NDArray[Any]]]
-
-
 def _block(
-    plan: Plan, task: BlockTask, values: Mapping[str, npt.NDArray[np.float64]], numbers: npt.NDArray[np.int64]
+    plan: Plan, task: BlockTask, values: Values, numbers: npt.NDArray[np.int64]
 ) -> tuple[npt.NDArray[np.int8], Found]:
     """Answer by a task that takes all possible points at once."""
     points, variables = plan.subject.points(values), variables_of(plan, task)
     good = np.flatnonzero(points.possible)
     kept = points if good.size == numbers.size else type(points)(*(chosen(each, good) for each in points))
-    block = Block(kept, numbers[good], plan.seed, frozenset(variables), plan.subject)
+    varied = {name: each[good] for name, each in values.items()}
+    block = Block(kept, numbers[good], plan.seed, frozenset(variables), plan.subject, varied)
     given = task.function(block, **plan.options) if good.size else {}
     found: Found = {}
     for name, variable in variables.items():
         whole = np.full((numbers.size, *(n for _, n in variable.dims)), variable.empty, dtype=variable.dtype)
         if good.size:
-            if name not in given or np.shape(given[name]) != (good.size, *whole.shape[1:]):
-                shape = np.shape(given[name]) if name in given else "missing"
+            told = given.get(name)
+            if isinstance(told, Coded):
+                variable, told = replace(variable, codes=told.codes), told.values
+            if told is None or np.shape(told) != (good.size, *whole.shape[1:]):
+                shape = "missing" if told is None else np.shape(told)
                 raise _wrong(plan, name, shape, f"an array of shape {(good.size, *whole.shape[1:])}")
-            whole[good] = given[name]
+            whole[good] = told
         found[name] = (variable, whole)
     return np.where(points.possible, COMPUTED, IMPOSSIBLE).astype(np.int8), found
 
@@ -89,7 +148,7 @@ def _block(
 def _single(
     plan: Plan,
     function: Callable[..., Any],
-    values: Mapping[str, npt.NDArray[np.float64]],
+    values: Values,
     numbers: npt.NDArray[np.int64],
 ) -> tuple[npt.NDArray[np.int8], Found]:
     """Answer point by point; what a task refuses is a point without numbers, any other error ends the sweep."""
@@ -137,8 +196,8 @@ def _numbers(plan: Plan, given: Any) -> dict[str, npt.NDArray[np.float64]]:
         given = {name: given[name] for name in plan.variables}
     found = {}
     for name, value in given.items():
-        if not isinstance(name, str) or not name or "/" in name or name in (*plan.base, "status"):
-            raise _wrong(plan, repr(name), name, "names without / that no axis bears")
+        if not isinstance(name, str) or not name or "/" in name or name in (*plan.base, *_OURS):
+            raise _wrong(plan, repr(name), name, "names without /, not that of an axis, status or level")
         try:
             found[name] = np.array(np.nan if value is None else value, dtype=np.float64)
         except (TypeError, ValueError):

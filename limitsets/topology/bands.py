@@ -13,7 +13,22 @@ from limitsets.maps.kernels import image_on, on_side
 from limitsets.topology.cells import COLLAPSES, LEAVES, cell_of
 from limitsets.topology.work import MOST_INTERVALS, Cells, Components, Pieces, Region, Unions
 
-__all__ = ["IMAGE", "NOTHING", "PUSHED", "SET", "begin_union", "push_through", "settle", "stays_around"]
+__all__ = [
+    "ANY",
+    "GAP",
+    "IMAGE",
+    "NOTHING",
+    "PUSHED",
+    "SET",
+    "begin_union",
+    "images_of",
+    "is_still",
+    "merge",
+    "push_through",
+    "put",
+    "settle",
+    "stays_around",
+]
 
 # Rows of `Unions`.
 SET, IMAGE, PUSHED = 0, 1, 2
@@ -30,7 +45,8 @@ IRREGULAR = -2
 
 
 @kernel
-def _put(u: Unions, row: int, side: int, lo: float, hi: float) -> None:
+def put(u: Unions, row: int, side: int, lo: float, hi: float) -> None:
+    """Append an interval to a row; past the last place it is only counted."""
     n = u.size[row]
     if n < MOST_INTERVALS:
         u.side[row, n], u.lo[row, n], u.hi[row, n] = side, lo, hi
@@ -38,7 +54,7 @@ def _put(u: Unions, row: int, side: int, lo: float, hi: float) -> None:
 
 
 @kernel(entry=True, counting=False)
-def _merge(u: Unions, row: int, gap: float) -> bool:
+def merge(u: Unions, row: int, gap: float) -> bool:
     """Sort a union and join what touches; False where it has too many intervals."""
     n = u.size[row]
     if n > MOST_INTERVALS:
@@ -62,6 +78,20 @@ def _merge(u: Unions, row: int, gap: float) -> bool:
 
 
 @kernel(entry=True, counting=False)
+def is_still(u: Unions, rest: float) -> bool:
+    """Make SET what IMAGE is; whether no end moved by more than `rest`."""
+    still: bool = u.size[IMAGE] == u.size[SET]
+    for i in range(u.size[IMAGE]):
+        lo, hi, side = u.lo[IMAGE, i], u.hi[IMAGE, i], u.side[IMAGE, i]
+        still = (
+            still and side == u.side[SET, i] and max(abs(lo - u.lo[SET, i]), abs(hi - u.hi[SET, i])) <= rest
+        )
+        u.side[SET, i], u.lo[SET, i], u.hi[SET, i] = side, lo, hi
+    u.size[SET] = u.size[IMAGE]
+    return still
+
+
+@kernel(entry=True, counting=False)
 def begin_union(sides: int, attractor: int, c: Cells, k: Components, u: Unions) -> bool:
     """Make SET the union of the cells of a closed component; whether the images of all are longer than they."""
     n, expands = 0, True
@@ -82,7 +112,7 @@ def begin_union(sides: int, attractor: int, c: Cells, k: Components, u: Unions) 
 
 
 @kernel(entry=True, counting=False)
-def _images(
+def images_of(
     params: Any, p: Pieces, u: Unions, row: int, into: int, leaving: int, only: int, sliver: float
 ) -> bool:
     """Append to a row the images of the parts of another, by piece; whether some part has no image.
@@ -110,7 +140,7 @@ def _images(
                 y_a, _, _ = image_on(here, a, side, branch)
             if b != p.hi[q]:
                 y_b, _, _ = image_on(here, b, side, branch)
-            _put(u, into, to, min(y_a, y_b), max(y_a, y_b))
+            put(u, into, to, min(y_a, y_b), max(y_a, y_b))
     return out
 
 
@@ -123,20 +153,15 @@ def settle(params: Any, r: Region, p: Pieces, u: Unions) -> int:
     rest, rested = REST * scale, 0
     for _ in range(MOST_IMAGES):
         u.size[IMAGE] = 0
-        if _images(params, p, u, SET, IMAGE, ANY, ANY, 0.0):
+        if images_of(params, p, u, SET, IMAGE, ANY, ANY, 0.0):
             return OUT
-        if not _merge(u, IMAGE, GAP * scale):
+        if not merge(u, IMAGE, GAP * scale):
             return TOO_MANY
-        moved = 0.0 if u.size[IMAGE] == u.size[SET] else scale
         for i in range(u.size[IMAGE]):
             side = u.side[IMAGE, i]
             if u.lo[IMAGE, i] < r.lo[side] - rest or u.hi[IMAGE, i] > r.hi[side] + rest:
                 return OUT
-            moved = scale if side != u.side[SET, i] else moved
-            moved = max(moved, abs(u.lo[IMAGE, i] - u.lo[SET, i]), abs(u.hi[IMAGE, i] - u.hi[SET, i]))
-            u.side[SET, i], u.lo[SET, i], u.hi[SET, i] = side, u.lo[IMAGE, i], u.hi[IMAGE, i]
-        u.size[SET] = u.size[IMAGE]
-        rested = rested + 1 if moved <= rest else 0
+        rested = rested + 1 if is_still(u, rest) else 0
         if rested == 2:
             return NOTHING
     return MOVES
@@ -161,10 +186,10 @@ def stays_around(
     """
     half = SEED * scale
     u.size[SET] = 0
-    _put(u, SET, side, max(x - half, r.lo[side]), min(x + half, r.hi[side]))
+    put(u, SET, side, max(x - half, r.lo[side]), min(x + half, r.hi[side]))
     for _ in range(MOST_IMAGES):
         u.size[IMAGE] = 0
-        if _images(params, p, u, SET, IMAGE, ANY, ANY, 0.0):
+        if images_of(params, p, u, SET, IMAGE, ANY, ANY, 0.0):
             return False
         if u.size[IMAGE] > MOST_INTERVALS:
             return True
@@ -174,19 +199,10 @@ def stays_around(
             ):
                 return False
         for i in range(u.size[SET]):
-            _put(u, IMAGE, u.side[SET, i], u.lo[SET, i], u.hi[SET, i])
-        if not _merge(u, IMAGE, (FILLED if u.size[IMAGE] > MANY else GAP) * scale):
+            put(u, IMAGE, u.side[SET, i], u.lo[SET, i], u.hi[SET, i])
+        if not merge(u, IMAGE, (FILLED if u.size[IMAGE] > MANY else GAP) * scale):
             return True
-        grown = u.size[IMAGE] != u.size[SET]
-        for i in range(u.size[IMAGE]):
-            grown |= (
-                u.lo[IMAGE, i] < u.lo[SET, i]
-                or u.hi[IMAGE, i] > u.hi[SET, i]
-                or u.side[IMAGE, i] != u.side[SET, i]
-            )
-            u.side[SET, i], u.lo[SET, i], u.hi[SET, i] = u.side[IMAGE, i], u.lo[IMAGE, i], u.hi[IMAGE, i]
-        u.size[SET] = u.size[IMAGE]
-        if not grown:
+        if is_still(u, 0.0):
             break
     return True
 
@@ -203,16 +219,16 @@ def push_through(
     regular, least = True, -1
     for side in range(sides):
         u.size[PUSHED] = 0
-        _images(params, p, u, SET, PUSHED, 1, side, SLIVER * scale)
+        images_of(params, p, u, SET, PUSHED, 1, side, SLIVER * scale)
         u.seen[side] = -1
         steps = 0
         while u.size[PUSHED] > 0:
-            if not _merge(u, PUSHED, GAP * scale):
+            if not merge(u, PUSHED, GAP * scale):
                 return TOO_MANY
             if steps == MOST_STEPS:
                 return MOVES
             u.size[IMAGE] = 0
-            _images(params, p, u, PUSHED, IMAGE, 1, ANY, SLIVER * scale)
+            images_of(params, p, u, PUSHED, IMAGE, 1, ANY, SLIVER * scale)
             for i in range(min(u.size[IMAGE], MOST_INTERVALS)):
                 regular &= u.seen[side] in (-1, u.side[IMAGE, i])
                 u.seen[side] = u.side[IMAGE, i]
@@ -220,7 +236,7 @@ def push_through(
                 jogs_min[side] = steps if jogs_min[side] < 0 else jogs_min[side]
                 jogs_max[side] = steps
             u.size[IMAGE] = 0
-            _images(params, p, u, PUSHED, IMAGE, 0, ANY, SLIVER * scale)
+            images_of(params, p, u, PUSHED, IMAGE, 0, ANY, SLIVER * scale)
             if u.size[IMAGE] > MOST_INTERVALS:
                 return TOO_MANY
             for i in range(u.size[IMAGE]):

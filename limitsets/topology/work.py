@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -151,8 +152,15 @@ def _places(cells: int, nearest: float) -> Floats:
     return np.concatenate([near[near < 0.75 / cells], equal[1:]])
 
 
-def work_for(sides: int, cells: int, samples: int, nearest: float) -> Work:
-    """Make the arrays for `cells` cells and `samples` samples a side; `nearest`: see `_places`, 0 without anchor."""
+def work_for(region: Region, cells: int, samples: int) -> Work:
+    """Make the arrays for `cells` cells and `samples` samples a side of the domains of several points.
+
+    Where these have an anchor, cells shrink towards it down to the least distance that any point has from it, rounded
+    to a power of two: what is found of a point must not depend on the last digits of those beside it.
+    """
+    sides = region.lo.shape[1]
+    least = float(((region.lo - region.bottom) / (region.hi - region.bottom)).min())
+    nearest = 2.0 ** round(math.log2(least)) if least > 0.0 else 0.0
     shape, scan = _places(cells, nearest), _places(samples, nearest)
     edges, pieces = shape.size + 2 * MOST_PIECES, sides * MOST_PIECES
     n = sides * edges

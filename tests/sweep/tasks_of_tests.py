@@ -74,3 +74,8 @@ def in_blocks(block, power=1):
 
 if __name__ == "__main__":  # a driver to kill
     atlas("paper-designed", X, Y, task=TASK, chunk=(3, 3), store=sys.argv[1], workers=2)
+
+
+def side_of_150(scene):
+    """Whether the arm is faster than 150 deg/s."""
+    return {"fast": scene.value("throw.speed") > math.radians(150.0)}

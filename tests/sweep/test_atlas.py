@@ -186,6 +186,19 @@ def test_fields_of_sides_and_of_inner_tuples_vary_too():
         atlas(given, "kappa=20:30:3", domain=DESIGNED.domain, task=BLOCKS)
 
 
+def test_the_default_task_tells_the_topology_of_the_designed_feeder():
+    """Against cells and critical orbits (`ls.attractors`, `ls.limit_set`), and the threshold of `ls.analyse`."""
+    found = atlas("paper-designed", "throw.kappa=25.3778518:25.3778518:1").dataset.isel({"throw.kappa": 0})
+    graph = ls.transitions(DESIGNED.map, ls.grid(DESIGNED.domain, cells=1024))
+    (attractor,) = ls.attractors(graph)
+    extents = ls.limit_set(graph, attractor).extents
+    assert (int(found.attractors), int(found.undecided), int(found.leaves)) == (1, 0, 0)
+    assert tuple(found.flip_order.values[0]) == attractor.flip_order
+    assert found.bands.values[0].tolist() == [len(extents[side]) for side in range(3)]
+    assert found.reach.values[0] == pytest.approx([extents[side][-1][1] for side in range(3)], abs=1e-8)
+    assert float(found.threshold) == pytest.approx(max(extents[side][-1][1] for side in (0, 1)), abs=1e-8)
+
+
 # ---------------------------------------------------------------- the same, however it is computed
 
 
@@ -363,6 +376,17 @@ def test_what_stands_in_a_script_is_not_sent_to_processes():
     lines = python(code).splitlines()
     assert "move it to a file, or pass executor=concurrent.futures.ThreadPoolExecutor(1)" in lines[0]
     assert lines[1] == "21"
+
+
+def test_a_script_without_a_guard_may_start_processes(tmp_path):
+    script = tmp_path / "script.py"
+    script.write_text(
+        f"import sys; sys.path.insert(0, {str(ROOT)!r})\nimport limitsets as ls\n"
+        f"found = ls.atlas('paper-designed', {X!r}, task={TASK!r}, chunk=[4], workers=2)\n"
+        "print(found.new, sys.modules['__main__'].__file__ == __file__)\n"
+    )
+    done = subprocess.run([sys.executable, str(script)], capture_output=True, text=True, check=False)
+    assert (done.stdout, done.stderr) == ("6 True\n", "")
 
 
 # ---------------------------------------------------------------- tables, chunks, libraries

@@ -1,0 +1,120 @@
+"""What the pictures of an atlas share: axes, pixels about the points, hatches, and the mark of the scene itself."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+from matplotlib.patches import PathPatch
+from matplotlib.path import Path
+
+from limitsets.plot import style
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from limitsets.sweep import Atlas
+
+__all__ = ["edges", "frame", "hatched", "mark", "pixels", "title_of"]
+
+
+def title_of(found: Atlas) -> str:
+    """Name what is varied."""
+    return str(found.dataset.attrs.get("title", "")).removeprefix("atlas of ")
+
+
+def frame(found: Atlas, tall: float = 0.0) -> tuple[Figure, Axes]:
+    """Make a figure with its axes labelled, flat where one quantity varies, but at least so tall [inches]."""
+    names = found.axes
+    figure, (axes,) = style.canvas(10.2, max(5.4 if len(names) == 2 else 2.6, tall))
+    axes.set_xlabel(_with_unit(found, names[-1]))
+    if len(names) == 2:
+        axes.set_ylabel(_with_unit(found, names[0]))
+    x, y = pixels(found)
+    axes.set_xlim(x[0], x[-1])
+    axes.set_ylim(y[0], y[-1])
+    return figure, axes
+
+
+def _with_unit(found: Atlas, name: str) -> str:
+    unit = found.dataset[name].attrs.get("units", "")
+    return f"{name} [{unit}]" if unit else name
+
+
+def edges(values: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+    """Give the edges of pixels about values: half way between them."""
+    if values.size == 1:
+        return np.array([values[0] - 0.5, values[0] + 0.5])
+    middle = 0.5 * (values[1:] + values[:-1])
+    return np.concatenate([[2 * values[0] - middle[0]], middle, [2 * values[-1] - middle[-1]]])
+
+
+def pixels(found: Atlas) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
+    """Edges of the pixels along x and along y."""
+    data, names = found.dataset, found.axes
+    across = edges(data[names[-1]].values)
+    return across, edges(data[names[0]].values) if len(names) == 2 else np.array([0.0, 1.0])
+
+
+def hatched(
+    axes: Axes,
+    x: npt.NDArray[np.float64],
+    y: npt.NDArray[np.float64],
+    where: npt.NDArray[np.bool_],
+    hatch: str,
+) -> None:
+    """Hatch pixels, given their edges."""
+    if not where.any():
+        return
+    # a box for each row of neighbours: contours would cut the corners of pixels
+    vertices: list[tuple[float, float]] = []
+    for i, row in enumerate(where):
+        ends = np.flatnonzero(np.diff(np.concatenate([[False], row, [False]]).astype(np.int8)))
+        for a, b in zip(ends[::2].tolist(), ends[1::2].tolist(), strict=True):
+            vertices += [(x[a], y[i]), (x[b], y[i]), (x[b], y[i + 1]), (x[a], y[i + 1]), (x[a], y[i])]
+    codes = [Path.MOVETO, Path.LINETO, Path.LINETO, Path.LINETO, Path.CLOSEPOLY] * (len(vertices) // 5)
+    axes.add_patch(
+        PathPatch(
+            Path(vertices, codes), facecolor="none", edgecolor=style.INK, hatch=hatch, lw=0.0, zorder=2, alpha=0.55,
+            hatch_linewidth=0.5,
+        )
+    )  # fmt: skip
+
+
+def mark(axes: Axes, found: Atlas) -> list[Any]:
+    """Mark the scene or map itself, if it lies in the window; the entry of a legend."""
+    values = []
+    for name in found.axes:
+        value, given = _value_of(found, name), found.dataset[name].values
+        if value is None or not given[0] <= value <= given[-1]:
+            return []
+        values.append(value)
+    look: dict[str, Any] = {
+        "marker": "*",
+        "ms": 13.0,
+        "mfc": "white",
+        "mec": style.INK,
+        "mew": 1.0,
+        "ls": "none",
+    }
+    x, y = values[-1], values[0] if len(values) == 2 else 0.15
+    axes.plot([x], [y], zorder=6, gid="design", **look)
+    numbers = ", ".join(f"{value:.6g}" for value in reversed(values))
+    return [style.key(f"{title_of(found)}: {numbers}", **look)]
+
+
+def _value_of(found: Atlas, name: str) -> float | None:
+    """Return the value of a quantity in the scene or map that is varied, in the unit of its axis."""
+    data, plan = found.dataset, found.dataset.attrs["plan"]
+    if "scene" not in plan:
+        value = plan.get("parameters", {}).get(name)
+        return float(value) if isinstance(value, int | float) else None
+    from limitsets.scene import load
+    from limitsets.scene.quantities import base_unit, find
+    from limitsets.scene.units import exact_factor
+
+    scene = load(data.attrs["scene"])
+    base = base_unit(find(name).dimension, scene.unit)
+    return scene.value(name) / float(exact_factor(data[name].attrs.get("units", ""), base))

@@ -1,0 +1,189 @@
+"""Maps of an atlas: the classes of its points, with a legend in words.
+
+The colour of a class comes from the class alone, so it is the same in every picture: the structure of the attractors
+gives the face, ways out a hatch.  Faces come back after seven; neighbours are told apart by a line and by the number of
+their line in the legend, which stands in the largest region of each class.
+"""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+from matplotlib.collections import LineCollection
+from matplotlib.colors import to_rgb
+from matplotlib.patches import Patch
+from scipy.ndimage import distance_transform_edt, label
+
+from limitsets.errors import AnswerError
+from limitsets.plot import style
+from limitsets.plot.atlas_frame import frame, hatched, mark, pixels, title_of
+from limitsets.sweep.classes import UNDECIDED, Entry, is_classified, legend, named_class, numbers_of
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from limitsets.sweep import Atlas
+
+__all__ = ["atlas", "look_of"]
+
+# Paul Tol's light scheme, made for areas and colour-blind readers, without its orange; a cycle's face.
+FACES = ("#EEDD88", "#44BB99", "#77AADD", "#FFAABB", "#99DDFF", "#BBCC33", "#AAAA00")
+# Bands that no cycle is are darker by this share of ink; without an attractor these, by what every start does.
+DARKER = 0.16
+ALL_LEAVE, ALL_COLLAPSE, NEITHER_ALL = "#EE9A62", "#6A4C93", "#F6D9C4"
+DOUBT, DOUBT_HATCH = "#B4B4B4", "xxxx"
+LEAVE_HATCH, COLLAPSE_HATCH = "////", "...."
+MOST_LINES = 12
+# Beyond so many edges between pixels lines would hide what they part.
+MOST_EDGES = 12_000
+# Least room around a number, as a share of the points along the shorter axis.
+ROOM = 0.025
+
+
+def look_of(number: int, name: str) -> dict[str, Any]:
+    """Return face and hatch of a class.
+
+    Examples
+    --------
+    >>> look_of(0, "undecided")
+    {'facecolor': '#B4B4B4', 'hatch': 'xxxx'}
+    >>> look_of(1, "bands:3,order:0,period:3;leaves:some;collapses:none")
+    {'facecolor': (0.4667, 0.6667, 0.8667), 'hatch': '////'}
+    """
+    if number == UNDECIDED:
+        return {"facecolor": DOUBT, "hatch": DOUBT_HATCH}
+    found = named_class(name)
+    hatch = LEAVE_HATCH * (found.leaves == "some") + COLLAPSE_HATCH * (found.collapses == "some")
+    if not found.attractors:
+        face = {found.leaves: ALL_LEAVE, found.collapses: ALL_COLLAPSE}.get("all", NEITHER_ALL)
+        return {"facecolor": face, "hatch": hatch}
+    parts = sum(sum(each.bands) for each in found.attractors)
+    share = 0.0 if any(each.period for each in found.attractors) else DARKER
+    colour = np.array(to_rgb(FACES[(parts + 2 * len(found.attractors) - 3) % len(FACES)]))
+    mixed = (1.0 - share) * colour + share * np.array(to_rgb(style.INK))
+    return {"facecolor": tuple(round(each, 4) for each in mixed.tolist()), "hatch": hatch}
+
+
+def atlas(found: Atlas) -> Figure:
+    """Draw the classes of an atlas of one or two axes, with a legend in words, most frequent classes first.
+
+    Parameters
+    ----------
+    found : Atlas
+        From `limitsets.atlas`, with the variable `class`, or those of which classes are made.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        Shares in the legend are of the points at which there is a scene or map.
+
+    Raises
+    ------
+    AnswerError
+        It says nothing of classes.
+
+    Examples
+    --------
+    >>> import limitsets as ls
+    >>> found = ls.atlas(ls.maps.Logistic(3.2), "r=3.2:3.84:3", domain=[(0, 1)])
+    >>> for text in ls.plot.atlas(found).legends[0].get_texts()[:3]:
+    ...     print(text.get_text())
+    1: one attractor, a cycle of 2 (33 %)
+    2: one attractor, a cycle of 3 (33 %)
+    3: one attractor, a cycle of 4 (33 %)
+    """
+    data = found.dataset
+    if not is_classified(data):
+        raise AnswerError("the atlas", ", ".join(map(str, data)), "one with class", "ask for this variable")
+    numbers, _ = numbers_of(data)
+    entries = legend(data)
+    looks = {each.number: look_of(each.number, each.name) for each in entries}
+    figure, axes = frame(found, 0.8 + 0.3 * min(len(entries), MOST_LINES + 2))
+    if len(found.axes) == 1:
+        axes.set_yticks([])
+    rows = np.atleast_2d(numbers)
+    _paint(axes, found, rows, looks)
+    doubt = [each for each in entries if each.number == UNDECIDED]
+    sure = entries[: len(entries) - len(doubt)]
+    lines, rest = sure[:MOST_LINES] + doubt, sure[MOST_LINES:]
+    for k, each in enumerate(lines):
+        _label(axes, found, rows == each.number, str(k + 1))
+    handles = [
+        Patch(label=_words(k + 1, each), edgecolor=style.INK, lw=0.5, **looks[each.number])
+        for k, each in enumerate(lines)
+    ]
+    if rest:
+        share = _percent(sum(each.share for each in rest))
+        handles.append(Patch(label=f"{len(rest)} other class{'es' * (len(rest) > 1)} ({share})", alpha=0.0))
+    handles += mark(axes, found)
+    figure.legend(
+        handles=handles, loc="outside right upper", fontsize=style.SMALL, frameon=False, handlelength=2.4,
+        handleheight=1.6, labelspacing=0.9, borderaxespad=0.8,
+    )  # fmt: skip
+    words = ""
+    if "level" in data:
+        words = f"; {_percent(float((data['level'].values >= 0).mean()))} of the points computed"
+    axes.set_title(
+        f"{title_of(found)}: topology of the attractors{words}", loc="left", fontsize=style.TEXT + 1
+    )
+    return figure
+
+
+def _percent(share: float) -> str:
+    percent = 100.0 * share
+    digits = ".0f" if percent >= 9.95 else ".1f" if percent >= 0.05 else ".1g"
+    return f"{percent:{digits}} %"
+
+
+def _words(number: int, entry: Entry) -> str:
+    share = _percent(entry.share).replace(" ", "\N{NO-BREAK SPACE}")  # on one line
+    lines = textwrap.wrap(f"{number}: {entry.words} ({share})", 46, subsequent_indent="   ")
+    return "\n".join(lines).replace("\N{NO-BREAK SPACE}", " ")
+
+
+def _paint(
+    axes: Axes, found: Atlas, rows: npt.NDArray[np.int64], looks: Mapping[int, dict[str, Any]]
+) -> None:
+    """Paint the classes, their hatches, and lines between them."""
+    x, y = pixels(found)
+    picture = np.ones((*rows.shape, 3))
+    for number, look in looks.items():
+        picture[rows == number] = to_rgb(look["facecolor"])
+    axes.pcolorfast(x, y, picture, zorder=1)
+    for hatch in {look["hatch"] for look in looks.values()} - {""}:
+        numbers = [number for number, look in looks.items() if look["hatch"] == hatch]
+        hatched(axes, x, y, np.isin(rows, numbers), hatch)
+    across, along = np.nonzero(rows[:, 1:] != rows[:, :-1]), np.nonzero(rows[1:] != rows[:-1])
+    if across[0].size + along[0].size <= MOST_EDGES:
+        i, j = across
+        lines = [np.stack([x[j + 1], y[i], x[j + 1], y[i + 1]], axis=1)]
+        i, j = along
+        lines.append(np.stack([x[j], y[i + 1], x[j + 1], y[i + 1]], axis=1))
+        pairs = np.concatenate(lines).reshape(-1, 2, 2)
+        axes.add_collection(
+            LineCollection(list(pairs), colors=style.INK, linewidths=0.5, zorder=3, gid="boundaries"),
+            autolim=False,
+        )
+
+
+def _label(axes: Axes, found: Atlas, where: npt.NDArray[np.bool_], words: str) -> None:
+    """Write the number of a class into its largest region, as far from the region's edge as can be."""
+    if len(found.axes) == 1:
+        where = np.repeat(where, max(where.size // 4, 3), axis=0)
+    regions, count = label(where)
+    if count == 0:
+        return
+    largest = regions == 1 + np.bincount(regions.ravel())[1:].argmax()
+    room = distance_transform_edt(np.pad(largest, 1))[1:-1, 1:-1]
+    i, j = np.unravel_index(room.argmax(), room.shape)
+    if room[i, j] < max(ROOM * min(where.shape), 1.5):
+        return
+    x = float(found.dataset[found.axes[-1]].values[j])
+    y = float(found.dataset[found.axes[0]].values[i]) if len(found.axes) == 2 else 0.5
+    box = {"boxstyle": "circle,pad=0.22", "fc": "white", "ec": style.INK, "lw": 0.5, "alpha": 0.92}
+    axes.text(x, y, words, ha="center", va="center", fontsize=style.SMALL, bbox=box, zorder=5, gid="number")

@@ -1,0 +1,164 @@
+"""Minimal fatal shock: the smallest push after which a state no longer comes to the same attractor.
+
+The push changes x and keeps the side.  It is not fatal while x stays in cells of the inner basin, and fatal once x is
+in a cell outside the outer basin, or beyond the border of the domain, where the orbit has left.
+
+Source: Halekotte, Feudel, "Minimal fatal shocks in multistable complex networks", Scientific Reports 10, 11783, 2020;
+Klinshov, Nekorkin, Kurths, "Stability threshold approach for complex dynamical systems", New J. Phys. 18, 2016.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from limitsets.errors import AnswerError
+from limitsets.files import as_table, picked
+from limitsets.graph import TransitionGraph
+from limitsets.graph.target import Target
+from limitsets.maps import codes
+from limitsets.resilience.colours import ROUNDING, Colours, colours
+from limitsets.sets import Attractor
+
+__all__ = ["FatalShock", "minimal_fatal_shock"]
+
+# Without proofs the bracket is widened by so many cells at both ends.
+CELLS = 2
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class FatalShock:
+    """The smallest fatal push of a state.
+
+    Attributes
+    ----------
+    lo, hi : float
+        No push smaller than `lo` is fatal; some pushes hardly larger than `hi` are [length].
+    how : str
+        "proved"; "cells" where images of cells are sampled: the bracket is then widened by two cells at both ends.
+    x, side : ndarray of shape (dimension,), int
+        The state.
+    basin : int or str
+        Where it comes to: number of the attractor, or name of the exit.
+    shock : ndarray, shape (dimension,)
+        The push to the nearest place known to be fatal.
+    into : int or str
+        Where the nearest decided place that is fatal leads to.
+    """
+
+    lo: float
+    hi: float
+    how: str
+    x: Floats
+    side: int
+    basin: int | str
+    shock: Floats
+    into: int | str
+
+    def to_json(self) -> dict[str, Any]:
+        """Give the shock as JSON takes it."""
+        return as_table(**picked(self, "lo", "hi", "how", "x", "side", "basin", "shock", "into"))
+
+
+def minimal_fatal_shock(
+    graph: TransitionGraph, found: tuple[Attractor, ...], x: ArrayLike, side: int = 0
+) -> FatalShock:
+    """Bracket the smallest push in x, on the same side, that takes a state out of its basin.
+
+    Parameters
+    ----------
+    graph : TransitionGraph
+        From `limitsets.transitions`; with method "boxes" the bracket is proved.
+    found : tuple of Attractor
+        From `limitsets.attractors` of the same graph.
+    x : float, or array_like of shape (dimension,)
+        The state [length].
+    side : int
+        Its side.
+
+    Returns
+    -------
+    FatalShock
+        In more than one dimension by the Euclidean norm.
+
+    Raises
+    ------
+    AnswerError
+        For attractors of another graph, or a state outside the domain or in an undecided cell.
+
+    Notes
+    -----
+    Halekotte, Feudel, Scientific Reports 10, 11783, 2020.  Beyond the border of the domain a state counts as having
+    left: choose the domain of a map that has none of its own large enough.
+
+    Examples
+    --------
+    >>> import limitsets as ls
+    >>> graph = ls.transitions(ls.maps.Cubic(1.5), ls.grid([(-1.5, 1.5)], cells=10_000), "boxes")
+    >>> found = ls.resilience.minimal_fatal_shock(graph, ls.attractors(graph, throws=100), 0.5**0.5)
+    >>> found.how, found.lo <= 1.5**0.5 - 0.5**0.5 <= found.hi, round(found.hi - found.lo, 2)
+    ('proved', True, 0.0)
+    """
+    parted = colours(graph, found)
+    state, cell = _place(parted, x, side)
+    own = int(np.flatnonzero(parted.codes == parted.labels[cell])[0])
+    here, number = graph.grid.of_side(side), np.arange(graph.grid.n_cells)[graph.grid.of_side(side)]
+    lo, hi = graph.grid.boxes(number, side)
+    push = np.clip(state, lo, hi) - state
+    distance = np.sqrt((push**2).sum(axis=1))
+    safe, fatal = parted.inner(own).mask[here], ~parted.outer(own).mask[here]
+    border = _border(parted, state, side)
+    least = min(float(distance[~safe].min(initial=np.inf)), *(near for near, *_ in border))
+    far, where, into = min(((far, push, code) for _, far, push, code in border), key=lambda each: each[0])
+    decided, beyond = parted.labels[here] != codes.UNDECIDED, far
+    if fatal.any():
+        nearest = int(np.flatnonzero(fatal)[distance[fatal].argmin()])
+        if distance[nearest] <= far:
+            far, where = float(distance[nearest]), push[nearest]
+    if (fatal & decided).any():
+        nearest = int(np.flatnonzero(fatal & decided)[distance[fatal & decided].argmin()])
+        into = int(parted.labels[number[nearest]]) if distance[nearest] <= beyond else into
+    if parted.proved:
+        least, far = least * (1.0 - ROUNDING), far * (1.0 + ROUNDING)
+    else:
+        width = CELLS * float(np.sqrt(((hi - lo) ** 2).sum(axis=1)).max())
+        least, far = max(least - width, 0.0), far + width
+    name = parted.names[int(np.flatnonzero(parted.codes == into)[0])]
+    return FatalShock(least, far, parted.how, state, side, parted.names[own], where, name)
+
+
+def _place(parted: Colours, x: ArrayLike, side: int) -> tuple[Floats, int]:
+    """Check a state; the state and its cell."""
+    grid = parted.grid
+    state = np.atleast_1d(np.asarray(x, dtype=np.float64))
+    known = 0 <= side < grid.sides and state.shape == (grid.dimension,)
+    cell = int(grid.index(state[None, :], side)[0]) if known else -1
+    if cell < 0:
+        raise AnswerError("the state", (x, side), "one in the domain of the grid", "pass x and side of one")
+    if parted.labels[cell] == codes.UNDECIDED:
+        raise AnswerError(
+            "the state", (x, side), "one in a cell that is decided", "ask for finer cells, or another state"
+        )
+    return state, cell
+
+
+def _border(parted: Colours, state: Floats, side: int) -> list[tuple[float, float, Floats, int]]:
+    """Distances to the border of the domain along each axis, at least and at most; the push, and the exit's code.
+
+    Below its lower border a state has left for certain only at the anchor, if there is one (a_i of the throw).
+    """
+    domain, ways = parted.grid.domain, list(parted.graph.exits.values())
+    target, found = Target.of(parted.grid, parted.graph.exits), []
+    for axis, x in enumerate(state.tolist()):
+        lo, hi = float(domain.lo[side, axis]), float(domain.hi[side, axis])
+        foot = lo if domain.anchor is None else float(domain.anchor[side])
+        for near, far, sink in ((lo, foot, target.sink_below), (hi, hi, target.sink_above)):
+            push = np.zeros(state.size)
+            push[axis] = far - x
+            found.append((abs(near - x), abs(far - x), push, ways[sink]))
+    return found

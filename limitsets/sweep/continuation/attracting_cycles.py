@@ -1,0 +1,147 @@
+"""Attracting cycles near the ends of orbits: closest returns, then Newton's method on their itinerary.
+
+An orbit that has come near a cycle of slope -1 or 1 creeps; its returns still tell the period, and Newton's method
+finds the cycle and its multiplier to rounding, on both sides of the bifurcation.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from limitsets.maps import advance, along, images
+from limitsets.maps.bisection import Array, Flags
+from limitsets.sets.cycle import Cycle, Ints
+from limitsets.sets.unions import EPS
+from limitsets.sweep.continuation.path import Place
+
+__all__ = ["MOST_PERIOD", "Recorded", "attracting_cycles", "on_itinerary", "recorded"]
+
+MOST_PERIOD = 128
+# Of the extent: a return that may be one of a cycle; how far Newton's method may lead; cycles nearer are one.
+RETURN, FAR, ONE = 1e-4, 0.05, 1e-9
+
+
+class Recorded:
+    """States of many orbits: x and side of shape (n, m + 1), code of shape (n, m)."""
+
+    def __init__(self, x: Array, side: Ints, code: Ints) -> None:
+        self.x, self.side, self.code = x, side, code
+
+    def rows(self, chosen: Flags) -> Recorded:
+        """Give some of the orbits."""
+        return Recorded(self.x[chosen], self.side[chosen], self.code[chosen])
+
+
+def recorded(place: Place, x: Array, side: Ints, steps: int) -> Recorded:
+    """Record orbits step by step; those that leave are left out."""
+    xs, sides, codes = [x], [side], []
+    for _ in range(steps):
+        x, side, code, _ = advance(place.params, xs[-1], sides[-1], 1)
+        xs.append(x)
+        sides.append(side)
+        codes.append(code)
+    found = Recorded(np.stack(xs, axis=1), np.stack(sides, axis=1), np.stack(codes, axis=1))
+    return found.rows((found.code >= 0).all(axis=1) & _on_domain(place, found))
+
+
+def _on_domain(place: Place, found: Recorded) -> Flags:
+    lo, hi = place.domain.lo[found.side, 0], place.domain.hi[found.side, 0]
+    inside: Flags = ((found.x >= lo) & (found.x <= hi)).all(axis=1)
+    return inside
+
+
+def on_itinerary(place: Place, x: Array, side: Ints, words: Ints) -> tuple[Array, Array, Flags]:
+    """Solve F^p(x) = x on forced branches near x: roots, slopes there, and where the method converged."""
+    start, converged = x.copy(), np.zeros(x.size, dtype=bool)
+    slope = np.full(x.size, np.nan)
+    for _ in range(80):
+        k = np.flatnonzero(~converged & np.isfinite(x))
+        if k.size == 0:
+            break
+        y, to, rate = along(place.params, x[k], side[k], words[k])
+        noise = 16.0 * EPS * place.extent * (1.0 + np.abs(rate))
+        slope[k] = rate
+        with np.errstate(divide="ignore", invalid="ignore"):
+            move = (y - x[k]) / (1.0 - rate)
+        done = (np.abs(y - x[k]) <= noise) & (to == side[k])
+        far = ~(np.abs(x[k] + move - start[k]) <= FAR * place.extent)
+        # A last step even where it is done: near slope 1 a small residual is no small error.
+        x[k] = np.where(far, np.where(done, x[k], np.nan), x[k] + move)
+        converged[k] = done
+    return x, slope, converged
+
+
+def _as_cycle(place: Place, x: float, side: int, word: Ints) -> Cycle | None:
+    """Follow one period from a root; None unless the map takes these branches and the cycle attracts."""
+    xs, sides, slopes = np.empty(word.size), np.empty(word.size, dtype=np.int64), np.empty(word.size)
+    for j, branch in enumerate(word.tolist()):
+        xs[j], sides[j] = x, side
+        after, to, slope = along(place.params, [x], side, [branch])
+        x, side, slopes[j] = float(after[0]), int(to[0]), slope[0]
+    multiplier = float(np.prod(slopes))
+    if not abs(multiplier) < 1.0:
+        return None
+    for s in np.unique(sides):
+        if (images(place.params, xs[sides == s], int(s)).code != word[sides == s]).any():
+            return None
+    return Cycle.through(xs, sides, word, multiplier, abs(x - float(xs[0])))
+
+
+def _shortest(place: Place, cycle: Cycle) -> Cycle:
+    """Cycle that this one runs through several times, if that one attracts."""
+    for period in range(1, cycle.period):
+        if cycle.period % period == 0 and cycle.side[period] == cycle.side[0]:
+            if abs(cycle.x[period] - cycle.x[0]) > 1e-3 * place.extent:
+                continue
+            word = cycle.branches[:period]
+            x, _, good = on_itinerary(place, cycle.x[:1].copy(), cycle.side[:1], word[None, :])
+            shorter = _as_cycle(place, float(x[0]), int(cycle.side[0]), word) if good[0] else None
+            if shorter is not None:
+                return shorter
+    return cycle
+
+
+def attracting_cycles(place: Place, found: Recorded) -> tuple[list[Cycle], Flags]:
+    """Find the attracting cycles that orbits have come near; which orbits have come near none."""
+    away = np.abs(found.x[:, 1:] - found.x[:, :1])
+    away[found.side[:, 1:] != found.side[:, :1]] = np.inf
+    near = away <= RETURN * place.extent
+    first = np.where(near.any(axis=1), near.argmax(axis=1) + 1, 0)
+    closest = away.argmin(axis=1) + 1 if away.size else first
+    cycles: list[Cycle] = []
+    left = np.ones(len(found.x), dtype=bool)
+    for periods in (first, 2 * first, np.where(first > 0, closest, 0)):
+        for period in np.unique(periods[left & (periods > 0) & (periods <= MOST_PERIOD)]).tolist():
+            k = np.flatnonzero(left & (periods == period))
+            words = np.ascontiguousarray(found.code[k, :period])
+            x, slope, good = on_itinerary(place, found.x[k, 0].copy(), found.side[k, 0], words)
+            for j in np.flatnonzero(good & (np.abs(slope) < 1.0 + 1e-6)).tolist():
+                side = int(found.side[k[j], 0])
+                if not any(_passes(cycle, float(x[j]), side, place.extent) for cycle in cycles):
+                    cycle = _as_cycle(place, float(x[j]), side, words[j])
+                    if cycle is None:
+                        continue
+                    cycles.append(_shortest(place, cycle))
+                left[k[j]] = False
+    return _told_apart(place, cycles), left
+
+
+def _told_apart(place: Place, cycles: list[Cycle]) -> list[Cycle]:
+    """Cycles of which rounding lets one be told from another: near slope 1 all numbers between two are roots."""
+    kept: list[Cycle] = []
+    for cycle in sorted(cycles, key=lambda each: each.period):
+        twin = False
+        for other in kept:
+            near = other.x[other.side == cycle.side[0]]
+            if cycle.period % other.period or near.size == 0:
+                continue
+            x = np.linspace(cycle.x[0], near[np.abs(near - cycle.x[0]).argmin()], 9)
+            y, _, slope = along(place.params, x, int(cycle.side[0]), cycle.branches)
+            noise = 16.0 * EPS * place.extent * (1.0 + np.abs(slope))
+            twin |= bool((np.abs(y - x) <= noise).all())
+        kept += [] if twin else [cycle]
+    return kept
+
+
+def _passes(cycle: Cycle, x: float, side: int, extent: float) -> bool:
+    return bool((np.abs(cycle.x[cycle.side == side] - x) <= ONE * extent).any())

@@ -1,0 +1,244 @@
+"""The attractors at one point of the path: attracting cycles by Newton's method, the others as intervals.
+
+Candidates are orbits from both sides of every critical point, from all over the domain, and from the attracting cells
+of a transition graph.  Orbits that close are cycles.  The others are grown from inside (`growth.py`).  A set that holds
+another one is no attractor: its orbits were still on their way.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from limitsets.cells import CellSet, grid
+from limitsets.graph import TransitionGraph, transitions
+from limitsets.maps import advance, kind_of
+from limitsets.maps.bisection import Array
+from limitsets.sets.cycle import Cycle, Ints
+from limitsets.sets.limit_set import End, ends_of
+from limitsets.sweep.continuation.attracting_cycles import (
+    MOST_PERIOD,
+    Recorded,
+    attracting_cycles,
+    recorded,
+)
+from limitsets.sweep.continuation.growth import carried, grown
+from limitsets.sweep.continuation.path import Place
+
+__all__ = ["Found", "Snapshot", "arrivals", "snapshot_at"]
+
+Intervals = dict[int, list[tuple[float, float]]]
+
+# Steps before an orbit is taken to be where it stays; starts per side beside those at critical points.
+TRANSIENT, STARTS, STARTS_PER_SET = 1000, 12, 4
+# Orbits from whose last states sets are grown, and the states taken of each.
+TRIED, STATES = 3, 8
+# Images until the ends of a set are critical orbits.
+MOST_IMAGES = 300
+
+
+@dataclass(frozen=True, eq=False)
+class Found:
+    """One attractor at one place.
+
+    Attributes
+    ----------
+    extents : dict of int to list of (lo, hi)
+        Its intervals per side; points of an attracting cycle have lo = hi.
+    ends : tuple of End
+        The ends with their critical orbits; none of a cycle.
+    cycle : Cycle or None
+        The attracting cycle.
+    cells : CellSet or None
+        In two and three dimensions: its cells.
+    decided : bool
+        Whether intervals grown from inside have settled; otherwise the set stands for what cells enclose.
+    """
+
+    extents: Intervals
+    ends: tuple[End, ...]
+    cycle: Cycle | None
+    cells: CellSet | None
+    decided: bool
+
+    @property
+    def period(self) -> int:
+        """Period of the attracting cycle, 0 for none."""
+        return 0 if self.cycle is None else self.cycle.period
+
+    @property
+    def bands(self) -> dict[int, int]:
+        """Intervals per side."""
+        return {side: len(parts) for side, parts in self.extents.items()}
+
+    def distance(self, x: Array, side: Ints) -> Array:
+        """Distance of states from the set along their side; infinite where it is not on that side."""
+        away = np.full(x.size, np.inf)
+        for s, parts in self.extents.items():
+            here = np.flatnonzero(side == s)
+            ends = np.array(parts)
+            beyond = np.maximum(ends[:, :1] - x[here], x[here] - ends[:, 1:])
+            away[here] = np.maximum(beyond, 0.0).min(axis=0)
+        return away
+
+
+@dataclass(frozen=True, eq=False)
+class Snapshot:
+    """The attractors at one place."""
+
+    place: Place
+    found: tuple[Found, ...]
+
+    @property
+    def t(self) -> float:
+        """Where on the path."""
+        return self.place.t
+
+
+def _cell_sets(graph: TransitionGraph) -> list[CellSet]:
+    """Attracting components of the cells."""
+    sets, ends = graph.recurrent_components(), graph.condensation().attracting
+    return [CellSet.of(graph.grid, cells) for cells, end in zip(sets, ends, strict=True) if end]
+
+
+def _starts(place: Place, sets: Iterable[CellSet]) -> tuple[Array, Ints]:
+    xs: list[float] = []
+    sides: list[int] = []
+    for side, pieces in place.forward.pieces.items():
+        lo, hi = place.forward.bounds[side]
+        ends = [end.x for piece in pieces for end in (piece.bottom, piece.top) if end.kind != "domain"]
+        # Unevenly spaced: evenly spaced starts of a symmetric map share their orbits.
+        inner = lo + (hi - lo) * (np.arange(STARTS) + 0.6180339887) / STARTS
+        xs += [*ends, *inner.tolist()]
+        sides += [side] * (len(ends) + STARTS)
+    for cells in sets:
+        numbers = cells.numbers()
+        chosen = numbers[np.linspace(0, numbers.size - 1, STARTS_PER_SET).astype(np.int64)]
+        owner = cells.grid.side_of(chosen)
+        for cell, side in zip(chosen.tolist(), owner.tolist(), strict=True):
+            low, high = cells.grid.boxes(np.array([cell]), side)
+            xs.append(0.5 * float(low[0, 0] + high[0, 0]))
+            sides.append(side)
+    return np.array(xs), np.array(sides, dtype=np.int64)
+
+
+def _of_cycle(cycle: Cycle) -> Found:
+    extents: Intervals = {}
+    for x, side in sorted(zip(cycle.x.tolist(), cycle.side.tolist(), strict=True)):
+        extents.setdefault(side, []).append((x, x))
+    return Found(dict(sorted(extents.items())), (), cycle, None, True)
+
+
+def _of_intervals(place: Place, extents: Intervals, *, inside: bool) -> Found | None:
+    union, known = carried(place.forward, extents, place.domain, place.extent, MOST_IMAGES, rest=not inside)
+    if not union:
+        return None
+    ends = ends_of(kind_of(place.params).branches, union)
+    found = {side: [(lo.x, hi.x) for lo, hi in parts] for side, parts in union.items()}
+    return Found(found, ends, None, None, inside and known)
+
+
+def _grown_sets(place: Place, rows: Recorded, sets: list[CellSet]) -> list[Found]:
+    """Find the sets of the orbits that are on no cycle."""
+    found: list[Found] = []
+    x, side = rows.x[:, -1], rows.side[:, -1]
+    left, tried = np.arange(x.size), 0
+    while left.size and tried < TRIED * (1 + len(sets)):
+        k, tried = int(left[0]), tried + 1
+        last = np.arange(rows.x.shape[1])[:: -max(1, rows.x.shape[1] // STATES)]
+        extents = grown(place.forward, rows.x[k, last], rows.side[k, last], place.extent)
+        if extents is not None:
+            new = _of_intervals(place, extents, inside=True)
+        else:
+            around = next((s for s in sets if s.holds(x[k : k + 1], int(side[k]))[0]), None)
+            new = None if around is None else _of_intervals(place, around.extents(), inside=False)
+        left = left[1:]
+        if new is not None:
+            found.append(new)
+            left = left[new.distance(x[left], side[left]) > 0.0]
+    return found
+
+
+def _holds(outer: Found, inner: Found, slack: float) -> bool:
+    ends = [(x, side) for side, parts in inner.extents.items() for pair in parts for x in pair]
+    x, side = np.array([each[0] for each in ends]), np.array([each[1] for each in ends], dtype=np.int64)
+    return bool((outer.distance(x, side) <= slack).all())
+
+
+def _least(found: list[Found], slack: float) -> tuple[Found, ...]:
+    """Keep the sets that hold no other one; of two that are the same the first."""
+    return tuple(
+        each
+        for k, each in enumerate(found)
+        if not any(
+            _holds(each, other, slack) and (j < k or not _holds(other, each, slack))
+            for j, other in enumerate(found)
+            if j != k
+        )
+    )
+
+
+def _order(found: Found) -> tuple[int, float]:
+    side = min(found.extents)
+    return side, found.extents[side][0][0]
+
+
+def snapshot_at(place: Place, cells: int) -> Snapshot:
+    """Find the attractors at one place; `cells` per axis."""
+    graph = transitions(place.params, grid(place.domain, cells))
+    sets = _cell_sets(graph)
+    if not place.on_line:
+        return Snapshot(place, tuple(Found(each.extents(), (), None, each, True) for each in sets))
+    x, side = _starts(place, sets)
+    x, side, code, _ = advance(place.params, x, side, TRANSIENT)
+    rows = recorded(place, x[code >= 0], side[code >= 0], MOST_PERIOD)
+    cycles, left = attracting_cycles(place, rows)
+    found = [_of_cycle(cycle) for cycle in cycles]
+    found += _grown_sets(place, rows.rows(left), sets)
+    return Snapshot(place, tuple(sorted(_least(found, 1e-9 * place.extent), key=_order)))
+
+
+def _sampled(found: Found, count: int = 9) -> tuple[Array, Ints]:
+    """States of an attractor."""
+    if found.cells is not None:
+        cover = found.cells.grid
+        numbers = found.cells.numbers()
+        numbers = numbers[:: max(1, numbers.size // 64)]
+        sides = cover.side_of(numbers)
+        x = np.empty((numbers.size, cover.dimension))
+        for side in np.unique(sides).tolist():
+            lo, hi = cover.boxes(numbers[sides == side], side)
+            x[sides == side] = 0.5 * (lo + hi)
+        return x, sides
+    parts = [(side, *pair) for side, pairs in found.extents.items() for pair in pairs]
+    width = 1 if found.cycle is not None else count
+    x = np.concatenate([np.linspace(lo, hi, width + 2)[1:-1] for _, lo, hi in parts])
+    return x, np.repeat([side for side, _, _ in parts], width).astype(np.int64)
+
+
+def _label(snapshot: Snapshot, x: Any, side: Ints, reach: float) -> Ints:
+    """Attractor that each state is at, -1 where it is at none."""
+    label = np.full(side.size, -1)
+    if not snapshot.found:
+        return label
+    if snapshot.found[0].cells is not None:
+        for number, each in enumerate(snapshot.found):
+            if each.cells is not None:
+                for s in np.unique(side).tolist():
+                    here = np.flatnonzero(side == s)
+                    label[here[each.cells.holds(x[here], s)]] = number
+        return label
+    away = np.stack([each.distance(x, side) for each in snapshot.found])
+    return np.where(away.min(axis=0) <= reach, away.argmin(axis=0), -1)
+
+
+def arrivals(found: Found, there: Snapshot, reach: float) -> set[int]:
+    """Attractors of another place in which the states of an attractor end; -2 for an exit."""
+    x, side = _sampled(found)
+    x, side, code, _ = advance(there.place.params, x, side, TRANSIENT)
+    stays = code >= 0
+    label = _label(there, x[stays], side[stays], reach)
+    return set(label[label >= 0].tolist()) | ({-2} if not stays.all() else set())

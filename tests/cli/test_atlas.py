@@ -1,0 +1,105 @@
+"""`limitsets atlas`: text, JSON, tables, and runs that go on."""
+
+import csv
+import json
+import math
+import sys
+
+import pytest
+
+from tests.cli.command import run
+
+TASK = "limitsets.sweep.examples:critical_points"
+KAPPA = ["--x", "throw.kappa=25.3778518:27:2"]
+
+
+def test_the_designed_critical_points_in_every_form(capfd, tmp_path):
+    code, out, _ = run(capfd, "atlas", "paper-designed", *KAPPA, "--task", TASK, "--csv", "a.csv", "--json")
+    record = json.loads(out)
+    assert code == 0
+    assert record["axes"] == [{"name": "throw.kappa", "unit": "in", "values": [25.3778518, 27.0]}]
+    assert record["variables"]["critical_point"]["values"][0] == pytest.approx([10, 10, 20], abs=1e-6)
+    rows = list(csv.DictReader((tmp_path / "a.csv").read_text(encoding="utf-8").splitlines()))
+    assert [float(row["throw.kappa"]) for row in rows] == [25.3778518, 27.0]
+    assert float(rows[0]["critical_point[2]"]) == record["variables"]["critical_point"]["values"][0][2]
+    assert (tmp_path / "paper-designed-atlas.zarr" / "zarr.json").is_file()
+    code, out, err = run(capfd, "atlas", "paper-designed", *KAPPA, "--task", TASK)
+    assert (code, err) == (0, "")
+    assert "2 points, 1 of its 1 chunks by earlier runs: paper-designed-atlas.zarr" in out
+    assert "2 computed" in out
+
+
+def test_a_task_in_a_file_of_the_present_folder(capfd, tmp_path, monkeypatch):
+    (tmp_path / "own_task_here.py").write_text("def twice(scene):\n    return {'twice': 2 * scene.kappa}\n")
+    monkeypatch.setattr(sys, "path", [place for place in sys.path if place not in ("", str(tmp_path))])
+    words = [
+        "atlas",
+        "paper-designed",
+        "--x",
+        "throw.kappa=25:30:9",
+        "--task",
+        "own_task_here:twice",
+        "--json",
+    ]
+    code, out, _ = run(capfd, *words, "--workers", "2")
+    assert code == 0
+    assert json.loads(out)["variables"]["twice"]["values"] == [50.0 + 1.25 * k for k in range(9)]
+
+
+def test_another_plan_in_the_same_place_is_bad_input(capfd):
+    assert run(capfd, "atlas", "paper-designed", *KAPPA, "--task", TASK)[0] == 0
+    code, out, err = run(
+        capfd, "atlas", "paper-initial", *KAPPA, "--task", TASK, "-o", "paper-designed-atlas.zarr"
+    )
+    assert (code, out) == (2, "")
+    assert "scene.name is 'paper-designed' there, 'paper-initial' here" in err
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        [],
+        ["--x", "throw.sped=1:2:3"],
+        ["--x", "throw.speed=1:2"],
+        [*KAPPA, "--y", "throw.kappa=1:2:3"],
+        [*KAPPA, "--task", "nothing:nowhere"],
+        [*KAPPA, "--task", TASK, "--variables", "nothing"],
+        [*KAPPA, "--task", TASK, "--workers", "0"],
+        [*KAPPA, "--task", TASK, "--workers", "2", "--cluster", "tcp://127.0.0.1:1"],
+        [*KAPPA, "--task", TASK, "--cluster", "here"],
+        [*KAPPA, "--task", TASK, "--out", "file"],
+        [*KAPPA, "--task", TASK, "--out", "file/below"],
+        [*KAPPA, "--task", TASK, "--csv", "."],
+    ],
+)
+def test_bad_input_is_one_line_and_exit_code_2(words, capfd, tmp_path):
+    (tmp_path / "file").write_text("a letter")
+    code, out, err = run(capfd, "atlas", "paper-designed", *words)
+    assert (code, out) == (2, "")
+    assert len(err.splitlines()) == 1
+    assert (tmp_path / "file").read_text() == "a letter"
+
+
+def test_points_without_a_scene_are_counted(capfd):
+    _, out, _ = run(capfd, "atlas", "paper-designed", "--x", "throw.speed=-10:10:3", "--task", TASK, "--json")
+    status = json.loads(out)["variables"]["status"]
+    # at 10 deg/s kappa is 193.045/(pi/18)^2 = 6337 in: there is a scene
+    assert status["values"] == [1, 1, 0]
+    assert math.prod(status["codes"].values()) == 0
+
+
+@pytest.mark.parametrize(("form", "begins"), [("png", b"\x89PNG"), ("svg", b"<?xml"), ("pdf", b"%PDF")])
+def test_the_map_of_classes_lies_beside_the_store(form, begins, capfd, tmp_path):
+    speed = ["--x", "throw.speed=135:165:17", "--refine", "--variables", "class"]
+    code, out, _ = run(capfd, "atlas", "paper-designed", *speed, "--format", form, "-o", "here.zarr")
+    assert code == 0
+    assert f"figure: here.{form}" in out
+    assert (tmp_path / f"here.{form}").read_bytes().startswith(begins)
+    assert "level" in out  # some points are filled
+
+
+def test_a_task_without_classes_has_no_map(capfd, tmp_path):
+    code, out, _ = run(capfd, "atlas", "paper-designed", *KAPPA, "--task", TASK, "-o", "here.zarr")
+    assert code == 0
+    assert "figure" not in out
+    assert [path.name for path in tmp_path.glob("here*")] == ["here.zarr"]

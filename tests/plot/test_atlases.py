@@ -1,0 +1,179 @@
+"""Maps and surfaces of an atlas: pixels, colours, words and marks against the numbers."""
+
+import math
+
+import numpy as np
+import pytest
+from matplotlib.colors import to_rgb
+
+import limitsets as ls
+from limitsets import maps
+from limitsets.errors import AnswerError
+from limitsets.plot.atlas_maps import look_of
+from limitsets.sweep.classes import UNDECIDED, legend
+
+X, Y = "throw.speed=130:180:24", "arm.surface_height=-1:0.2:16"
+
+
+@pytest.fixture(scope="module")
+def feeders():
+    wanted = ["class", "share", "threshold", "lyapunov", "leaves", "reach", "jogs_max"]
+    return ls.atlas("paper-designed", X, Y, variables=wanted, options={"throws": 500}, chunk=(16, 24))
+
+
+def image_of(figure):
+    (found,) = figure.axes[0].images
+    return found
+
+
+def test_each_pixel_has_the_colour_of_its_class(feeders):
+    figure = ls.plot.atlas(feeders)
+    numbers = feeders.dataset["class"].values
+    drawn = np.asarray(image_of(figure).get_array())[..., :3]
+    drawn = drawn / (255.0 if drawn.dtype.kind == "u" else 1.0)
+    entries = legend(feeders.dataset)
+    assert len(entries) >= 5
+    for each in entries:
+        face = to_rgb(look_of(each.number, each.name)["facecolor"])
+        assert np.allclose(drawn[numbers == each.number], face, atol=1 / 255)
+
+
+def test_the_legend_is_in_words_and_numbers_stand_in_the_largest_regions(feeders):
+    figure = ls.plot.atlas(feeders)
+    entries = legend(feeders.dataset)
+    texts = [text.get_text().replace("\n  ", "") for text in figure.legends[0].get_texts()]
+    assert texts[0].startswith(f"1: {entries[0].words} (")
+    # 158.02 deg/s is sqrt(g/kappa) of the file's decimals
+    assert texts[-1] == f"paper-designed: {math.degrees(math.sqrt(193.045 / 25.3778518)):.6g}, -0.2"
+    data, axes = feeders.dataset, figure.axes[0]
+    written = [text for text in axes.texts if text.get_gid() == "number"]
+    assert {"1", "2"} <= {text.get_text() for text in written}
+    for text in written:
+        x, y = text.get_position()
+        here = data["class"].sel({"throw.speed": x, "arm.surface_height": y}, method="nearest")
+        assert int(here) == entries[int(text.get_text()) - 1].number
+
+
+def test_the_design_is_marked_where_it_is(feeders):
+    (star,) = [line for line in ls.plot.atlas(feeders).axes[0].lines if line.get_gid() == "design"]
+    speed = math.degrees(math.sqrt(193.045 / 25.3778518))
+    assert star.get_xdata()[0] == pytest.approx(speed, rel=1e-12)
+    assert star.get_ydata()[0] == pytest.approx(-0.2, rel=1e-12)
+    outside = ls.atlas("paper-designed", "throw.speed=130:140:3", variables=["class"])
+    assert not [line for line in ls.plot.atlas(outside).axes[0].lines if line.get_gid() == "design"]
+
+
+def test_lines_part_the_classes_and_nothing_else(feeders):
+    numbers = feeders.dataset["class"].values
+    wanted = (numbers[1:] != numbers[:-1]).sum() + (numbers[:, 1:] != numbers[:, :-1]).sum()
+    (lines,) = [each for each in ls.plot.atlas(feeders).axes[0].collections if each.get_gid() == "boundaries"]
+    assert len(lines.get_segments()) == wanted
+
+
+def test_a_class_looks_alike_in_every_picture():
+    few = ls.atlas(maps.Logistic(3.8), "r=3.83:3.832:2", domain=[(0, 1)])
+    many = ls.atlas(maps.Logistic(3.8), "r=2.8:3.832:120", domain=[(0, 1)])
+    looks = []
+    for found in (few, many):
+        (number,) = {each.number for each in legend(found.dataset) if "a cycle of 3" in each.words}
+        row = np.flatnonzero(found.dataset["class"].values == number)[0]
+        looks.append(np.asarray(image_of(ls.plot.atlas(found)).get_array())[0, row])
+    assert len(legend(many.dataset)) > len(legend(few.dataset))
+    assert np.array_equal(*looks)
+
+
+def lightness(colour):
+    """CIE L* of sRGB, from its definition."""
+    linear = [c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in to_rgb(colour)]
+    y = 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2]
+    return 116 * y ** (1 / 3) - 16
+
+
+def test_classes_of_feeders_differ_without_colour():
+    names = [
+        "bands:1+1+1,order:0-1-2,period:0;leaves:none;collapses:none",
+        "bands:1+1+1,order:0-1-2,period:0;leaves:some;collapses:none",
+        "bands:1+1+1,order:0-1-2,period:0;leaves:none;collapses:some",
+        "no-attractor;leaves:all;collapses:none",
+        "no-attractor;leaves:none;collapses:all",
+        "no-attractor;leaves:some;collapses:some",
+    ]
+    looks = [look_of(1, name) for name in names] + [look_of(UNDECIDED, "undecided")]
+    for k, one in enumerate(looks):
+        for other in looks[:k]:
+            apart = abs(lightness(one["facecolor"]) - lightness(other["facecolor"]))
+            assert one["hatch"] != other["hatch"] or apart > 8
+
+
+def test_undecided_points_are_hatched_grey():
+    look = look_of(UNDECIDED, "undecided")
+    red, green, blue = to_rgb(look["facecolor"])
+    assert red == green == blue
+    assert look["hatch"]
+
+
+@pytest.mark.parametrize(
+    ("variable", "side", "label"),
+    [
+        ("threshold", None, "threshold of the goal [in]"),
+        ("lyapunov", None, "Lyapunov exponent [per throw]"),
+        ("leaves", None, "share of the starts that leave"),
+        ("reach", 1, "largest x of the attractor, side 1 [in]"),
+        ("jogs_max", 2, "most jogs of a visit, side 2"),
+    ],
+)
+def test_surfaces_show_the_largest_attractor_and_nothing_where_there_is_none(feeders, variable, side, label):
+    figure = ls.plot.atlas_surface(feeders, variable, side)
+    data = feeders.dataset
+    values = data[variable].values.astype(float)
+    if side is not None:
+        values = values[..., side]
+    values = values[..., 0] if values.ndim == 3 else values  # here there is one attractor at most
+    drawn = image_of(figure).get_array()
+    shown = np.isfinite(values) & (values >= 0)
+    assert np.array_equal(~np.ma.getmaskarray(drawn), shown)
+    assert np.array_equal(drawn[shown], values[shown])
+    assert figure.axes[1].get_ylabel() == label
+
+
+def test_the_line_of_the_goal_parts_what_holds_from_what_does_not(feeders):
+    (line,) = [
+        each
+        for each in ls.plot.atlas_surface(feeders, "threshold").axes[0].collections
+        if each.get_gid() == "level"
+    ]
+    data = feeders.dataset
+    for x, y in line.get_paths()[0].vertices[::5]:
+        near = data.threshold.sel({"throw.speed": x, "arm.surface_height": y}, method="nearest")
+        assert abs(float(near) - 20.0) < 0.5  # a pixel is 2 deg/s wide
+
+
+def test_one_quantity_is_a_line():
+    found = ls.atlas("paper-designed", "throw.speed=150:165:7", variables=["threshold", "class"])
+    figure = ls.plot.atlas_surface(found, "threshold")
+    (line,) = [each for each in figure.axes[0].lines if each.get_gid() == "values"]
+    assert np.array_equal(line.get_ydata(), found.dataset.threshold.values)
+    assert image_of(ls.plot.atlas(found)).get_array().shape[:2] == (1, 7)
+
+
+@pytest.mark.parametrize(
+    ("variable", "side", "words"),
+    [
+        ("class", None, "the variable to draw"),
+        ("nothing", None, "the variable to draw"),
+        ("reach", None, "the side of reach"),
+        ("reach", 3, "the side of reach"),
+        ("threshold", 0, "the side of threshold"),
+    ],
+)
+def test_what_is_no_surface(feeders, variable, side, words):
+    with pytest.raises(AnswerError, match=words):
+        ls.plot.atlas_surface(feeders, variable, side)
+
+
+def test_an_atlas_without_classes():
+    found = ls.atlas(
+        "paper-designed", "throw.kappa=25.3778518:26:2", task="limitsets.sweep.examples:critical_points"
+    )
+    with pytest.raises(AnswerError, match="one with class"):
+        ls.plot.atlas(found)

@@ -1,0 +1,142 @@
+"""Maps whose basins are known on paper, registered from outside the package as a user's maps are."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import limitsets as ls
+
+
+class Stripes(NamedTuple):
+    """On [0, 2) x' = 2.25 in even stripes of one width, 2.75 in odd ones; beyond, 2.25 up to 2.5, then 2.75.
+
+    Known answers: two attractors, and boundaries at every multiple of the width up to 2, at 2 if need be, and at 2.5.
+    """
+
+    width: float
+
+
+def stripes(params, x, side):
+    even = math.floor(x / params.width) % 2 == 0 if x < 2.0 else x < 2.5
+    return 2.25 if even else 2.75, side, 0
+
+
+ls.register(Stripes, image=stripes)
+
+
+class Gaps(NamedTuple):
+    """Slope s = 2 n + 1 on [0, 1]: n + 1 full branches, and between them n gaps, from which an orbit leaves.
+
+    Known answers: what stays is a Cantor set of dimension D = ln(n + 1) / ln(s), the boundary of all basins.  Without
+    halves gap number j leads to exit j: of all starts each exit takes 1/n, for P = 1/s + (n + 1)/s P.  With halves (one
+    gap) its lower half leads to the first exit and its upper half to the second.  Steps until an orbit leaves are
+    geometric, with mean s/n.
+    """
+
+    number: float
+    halves: float
+
+
+def gaps(params, x, side):
+    slope = 2.0 * params.number + 1.0
+    k = min(math.floor(slope * x), slope - 1.0)
+    rest = slope * x - k
+    which = int(k) // 2
+    if int(k) % 2 == 0:
+        return rest, side, which
+    if params.halves > 0.0:
+        which = 0 if rest < 0.5 else 1
+    return rest, side, -1 - which
+
+
+ls.register(
+    Gaps,
+    image=gaps,
+    branches=("one", "two", "three", "four"),
+    exits={"first": -1, "second": -2, "third": -3},
+)
+
+
+class Sheet(NamedTuple):
+    """`Gaps` in x_0, and x_1' = x_1 / 2.
+
+    Known answers: those of `Gaps`, with a boundary of dimension D + 1.
+    """
+
+    number: float
+    halves: float
+
+
+def sheet(params, z, side):
+    after, side, code = gaps(params, z[0], side)
+    return (after, 0.5 * z[1]), side, code
+
+
+ls.register(
+    Sheet,
+    image=sheet,
+    dimension=2,
+    branches=("one", "two", "three", "four"),
+    exits={"first": -1, "second": -2, "third": -3},
+)
+
+
+class Wall(NamedTuple):
+    """In space: x' = (1/2, 1/2, 1/2) beyond the plane x_0 = at, (-1/2, -1/2, -1/2) before it.
+
+    Known answer: two attractors; their basins are the two sides of the plane.
+    """
+
+    at: float
+
+
+def wall(params, z, side):
+    value = 0.5 if z[0] > params.at else -0.5
+    return (value, value, value), side, 1 if z[0] > params.at else 0
+
+
+def wall_on(params, z, side, branch):
+    value = branch - 0.5
+    return (value, value, value), side, ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+
+
+def wall_margin(params, z, side):
+    return z[0] - params.at
+
+
+ls.register(
+    Wall, image=wall, image_on=wall_on, margin=wall_margin, dimension=3, branches=("before", "beyond")
+)
+
+
+class Turnstile(NamedTuple):
+    """On two sides: x' = x^2 on the same side up to 1/2, on the other side beyond.
+
+    Known answers on [-1/4, 2]: 0 on each side attracts; x = 1 goes round for ever.  A start below 1/2 stays, one
+    between 1/2 and 1 changes side once for each step on which x > 1/2; one beyond 1 leaves.
+    """
+
+    power: float
+
+
+def turnstile(params, x, side):
+    flips = x > 0.5
+    return x * x, 1 - side if flips else side, 1 if flips else 0
+
+
+def turnstile_on(params, x, side, branch):
+    return x * x, 1 - side if branch == 1 else side, 2.0 * x
+
+
+def turnstile_margin(params, x, side):
+    return x - 0.5
+
+
+ls.register(
+    Turnstile,
+    image=turnstile,
+    image_on=turnstile_on,
+    margin=turnstile_margin,
+    branches=("stays", "changes"),
+)

@@ -1,0 +1,157 @@
+"""Classes: written down by hand here; their numbers by hashlib, their examples by theory."""
+
+import hashlib
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+import limitsets as ls
+from limitsets import maps
+from limitsets.errors import AnswerError
+from limitsets.sweep import atlas
+from limitsets.sweep.classes import FIELDS, classes, legend, named_class
+from tests.sweep.stores import Shuffled, bytes_of
+
+NONE = (0, 0, 0)
+# Of two attractors of three sides: bands, order and period of each.
+ONE = ([(1, 1, 1), NONE], [(0, 1, 2), (-1, -1, -1)], [0, -1])
+TWO = ([(2, 0, 1), (0, 3, 0)], [(0, 2, -1), (1, -1, -1)], [0, 3])
+SWAPPED = ([(0, 3, 0), (2, 0, 1)], [(1, -1, -1), (0, 2, -1)], [3, 0])
+IRREGULAR = ([(1, 1, 1), NONE], [(-2, -2, -2), (-1, -1, -1)], [0, -1])
+NO = ([NONE, NONE], [(-1, -1, -1)] * 2, [-1, -1])
+# attractors, undecided, the rest, leaves, collapses
+POINTS = {
+    "all stay": (1, 0, ONE, 0.0, 0.0),
+    "some leave": (1, 0, ONE, 0.25, 0.0),
+    "some collapse": (1, 0, ONE, 0.0, 1e-4),
+    "two": (2, 0, TWO, 0.0, 0.0),
+    "two, in the other places": (2, 0, SWAPPED, 0.0, 0.0),
+    "irregular": (1, 0, IRREGULAR, 0.0, 0.0),
+    "every start leaves": (0, 0, NO, 1.0 - 1e-14, 0.0),
+    "undecided": (1, 3, ONE, 0.0, 0.0),
+    "no scene": (-1, -1, NO, np.nan, np.nan),
+}
+NAMES = {
+    "all stay": "bands:1+1+1,order:0-1-2,period:0;leaves:none;collapses:none",
+    "some leave": "bands:1+1+1,order:0-1-2,period:0;leaves:some;collapses:none",
+    "some collapse": "bands:1+1+1,order:0-1-2,period:0;leaves:none;collapses:some",
+    "two": "bands:0+3+0,order:1,period:3;bands:2+0+1,order:0-2,period:0;leaves:none;collapses:none",
+    "irregular": "bands:1+1+1,order:changes,period:0;leaves:none;collapses:none",
+    "every start leaves": "no-attractor;leaves:all;collapses:none",
+    "undecided": "undecided",
+}
+WORDS = {
+    "all stay": "one attractor, 3 bands, 0-1-2",
+    "some leave": "one attractor, 3 bands, 0-1-2; some starts leave",
+    "some collapse": "one attractor, 3 bands, 0-1-2; some starts collapse",
+    "two": "two attractors: a cycle of 3, side 1 alone; 3 bands (2 + 0 + 1), 0-2",
+    "irregular": "one attractor, 3 bands, the order changes",
+    "every start leaves": "no attractors; every start leaves",
+}
+
+
+def fields_of(points):
+    rows = [(n, doubt, *rest, out, back) for n, doubt, rest, out, back in points]
+    columns = zip(*rows, strict=True)
+    return SimpleNamespace(**{name: np.array(column) for name, column in zip(FIELDS, columns, strict=True)})
+
+
+def number_of(name):
+    return int.from_bytes(hashlib.sha256(name.encode()).digest()[:6], "big")
+
+
+def test_classes_by_hand():
+    numbers, names = classes(fields_of(POINTS.values()))
+    by_point = dict(zip(POINTS, numbers.tolist(), strict=True))
+    for point, name in NAMES.items():
+        assert names[by_point[point]] == name
+        assert by_point[point] == (0 if name == "undecided" else number_of(name))
+    assert by_point["two"] == by_point["two, in the other places"]
+    assert by_point["no scene"] == -1
+    assert len(set(by_point.values())) == len(POINTS) - 1
+    assert {point: named_class(NAMES[point]).words for point in WORDS} == WORDS
+
+
+def test_a_class_has_its_number_whatever_else_is_met():
+    together = dict(zip(POINTS, classes(fields_of(POINTS.values()))[0].tolist(), strict=True))
+    for seed in range(5):
+        rng = np.random.default_rng(seed)
+        some = [str(each) for each in rng.permutation(list(POINTS))[: rng.integers(1, len(POINTS))]]
+        numbers, names = classes(fields_of([POINTS[each] for each in some]))
+        assert numbers.tolist() == [together[each] for each in some]
+        assert set(names) == set(numbers.tolist()) - {-1}
+
+
+def test_shares_of_rounding_are_none_and_all():
+    points = [(1, 0, ONE, 1e-12, 0.0), (0, 0, NO, 0.0, 1.0), (1, 0, ONE, 1e-6, 1.0 - 1e-6)]
+    _, names = classes(fields_of(points))
+    ways = {(each.leaves, each.collapses) for each in map(named_class, names.values())}
+    assert ways == {("none", "none"), ("none", "all"), ("some", "some")}
+
+
+@pytest.mark.parametrize(
+    "name", ["", "undecided", "bands:1;leaves:none;collapses:none", "bands:x,order:0,period:0;a;b"]
+)
+def test_what_names_no_class(name):
+    with pytest.raises(AnswerError, match="the name of a class"):
+        named_class(name)
+
+
+def test_a_field_that_is_missing_is_named():
+    fields = fields_of(POINTS.values())
+    del fields.period
+    with pytest.raises(AnswerError, match="the variable period"):
+        classes(fields)
+
+
+@pytest.fixture(scope="module")
+def feeders():
+    """The scene at 12 x 9 points in one chunk."""
+    return atlas("paper-designed", "throw.speed=130:180:12", "arm.surface_height=-1:0.2:9", chunk=(9, 12))
+
+
+def test_an_atlas_stores_what_its_fields_say(feeders):
+    data = feeders.dataset
+    numbers, names = classes(data)
+    assert np.array_equal(data["class"].values, numbers)
+    attributes = data["class"].attrs
+    assert dict(zip(attributes["flag_values"], attributes["flag_meanings"].split(), strict=True)) == names
+    # docs/physics: h <= 0 and slow throws lose every start, and one attractor holds the paper's design
+    assert named_class(names[int(numbers[0, 0])]).words == "no attractors; every start leaves"
+    near = data["class"].sel({"throw.speed": 158, "arm.surface_height": -0.2}, method="nearest")
+    assert named_class(names[int(near)]).words == "one attractor, 3 bands, 0-1-2"
+
+
+def test_chunks_and_their_order_leave_no_trace(feeders, tmp_path):
+    stores = []
+    for seed in range(2):
+        store = tmp_path / f"{seed}.zarr"
+        found = atlas(
+            "paper-designed", "throw.speed=130:180:12", "arm.surface_height=-1:0.2:9", chunk=(4, 5),
+            variables=["class"], store=store, executor=Shuffled(seed),
+        )  # fmt: skip
+        assert np.array_equal(found.dataset["class"].values, feeders.dataset["class"].values)
+        assert found.dataset["class"].attrs == feeders.dataset["class"].attrs
+        stores.append(bytes_of(store))
+    assert stores[0] == stores[1]
+
+
+def test_the_legend_says_jogs_and_shares(feeders):
+    entries = legend(feeders.dataset)
+    assert [each.share for each in entries] == sorted((each.share for each in entries), reverse=True)
+    assert sum(each.share for each in entries) == pytest.approx(1.0)
+    first = next(each for each in entries if each.name == NAMES["all stay"])
+    here = feeders.dataset["class"].values == first.number
+    least, most = (feeders.dataset[name].values[here][:, 0] for name in ("jogs_min", "jogs_max"))
+    assert first.words == f"{WORDS['all stay']}; {least.min()} to {most.max()} jogs a visit"
+
+
+def test_windows_of_the_logistic_map():
+    # cycles of 1, 2, 4, 3 and, at 4, the whole of [0, 1] (Feigenbaum; Sharkovsky)
+    values = [2.8, 3.2, 3.5, 3.83, 4.0]
+    found = atlas(maps.Logistic(3.8), ls.sweep.Axis("r", values), domain=[(0, 1)]).dataset
+    numbers, names = classes(found)
+    words = [named_class(names[each]).words for each in numbers.tolist()]
+    kinds = ["a fixed point", "a cycle of 2", "a cycle of 4", "a cycle of 3", "1 band"]
+    assert words == [f"one attractor, {kind}" for kind in kinds]

@@ -1,0 +1,380 @@
+"""Continuation: events at parameters known in closed form, from 40 digits, or by bands on both sides."""
+
+import json
+import math
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+
+import limitsets as ls
+from limitsets import maps
+from limitsets.errors import AnswerError, MapError, SceneError
+from limitsets.files import as_json
+from limitsets.sets import limit_set_of
+from tests.maps_of_tests import TwoState
+from tests.sets.part import Part, mp
+
+
+class Steps(NamedTuple):
+    """A tent with jumps at `low` and `high`, where the image is lifted beyond them.
+
+    Known answers for 0.1 of lift, low 0.25 and high 0.9: as long as the tent's core [s (1 - s/2), s/2] lies between the
+    jumps it is the attractor; its upper end meets `high` at s = 1.8, its lower end `low` at s = 1 + sqrt(1/2).
+    """
+
+    slope: float = 1.7
+    low: float = 0.25
+    high: float = 0.9
+    lift: float = 0.1
+
+
+def steps(params: Steps, x: float, side: int) -> tuple[float, int, int]:
+    if x < params.low:
+        return params.slope * x + params.lift, side, 0
+    if x < 0.5:
+        return params.slope * x, side, 1
+    if x < params.high:
+        return params.slope * (1.0 - x), side, 2
+    return params.slope * (1.0 - x) + params.lift, side, 3
+
+
+def steps_on(params: Steps, x: float, side: int, branch: int) -> tuple[float, int, float]:
+    lift = params.lift if (branch == 0) | (branch == 3) else 0.0
+    if branch >= 2:
+        return params.slope * (1.0 - x) + lift, side, -params.slope
+    return params.slope * x + lift, side, params.slope
+
+
+ls.register(Steps, image=steps, image_on=steps_on, branches=("lifted up", "up", "down", "lifted down"))
+
+
+class Kink(NamedTuple):
+    """x' = left x + mu below 0, right x + mu from 0 on: the normal form of a border collision in one dimension.
+
+    Known answers at mu = 0 (Nusse and Yorke, Physica D 57, 1992): for 0 < left < 1 the fixed point mu / (1 - left) of
+    mu < 0 becomes that of the other branch where abs(right) < 1, and a cycle of period 2, one point on each branch,
+    where right < -1 < left right.
+    """
+
+    mu: float = -1.0
+    left: float = 0.5
+    right: float = -0.5
+
+
+def kink(params: Kink, x: float, side: int) -> tuple[float, int, int]:
+    return (params.left * x + params.mu, side, 0) if x < 0.0 else (params.right * x + params.mu, side, 1)
+
+
+def kink_on(params: Kink, x: float, side: int, branch: int) -> tuple[float, int, float]:
+    slope = params.left if branch == 0 else params.right
+    return slope * x + params.mu, side, slope
+
+
+ls.register(Kink, image=kink, image_on=kink_on, branches=("left", "right"))
+
+LINE = [(0.0, 1.0)]
+
+
+def middle(event, name):
+    return 0.5 * (event.values[0][name] + event.values[1][name])
+
+
+def of_kind(found, kind):
+    return [event for event in found.events if event.kind == kind]
+
+
+def of_top(r, count):
+    """F^count(1/2) of the logistic map."""
+    x = mp.mpf(1) / 2
+    for _ in range(count):
+        x = r * x * (1 - x)
+    return x
+
+
+def window_end():
+    """r where F^3(c) falls on the unstable 3-cycle: F^6(c) = F^9(c), at 40 digits."""
+    return float(mp.findroot(lambda r: of_top(r, 6) - of_top(r, 9), (3.8567, 3.8569)))
+
+
+MERGING = float(max(np.roots([1.0, -2.0, -4.0, -8.0]).real))  # F^3(c) = 1 - 1/r
+
+LOGISTIC = {
+    "flip": (2.9, 3.1, 3.0, "period 1 -> period 2"),
+    "second flip": (3.42, 3.47, 1.0 + math.sqrt(6.0), "period 2 -> period 4"),
+    "tangent": (3.8282, 3.8286, 1.0 + math.sqrt(8.0), "1 band -> period 3"),
+    "bands merge": (3.675, 3.68, MERGING, "2 bands -> 1 band"),
+    "interior crisis": (3.8566, 3.857, window_end(), "3 bands -> 1 band"),
+}
+
+
+@pytest.mark.parametrize("name", LOGISTIC)
+def test_bifurcations_of_the_logistic_map(name):
+    first, last, at, change = LOGISTIC[name]
+    found = ls.continuation(maps.Logistic(3.0), {"r": (first, last)}, steps=3)
+    assert [(event.kind, event.change) for event in found.events] == [("bands", change)]
+    (event,) = found.events
+    assert event.t[1] - event.t[0] <= 1e-9
+    assert abs(middle(event, "r") - at) < 2e-9
+    assert event.before == event.after == (0,)
+    # A crisis and a tangent bifurcation change the set at once, the others from nothing on.
+    assert (event.jump > 0.1) == (name in ("tangent", "interior crisis"))
+    assert event.jump > 0.1 or event.jump < 1e-4
+    assert event.collision is None
+
+
+def test_the_numbers_of_the_logistic_map():
+    assert abs(MERGING - 3.678573510428322) < 1e-14
+    assert window_end() == pytest.approx(3.8568, abs=1e-4)  # Grebogi, Ott, Yorke, Physica D 7, 1983
+
+
+def test_bands_of_the_logistic_map_in_closed_form():
+    found = ls.continuation(maps.Logistic(3.6), {"r": (3.70, 3.71)}, steps=2)
+    for r, states in zip(found.values["r"], found.attractors, strict=True):
+        if states[0].period == 0:
+            assert states[0].decided
+            (lo, hi) = states[0].extents[0][0]
+            assert abs(hi - r / 4.0) < 1e-12
+            assert abs(lo - r * (r / 4.0) * (1.0 - r / 4.0)) < 1e-12
+
+
+@pytest.mark.parametrize("period", [6, 7, 8])
+def test_long_transients_hide_no_cycle(period):
+    """The last superstable cycle below r = 4: most orbits wander for thousands of steps before they come to it."""
+    guess = 4.0 - 10.0 / 4.0**period
+    r = float(mp.findroot(lambda r: of_top(r, period) - mp.mpf(1) / 2, (guess, guess + 1e-3 / 4.0**period)))
+    found = ls.continuation(maps.Logistic(3.0), lambda t: {"r": r}, steps=1)
+    assert [state.period for states in found.attractors for state in states.values()] == [period] * 2
+
+
+def test_an_attractor_leaves_at_four():
+    found = ls.continuation(maps.Logistic(3.0), {"r": (3.9999, 4.0001)}, steps=3)
+    (death,) = of_kind(found, "death")
+    assert abs(middle(death, "r") - 4.0) < 1e-9
+    assert death.after == ()
+    assert found.attractors[-1] == {}
+    # F(1/2) = r / 4 leaves [0, 1].
+    assert (death.collision.k, death.collision.x, death.collision.change) == (1, 1.0, "end of the domain")
+
+
+def test_two_attractors_merge_and_split():
+    """x' = r x - x^3: the two chaotic sets of one sign each meet at 0 where F^2(c) = 0, r = 3 sqrt(3) / 2."""
+    found = ls.continuation(maps.Cubic(1.5), {"r": (2.59, 2.605)}, steps=3, domain=[(-2.0, 2.0)])
+    (merge,) = of_kind(found, "merge")
+    assert abs(middle(merge, "r") - 1.5 * math.sqrt(3.0)) < 1e-9
+    assert merge.before == (0, 1)
+    assert merge.after == (0,)
+    back = ls.continuation(maps.Cubic(1.5), {"r": (2.605, 2.59)}, steps=3, domain=[(-2.0, 2.0)])
+    (split,) = of_kind(back, "split")
+    assert abs(middle(split, "r") - 1.5 * math.sqrt(3.0)) < 1e-9
+    assert (split.before, split.after) == ((0,), (0, 1))
+    fork = ls.continuation(maps.Cubic(1.5), {"r": (0.9, 1.1)}, steps=4)
+    (event,) = fork.events
+    assert event.kind == "split"
+    # Two cycles nearer than rounding lets a slope of 1 be told are one: (16 eps)^(2/3) and more.
+    assert abs(middle(event, "r") - 1.0) < 5e-9
+
+
+@pytest.mark.sweep
+def test_the_first_tongue_of_the_circle_map_ends():
+    found = ls.continuation(maps.Circle(0.0, 0.5), {"omega": (0.078, 0.081)}, steps=3)
+    first = found.events[0]
+    assert first.kind == "bands"
+    assert first.change.startswith("period 1 -> ")
+    assert abs(middle(first, "omega") - 0.5 / math.tau) < 1e-9
+
+
+# ---------------------------------------------------------------- border collisions
+
+
+def test_ends_of_a_band_meet_jumps_where_they_should():
+    found = ls.continuation(Steps(), {"slope": (1.65, 1.85)}, steps=5, domain=LINE)
+    collisions = of_kind(found, "border collision")
+    expected = [(1.0 + math.sqrt(0.5), 0.25, 2, ("down",)), (1.8, 0.9, 1, ())]
+    assert len(collisions) == 2
+    for event, (at, x, k, rest) in zip(collisions, expected, strict=True):
+        assert event.t[1] - event.t[0] <= 1e-9
+        assert event.values[0]["slope"] < at < event.values[1]["slope"]
+        met = event.collision
+        assert (met.k, met.side, met.start_side, met.start) == (k, 0, 0, pytest.approx(0.5, abs=1e-15))
+        assert met.x == pytest.approx(x, abs=1e-12)
+        # The tent is continuous at 1/2: both limits lead there.
+        assert met.limit in ("c-", "c+")
+        assert met.itinerary == ("up" if met.limit == "c-" else "down", *rest)
+    assert collisions[1].collision.change == "down->lifted down"
+
+
+@pytest.mark.parametrize(("right", "change"), [(-0.5, ""), (-1.5, "period 1 -> period 2")])
+def test_a_point_of_a_cycle_meets_the_border(right, change):
+    found = ls.continuation(Kink(-1.0, 0.5, right), {"mu": (-0.5, 0.73)}, steps=4, domain=[(-2.0, 2.0)])
+    (event,) = found.events
+    assert (event.kind, event.change) == ("border collision", change)
+    assert event.values[0]["mu"] < 0.0 < event.values[1]["mu"]
+    assert event.t[1] - event.t[0] <= 1e-9
+    assert (event.collision.k, event.collision.limit, event.collision.x) == (
+        1,
+        "cycle",
+        pytest.approx(0.0, abs=1e-9),
+    )
+    last = found.attractors[-1][0].extents[0]
+    mu, period_two = 0.73, right < -1.0
+    # x1 = left x0 + mu and x0 = right x1 + mu; or mu / (1 - right).
+    low = mu * (1.0 + right) / (1.0 - 0.5 * right)
+    points = [low, 0.5 * low + mu] if period_two else [mu / (1.0 - right)]
+    assert [lo for lo, _ in last] == pytest.approx(points, abs=1e-12)
+
+
+def test_a_touch_and_two_collisions_within_a_step():
+    def touching(t):
+        return {"slope": 1.8 - 0.2 * (t - 0.55) ** 2}
+
+    found = ls.continuation(Steps(), touching, steps=10, domain=LINE)
+    (touch,) = found.events
+    assert touch.kind == "touch"
+    assert touch.t[0] < 0.55 < touch.t[1]
+    assert (touch.collision.k, touch.collision.x) == (1, pytest.approx(0.9, abs=1e-9))
+
+    def passing(t):
+        return {"slope": 1.8001 - 0.2 * (t - 0.55) ** 2}
+
+    found = ls.continuation(Steps(), passing, steps=10, domain=LINE)
+    assert [event.kind for event in found.events] == ["border collision"] * 2
+    for event, sign in zip(found.events, (-1.0, 1.0), strict=True):
+        assert abs(sum(event.t) / 2.0 - (0.55 + sign * math.sqrt(0.0005))) < 1e-9
+
+
+def test_no_border_where_the_map_is_smooth():
+    """At r = 1 + sqrt(5) a point of the 2-cycle passes the top 1/2, which names two branches and is no border."""
+    found = ls.continuation(maps.Logistic(3.0), {"r": (3.2, 3.3)}, steps=4)
+    assert found.events == ()
+
+
+# ---------------------------------------------------------------- throws
+
+
+def collision_of_part(start, word, target):
+    """kappa where an orbit from critical point `start` along `word` meets that of side `target`, at 40 digits."""
+
+    def gap(kappa):
+        part = Part("paper-initial", ("-0.2", "3.9867006", "1.8835981", kappa))
+        side, near = start
+        x = part.critical_point(side, near)
+        for branch in word:
+            x, side = part.throw(x, side, branch)
+        assert side == target[0]
+        return x - part.critical_point(*target)
+
+    return gap
+
+
+@pytest.mark.parametrize(
+    ("first", "last", "bands"), [("120.5 deg/s", "121.5 deg/s", (7, 8)), ("135.8 deg/s", "137 deg/s", (5, 4))]
+)
+def test_a_throw_meets_a_border_where_40_digits_say(first, last, bands):
+    scene = ls.load("paper-initial")
+    found = ls.continuation(scene, {"throw.speed": (first, last)}, steps=2)
+    (event,) = found.events
+    assert event.kind == "border collision"
+    assert event.t[1] - event.t[0] <= 1e-9
+    assert event.change == f"{bands[0]} bands -> {bands[1]} bands"
+    met = event.collision
+    assert len(met.itinerary) == met.k
+    assert met.limit == ("c-" if met.itinerary[0] == "jog" else "c+")  # jogs below r_i, flips from there on
+    gap = collision_of_part((met.start_side, met.start), met.itinerary, (met.side, met.x))
+    gravity = mp.mpf(scene.value("gravity.acceleration"))
+    ends = [gravity / mp.mpf(values["throw.speed"]) ** 2 for values in event.values]
+    assert gap(ends[0]) * gap(ends[1]) < 0
+    # Bands on both sides by images of a whole neighbourhood, from outside.
+    for values, step, count in zip(event.values, (-1e-7, 1e-7), bands, strict=True):
+        there = scene.with_values({"throw.speed": values["throw.speed"] + step})
+        graph = ls.transitions(there.map, ls.grid(there.domain, cells=8192))
+        (cells,) = ls.attractors(graph, throws=1000)
+        outer = limit_set_of(there.map, cells.extents, there.domain).extents
+        assert sum(len(parts) for parts in outer.values()) == count
+
+
+def test_the_set_begins_where_the_longest_jog_ends_on_the_arm():
+    """paper-designed: below some speed the jog from r_2 - 0 passes the arm's end, 28 in."""
+    scene = ls.load("paper-designed")
+    found = ls.continuation(scene, {"throw.speed": ("140 deg/s", "142 deg/s")}, steps=2)
+    (birth,) = found.events
+    assert (birth.kind, birth.before, birth.after) == ("birth", (), (0,))
+    assert birth.t[1] - birth.t[0] <= 1e-9
+    met = birth.collision
+    assert (met.change, met.x, met.side) == ("end of the domain", 28.0, 2)
+    assert (met.k, met.limit, met.itinerary, met.start_side) == (1, "c-", ("jog",), 2)
+    gravity = mp.mpf(scene.value("gravity.acceleration"))
+    ends = []
+    for values in birth.values:
+        kappa = gravity / mp.mpf(values["throw.speed"]) ** 2
+        part = Part("paper-designed", ("-0.2", "4.2255778", "0.7082490", kappa))
+        ends.append(part.throw(part.critical_point(2, met.start), 2, "jog")[0] - 28)
+    assert ends[0] > 0 > ends[1]
+
+
+# ---------------------------------------------------------------- cells, numbers, forms
+
+
+def test_births_and_deaths_on_cells():
+    """Below r = 1/2 all goes to the origin, from there on to one of (r, r) and (-r, -r)."""
+    found = ls.continuation(
+        TwoState(1.0), {"r": (0.3, 0.8)}, steps=3, cells=64, domain=[(-2.0, 2.0), (-2.0, 2.0)]
+    )
+    assert sorted(event.kind for event in found.events) == ["birth", "birth", "death"]
+    for event in found.events:
+        assert event.values[0]["r"] < 0.5 <= event.values[1]["r"]
+        assert event.t[1] - event.t[0] <= 1e-9
+    assert set(found.attractors[0]) == {0}
+    assert set(found.attractors[-1]) == {1, 2}
+    assert found.critical[0] == {}
+
+
+def test_any_curve_and_its_forms():
+    def curve(t):
+        return maps.Logistic(3.2 + 0.01 * math.sin(math.pi * t))
+
+    found = ls.continuation(maps.Logistic(3.0), curve, steps=2)
+    assert found.values["r"] == pytest.approx([3.2, 3.21, 3.2])
+    assert found.numbers == (0,)
+    table = json.loads(as_json(found))
+    assert [step["attractors"]["0"]["period"] for step in table["steps"]] == [2, 2, 2]
+    assert table["steps"][0]["critical_points"] == {"0": [0.5]}
+    assert table["events"] == []
+    frame = found.to_dataframe()
+    assert list(frame.columns) == ["t", "r", "attractor", "period", "decided", "side", "band", "lo", "hi"]
+    assert len(frame) == 6
+    assert (frame.lo == frame.hi).all()
+
+
+def test_events_as_json():
+    found = ls.continuation(Kink(-1.0, 0.5, -0.5), {"mu": (-0.5, 0.73)}, steps=2, domain=[(-2.0, 2.0)])
+    (event,) = json.loads(as_json(found))["events"]
+    assert event["kind"] == "border collision"
+    assert event["collision"]["itinerary"] == ["right"] or event["collision"]["itinerary"] == ["left"]
+    assert event["collision"]["start"] is None
+
+
+def test_progress_is_told():
+    told = []
+    ls.continuation(maps.Logistic(3.0), {"r": (3.2, 3.21)}, steps=2, progress=lambda *what: told.append(what))
+    assert told == [("steps", 0, 2), ("steps", 1, 2), ("steps", 2, 2)]
+
+
+@pytest.mark.parametrize(
+    ("subject", "path", "options", "error"),
+    [
+        (maps.Logistic(3.0), {"r": (3.0, 3.1)}, {"steps": 0}, AnswerError),
+        (maps.Logistic(3.0), {"r": 3.0}, {}, AnswerError),
+        (maps.Logistic(3.0), {}, {}, AnswerError),
+        (maps.Logistic(3.0), {"q": (3.0, 3.1)}, {}, AnswerError),
+        (maps.Logistic(3.0), lambda t: 3.0, {}, AnswerError),
+        (Kink(), lambda t: {"mu": 1.0} if t < 1.0 else {"left": 0.5}, {"domain": [(-2.0, 2.0)]}, AnswerError),
+        (Kink(), {"mu": (-1.0, 1.0)}, {}, MapError),
+        ("paper-designed", {"throw.sped": (1.0, 2.0)}, {}, SceneError),
+        ("paper-designed", {"throw.speed": (2.6, 2.7)}, {"domain": LINE}, AnswerError),
+        ("paper-designed", {"throw.speed": ("1 in", "2 in")}, {}, SceneError),
+    ],
+)
+def test_what_is_no_path_is_refused(subject, path, options, error):
+    with pytest.raises(error):
+        ls.continuation(subject, path, **options)
