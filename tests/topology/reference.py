@@ -29,7 +29,7 @@ BESIDE, JUMPS = 1e-8, 40.0
 HOLE = 4
 # Images until a set rests; ends rest that move by less than this share of the longest side.
 MOST_IMAGES, REST = 20_000, 1e-13
-THROWS, AFTER, STARTS = 3000, 1500, 1000
+THROWS, AFTER, STARTS = 3000, 1500, 1000  # before orbits are looked at, from then on, and how many of them
 
 
 @dataclass
@@ -304,12 +304,19 @@ def _order(after: dict[int, set[int]], sides: list[int]) -> tuple[int, ...] | No
 
 def _period(params: Any, x: float, side: int, scale: float) -> int:
     """Length of the cycle on which a state is, 0 for none of at most 4096."""
-    path = orbit(params, x, side, 8192)
-    near = (np.abs(path.x[1:4097] - path.x[0]) <= 1e-8 * scale) & (path.side[1:4097] == path.side[0])
+    at, on = followed(params, x, side, 8192)
+    near = (np.abs(at[1:4097] - at[0]) <= 1e-8 * scale) & (on[1:4097] == on[0])
     for p in np.flatnonzero(near) + 1:
-        if np.all(np.abs(path.x[p:4096] - path.x[: 4096 - p]) <= 1e-7 * scale):
+        if np.all(np.abs(at[p:8192] - at[: 8192 - p]) <= 1e-7 * scale):
             return int(p)
     return 0
+
+
+def followed(params: Any, x: float, side: int, count: int) -> tuple[Floats, Ints]:
+    """Orbit of `count` steps; where steps round away, or it leaves, its last state stands for the rest."""
+    path = orbit(params, x, side, count)
+    rest = count + 1 - path.x.size
+    return np.pad(path.x, (0, rest), mode="edge"), np.pad(path.side, (0, rest), mode="edge")
 
 
 def reference(
@@ -381,9 +388,8 @@ def _attractor(scan: Scan, member: Any, x: Floats, side: Ints, mine: Any, after:
     union = settled(scan, union)
     counts, jogs, follow, period = np.zeros(member.size, np.int64), {}, {}, 0
     if mine.any():
-        paths = [orbit(scan.params, x[k], int(side[k]), after) for k in np.flatnonzero(mine)]
-        paths = [path for path in paths if path.code.size == after]
-        places, on = np.array([path.x for path in paths]), np.array([path.side for path in paths])
+        paths = [followed(scan.params, x[k], int(side[k]), after) for k in np.flatnonzero(mine)]
+        places, on = (np.array(each) for each in zip(*paths, strict=True))
         jogs, follow = _visits(on)
         counts = np.bincount(scan.cell_of(places.ravel(), on.ravel()), minlength=counts.size)
     if mine.any():
