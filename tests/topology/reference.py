@@ -2,14 +2,14 @@
 
 Numpy and scipy, and of the package the images of states alone.  Sides are scanned at the ends and the middle of every
 cell; where the side, the code or the value of the image jumps, or where the image turns, the cell is cut.  A component
-that no image leaves holds an attractor, which is the limit of the images of its cells; 1000 orbits from random starts say what
-is really visited, and a stretch of cells that none of them visits is a gap.
+that no image leaves holds an attractor, which is the limit of the images of its cells; 1000 orbits from random starts
+say what is really visited, and a stretch of cells that none of them visits is a gap.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, field
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -54,7 +54,9 @@ class Reference:
     leaves: float
     collapses: float
     remain: float  # of the starts: they neither left nor came to an attractor
-    some: dict[str, str] = field(default_factory=dict)  # "none", "some", "all", or "?" where cells cannot tell
+    some: dict[str, str] = field(
+        default_factory=dict
+    )  # "none", "some", "all", or "?" where cells cannot tell
 
 
 class Scan:
@@ -102,11 +104,7 @@ class Scan:
         x = np.sort(np.concatenate([edges, 0.5 * (edges[1:] + edges[:-1])]))
         y, to, code = self.at(x, side)
         with np.errstate(invalid="ignore"):
-            differ = (
-                (to[1:] != to[:-1])
-                | (code[1:] != code[:-1])
-                | ~(np.abs(np.diff(y)) <= JUMPS * width)
-            )
+            differ = (to[1:] != to[:-1]) | (code[1:] != code[:-1]) | ~(np.abs(np.diff(y)) <= JUMPS * width)
         cuts: list[float] = []
         k = np.flatnonzero(differ)
         if k.size:
@@ -256,7 +254,15 @@ def settled(scan: Scan, union: list[Interval]) -> list[Interval]:
     for _ in range(MOST_IMAGES):
         after = scan.image(union)
         same = len(after) == len(union) and [s for s, *_ in after] == [s for s, *_ in union]
-        if same and max(abs(p - q) for a, b in zip(after, union, strict=True) for p, q in zip(a[1:], b[1:], strict=True)) <= REST * scan.scale:
+        if (
+            same
+            and max(
+                abs(p - q)
+                for a, b in zip(after, union, strict=True)
+                for p, q in zip(a[1:], b[1:], strict=True)
+            )
+            <= REST * scan.scale
+        ):
             return after
         union = after
     raise ArithmeticError("the images do not come to rest")
@@ -329,7 +335,6 @@ def reference(
     throws: int = THROWS,
     after: int = AFTER,
     seed: int = 0,
-    told: Callable[[str], None] | None = None,
 ) -> Reference:
     """Find the topology of the attractors of one map on the domain `lo`, `hi` (one entry per side)."""
     lo, hi = np.asarray(lo, float), np.asarray(hi, float)
@@ -401,7 +406,7 @@ def _attractor(scan: Scan, member: Any, x: Floats, side: Ints, mine: Any, after:
         parts = _without_holes(scan, counts, s, lo, hi) if mine.any() and period == 0 else [(lo, hi)]
         holes += len(parts) - 1
         bands.setdefault(s, []).extend(parts)
-    gaps = [b[0] - a[1] for parts in bands.values() for a, b in zip(parts, parts[1:], strict=False)]
+    gaps = [b[0] - a[1] for parts in bands.values() for a, b in pairwise(parts)]
     return Attractor(
         bands,
         _order(follow, sorted(bands)),
@@ -419,7 +424,7 @@ def _without_holes(scan: Scan, counts: Ints, side: int, lo: float, hi: float) ->
     ends = scan.cell_of(np.array([lo, hi]), np.array([side, side]))
     seen = np.flatnonzero(counts[ends[0] : ends[1] + 1]) + ends[0]
     parts, start = [], lo
-    for a, b in zip(seen[:-1], seen[1:], strict=True):
+    for a, b in pairwise(seen):
         if b - a > HOLE:
             parts.append((start, float(scan.right[a])))
             start = float(scan.left[b])

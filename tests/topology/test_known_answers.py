@@ -126,7 +126,7 @@ def test_circle_locks_to_the_fixed_point():
     couplings = (0.3, 0.6, 0.95)
     for share, locked in ((0.2, True), (0.97, True), (1.03, False)):
         t = found([maps.Circle(share * k / math.tau, k) for k in couplings])
-        for i, k in enumerate(couplings):
+        for i in range(len(couplings)):
             assert t.undecided[i] or (t.period[i, 0] == 1) == locked
             if locked:
                 assert not t.undecided[i]
@@ -153,7 +153,10 @@ def test_circle_staircase():
             assert turns == pytest.approx(round(turns), abs=period * 1e-4)
             assert t.bands[i, 0, 0] == period
         else:
-            assert (t.lowest[i, 0, 0], t.reach[i, 0, 0]) == (pytest.approx(0.0, abs=1e-9), pytest.approx(1.0, abs=1e-9))
+            assert (t.lowest[i, 0, 0], t.reach[i, 0, 0]) == (
+                pytest.approx(0.0, abs=1e-9),
+                pytest.approx(1.0, abs=1e-9),
+            )
     assert told >= 0.9 * omegas.size
 
 
