@@ -450,7 +450,7 @@ def _compiled_estimate() -> Any:
 
 
 def test_only_entries_of_the_package_are_kept() -> None:
-    compiled: list[Any] = [kernel(entry=True)(multiply_add), drivers.step, drivers._images]
+    compiled: list[Any] = [kernel(entry=True)(multiply_add), drivers.step, drivers.fill_images]
     caches = [type(one._cache) for one in compiled]
     assert [cache.__name__ for cache in caches[:2]] == ["NullCache", "NullCache"]
     if jit_cache.CACHE is not None:

@@ -3,6 +3,7 @@
 docs/certificates.md, "Checking one": numbers are written from the exact values that were checked.
 """
 
+import functools
 import re
 from decimal import ROUND_CEILING, ROUND_FLOOR, Context
 from fractions import Fraction
@@ -107,28 +108,30 @@ class Quantity(NamedTuple):
         return lo if self.lo == self.hi else f"every value in [{lo}, {hi}]"
 
 
+@functools.lru_cache(maxsize=4096)  # a scene is read again for each half of a tolerance
+def number_and_unit(text: str, kinds: str, where: str) -> tuple[Fraction, str]:
+    """Read a text like `"5.75 in"`: the number in the basic unit of its kind, and the unit written."""
+    words = text if len(text) <= LONGEST_TEXT else ""
+    tidy = words == " ".join(words.split()) != ""
+    require(tidy, f"{where}: {plain(text)} is not text of at most {LONGEST_TEXT} signs, with single blanks")
+    found = NUMBER.fullmatch(words)
+    require(found is not None, f"{where}: {plain(text)} is not a decimal number and a unit")
+    assert found is not None
+    size = abs(Fraction(found[1]))
+    ordinary = size == 0 or Fraction(1, 10**300) <= size <= 10**12
+    require(ordinary, f"{where}: {plain(text)} is not 0 or of a size from 1e-300 to 1e12")
+    factors = [UNITS[kind][found[2]] for kind in kinds.split() if found[2] in UNITS[kind]]
+    require(len(factors) == 1, f"{where}: {plain(found[2])} is not a unit of {kinds}")
+    return Fraction(found[1]) * factors[0], found[2]
+
+
 def quantity(value: object, kinds: str, where: str) -> Quantity:
     """Read a quantity of one of the kinds named: a text like `"5.75 in"`, or a pair of such texts for an interval."""
     if isinstance(value, Quantity):  # `Scene.halves` put it there: JSON holds no such object
         return value
     pair = value if isinstance(value, list) else [value, value]
     require(len(pair) == 2, f"{where}: an interval has two ends")
-    read = []
-    for text in pair:
-        words = text if isinstance(text, str) and len(text) <= LONGEST_TEXT else ""
-        tidy = words == " ".join(words.split()) != ""
-        require(
-            tidy, f"{where}: {plain(text)} is not text of at most {LONGEST_TEXT} signs, with single blanks"
-        )
-        found = NUMBER.fullmatch(words)
-        require(found is not None, f"{where}: {plain(text)} is not a decimal number and a unit")
-        assert found is not None
-        size = abs(Fraction(found[1]))
-        ordinary = size == 0 or Fraction(1, 10**300) <= size <= 10**12
-        require(ordinary, f"{where}: {plain(text)} is not 0 or of a size from 1e-300 to 1e12")
-        factors = [UNITS[kind][found[2]] for kind in kinds.split() if found[2] in UNITS[kind]]
-        require(len(factors) == 1, f"{where}: {plain(found[2])} is not a unit of {kinds}")
-        read.append((Fraction(found[1]) * factors[0], found[2]))
+    read = [number_and_unit(text if isinstance(text, str) else plain(text), kinds, where) for text in pair]
     (lo, unit), (hi, other) = read
     require((unit in BY_PI) == (other in BY_PI), f"{where}: mixes degrees and radians")
     require(lo <= hi, f"{where}: the interval is empty")

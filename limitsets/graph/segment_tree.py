@@ -53,7 +53,7 @@ def _strong(
     at: Any,
     waiting: Any,
 ) -> Any:
-    """As `components._strong`, on the tree: nodes 1 .. 2 leaf - 1, cell k is node leaf + k.
+    """As `components.fill_components`, on the tree: nodes 1 .. 2 leaf - 1, cell k is node leaf + k.
 
     The place in a range is kept as the two running node numbers of the bottom-up cover; `at` holds box, left and right.
     """

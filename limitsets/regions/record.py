@@ -6,6 +6,7 @@ they are about any.  Here they are asked for, as cheaply as may be, and put toge
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
@@ -31,8 +32,14 @@ from limitsets.scene import Scene
 
 __all__ = ["CELLS", "Block", "Record", "certify_cell"]
 
-# Cells per side, tried in turn until the goal is settled.
+# Cells per side where nothing is known yet; more where nothing attracts with them.
+COARSE = (64, 256, 1024)
+
+# Cells per side, as narrow as these in what attracts, tried in turn until the goal is settled.
 CELLS = (256, 1024)
+
+# Borders of cells are apart by this share of the narrowest cell wanted.
+APART = 0.125
 
 # Pieces of the parameter that is known least, where a cell is open to both decisions.
 PIECES = 8
@@ -136,10 +143,10 @@ def certify_cell(
     try:
         box = parameter_box(scene, tree=piece.tree())
         middle = parameter_box(scene, tree=_middle(piece).tree())
-        cuts = dict.fromkeys(range(box.lo.a.size), borders(scene.goal))
+        coarse = _coarse(box, scene)
         first: Record | None = None
         for number in cells:
-            found = attraction(cover(box, number, cuts, PIECES))
+            found = _finer(coarse, scene, number)
             doubtful = _may_violate(found, scene)
             against = _refuting(found, scene, middle) if doubtful and first is None else Violation()
             # where these cells do not prove it finer ones are asked before two throws at once, which cost more
@@ -157,6 +164,34 @@ def certify_cell(
         return Record(ends, "undecided" if scene.goal else "", str(error).splitlines()[0])
     # of a cell that stays undecided the coarse cells say as much as the fine ones
     return replace(first if first is not None and first.blocks else record, reason=record.reason)
+
+
+def _coarse(box: ParameterBox, scene: Scene) -> tuple[Attraction, int]:
+    """Find about where the attracting blocks are, and with how many cells a side."""
+    cuts = dict.fromkeys(range(box.lo.a.size), borders(scene.goal))
+    for number in COARSE:
+        found = attraction(cover(box, number, cuts, PIECES))
+        if (found.component >= 0).any():
+            break
+    return found, number
+
+
+def _finer(coarse: tuple[Attraction, int], scene: Scene, number: int) -> Attraction:
+    """Cut what attracts at multiples of a number-th of the arm, so that neighbours in the plane have such in common."""
+    found, base = coarse
+    extents, step = found.cells.extents(), float(found.cover.box.lo.arm_length) / number
+    if not extents:
+        return found
+    cuts = {}
+    for side, (edges,) in enumerate(found.cover.grid.edges):
+        cuts[side] = list(borders(scene.goal))
+        for lo, hi in extents.get(side, ()):
+            at = np.arange(math.ceil(lo / step), math.floor(hi / step) + 1) * step
+            k = np.clip(np.searchsorted(edges, at), 1, edges.size - 1)
+            # none so near to another border that the images of a cell had no room in the digits of x
+            apart = np.minimum(np.abs(at - edges[k - 1]), np.abs(edges[k] - at)) > APART * step
+            cuts[side] += at[apart].tolist()
+    return attraction(cover(found.cover.box, base, cuts, PIECES))
 
 
 def _middle(piece: SceneBox) -> SceneBox:

@@ -17,6 +17,7 @@ from limitsets.maps.kernels import on_side
 from limitsets.maps.stacks import point_of, size_of
 from limitsets.topology.bands import NOTHING, SET, begin_union, push_through, settle, stays_around
 from limitsets.topology.cells import fill_cells
+from limitsets.topology.inner import fills
 from limitsets.topology.orbits import CLOSES, INNER, averages, cycle_length, remaining, visits_all
 from limitsets.topology.pieces import find_pieces
 from limitsets.topology.records import (
@@ -35,8 +36,8 @@ from limitsets.topology.work import MOST_ATTRACTORS, Region, Work, work_for
 
 __all__ = ["region_of", "topologies"]
 
-# Cells and samples a side: from coarse to fine.
-LEVELS = ((300, 48), (1200, 192), (4800, 768), (16_384, 1536))
+# Cells and samples a side: from coarse to fine; no edge of some is one of others, for cycles may lie on them.
+LEVELS = ((300, 48), (1201, 192), (4801, 768), (16_381, 1536))
 # Bands whose gap is below this are one or two: not decided [of the largest side].
 GAP = 1e-7
 # A set all of whose intervals are shorter is a cycle [of the largest side].
@@ -61,6 +62,8 @@ def _attractor(params: Any, a: int, r: Region, scale: float, w: Work, t: Topolog
         return NOT_ONE
     if not visits_all(params, CLOSES * scale, u):
         return NOT_ONE
+    if t.period[i, a] == 0 and not fills(params, x, side, scale, w.pieces, u):
+        return NOT_ONE
     t.start[i, a], t.start_side[i, a] = x, side
     t.bands[i, a, :], t.reach[i, a, :], t.lowest[i, a, :] = 0, np.nan, np.nan
     for k in range(u.size[SET]):
@@ -72,6 +75,19 @@ def _attractor(params: Any, a: int, r: Region, scale: float, w: Work, t: Topolog
     jogs_min, jogs_max, order = t.jogs_min[i, a], t.jogs_max[i, a], t.flip_order[i, a]
     found = push_through(params, sides, scale, w.pieces, u, jogs_min, jogs_max, order)
     return DECIDED if found == NOTHING else MOVING
+
+
+@kernel
+def _met_twice(count: int, scale: float, t: Topologies, i: int) -> bool:
+    """Whether two attractors share a state: the cells on either side of it are closed each by itself."""
+    for a in range(count):
+        for b in range(a):
+            for side in range(t.reach.shape[2]):
+                if min(t.reach[i, a, side], t.reach[i, b, side]) + POINT * scale >= max(
+                    t.lowest[i, a, side], t.lowest[i, b, side]
+                ) and (t.period[i, a] > 0 and t.period[i, a] == t.period[i, b]):
+                    return True
+    return False
 
 
 @kernel(entry=True, counting=False)
@@ -92,6 +108,8 @@ def _point(params: Any, decided: bool, r: Region, w: Work, t: Topologies, i: int
     for a in range(count):
         found = _attractor(params, a, r, scale, w, t, i)
         doubt = found if doubt == DECIDED else doubt
+    if doubt == DECIDED and _met_twice(count, scale, t, i):
+        doubt = NOT_ONE
     if doubt == DECIDED and remaining(params, sides, w.cells, w.components, w.starts) > 0:
         x, side = w.starts.x[0], w.starts.side[0]
         if stays_around(params, x, side, scale, r, w.pieces, w.cells, w.components, w.unions):
@@ -206,7 +224,8 @@ def _tidy(t: Topologies) -> None:
     """Order the attractors of each point by side and place, and clear what coarser cells left of others."""
     for i in np.flatnonzero(t.attractors > 1):
         count = t.attractors[i]
-        order = np.lexsort((np.nanmin(t.lowest[i, :count], axis=1), t.start_side[i, :count]))
+        lowest = np.fmin.reduce(t.lowest[i, :count], axis=1)  # nan where none was found
+        order = np.lexsort((lowest, t.start_side[i, :count]))
         for array in t[2:]:
             if array.ndim > 1:
                 array[i, :count] = array[i, order]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -159,7 +160,7 @@ def work_for(region: Region, cells: int, samples: int) -> Work:
     """
     sides = region.lo.shape[1]
     least = float(((region.lo - region.bottom) / (region.hi - region.bottom)).min())
-    nearest = 2.0 ** np.round(np.log2(least)) if least > 0.0 else 0.0
+    nearest = 2.0 ** round(math.log2(least)) if least > 0.0 else 0.0
     shape, scan = _places(cells, nearest), _places(samples, nearest)
     edges, pieces = shape.size + 2 * MOST_PIECES, sides * MOST_PIECES
     n = sides * edges

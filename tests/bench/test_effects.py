@@ -73,7 +73,7 @@ def test_an_effect(benchmark, effects, table):
 
     def throws(params):
         after, side, code = (np.empty(COUNT),), np.empty(COUNT, np.int64), np.empty(COUNT, np.int64)
-        return lambda: drivers._images(params, 2, (x,), after, side, code)
+        return lambda: drivers.fill_images(params, 2, (x,), after, side, code)
 
     turns = take_turns(benchmark, throws(full.map), {"the bare map": throws(bare.map)}, PAIRS)
     what = f"a throw with {' and '.join(effects)}"

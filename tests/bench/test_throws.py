@@ -58,7 +58,7 @@ def test_kernel(benchmark, throws, table):
     after, side, code = (np.empty(COUNT),), np.empty(COUNT, np.int64), np.empty(COUNT, np.int64)
 
     def ours():
-        return drivers._images(params, SIDE, (x,), after, side, code)
+        return drivers.fill_images(params, SIDE, (x,), after, side, code)
 
     turns = take_turns(benchmark, repeated(ours), rivals, ROUNDS)
     assert turns.answer == 0  # none needed the second pass

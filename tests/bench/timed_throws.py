@@ -15,9 +15,9 @@ COUNT, REPEATS = 4096, 50
 params = ls.load("paper-designed").map
 x = np.random.default_rng(2).uniform(9.0, 23.0, COUNT)
 after, side, code = (np.empty(COUNT),), np.empty(COUNT, np.int64), np.empty(COUNT, np.int64)
-drivers._images(params, 2, (x,), after, side, code)
+drivers.fill_images(params, 2, (x,), after, side, code)
 for _ in sys.stdin:
     begin = perf_counter()
     for _ in range(REPEATS):
-        drivers._images(params, 2, (x,), after, side, code)
+        drivers.fill_images(params, 2, (x,), after, side, code)
     print((perf_counter() - begin) / (COUNT * REPEATS), flush=True)

@@ -291,7 +291,8 @@ def wide_target(f):
 
 
 def narrowed(f):
-    f.arrays["jog"][wide_target(f), 1] -= 1
+    k = wide_target(f)
+    f.arrays["jog"][k, 1] = f.arrays["jog"][k].sum() // 2
 
 
 def rank_of(f, value):

@@ -53,7 +53,9 @@ def test_tongues_of_the_circle_map(study, recorded, tmp_path):
     assert set(range(1, 20)) <= set(recorded["circle"]["periods"])
     refined = [recorded["circle"]["refined"][step] for step in ("4", "8", "16")]
     assert [each["differ"] for each in refined] == sorted(each["differ"] for each in refined)
-    assert [each["computed"] for each in refined] == sorted((each["computed"] for each in refined), reverse=True)
+    assert [each["computed"] for each in refined] == sorted(
+        (each["computed"] for each in refined), reverse=True
+    )
     found = study.circle(40, tmp_path)
     assert found["main tongue differs"] == 0
 

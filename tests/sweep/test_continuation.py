@@ -153,6 +153,8 @@ def test_an_attractor_leaves_at_four():
     assert abs(middle(death, "r") - 4.0) < 1e-9
     assert death.after == ()
     assert found.attractors[-1] == {}
+    # F(1/2) = r / 4 leaves [0, 1].
+    assert (death.collision.k, death.collision.x, death.collision.change) == (1, 1.0, "end of the domain")
 
 
 def test_two_attractors_merge_and_split():
@@ -291,6 +293,25 @@ def test_a_throw_meets_a_border_where_40_digits_say(first, last, bands):
         assert sum(len(parts) for parts in outer.values()) == count
 
 
+def test_the_set_begins_where_the_longest_jog_ends_on_the_arm():
+    """paper-designed: below some speed the jog from r_2 - 0 passes the arm's end, 28 in."""
+    scene = ls.load("paper-designed")
+    found = ls.continuation(scene, {"throw.speed": ("140 deg/s", "142 deg/s")}, steps=2)
+    (birth,) = found.events
+    assert (birth.kind, birth.before, birth.after) == ("birth", (), (0,))
+    assert birth.t[1] - birth.t[0] <= 1e-9
+    met = birth.collision
+    assert (met.change, met.x, met.side) == ("end of the domain", 28.0, 2)
+    assert (met.k, met.limit, met.itinerary, met.start_side) == (1, "c-", ("jog",), 2)
+    gravity = mp.mpf(scene.value("gravity.acceleration"))
+    ends = []
+    for values in birth.values:
+        kappa = gravity / mp.mpf(values["throw.speed"]) ** 2
+        part = Part("paper-designed", ("-0.2", "4.2255778", "0.7082490", kappa))
+        ends.append(part.throw(part.critical_point(2, met.start), 2, "jog")[0] - 28)
+    assert ends[0] > 0 > ends[1]
+
+
 # ---------------------------------------------------------------- cells, numbers, forms
 
 
@@ -350,6 +371,7 @@ def test_progress_is_told():
         (Kink(), lambda t: {"mu": 1.0} if t < 1.0 else {"left": 0.5}, {"domain": [(-2.0, 2.0)]}, AnswerError),
         (Kink(), {"mu": (-1.0, 1.0)}, {}, MapError),
         ("paper-designed", {"throw.sped": (1.0, 2.0)}, {}, SceneError),
+        ("paper-designed", {"throw.speed": (2.6, 2.7)}, {"domain": LINE}, AnswerError),
         ("paper-designed", {"throw.speed": ("1 in", "2 in")}, {}, SceneError),
     ],
 )

@@ -29,7 +29,7 @@ for flight, flip in json.loads(sys.argv[1]):
     enclosures(scene.map, scene.map, x, 0)
     images(scene.map, x, 0)
 ls.transitions(scene.map, ls.grid(scene.domain, cells=8))
-codes = {"boxes": hulls._enclose.inspect_asm(), "floats": drivers._images.inspect_asm()}
+codes = {"boxes": hulls._enclose.inspect_asm(), "floats": drivers.fill_images.inspect_asm()}
 found = {key: [len(fused.findall(code)) for code in found.values()] for key, found in codes.items()}
 found["widest"] = [code.count("zmm") for code in codes["floats"].values()]
 found["counted"] = [code.count("NRT_") for code in _hulls.inspect_asm().values()]

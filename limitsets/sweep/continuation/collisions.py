@@ -6,8 +6,9 @@ forced, and so is its distance from a critical point c'.  A change of sign of th
 (Brent's method); it counts if on both sides of the root the map itself takes these branches, further from every change
 of branch than rounding reaches, and the point is an end of the attractor on one side of the root or both.
 
-Critical points across which the map is smooth (the top of the logistic map, which only names two branches) are no
-borders: nothing happens where an end passes them.
+The same is done for exits and the ends of the domain, where an attractor begins to leave.  Critical points across which
+the map is smooth (the top of the logistic map, which only names two branches) are no borders: nothing happens where an
+end passes them.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ from limitsets.maps import along, images, kind_of
 from limitsets.maps.critical import branches_of_side
 from limitsets.sets.unions import EPS
 from limitsets.sweep.continuation.attracting_cycles import on_itinerary
-from limitsets.sweep.continuation.path import Border, Path, Place
+from limitsets.sweep.continuation.path import LEAVING, Border, Path, Place
 from limitsets.sweep.continuation.result import Collision
 from limitsets.sweep.continuation.snapshot import Found, Snapshot
 
@@ -136,11 +137,13 @@ class Approach(NamedTuple):
         if begin is None:
             return False
         x, side = begin
+        leaves = self.target[0].kind in LEAVING
         error = 4.0 * EPS * place.extent
         for j, branch in enumerate(self.word):
             # The first branch of a one-sided limit is forced by its side; the tracked point of a cycle is the one
             # that passes the border.
-            if j > 0:
+            # What happens in the last step to a point that leaves is the event itself.
+            if j > 0 and not (leaves and j == len(self.word) - 1):
                 around = np.array([x - 4.0 * error, x + 4.0 * error])
                 if (images(place.params, around, side).code != branch).any():
                     return False
@@ -169,7 +172,9 @@ class Approach(NamedTuple):
         begin, border = self.point(place), self._border(place, self.target)
         if begin is None or border is None:
             return None
-        change = "jump" if border.kind == "jump" else f"{names[border.below]}->{names[border.above]}"
+        change = f"{names[border.below]}->{names[border.above]}"
+        if border.kind != "critical":
+            change = {"domain": "end of the domain"}.get(border.kind, border.kind)
         itinerary = tuple(names[branch] for branch in self.word)
         limit = "cycle" if self.start is None else ("c+" if self.from_above else "c-")
         start = None if self.start is None else begin[0]
@@ -222,7 +227,7 @@ def approaches(path: Path, lo: Snapshot, hi: Snapshot) -> Iterator[Approach]:
         targets = [
             (target, pair)
             for target in borders[which]
-            if target.kind != "turning" and not _is_smooth(snapshot.place, target)
+            if target.kind in LEAVING or (target.kind != "turning" and not _is_smooth(snapshot.place, target))
             if (pair := _at_both(target, borders[1 - which], which)) is not None
         ]
         points = [point for found in snapshot.found for point in _tracked(found, borders[which], names)]
@@ -265,6 +270,8 @@ def crossing(approach: Approach, lo: Snapshot, hi: Snapshot) -> float | None:
 
 def nearest(approach: Approach, middle: float) -> tuple[float, float] | None:
     """Least gap between two places at whose ends it is no smaller than in the middle: t, and the gap there."""
+    if approach.target[0].kind in LEAVING:  # a set may end with the domain all along
+        return None
     lo, hi = approach.span
     first, between, last = (approach.at(t) for t in (lo, middle, hi))
     if not np.isfinite([first, between, last]).all():

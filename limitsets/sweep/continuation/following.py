@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from itertools import pairwise
+from operator import itemgetter
 from typing import Any
 
 import numpy as np
@@ -13,7 +14,7 @@ from limitsets.scene import load
 from limitsets.sweep.continuation.events import events_of, numbered
 from limitsets.sweep.continuation.path import Curve, Path, read_path
 from limitsets.sweep.continuation.result import Continuation, State
-from limitsets.sweep.continuation.snapshot import Found, Snapshot
+from limitsets.sweep.continuation.snapshot import Snapshot
 from limitsets.sweep.continuation.stepping import Follower
 
 __all__ = ["continuation"]
@@ -111,7 +112,7 @@ def _answer(curve: Path, follower: Follower) -> Continuation:
         tuple(
             {
                 number: State.of(found)
-                for number, found in sorted(zip(row, each.found, strict=True), key=_first)
+                for number, found in sorted(zip(row, each.found, strict=True), key=itemgetter(0))
             }
             for row, each in zip(numbers, visited, strict=True)
         ),
@@ -119,10 +120,6 @@ def _answer(curve: Path, follower: Follower) -> Continuation:
         events_of(follower, numbers),
         len(visited),
     )
-
-
-def _first(pair: tuple[int, Found]) -> int:
-    return pair[0]
 
 
 def _critical(snapshot: Snapshot) -> dict[int, tuple[float, ...]]:

@@ -17,7 +17,7 @@ from limitsets.scene import Scene
 from limitsets.scene.quantities import in_units
 from limitsets.sets.interval_map import IntervalMap
 
-__all__ = ["Border", "Curve", "Path", "Place", "read_path"]
+__all__ = ["LEAVING", "Border", "Curve", "Path", "Place", "read_path"]
 
 Values: TypeAlias = Mapping[str, Any]
 Curve: TypeAlias = Mapping[str, tuple[Any, Any]] | Callable[[float], Any]
@@ -28,10 +28,12 @@ SAMPLES = 512
 
 # Kinds of ends of pieces that another piece follows.
 KINDS = ("critical", "turning", "jump")
+# Kinds of ends beyond which a map leaves.
+LEAVING = ("exit", "domain")
 
 
 class Border(NamedTuple):
-    """A place where two monotone pieces of a side meet."""
+    """A place where two monotone pieces of a side meet, or one ends with the domain."""
 
     side: int
     kind: str
@@ -88,13 +90,20 @@ class Place:
 
     @cached_property
     def borders(self) -> list[Border]:
-        """Where two monotone pieces meet."""
-        return [
-            Border(side, lower.top.kind, lower.branch, upper.branch, lower.top.x, upper.bottom.x)
-            for side, pieces in self.forward.pieces.items()
-            for lower, upper in pairwise(pieces)
-            if lower.top.kind in KINDS
-        ]
+        """Where two monotone pieces meet, and where one ends at an exit or with the domain (branch -1 beyond)."""
+        found: list[Border] = []
+        for side, pieces in self.forward.pieces.items():
+            found += [
+                Border(side, lower.top.kind, lower.branch, upper.branch, lower.top.x, upper.bottom.x)
+                for lower, upper in pairwise(pieces)
+                if lower.top.kind in KINDS
+            ]
+            for branch, bottom, top in pieces:
+                if top.kind in LEAVING:
+                    found.append(Border(side, top.kind, branch, -1, top.x, top.x))
+                if bottom.kind in LEAVING:
+                    found.append(Border(side, bottom.kind, -1, branch, bottom.x, bottom.x))
+        return found
 
 
 class Path(NamedTuple):
@@ -185,6 +194,8 @@ def _of_map(params: Any, path: Curve, domain: Any) -> Path:
 
 def read_path(subject: Any, path: Curve, domain: Any) -> Path:
     """Read a path of a scene, or of a map; AnswerError for what is none."""
+    if isinstance(subject, Scene) and domain is not None:
+        raise AnswerError("the domain", domain, "None: a scene has its own", "leave it out")
     found = _of_scene(subject, path) if isinstance(subject, Scene) else _of_map(subject, path, domain)
     names = set(found.at(0.0).values)
 

@@ -63,7 +63,8 @@ class Collision(NamedTuple):
     x, side : float, int
         c': where, and on which side.
     change : str
-        What changes at c', from below to above: ``"jog->flip"``, or "jump".
+        What changes at c', from below to above: ``"jog->flip"``; "jump"; "exit" or "end of the domain" where the
+        set begins to leave.
     k : int
         Steps from c, or the period of the cycle.
     start : float or None
@@ -115,7 +116,7 @@ class Event:
         Distance (Hausdorff) of the extents at both ends of the bracket [length], infinite where a side is lost or
         gained; None where more than one attractor is concerned.
     collision : Collision or None
-        Of a border collision or a touch.
+        Of a border collision or a touch, and of a birth or death at which an end leaves the domain.
     """
 
     kind: str

@@ -17,8 +17,8 @@ from limitsets.maps import drivers, images
 if sys.argv[1] == "with":
     import limitsets.thrower.effects
 images(ls.load("paper-designed").map, np.linspace(9.0, 20.0, 8), 2)
-(signature,) = drivers._images.signatures
-code = drivers._images.inspect_asm(signature)
+(signature,) = drivers.fill_images.signatures
+code = drivers.fill_images.inspect_asm(signature)
 lines = [line for line in code.splitlines() if not line.lstrip().startswith((".", "#"))]
 symbol = r"[A-Za-z0-9_.$]*_ZN?[A-Za-z0-9_.$]*|\\.?numba[A-Za-z0-9_.$]*|NRT[A-Za-z0-9_]*"
 body = re.sub(symbol, "symbol", "\\n".join(lines))

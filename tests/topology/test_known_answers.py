@@ -1,0 +1,203 @@
+"""Attractors, bands, periods, shares and exponents of textbook maps, from closed forms."""
+
+import math
+
+import numpy as np
+import pytest
+
+from limitsets import maps
+from limitsets.maps.stacks import stacked
+from limitsets.topology import topologies
+from tests.maps_of_tests import Contraction, Tent
+from tests.topology.maps_with_answers import Grazing, Two, rotations, tongue_of
+
+
+def found(points, lo=0.0, hi=1.0, throws=0):
+    n = len(points)
+    return topologies(stacked(points), np.full((n, 1), lo), np.full((n, 1), hi), throws=throws)
+
+
+def logistic(*values, **options):
+    return found([maps.Logistic(r) for r in values], **options)
+
+
+def decided(t):
+    return t.undecided.tolist() == [0] * t.undecided.size
+
+
+# ends of the windows of period 1, 2, 4 and 3: 3, 1 + sqrt 6, 3.544090359551922, 1 + sqrt 8 and 3.841499007543194
+# (Strogatz, Nonlinear Dynamics and Chaos, section 10; the last is the root of the discriminant of period 6)
+PERIODS = {
+    1: (1.2, 1.5, 2.0, 2.3, 2.95),
+    2: (3.05, 3.2, 1 + math.sqrt(5), 3.44),
+    4: (3.46, 3.498561699327701, 3.53),
+    8: (3.546, 3.5546438, 3.56),
+    3: (1 + math.sqrt(8) + 1e-3, 3.83, 3.8318740552833155, 3.84),
+}
+
+
+@pytest.mark.parametrize("period", PERIODS)
+def test_logistic_cycles(period):
+    t = logistic(*PERIODS[period])
+    assert decided(t)
+    assert t.attractors.tolist() == [1] * len(PERIODS[period])
+    assert t.period[:, 0].tolist() == t.bands[:, 0, 0].tolist() == [period] * len(PERIODS[period])
+    assert t.share[:, 0] == pytest.approx(1.0)
+
+
+def test_logistic_fixed_point_and_cycle_of_two():
+    t = logistic(2.3, 2.8, 3.2, 3.4)
+    for i, r in enumerate((2.3, 2.8)):
+        assert t.lowest[i, 0, 0] == pytest.approx(1 - 1 / r, abs=1e-10)
+        assert t.reach[i, 0, 0] == pytest.approx(1 - 1 / r, abs=1e-10)
+    for i, r in ((2, 3.2), (3, 3.4)):
+        root = math.sqrt((r + 1) * (r - 3))
+        assert t.lowest[i, 0, 0] == pytest.approx((r + 1 - root) / (2 * r), abs=1e-10)
+        assert t.reach[i, 0, 0] == pytest.approx((r + 1 + root) / (2 * r), abs=1e-10)
+
+
+def test_logistic_core_and_exponent():
+    rs = (3.7, 3.8, 3.9, 4.0)
+    t = logistic(*rs, throws=200_000)
+    assert decided(t)
+    for i, r in enumerate(rs):
+        assert (t.bands[i, 0, 0], t.period[i, 0]) == (1, 0)
+        assert t.lowest[i, 0, 0] == pytest.approx(r * r / 4 * (1 - r / 4), abs=1e-12)
+        assert t.reach[i, 0, 0] == pytest.approx(r / 4, abs=1e-12)
+    assert t.lyapunov[3, 0] == pytest.approx(math.log(2), abs=5 * t.lyapunov_error[3, 0])
+    assert t.lyapunov_error[3, 0] < 0.01
+
+
+# r at which two bands become one and four become two: F^3(1/2) is the fixed point, F^5(1/2) one of the cycle of two
+MERGE = {1: 3.678573510428322, 2: 3.592572184}
+
+
+@pytest.mark.parametrize("bands", MERGE)
+@pytest.mark.parametrize("off", [1e-2, 1e-3, 1e-4, 1e-5, 1e-6])
+def test_bands_merge_or_are_undecided(bands, off):
+    if bands == 2 and off <= 1e-6:
+        off = 2e-6  # the place is known to 1e-9 and the gap is a few times as wide
+    t = logistic(MERGE[bands] - off, MERGE[bands] + off)
+    for i, right in ((0, 2 * bands), (1, bands)):
+        periodic = t.period[i, 0] > 0  # a window between
+        assert t.undecided[i] or periodic or t.bands[i, 0, 0] == right
+
+
+def test_weakly_attracting_cycles_are_no_bands():
+    # beyond the ends of windows cycles attract slowly: six points, or 16, or nothing said, but never a band
+    rs = [3.8415, 3.84151, 3.8416, 3.8425, 3.0001, 3.0005, 3.4496, 3.5442, 3.8285]
+    t = logistic(*rs)
+    assert all(t.undecided[i] or t.period[i, 0] > 0 for i in range(len(rs)))
+
+
+def test_a_fixed_point_on_the_edge_of_a_cell_is_one():
+    rs = [1 / (1 - k / 60) for k in range(6, 40)]
+    t = logistic(*rs)
+    wrong = [rs[i] for i in range(len(rs)) if not t.undecided[i] and t.attractors[i] != 1]
+    assert not wrong
+    assert decided(t)
+
+
+@pytest.mark.parametrize("doublings", [0, 1, 2, 3])
+def test_tent_bands(doublings):
+    # x -> F^2(x) on its right part is a tent of slope s^2: each halving of ln s doubles the bands
+    slopes = [2.0 ** (top / 2**doublings) for top in (0.55, 0.7, 0.85, 0.97)]
+    t = found([Tent(s) for s in slopes], throws=4000)
+    assert decided(t)
+    for i, s in enumerate(slopes):
+        assert (t.attractors[i], t.bands[i, 0, 0], t.period[i, 0]) == (1, 2**doublings, 0)
+        assert t.lowest[i, 0, 0] == pytest.approx(s * (1 - s / 2), abs=1e-12)
+        assert t.reach[i, 0, 0] == pytest.approx(s / 2, abs=1e-12)
+        assert t.lyapunov[i, 0] == pytest.approx(math.log(s), abs=1e-9)
+        assert (t.leaves[i], t.collapses[i], t.share[i, 0]) == (0.0, 0.0, pytest.approx(1.0))
+
+
+def test_tents_that_leave():
+    t = found([Tent(s) for s in (2.05, 2.4, 3.0)])
+    assert decided(t)
+    assert t.attractors.tolist() == [0, 0, 0]
+    assert t.leaves == pytest.approx(1.0)
+
+
+def test_circle_locks_to_the_fixed_point():
+    couplings = (0.3, 0.6, 0.95)
+    for share, locked in ((0.2, True), (0.97, True), (1.03, False)):
+        t = found([maps.Circle(share * k / math.tau, k) for k in couplings])
+        for i, k in enumerate(couplings):
+            assert t.undecided[i] or (t.period[i, 0] == 1) == locked
+            if locked:
+                assert not t.undecided[i]
+                x = math.asin(share) / math.tau
+                assert t.lowest[i, 0, 0] == pytest.approx(x, abs=1e-9)
+
+
+def test_circle_staircase():
+    coupling, omegas = 0.9, np.arange(0.01, 0.5, 0.0103)
+    t = found([maps.Circle(omega, coupling) for omega in omegas])
+    told, rotation = 0, rotations(omegas, coupling)
+    for i, omega in enumerate(omegas):
+        tongue = tongue_of(omega, coupling, rotation[i])
+        if t.undecided[i] or (tongue and tongue[0] < 0):
+            continue
+        told += 1
+        period = int(t.period[i, 0])
+        if tongue:
+            assert period == tongue[1], omega
+        else:
+            assert period == 0 or period > 16
+        if period:
+            turns = period * rotation[i]
+            assert turns == pytest.approx(round(turns), abs=period * 1e-4)
+            assert t.bands[i, 0, 0] == period
+        else:
+            assert (t.lowest[i, 0, 0], t.reach[i, 0, 0]) == (pytest.approx(0.0, abs=1e-9), pytest.approx(1.0, abs=1e-9))
+    assert told >= 0.9 * omegas.size
+
+
+def test_cubic_shares():
+    # below sqrt r the sign stays; u = +-sqrt(r - 1)
+    rs, lo, hi = (1.46, 1.5, 1.8, 1.95), -1.0, 1.2
+    t = found([maps.Cubic(r) for r in rs], lo, hi)
+    assert decided(t)
+    assert t.attractors.tolist() == [2] * len(rs)
+    assert t.period[:, :2].tolist() == [[1, 1]] * len(rs)
+    assert t.lowest[:, :2, 0] == pytest.approx(np.array([[-math.sqrt(r - 1), math.sqrt(r - 1)] for r in rs]))
+    # the cell in which 0 lies counts for one of them
+    assert t.share[:, :2] == pytest.approx(np.array([[1.0, 1.2]] * len(rs)) / 2.2, abs=1 / 300)
+
+
+def test_cubic_basin_ends_at_its_cycle_of_two():
+    # for r = 1/2 orbits from within sqrt(r + 1) come to 0, those from beyond leave
+    rs, half = (0.3, 0.5, 0.8), 2.0
+    t = found([maps.Cubic(r) for r in rs], -half, half)
+    assert decided(t)
+    assert t.period[:, 0].tolist() == [1, 1, 1]
+    for i, r in enumerate(rs):
+        assert t.share[i, 0] == pytest.approx(math.sqrt(r + 1) / half, abs=2e-3)
+        assert t.leaves[i] + t.collapses[i] == pytest.approx(1 - math.sqrt(r + 1) / half, abs=2e-3)
+
+
+def test_a_chaotic_attractor_beside_a_fixed_point():
+    t = found([Two(1.9, 0.5, 0.6), Two(1.3, -0.5, 0.37), Two(1.5, 0.999, 0.41)], -1.0, 1.0)
+    assert decided(t)
+    assert t.attractors.tolist() == [2, 2, 2]
+    assert t.period[:, :2].tolist() == [[0, 1]] * 3
+    assert t.bands[:, :2, 0].tolist() == [[1, 1], [2, 1], [1, 1]]
+    assert t.share[:, :2] == pytest.approx(0.5)
+    assert t.lowest[:, 1, 0] == pytest.approx([0.6, 0.37, 0.41], abs=1e-8)
+
+
+def test_a_jump_within_a_branch():
+    jumps = (0.1, 0.3, 0.777)
+    t = found([Grazing(j) for j in jumps])
+    for i, jump in enumerate(jumps):
+        assert t.undecided[i] or t.attractors[i] == 2
+        assert t.undecided[i] or t.share[i, :2] == pytest.approx([jump, 1 - jump], abs=1 / 300)
+
+
+def test_contractions():
+    slopes = (0.98, 0.5, 0.0, -0.5, -0.98)
+    t = found([Contraction(s, 0.3 * (1 - s)) for s in slopes])
+    assert decided(t)
+    assert t.period[:, 0].tolist() == [1] * 5
+    assert t.reach[:, 0, 0] == pytest.approx(0.3, abs=1e-6)
