@@ -31,13 +31,16 @@ __all__ = ["Chain", "Violation", "violating_chain"]
 SETTLING, SEARCHED = 2_000, 20_000
 
 # Longest period; how near a return has to be, relative to x; returns that are tried, those with most room first.
-LONGEST, NEAR, TRIED = 40, 4e-3, 16
+LONGEST, NEAR, TRIED = 60, 1e-2, 64
 
 # Widths beside the orbit, relative to x, on which the decision may be proved; times round the orbit.
 WIDTHS, ROUNDS = tuple(0.1 * 2.0**-k for k in range(9)), 30
 
 # An interval that has to shrink does so by this share of it more, so that the shrinking ends.
-MORE = 2.0**-9
+MORE = 2.0**-20
+
+# Of the widths so much is used.
+SURE = 1.0 - 2.0**-5
 
 # Images hold the next interval with this much to spare, so that other arithmetic can confirm it.
 ROOM = 1e-9
@@ -165,7 +168,8 @@ def _decided(box: ParameterBox, near: Return, k: int) -> tuple[float, float]:
     for sign in (-1.0, 1.0):
         tried = (x + sign * width * abs(x) for width in WIDTHS)
         ends.append(next((end for end in tried if _goes(box, near, k, min(x, end), max(x, end))), x))
-    return ends[0], ends[1]
+    # a little nearer, so that other arithmetic can confirm it
+    return x + SURE * (ends[0] - x), x + SURE * (ends[1] - x)
 
 
 def _goes(box: ParameterBox, near: Return, k: int, lo: float, hi: float) -> bool:

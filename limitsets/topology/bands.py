@@ -15,12 +15,14 @@ from limitsets.topology.work import MOST_INTERVALS, Cells, Components, Pieces, R
 
 __all__ = [
     "ANY",
+    "COVERED",
     "GAP",
     "IMAGE",
     "NOTHING",
     "PUSHED",
     "SET",
     "begin_union",
+    "cover_more",
     "images_of",
     "is_still",
     "merge",
@@ -31,11 +33,11 @@ __all__ = [
 ]
 
 # Rows of `Unions`.
-SET, IMAGE, PUSHED = 0, 1, 2
+SET, IMAGE, PUSHED, COVERED = 0, 1, 2, 3
 # Of the largest side: ends rest that move by less; a gap this small is rounding, and a part this short.
 REST, GAP, SLIVER = 1e-12, 1e-13, 1e-10
 # Half the length of the interval whose images are followed, likewise, and gaps that are filled where there are many.
-SEED, FILLED, MANY = 1e-6, 1e-3, 16
+SEED, FILLED, MANY = 1e-6, 1e-3, 64
 MOST_IMAGES, MOST_STEPS = 2000, 100_000
 # What a search may end with besides an answer.
 NOTHING, TOO_MANY, MOVES, OUT = 0, 1, 2, 3
@@ -182,28 +184,50 @@ def stays_around(
 ) -> bool:
     """Whether no part of the images of a short interval about a state is lost, as far as they are followed.
 
-    Gaps are filled where there are many: near a fixed point that repels slowly one interval follows another.
+    COVERED is what they cover together, PUSHED what is new of it.
     """
     half = SEED * scale
-    u.size[SET] = 0
-    put(u, SET, side, max(x - half, r.lo[side]), min(x + half, r.hi[side]))
+    u.size[COVERED], u.size[PUSHED] = 0, 0
+    for row in (COVERED, PUSHED):
+        put(u, row, side, max(x - half, r.lo[side]), min(x + half, r.hi[side]))
     for _ in range(MOST_IMAGES):
         u.size[IMAGE] = 0
-        if images_of(params, p, u, SET, IMAGE, ANY, ANY, 0.0):
+        if images_of(params, p, u, PUSHED, IMAGE, ANY, ANY, 0.0):
             return False
-        if u.size[IMAGE] > MOST_INTERVALS:
-            return True
-        for i in range(u.size[IMAGE]):
-            if _lost(r, c, k, u.side[IMAGE, i], u.lo[IMAGE, i]) or _lost(
-                r, c, k, u.side[IMAGE, i], u.hi[IMAGE, i]
-            ):
+        for i in range(min(u.size[IMAGE], MOST_INTERVALS)):
+            to = u.side[IMAGE, i]
+            if _lost(r, c, k, to, u.lo[IMAGE, i]) or _lost(r, c, k, to, u.hi[IMAGE, i]):
                 return False
-        for i in range(u.size[SET]):
-            put(u, IMAGE, u.side[SET, i], u.lo[SET, i], u.hi[SET, i])
-        if not merge(u, IMAGE, (FILLED if u.size[IMAGE] > MANY else GAP) * scale):
+        if not cover_more(u, scale) or u.size[PUSHED] == 0:
             return True
-        if is_still(u, 0.0):
-            break
+    return True
+
+
+@kernel(entry=True, counting=False)
+def cover_more(u: Unions, scale: float) -> bool:
+    """Join IMAGE to COVERED, and make PUSHED what is new; False for too many intervals.
+
+    Gaps are filled where there are many intervals: near a fixed point that repels slowly one follows another.
+    """
+    if u.size[IMAGE] > MOST_INTERVALS - MANY:
+        return False
+    u.size[PUSHED] = 0
+    for i in range(u.size[IMAGE]):
+        lo, hi, side, held = u.lo[IMAGE, i], u.hi[IMAGE, i], u.side[IMAGE, i], False
+        for k in range(u.size[COVERED]):
+            held = held or (u.side[COVERED, k] == side and u.lo[COVERED, k] <= lo and hi <= u.hi[COVERED, k])
+        if not held:
+            put(u, PUSHED, side, lo, hi)
+            put(u, COVERED, side, lo, hi)
+    many = u.size[COVERED] > MANY
+    merge(u, COVERED, (FILLED if many else GAP) * scale)
+    if u.size[COVERED] > MANY:
+        return False
+    if many:  # what was filled has images too
+        u.size[PUSHED] = u.size[COVERED]
+        for i in range(u.size[COVERED]):
+            u.side[PUSHED, i], u.lo[PUSHED, i] = u.side[COVERED, i], u.lo[COVERED, i]
+            u.hi[PUSHED, i] = u.hi[COVERED, i]
     return True
 
 

@@ -9,40 +9,30 @@ from typing import Any
 
 from limitsets.jit import kernel
 from limitsets.maps.drivers import step
-from limitsets.topology.bands import ANY, GAP, IMAGE, PUSHED, SET, images_of, merge, put
+from limitsets.topology.bands import ANY, COVERED, GAP, IMAGE, PUSHED, SET, cover_more, images_of, merge, put
 from limitsets.topology.work import Pieces, Unions
 
 __all__ = ["fills"]
 
 # Of the length of the set: half the interval that is followed, and its length from which its images are joined.
 SEED, LONG = 1e-5, 1e-2
-# Throws before the interval is placed; images that are taken; ends that differ by less are the same [of the largest side].
+# Throws before the interval is placed; images that are taken; ends that differ by less are one [of the largest side].
 BEFORE, MOST_IMAGES, SAME = 100, 2000, 1e-9
 # Where the interval does not grow: stretches of the set that an orbit has to visit, and its throws.
 STRETCHES, MOST_VISITS = 200, 20_000
 
 
 @kernel(entry=True, counting=False)
-def _agree(u: Unions, row: int, slack: float) -> bool:
-    """Whether IMAGE and another row hold the same intervals."""
-    if u.size[row] != u.size[IMAGE]:
+def _agree(u: Unions, slack: float) -> bool:
+    """Whether SET and COVERED hold the same intervals."""
+    if u.size[SET] != u.size[COVERED]:
         return False
-    for i in range(u.size[row]):
-        if u.side[row, i] != u.side[IMAGE, i]:
+    for i in range(u.size[SET]):
+        if u.side[SET, i] != u.side[COVERED, i]:
             return False
-        if max(abs(u.lo[row, i] - u.lo[IMAGE, i]), abs(u.hi[row, i] - u.hi[IMAGE, i])) > slack:
+        if max(abs(u.lo[SET, i] - u.lo[COVERED, i]), abs(u.hi[SET, i] - u.hi[COVERED, i])) > slack:
             return False
     return True
-
-
-@kernel(entry=True, counting=False)
-def _push(params: Any, joined: bool, gap: float, p: Pieces, u: Unions) -> bool:
-    """Make IMAGE the image of PUSHED, `joined` with it or not; False for too many intervals."""
-    u.size[IMAGE] = 0
-    images_of(params, p, u, PUSHED, IMAGE, ANY, ANY, 0.0)
-    for i in range(u.size[PUSHED] if joined else 0):
-        put(u, IMAGE, u.side[PUSHED, i], u.lo[PUSHED, i], u.hi[PUSHED, i])
-    return merge(u, IMAGE, gap)
 
 
 @kernel(entry=True, counting=False)
@@ -94,17 +84,24 @@ def fills(params: Any, x: float, side: int, scale: float, p: Pieces, u: Unions) 
             half = SEED * length
             put(u, PUSHED, side, max(x - half, u.lo[SET, i]), min(x + half, u.hi[SET, i]))
     for _ in range(MOST_IMAGES):
-        if not _push(params, False, GAP * scale, p, u):
+        u.size[IMAGE] = 0
+        images_of(params, p, u, PUSHED, IMAGE, ANY, ANY, 0.0)
+        if not merge(u, IMAGE, GAP * scale):
             return False
         long = _take(u)
         if long >= LONG * length:
             break
     if long < LONG * length:
         return _spreads(params, x, side, length, u)
+    u.size[COVERED] = u.size[PUSHED]
+    for i in range(u.size[PUSHED]):
+        u.side[COVERED, i], u.lo[COVERED, i] = u.side[PUSHED, i], u.lo[PUSHED, i]
+        u.hi[COVERED, i] = u.hi[PUSHED, i]
     for _ in range(MOST_IMAGES):
-        if not _push(params, True, GAP * scale, p, u):
+        u.size[IMAGE] = 0
+        images_of(params, p, u, PUSHED, IMAGE, ANY, ANY, 0.0)
+        if not cover_more(u, scale):
             return False
-        if _agree(u, PUSHED, 0.0):
+        if u.size[PUSHED] == 0:
             break
-        _take(u)
-    return _agree(u, SET, SAME * scale)
+    return _agree(u, SAME * scale)

@@ -15,7 +15,7 @@ from limitsets.topology.work import Cells, Components, Starts, Unions
 __all__ = ["CLOSES", "INNER", "averages", "cycle_length", "remaining", "visits_all"]
 
 # Throws of the orbits from cells that recur though they are left, and those between two looks at where they are.
-THROWS, LOOKED = 400, 4
+THROWS, LOOKED = 160, 8
 # Throws until every band has to be visited; throws before a cycle is sought, and the longest one that is found.
 MOST_VISITS, BEFORE, MOST_PERIOD = 20_000, 1000, 4096
 # Throws before means are taken.

@@ -112,7 +112,7 @@ class Components(NamedTuple):
 
 
 class Unions(NamedTuple):
-    """Three unions of intervals, ascending by side and place: a set, its image, and what is pushed through it."""
+    """Unions of intervals, ascending by side and place: a set, an image, what is pushed on, what was covered."""
 
     side: Ints
     lo: Floats
@@ -215,10 +215,10 @@ def work_for(region: Region, cells: int, samples: int) -> Work:
             floats(n, MOST_ATTRACTORS + 2),
         ),
         Unions(
-            ints(3, MOST_INTERVALS),
-            floats(3, MOST_INTERVALS),
-            floats(3, MOST_INTERVALS),
-            ints(3),
+            ints(4, MOST_INTERVALS),
+            floats(4, MOST_INTERVALS),
+            floats(4, MOST_INTERVALS),
+            ints(4),
             ints(MOST_INTERVALS),
         ),
         Starts(floats(STARTS), ints(STARTS), ints(STARTS)),

@@ -284,10 +284,10 @@ def forgotten_chain(f):
 
 
 def wide_target(f):
-    k = cell_with(f, 1)
-    here = rows_of(f, k)
+    """Of the cells from which only jogs are possible, the one with the widest image."""
+    here = rows_of(f, cell_with(f, 1))
     ends = f.arrays["jog"][here]
-    return here.start + int((ends[:, 1] - ends[:, 0]).argmax())
+    return here.start + int(np.where(f.arrays["flip"][here, 0] < 0, ends[:, 1] - ends[:, 0], -1).argmax())
 
 
 def narrowed(f):

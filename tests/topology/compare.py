@@ -51,7 +51,9 @@ def differences(t: Topologies, i: int, r: Reference, starts: int, scale: float) 
         note(name + " in words", word, ours, word in ("?", in_words(ours)))
     for a in range(k if len(r.attractors) == k else 0):
         each = r.attractors[a]
-        slack = SHARE + 4.0 * math.sqrt(max(each.share * (1.0 - each.share), 1.0 / starts) / starts) + r.remain
+        slack = (
+            SHARE + 4.0 * math.sqrt(max(each.share * (1.0 - each.share), 1.0 / starts) / starts) + r.remain
+        )
         ours = float(t.share[i, a])
         note(f"share {a}", each.share, ours, abs(each.share - ours) <= slack)
         order = tuple(int(s) for s in t.flip_order[i, a] if s != -1)
@@ -64,7 +66,12 @@ def differences(t: Topologies, i: int, r: Reference, starts: int, scale: float) 
             if bands and t.bands[i, a, side]:
                 ends = np.array([bands[0][0], bands[-1][1]])
                 mine = np.array([t.lowest[i, a, side], t.reach[i, a, side]])
-                note(f"extents {a} {side}", ends, mine, bool(np.all(np.abs(ends - mine) <= EXTENT * max(scale, 1.0))))
+                note(
+                    f"extents {a} {side}",
+                    ends,
+                    mine,
+                    bool(np.all(np.abs(ends - mine) <= EXTENT * max(scale, 1.0))),
+                )
             jogs = each.jogs.get(side, (-1, -1))
             mine_jogs = (int(t.jogs_min[i, a, side]), int(t.jogs_max[i, a, side]))
             note(f"jogs {a} {side}", (jogs, each.seen_jogs.get(side)), mine_jogs, jogs == mine_jogs)

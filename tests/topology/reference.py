@@ -2,14 +2,14 @@
 
 Numpy and scipy, and of the package the images of states alone.  Sides are scanned at the ends and the middle of every
 cell; where the side, the code or the value of the image jumps, or where the image turns, the cell is cut.  A component
-that no image leaves holds an attractor, which is the limit of the images of its cells; 1000 orbits from random starts say what
-is really visited, and a stretch of cells that none of them visits is a gap.
+that no image leaves holds an attractor, which is the limit of the images of its cells; 1000 orbits from random starts
+say what is really visited, and a stretch of cells that none of them visits is a gap.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, field
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -29,7 +29,7 @@ BESIDE, JUMPS = 1e-8, 40.0
 HOLE = 4
 # Images until a set rests; ends rest that move by less than this share of the longest side.
 MOST_IMAGES, REST = 20_000, 1e-13
-THROWS, AFTER, STARTS = 3000, 1500, 1000
+THROWS, AFTER, STARTS = 3000, 1500, 1000  # before orbits are looked at, from then on, and how many of them
 
 
 @dataclass
@@ -54,7 +54,9 @@ class Reference:
     leaves: float
     collapses: float
     remain: float  # of the starts: they neither left nor came to an attractor
-    some: dict[str, str] = field(default_factory=dict)  # "none", "some", "all", or "?" where cells cannot tell
+    some: dict[str, str] = field(
+        default_factory=dict
+    )  # "none", "some", "all", or "?" where cells cannot tell
 
 
 class Scan:
@@ -102,11 +104,7 @@ class Scan:
         x = np.sort(np.concatenate([edges, 0.5 * (edges[1:] + edges[:-1])]))
         y, to, code = self.at(x, side)
         with np.errstate(invalid="ignore"):
-            differ = (
-                (to[1:] != to[:-1])
-                | (code[1:] != code[:-1])
-                | ~(np.abs(np.diff(y)) <= JUMPS * width)
-            )
+            differ = (to[1:] != to[:-1]) | (code[1:] != code[:-1]) | ~(np.abs(np.diff(y)) <= JUMPS * width)
         cuts: list[float] = []
         k = np.flatnonzero(differ)
         if k.size:
@@ -256,7 +254,15 @@ def settled(scan: Scan, union: list[Interval]) -> list[Interval]:
     for _ in range(MOST_IMAGES):
         after = scan.image(union)
         same = len(after) == len(union) and [s for s, *_ in after] == [s for s, *_ in union]
-        if same and max(abs(p - q) for a, b in zip(after, union, strict=True) for p, q in zip(a[1:], b[1:], strict=True)) <= REST * scan.scale:
+        if (
+            same
+            and max(
+                abs(p - q)
+                for a, b in zip(after, union, strict=True)
+                for p, q in zip(a[1:], b[1:], strict=True)
+            )
+            <= REST * scan.scale
+        ):
             return after
         union = after
     raise ArithmeticError("the images do not come to rest")
@@ -304,12 +310,19 @@ def _order(after: dict[int, set[int]], sides: list[int]) -> tuple[int, ...] | No
 
 def _period(params: Any, x: float, side: int, scale: float) -> int:
     """Length of the cycle on which a state is, 0 for none of at most 4096."""
-    path = orbit(params, x, side, 8192)
-    near = (np.abs(path.x[1:4097] - path.x[0]) <= 1e-8 * scale) & (path.side[1:4097] == path.side[0])
+    at, on = followed(params, x, side, 8192)
+    near = (np.abs(at[1:4097] - at[0]) <= 1e-8 * scale) & (on[1:4097] == on[0])
     for p in np.flatnonzero(near) + 1:
-        if np.all(np.abs(path.x[p:4096] - path.x[: 4096 - p]) <= 1e-7 * scale):
+        if np.all(np.abs(at[p:8192] - at[: 8192 - p]) <= 1e-7 * scale):
             return int(p)
     return 0
+
+
+def followed(params: Any, x: float, side: int, count: int) -> tuple[Floats, Ints]:
+    """Orbit of `count` steps; where steps round away, or it leaves, its last state stands for the rest."""
+    path = orbit(params, x, side, count)
+    rest = count + 1 - path.x.size
+    return np.pad(path.x, (0, rest), mode="edge"), np.pad(path.side, (0, rest), mode="edge")
 
 
 def reference(
@@ -322,7 +335,6 @@ def reference(
     throws: int = THROWS,
     after: int = AFTER,
     seed: int = 0,
-    told: Callable[[str], None] | None = None,
 ) -> Reference:
     """Find the topology of the attractors of one map on the domain `lo`, `hi` (one entry per side)."""
     lo, hi = np.asarray(lo, float), np.asarray(hi, float)
@@ -381,9 +393,8 @@ def _attractor(scan: Scan, member: Any, x: Floats, side: Ints, mine: Any, after:
     union = settled(scan, union)
     counts, jogs, follow, period = np.zeros(member.size, np.int64), {}, {}, 0
     if mine.any():
-        paths = [orbit(scan.params, x[k], int(side[k]), after) for k in np.flatnonzero(mine)]
-        paths = [path for path in paths if path.code.size == after]
-        places, on = np.array([path.x for path in paths]), np.array([path.side for path in paths])
+        paths = [followed(scan.params, x[k], int(side[k]), after) for k in np.flatnonzero(mine)]
+        places, on = (np.array(each) for each in zip(*paths, strict=True))
         jogs, follow = _visits(on)
         counts = np.bincount(scan.cell_of(places.ravel(), on.ravel()), minlength=counts.size)
     if mine.any():
@@ -395,7 +406,7 @@ def _attractor(scan: Scan, member: Any, x: Floats, side: Ints, mine: Any, after:
         parts = _without_holes(scan, counts, s, lo, hi) if mine.any() and period == 0 else [(lo, hi)]
         holes += len(parts) - 1
         bands.setdefault(s, []).extend(parts)
-    gaps = [b[0] - a[1] for parts in bands.values() for a, b in zip(parts, parts[1:], strict=False)]
+    gaps = [b[0] - a[1] for parts in bands.values() for a, b in pairwise(parts)]
     return Attractor(
         bands,
         _order(follow, sorted(bands)),
@@ -413,7 +424,7 @@ def _without_holes(scan: Scan, counts: Ints, side: int, lo: float, hi: float) ->
     ends = scan.cell_of(np.array([lo, hi]), np.array([side, side]))
     seen = np.flatnonzero(counts[ends[0] : ends[1] + 1]) + ends[0]
     parts, start = [], lo
-    for a, b in zip(seen[:-1], seen[1:], strict=True):
+    for a, b in pairwise(seen):
         if b - a > HOLE:
             parts.append((start, float(scan.right[a])))
             start = float(scan.left[b])

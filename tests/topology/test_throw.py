@@ -75,34 +75,6 @@ def test_paper_scenes(name):
         assert t.lyapunov[0, 0] == pytest.approx(exact, abs=1e-9)
 
 
-@pytest.mark.parametrize("name", SCENES)
-def test_escape_far_below_the_joint(name):
-    # docs/model.md: exact scenes lose starts outward at h = -2, all of them at h = -3
-    scene = ls.load(name)
-    if scene.flight != "exact":
-        return
-    heights = np.array([-2.0, -3.0])
-    stack, t = of_scene(scene, heights)
-    assert t.undecided.tolist() == [0, 0]
-    assert t.leaves[0] >= 26 / 180 - 0.01
-    assert t.leaves[1] == 1.0
-    assert t.attractors[1] == 0
-    assert t.collapses.tolist() == [0.0, 0.0]
-
-
-@pytest.mark.parametrize("name", SCENES)
-def test_collapse_above_the_joint(name):
-    scene = ls.load(name)
-    stack, t = of_scene(scene, np.array([0.5, 0.75, 1.0]))
-    assert t.undecided.tolist() == [0, 0, 0]
-    small = scene.flight != "exact"
-    for i in range(3):
-        assert t.collapses[i] == 1.0 if small else t.collapses[i] > 0.0
-        # and as many as orbits say
-        starts = _starts(stack, i, 60)
-        x, side, code, _ = advance(ls.maps.coerce(_params(stack, i)), *starts, 20_000)
-        inward = np.mean((code == ls.maps.INWARD) | (np.abs(x - stack.params.a[i][side]) < 1e-3))
-        assert t.collapses[i] == pytest.approx(inward, abs=0.02 + 4 * math.sqrt(0.25 / 180))
 EXACT = ("paper-initial", "paper-designed")
 
 
@@ -151,9 +123,10 @@ def test_starts_below_the_fixed_point_of_the_jog_collapse():
     borders = np.array([[3.16, 3.19, 4.81], [4.64, 4.55, 5.39]])
     share = (borders - stack.lo).sum(axis=1) / (stack.hi - stack.lo).sum(axis=1)
     assert t.undecided.tolist() == [0, 0]
-    assert np.all(t.collapses >= share - 0.0005)  # and a few that a flip brings there
+    # a border falls into one of 300 cells of each side, and a flip may bring a few more starts there
+    assert np.all(t.collapses >= share - 1 / 300)
     for i in range(2):
-        assert t.collapses[i] == pytest.approx(lost(stack, i)[1], abs=0.01)
+        assert t.collapses[i] == pytest.approx(lost(stack, i)[1], abs=1 / 300)
 
 
 def test_henon_has_a_cycle_of_seven():

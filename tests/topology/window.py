@@ -54,7 +54,9 @@ def beside_boundaries(scene: ls.Scene, count: int, rng: Any) -> Any:
         a, b, first = a[pairs], b[pairs], [first[k] for k in pairs]
         while len(a) and np.linalg.norm(a - b, axis=1).max() > NEAR:
             middle = 0.5 * (a + b)
-            same = np.array([x == y for x, y in zip(classes(looked_at(scene, middle)[1]), first, strict=True)])
+            same = np.array(
+                [x == y for x, y in zip(classes(looked_at(scene, middle)[1]), first, strict=True)]
+            )
             a, b = np.where(same[:, None], middle, a), np.where(same[:, None], b, middle)
         either = rng.random(len(a)) < 0.5
         kept = np.concatenate([kept, np.where(either[:, None], a, b)])
