@@ -18,7 +18,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-__all__ = ["STEP", "Refined", "refined"]
+__all__ = ["FILLED", "STEP", "Refined", "refined"]
 
 # Of the coarse grid.
 STEP = 8

@@ -48,7 +48,7 @@ def _variables(
     found = {
         "attractors": Variable("int8", about="how many attractors"),
         "undecided": Variable("int8", codes=_CODES, about=doubts),
-        "checked": Variable("int8", codes=CODES, about=ABOUT, fill=NOT_CHECKED),
+        "checked": Variable("int8", codes=CODES, about=ABOUT, fill=NOT_CHECKED, copied=False),
         "class": Variable("int64", about="hash of the class's name, the same in every atlas; 0: undecided"),
         "bands": Variable("int16", sides, about="intervals of the attractor on each side", fill=0),
         "flip_order": Variable("int8", sides, about="sides in cyclic order, then -1; all -2: it changes"),

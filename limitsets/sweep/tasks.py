@@ -42,6 +42,8 @@ class Variable:
         Of integers, where there is nothing; of floats that is nan.
     default : bool
         Whether it is computed unless others are asked for.
+    copied : bool
+        Whether points that refinement fills get it from their neighbour.
     """
 
     dtype: str = "float64"
@@ -51,6 +53,7 @@ class Variable:
     about: str = ""
     fill: int = -1
     default: bool = True
+    copied: bool = True
 
     @property
     def empty(self) -> float | int:

@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from limitsets.errors import LimitsetsError
 from limitsets.maps.stacks import chosen
-from limitsets.sweep.boundaries import refined
+from limitsets.sweep.boundaries import FILLED, refined
 from limitsets.sweep.plan import Plan, require_same_code
 from limitsets.sweep.tasks import Block, BlockTask, Coded, Variable, registered, resolved
 
@@ -85,8 +85,10 @@ def _refined(plan: Plan, shape: tuple[int, ...], values: Values, numbers: npt.ND
     layout = refined(shape, step, ask)
     found: Found = {"level": (LEVEL, layout.level)}
     for each in dict.fromkeys(key for batch in batches for key in batch):
-        found[each] = _joined(plan, each, batches)
-        found[each] = (found[each][0], found[each][1][layout.source])
+        variable, values = _joined(plan, each, batches)
+        found[each] = (variable, values[layout.source])
+        if not variable.copied:
+            found[each][1][layout.level == FILLED] = variable.empty
     if name not in found and (found["status"][1] == COMPUTED).any():
         raise _wrong(plan, name, "missing", "the variable by which the atlas is refined")
     return found

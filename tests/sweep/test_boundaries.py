@@ -164,3 +164,14 @@ def test_a_task_without_the_variable_is_told_so():
             task="tests.sweep.tasks_of_tests:side_of_150",
             refine="slow",
         )
+
+
+def test_checks_count_once():
+    given = {"domain": [(0, 1)], "chunk": (64, 64), "variables": ["checked"]}
+    found = atlas(maps.Circle(), "omega=0.2:0.24:64", "coupling=0.05:0.15:64", refine=True, **given).dataset
+    none = dict(
+        zip(found.checked.attrs["flag_meanings"].split(), found.checked.attrs["flag_values"], strict=True)
+    )["not_checked"]
+    filled = found.level.values < 0
+    assert filled.mean() > 0.8
+    assert (found.checked.values[filled] == none).all()
