@@ -342,7 +342,7 @@ def plane_in_words(plane: Plane, goal: dict[str, Any] | None) -> list[str]:
     counts = np.bincount(plane.blocks[:, 0], minlength=len(f["cells"]))
     least, number = int(counts.min()), int(f["region"].max()) + 1
     joined = "in which attracting blocks of neighbours correspond one to one"
-    lines.append(f"    in each cell at least {least} attracting blocks; {number} regions, {joined}")
+    lines.append(f"    attracting blocks in each cell: at least {least}; regions, {joined}: {number}")
     return lines
 
 

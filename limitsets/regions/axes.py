@@ -59,19 +59,6 @@ class CellAxis:
             )
         return cls(quantity, units.pop(), values)
 
-    @classmethod
-    def about(cls, quantity: str, points: Sequence[float], unit: str) -> CellAxis:
-        """Cut where two points of an atlas meet half way, to the 12th place; the first and the last point are ends.
-
-        Examples
-        --------
-        >>> CellAxis.about("throw.speed", [150.0, 151.0, 152.0], "deg/s").borders[1:3]
-        (Fraction(301, 2), Fraction(303, 2))
-        """
-        halfway = [0.5 * (a + b) for a, b in pairwise(points)]
-        values = [_short(Fraction(x)) for x in (points[0], *halfway, points[-1])]
-        return cls.of(quantity, [f"{_decimal(value)} {unit}" for value in values])
-
     def refined(self, depth: int) -> CellAxis:
         """Halve every cell so many times."""
         borders = self.borders
@@ -100,12 +87,9 @@ def evenly(quantity: str, first: str, last: str, cells: int) -> CellAxis:
     """
     ends = CellAxis.of(quantity, [first, last])
     low, high = ends.borders
-    borders = [_short(low + (high - low) * k / cells) for k in range(1, cells)]
+    scale = 10**12
+    borders = [Fraction(round((low + (high - low) * k / cells) * scale), scale) for k in range(1, cells)]
     return CellAxis.of(quantity, [f"{_decimal(value)} {ends.unit}" for value in (low, *borders, high)])
-
-
-def _short(value: Fraction) -> Fraction:
-    return Fraction(round(value * 10**12), 10**12)
 
 
 def _decimal(value: Fraction) -> str:

@@ -85,8 +85,8 @@ def _refined(plan: Plan, shape: tuple[int, ...], values: Values, numbers: npt.ND
     layout = refined(shape, step, ask)
     found: Found = {"level": (LEVEL, layout.level)}
     for each in dict.fromkeys(key for batch in batches for key in batch):
-        variable, joined = _joined(plan, each, batches)
-        found[each] = (variable, joined[layout.source])
+        variable, answers = _joined(plan, each, batches)
+        found[each] = (variable, answers[layout.source])
         if not variable.copied:
             found[each][1][layout.level == FILLED] = variable.empty
     if name not in found and (found["status"][1] == COMPUTED).any():
