@@ -12,6 +12,7 @@ from limitsets.jit import generic, kernel, of_entries
 from limitsets.maps import codes
 
 __all__ = [
+    "decision",
     "displacement",
     "entries_of",
     "fallback",
@@ -103,6 +104,16 @@ def displacement(params: Any, x: Any, side: int) -> Any:
 @generic(default=_as_they_are)
 def scattered(params: Any, start: int, step: int) -> Any:
     """Return the parameters of one step of one start."""
+
+
+def _one_by_one(params: Any, x: Any, side: int) -> Any:
+    value = margin(params, x, side)
+    return value, image_on(params, x, side, 1 if value > 0.0 else 0)[2]
+
+
+@generic(default=_one_by_one)
+def decision(params: Any, x: Any, side: int) -> Any:
+    """Return the margin, and the slope on the branch that it decides for: together where that is cheaper."""
 
 
 # ---------------------------------------------------------------- states in arrays

@@ -1,7 +1,7 @@
 """Checks in the run itself: a sample of the points against fine cells, and some of these against a proved goal.
 
 Which points are checked depends on their numbers in the plan alone.  A point is a disagreement where any field of its
-topology differs on cells sixteen times as fine, or where a certificate proves or refutes what the threshold denies.
+topology differs on cells twenty times as fine, or where a certificate proves or refutes what the threshold denies.
 """
 
 from __future__ import annotations
@@ -18,7 +18,6 @@ from limitsets.sweep.float_margins import threshold_of
 from limitsets.sweep.subjects import SceneSubject
 from limitsets.sweep.tasks import Block
 from limitsets.topology import Topologies, topologies
-from limitsets.topology.points import LEVELS
 from limitsets.topology.records import DECIDED
 
 __all__ = ["ABOUT", "CODES", "NOT_CHECKED", "checks"]
@@ -32,11 +31,13 @@ CODES = {
     "differs_from_certificate": CONTRADICTED,
 }
 ABOUT = (
-    "a sample: every field against cells sixteen times as fine; of these some against a proof of the goal too"
+    "a sample: every field against cells twenty times as fine; of these some against a proof of the goal too"
 )
 
 # One point of so many is checked on fine cells, one of so many of these by a proof.
 SAMPLED, PROVED_OF = 1000, 10
+# Cells and samples of a side.
+FINE = ((4801, 768), (16_381, 1536))
 # Extents that agree, as a share of the largest side, and shares of starts: fine cells split these better.
 CLOSE, NEAR = 1e-8, 0.02
 # Multiples of this odd number, modulo 2^32, come in no order.
@@ -51,7 +52,7 @@ def checks(block: Block, told: Topologies) -> npt.NDArray[np.int8]:
     if not at.size:
         return found
     points = chosen(block.points, at)
-    fine = topologies(points.params, points.lo, points.hi, points.anchor, levels=LEVELS[2:])
+    fine = topologies(points.params, points.lo, points.hi, points.anchor, levels=FINE)
     scale = (points.hi - points.lo).max(axis=1)
     found[at] = np.where(_same(chosen(told, at), fine, scale), AGREES, DIFFERS)
     for k in at[(mixed[at] // np.uint64(SAMPLED)) % np.uint64(PROVED_OF) == 0]:

@@ -12,7 +12,7 @@ from typing import Any
 from limitsets.jit import kernel
 from limitsets.maps import codes
 from limitsets.maps.contract import register
-from limitsets.maps.kernels import fallback_box, image_box
+from limitsets.maps.kernels import decision, fallback_box, image_box
 from limitsets.thrower.flight import impact_angle, sure_impact_angle
 from limitsets.thrower.impact import jog_displacement, margin, strike
 from limitsets.thrower.params import Side, Throw, gather
@@ -108,6 +108,16 @@ def side_margin(part: Side, x: float, side: int) -> float:
 
 
 @kernel
+def side_decision(part: Side, x: float, side: int) -> tuple[float, float]:
+    """`decision` of the throw on one side: the angle of the impact is found once."""
+    at, phi_slope = settle(part, x)
+    if not (x > part.a and 0.0 < at.phi <= part.flight.full_turn):
+        return math.nan, 1.0
+    _, shift_slope = jog_displacement(part.flight, part, at)
+    return flip_margin(part, x, at), 1.0 + shift_slope * phi_slope
+
+
+@kernel
 def side_displacement(part: Side, x: float, side: int) -> float:
     """`displacement` of the throw on one side."""
     at, _ = settle(part, x)
@@ -161,3 +171,4 @@ register(
     branches=("jog", "flip"),
     exits=EXITS,
 )
+decision.on(Side, side_decision)

@@ -10,7 +10,7 @@ from typing import Any
 
 from limitsets.jit import kernel
 from limitsets.maps.kernels import image_on, on_side
-from limitsets.topology.cells import COLLAPSES, LEAVES, cell_of
+from limitsets.topology.cells import cell_of
 from limitsets.topology.work import MOST_INTERVALS, Cells, Components, Pieces, Region, Unions
 
 __all__ = [
@@ -37,7 +37,7 @@ SET, IMAGE, PUSHED, COVERED = 0, 1, 2, 3
 # Of the largest side: ends rest that move by less; a gap this small is rounding, and a part this short.
 REST, GAP, SLIVER = 1e-12, 1e-13, 1e-10
 # Half the length of the interval whose images are followed, likewise, and gaps that are filled where there are many.
-SEED, FILLED, MANY = 1e-6, 1e-3, 64
+SEED, FILLED, MANY = 1e-6, 1e-3, 256
 MOST_IMAGES, MOST_STEPS = 2000, 100_000
 # What a search may end with besides an answer.
 NOTHING, TOO_MANY, MOVES, OUT = 0, 1, 2, 3
@@ -170,19 +170,20 @@ def settle(params: Any, r: Region, p: Pieces, u: Unions) -> int:
 
 
 @kernel
-def _lost(r: Region, c: Cells, k: Components, side: int, x: float) -> bool:
-    """Whether a state is out of the domain, or in a cell all of whose starts leave it."""
+def _told(r: Region, c: Cells, k: Components, side: int, x: float) -> bool:
+    """Whether a state is out of the domain, or in a cell all of whose starts end in one known way."""
     if x < r.lo[side] or x > r.hi[side]:
         return True
     cell = cell_of(c, side, x)
-    return not k.held[cell] and k.ends[cell] in (LEAVES, COLLAPSES)
+    ends = k.ends[cell]
+    return not k.held[cell] and ends & (ends - 1) == 0
 
 
 @kernel(entry=True, counting=False)
 def stays_around(
     params: Any, x: float, side: int, scale: float, r: Region, p: Pieces, c: Cells, k: Components, u: Unions
 ) -> bool:
-    """Whether no part of the images of a short interval about a state is lost, as far as they are followed.
+    """Whether no part of the images of a short interval about a state comes to a known end.
 
     COVERED is what they cover together, PUSHED what is new of it.
     """
@@ -196,7 +197,7 @@ def stays_around(
             return False
         for i in range(min(u.size[IMAGE], MOST_INTERVALS)):
             to = u.side[IMAGE, i]
-            if _lost(r, c, k, to, u.lo[IMAGE, i]) or _lost(r, c, k, to, u.hi[IMAGE, i]):
+            if _told(r, c, k, to, u.lo[IMAGE, i]) or _told(r, c, k, to, u.hi[IMAGE, i]):
                 return False
         if not cover_more(u, scale) or u.size[PUSHED] == 0:
             return True

@@ -11,7 +11,7 @@ from typing import Any
 
 from limitsets.jit import kernel
 from limitsets.maps import codes
-from limitsets.maps.kernels import fallback, image, image_on, margin
+from limitsets.maps.kernels import decision, fallback, image, image_on, margin
 from limitsets.topology.work import MOST_PIECES, Pieces, Region, Samples
 
 __all__ = ["branch_at", "find_pieces"]
@@ -24,11 +24,16 @@ MARGIN, SLOPE, CODE = 0, 1, 2
 
 
 @kernel
+def _decided(value: float) -> int:
+    """Branch that a margin decides for."""
+    return codes.OUTSIDE_MODEL if value != value else 1 if value > 0.0 else 0
+
+
+@kernel
 def branch_at(here: Any, x: float, side: int, decided: bool) -> int:
     """Branch in force; a negative code where there is none.  `decided`: the map has a margin, or but one branch."""
     if decided:
-        value = margin(here, x, side)
-        return codes.OUTSIDE_MODEL if value != value else 1 if value > 0.0 else 0
+        return _decided(margin(here, x, side))
     after, _, code = image(here, x, side)
     if code == codes.UNSETTLED:
         after, _, code = fallback(here, x, side)
@@ -107,9 +112,14 @@ def _sample(here: Any, side: int, decided: bool, bottom: float, span: float, sca
     for j in range(scan.size):
         x = bottom + span * scan[j]
         s.x[j] = x
-        s.branch[j] = branch_at(here, x, side, decided)
-        s.margin[j] = margin(here, x, side) if decided else 0.0
-        s.slope[j] = image_on(here, x, side, s.branch[j])[2] if s.branch[j] >= 0 else 1.0
+        s.margin[j], s.slope[j] = 0.0, 1.0
+        if decided:
+            s.margin[j], s.slope[j] = decision(here, x, side)
+            s.branch[j] = _decided(s.margin[j])
+        else:
+            s.branch[j] = branch_at(here, x, side, decided)
+            if s.branch[j] >= 0:
+                _, _, s.slope[j] = image_on(here, x, side, s.branch[j])
 
 
 @kernel(entry=True, counting=False)

@@ -37,7 +37,7 @@ from limitsets.topology.work import MOST_ATTRACTORS, Region, Work, work_for
 __all__ = ["region_of", "topologies"]
 
 # Cells and samples a side: from coarse to fine; no edge of some is one of others, for cycles may lie on them.
-LEVELS = ((300, 48), (1201, 192), (4801, 768), (16_381, 1536))
+LEVELS = ((240, 40), (701, 112), (2803, 448), (16_381, 1536))
 # Bands whose gap is below this are one or two: not decided [of the largest side].
 GAP = 1e-7
 # A set all of whose intervals are shorter is a cycle [of the largest side].

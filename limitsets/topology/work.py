@@ -29,7 +29,7 @@ Ints = NDArray[np.int64]
 # Orbits from cells that recur though they are left.
 STARTS = 20
 # More than these are not followed: the point is undecided, and says which of them ran over.
-MOST_PIECES, MOST_INTERVALS, MOST_ATTRACTORS = 24, 256, 4
+MOST_PIECES, MOST_INTERVALS, MOST_ATTRACTORS = 24, 512, 4
 
 
 class Region(NamedTuple):
