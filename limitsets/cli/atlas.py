@@ -13,6 +13,8 @@ import typer
 from limitsets.cli.output import Json, Scene, answer, opened, option, progress, saved, table
 
 if TYPE_CHECKING:
+    import xarray as xr
+
     from limitsets.sweep import Atlas
     from limitsets.sweep.driving import Progress
 
@@ -125,19 +127,14 @@ def _draw(found: Atlas, file: Path) -> bool:
 
 
 def _text(found: Atlas, csv: Path | None, picture: Path | None) -> None:
-    """Print what the answers range over, and where they are."""
-    import numpy as np
+    """Print the classes, what the answers range over, and where they are."""
+    from limitsets.sweep.classes import is_classified, legend
 
-    rows = []
-    for name, variable in found.dataset.data_vars.items():
-        values, unit = np.asarray(variable.values), variable.attrs.get("units", "")
-        if "flag_meanings" in variable.attrs:
-            codes = zip(variable.attrs["flag_meanings"].split(), variable.attrs["flag_values"], strict=True)
-            counts = [(word, int((values == code).sum())) for word, code in codes]
-            rows.append([name, ", ".join(f"{count} {word}" for word, count in counts if count), ""])
-        else:
-            good = values[np.isfinite(values)]
-            rows.append([name, f"{good.min():.9g} to {good.max():.9g}" if good.size else "none", unit])
+    for each in legend(found.dataset) if is_classified(found.dataset) else ():
+        typer.echo(f"{100 * each.share:6.2f} %  {each.words}")
+    rows = [
+        _row(str(name), found.dataset[name]) for name in sorted(found.dataset, key=str) if name != "class"
+    ]
     table(["variable", "values", "unit"], rows)
     points = found.dataset["status"].size
     again = f", {found.kept} of its {found.kept + found.new} chunks by earlier runs" if found.kept else ""
@@ -146,3 +143,17 @@ def _text(found: Atlas, csv: Path | None, picture: Path | None) -> None:
         typer.echo(f"table: {csv}")
     if picture is not None:
         typer.echo(f"figure: {picture}")
+
+
+def _row(name: str, variable: xr.DataArray) -> list[str]:
+    """Say what one variable ranges over, apart from where there is nothing; of codes how many there are of each."""
+    import numpy as np
+
+    values, attributes = np.asarray(variable.values), variable.attrs
+    if "flag_meanings" in attributes:
+        codes = zip(attributes["flag_meanings"].split(), attributes["flag_values"], strict=True)
+        counts = [(word, int((values == code).sum())) for word, code in codes]
+        return [name, ", ".join(f"{count} {word}" for word, count in counts if count), ""]
+    good = values[np.isfinite(values) if values.dtype.kind == "f" else values >= 0]
+    said = f"{good.min():.9g} to {good.max():.9g}" if good.size else "none"
+    return [name, said, attributes.get("units", "")]
