@@ -267,7 +267,7 @@ def atlas(
 def opened(store: Any) -> xr.Dataset:
     """Open what a store holds, without the marks of its chunks."""
     found = imported("xarray").open_zarr(store, chunks=None, consolidated=False, decode_timedelta=False)
-    return found.drop_vars(CHECKSUM)  # type: ignore[no-any-return]
+    return found.drop_vars(CHECKSUM)  # type: ignore[no-any-return]  # a Dataset
 
 
 def plan_of(

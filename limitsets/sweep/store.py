@@ -133,7 +133,7 @@ class Store:
         assert self.path is not None
         for left in self.path.rglob("*.partial"):  # by a driver that was killed while it wrote
             left.unlink(missing_ok=True)
-        return group  # type: ignore[no-any-return]
+        return group  # type: ignore[no-any-return]  # zarr is imported where it is used
 
     def _is_done(self, number: int) -> bool:
         """Whether the data of a chunk are those that were written."""

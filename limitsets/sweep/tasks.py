@@ -187,4 +187,4 @@ def resolved(name: str) -> Callable[..., Any]:
         raise LimitsetsError("the task", name, "module:function that can be imported", f"{error}") from None
     if not callable(found):
         raise LimitsetsError("the task", name, "a function", "it is none")
-    return found  # type: ignore[no-any-return]
+    return found  # type: ignore[no-any-return]  # of a task that is known by name
