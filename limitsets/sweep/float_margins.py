@@ -82,12 +82,10 @@ def float_margins(
     """
     goal = scene.goal
     if not isinstance(goal, OrientedBeyond | Reaches) or goal.from_anywhere:
-        word = getattr(goal, "word", None) or type(goal).__name__
+        word = "missing" if goal is None else getattr(goal, "word", None) or type(goal).__name__
+        remedy = "add [goal] to the scene" if goal is None else "ask margin for others"
         raise AnswerError(
-            "the goal of a margin by floats",
-            word,
-            "oriented_beyond or reaches, of the limit set",
-            "ask margin for others",
+            "the goal of a margin by floats", word, "oriented_beyond or reaches, of the limit set", remedy
         )
     there = np.flatnonzero((known.undecided == DECIDED) & (known.attractors > 0))
     found = np.full(known.undecided.size, np.nan)

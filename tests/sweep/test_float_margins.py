@@ -69,3 +69,10 @@ def test_a_goal_that_has_no_threshold_is_refused():
     scene = ls.load({**tree, "goal": {"stays_on_arm": True}})
     with pytest.raises(AnswerError, match="oriented_beyond or reaches"):
         margins(scene, {"arm.surface_height": -0.2}, "throw.speed")
+
+
+def test_a_scene_without_a_goal_is_told_to_have_one():
+    tree = ls.load("paper-designed").as_dict()
+    del tree["goal"]
+    with pytest.raises(AnswerError, match=r"missing.*add \[goal\] to the scene"):
+        margins(ls.load(tree), {"arm.surface_height": -0.2}, "throw.speed")
