@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from limitsets.graph import segment_tree
-from limitsets.graph.ranges import ROWS, RUN, SIDE, START, Ranges, box_rows, boxes_of, row_start
+from limitsets.graph.ranges import RUN, Ranges, Runs, box_at, box_rows, boxes_of, row_start
 from limitsets.jit import kernel
 
 __all__ = ["Components", "descend", "fill_components", "ranks", "reach", "strong_components"]
@@ -49,7 +49,15 @@ class Components:
 
 @kernel(entry=True, counting=False)
 def fill_components(
-    r: Ranges, rank: Any, label: Any, order: Any, path: Any, boxes: Any, rows: Any, waiting: Any, loops: Any
+    r: Ranges | Runs,
+    rank: Any,
+    label: Any,
+    order: Any,
+    path: Any,
+    boxes: Any,
+    rows: Any,
+    waiting: Any,
+    loops: Any,
 ) -> Any:
     """Fill `label`, `order` and `loops` (cells that meet their own image); the number of components.
 
@@ -62,21 +70,19 @@ def fill_components(
         if rank[root] != 0:
             continue
         depth = 0
-        path[0], boxes[0], rows[0] = root, boxes_of(r, root)[0], 0
+        cell: Any = np.int64(root)
+        box: Any = np.int64(boxes_of(r, root)[0])
+        row: Any = np.int64(0)
+        path[0] = root
         rank[root] = clock
         label[root] = clock  # its own number, to see later whether it reached an older one
         clock += 1
         while depth >= 0:
-            cell = path[depth]
             best = rank[cell]
-            child = -1
-            box: Any = np.int64(boxes[depth])
-            row: Any = np.int64(rows[depth])
+            child: Any = np.int64(-1)
             _, last = boxes_of(r, cell)
             while box < last and child < 0:
-                count, run = box_rows(r, box), np.int64(r.box[box, RUN])
-                start, stride = np.int64(r.box[box, START]), r.row_stride[r.box[box, SIDE]]
-                flat = np.int64(r.box[box, ROWS])
+                start, run, count, flat, stride = box_at(r, box)
                 while row < count:
                     begin = start + row * stride if row < flat else row_start(r, box, row)
                     if begin <= cell < begin + run:
@@ -92,15 +98,16 @@ def fill_components(
                     row += 1
                 if child < 0:
                     box += 1
-                    row = 0
+                    row = np.int64(0)
             rank[cell] = best
             if child >= 0:
                 boxes[depth], rows[depth] = box, row
                 depth += 1
-                path[depth], boxes[depth], rows[depth] = child, boxes_of(r, child)[0], 0
+                path[depth] = child
                 rank[child] = clock
                 label[child] = clock
                 clock += 1
+                cell, box, row = child, np.int64(boxes_of(r, child)[0]), np.int64(0)
                 continue
             if best == label[cell]:  # nothing older reached: the cell closes a component
                 clock -= 1
@@ -121,6 +128,8 @@ def fill_components(
                 waiting[held] = cell
                 held += 1
             depth -= 1
+            if depth >= 0:
+                cell, box, row = np.int64(path[depth]), np.int64(boxes[depth]), np.int64(rows[depth])
     return n - closed
 
 

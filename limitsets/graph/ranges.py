@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from limitsets.cells import Grid
-from limitsets.jit import kernel
+from limitsets.jit import generic, kernel
 
 __all__ = [
     "PLANES",
@@ -25,6 +25,8 @@ __all__ = [
     "SIDE",
     "START",
     "Ranges",
+    "Runs",
+    "box_at",
     "box_rows",
     "boxes_of",
     "build",
@@ -63,6 +65,13 @@ class Ranges(NamedTuple):
     exits: NDArray[np.uint8]
 
 
+class Runs(NamedTuple):
+    """A graph in which every cell has one run of targets: the first and the last, none where last < first."""
+
+    first: NDArray[np.int64]
+    last: NDArray[np.int64]
+
+
 def build(
     grid: Grid,
     first: NDArray[np.int64],
@@ -99,12 +108,19 @@ def one_run(side: NDArray[Any], start: NDArray[Any], run: NDArray[Any]) -> NDArr
     return np.stack([start, run, one, one, side], axis=1).astype(np.int32)
 
 
-@kernel(counting=False)
-def boxes_of(r: Ranges, cell: Any) -> tuple[Any, Any]:
+@generic
+def boxes_of(r: Ranges | Runs, cell: Any) -> tuple[Any, Any]:
     """Return the number of a cell's first box, and of the first that is not its own."""
-    if r.single:
-        return np.int64(cell), np.int64(cell) + 1
-    return r.first[cell], r.first[cell + 1]
+
+
+@generic
+def box_at(r: Ranges | Runs, box: Any) -> tuple[Any, Any, Any, Any, Any]:
+    """Return a box: its first cell, cells per run, runs, runs per plane, and cells from run to run of a plane."""
+
+
+@generic
+def row_start(r: Ranges | Runs, box: Any, row: Any) -> Any:
+    """First cell of a run."""
 
 
 @kernel(counting=False)
@@ -113,13 +129,42 @@ def box_rows(r: Ranges, box: Any) -> Any:
     return np.int64(r.box[box, ROWS]) * np.int64(r.box[box, PLANES])
 
 
-@kernel(counting=False)
-def row_start(r: Ranges, box: Any, row: Any) -> Any:
-    """First cell of a run."""
+def _boxes_of_cell(r: Ranges, cell: Any) -> tuple[Any, Any]:
+    if r.single:
+        return np.int64(cell), np.int64(cell) + 1
+    return r.first[cell], r.first[cell + 1]
+
+
+def _box_of_ranges(r: Ranges, box: Any) -> tuple[Any, Any, Any, Any, Any]:
+    rows, stride = np.int64(r.box[box, ROWS]), r.row_stride[r.box[box, SIDE]]
+    return np.int64(r.box[box, START]), np.int64(r.box[box, RUN]), box_rows(r, box), rows, stride
+
+
+def _row_of_box(r: Ranges, box: Any, row: Any) -> Any:
     start, rows, side = np.int64(r.box[box, START]), np.int64(r.box[box, ROWS]), r.box[box, SIDE]
     if row < rows:
         return start + row * r.row_stride[side]
     return start + (row % rows) * r.row_stride[side] + (row // rows) * r.plane_stride[side]
+
+
+def _box_of_its_own(r: Runs, cell: Any) -> tuple[Any, Any]:
+    return np.int64(cell), np.int64(cell) + 1
+
+
+def _whole_run(r: Runs, box: Any) -> tuple[Any, Any, Any, Any, Any]:
+    return r.first[box], r.last[box] - r.first[box] + 1, 1, 1, 0
+
+
+def _start_of_run(r: Runs, box: Any, row: Any) -> Any:
+    return r.first[box]
+
+
+boxes_of.on(Ranges, _boxes_of_cell)
+boxes_of.on(Runs, _box_of_its_own)
+box_at.on(Ranges, _box_of_ranges)
+box_at.on(Runs, _whole_run)
+row_start.on(Ranges, _row_of_box)
+row_start.on(Runs, _start_of_run)
 
 
 @kernel(entry=True, counting=False)

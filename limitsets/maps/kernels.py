@@ -108,12 +108,15 @@ def scattered(params: Any, start: int, step: int) -> Any:
 
 def _one_by_one(params: Any, x: Any, side: int) -> Any:
     value = margin(params, x, side)
-    return value, image_on(params, x, side, 1 if value > 0.0 else 0)[2]
+    return value, image_on(params, x, side, 1 if value > 0.0 else 0)[2], True
 
 
 @generic(default=_one_by_one)
 def decision(params: Any, x: Any, side: int) -> Any:
-    """Return the margin, and the slope on the branch that it decides for: together where that is cheaper."""
+    """Return the margin, the slope on the branch that it decides for, and whether these can be vouched for.
+
+    For loops over many states: a map whose `margin` has a slow way gives here what the fast one finds.
+    """
 
 
 # ---------------------------------------------------------------- states in arrays

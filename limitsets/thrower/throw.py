@@ -108,13 +108,13 @@ def side_margin(part: Side, x: float, side: int) -> float:
 
 
 @kernel
-def side_decision(part: Side, x: float, side: int) -> tuple[float, float]:
-    """`decision` of the throw on one side: the angle of the impact is found once."""
-    at, phi_slope = settle(part, x)
-    if not (x > part.a and 0.0 < at.phi <= part.flight.full_turn):
-        return math.nan, 1.0
+def side_decision(part: Side, x: float, side: int) -> tuple[float, float, bool]:
+    """`decision` of the throw on one side: the angle of the impact is found once, the fast way."""
+    at, phi_slope, settled = impact_angle(part.flight, part, x)
+    falls = (x > part.a) & (at.phi > 0.0) & (at.phi <= part.flight.full_turn)
     _, shift_slope = jog_displacement(part.flight, part, at)
-    return flip_margin(part, x, at), 1.0 + shift_slope * phi_slope
+    value = flip_margin(part, x, at)
+    return value if falls else math.nan, 1.0 + shift_slope * phi_slope, settled
 
 
 @kernel

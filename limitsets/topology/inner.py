@@ -17,7 +17,7 @@ __all__ = ["fills"]
 # Of the length of the set: half the interval that is followed, and its length from which its images are joined.
 SEED, LONG = 1e-5, 1e-2
 # Throws before the interval is placed; images that are taken; ends that differ by less are one [of the largest side].
-BEFORE, MOST_IMAGES, SAME = 100, 2000, 1e-9
+BEFORE, MOST_IMAGES, SAME = 40, 2000, 1e-9
 # Where the interval does not grow: stretches of the set that an orbit has to visit, and its throws.
 STRETCHES, MOST_VISITS = 200, 20_000
 

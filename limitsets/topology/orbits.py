@@ -6,7 +6,7 @@ import math
 from typing import Any
 
 from limitsets.jit import kernel
-from limitsets.maps.drivers import step
+from limitsets.maps.drivers import fill_images, step
 from limitsets.maps.kernels import image_on
 from limitsets.topology.bands import SET
 from limitsets.topology.cells import cell_of
@@ -29,35 +29,54 @@ INNER = 1.0 - GOLDEN
 
 
 @kernel(entry=True, counting=False)
-def _starts(sides: int, total: float, c: Cells, k: Components, s: Starts) -> None:
-    """Spread the starts over the cells in `held`, in proportion to their lengths."""
-    for start in range(s.x.size):
+def _starts(sides: int, c: Cells, k: Components, s: Starts) -> int:
+    """Spread the starts over the cells in `held`, in proportion to their lengths; how many starts there are."""
+    held, total = 0, 0.0
+    for side in range(sides):
+        for cell in range(c.begin[side], c.begin[side + 1]):
+            if k.held[cell]:
+                k.path[held], k.rows[held] = cell, side
+                total += c.hi[cell] - c.lo[cell]
+                held += 1
+    for start in range(s.x.size if held else 0):
         place = total * ((0.5 + start * GOLDEN) % 1.0)
-        for side in range(sides):
-            for cell in range(c.begin[side], c.begin[side + 1]):
-                if k.held[cell]:
-                    length = c.hi[cell] - c.lo[cell]
-                    if 0.0 <= place < length:
-                        s.x[start], s.side[start] = c.lo[cell] + place, side
-                    place -= length
+        for j in range(held):
+            cell = k.path[j]
+            length = c.hi[cell] - c.lo[cell]
+            if place < length or j == held - 1:
+                s.x[start], s.side[start] = c.lo[cell] + min(place, length), k.rows[j]
+                break
+            place -= length
+    return s.x.size if held else 0
+
+
+@kernel(entry=True, counting=False)
+def _throw_all(params: Any, sides: int, count: int, s: Starts) -> None:
+    """Make a step of several orbits, side by side: the images of a side are one loop over an array."""
+    found = 0
+    for side in range(sides):
+        begin = found
+        for i in range(count):
+            if s.side[i] == side:
+                s.which[found], s.before[found] = i, s.x[i]
+                found += 1
+        if found > begin:
+            before, after = (s.before[begin:found],), (s.after[begin:found],)
+            fill_images(params, side, before, after, s.to[begin:found], s.codes[begin:found])
+    for j in range(count):
+        i = s.which[j]
+        s.x[i], s.side[i], s.code[i] = s.after[j], s.to[j], s.codes[j]
 
 
 @kernel(entry=True, counting=False)
 def remaining(params: Any, sides: int, c: Cells, k: Components, s: Starts) -> int:
     """Count the orbits from the cells in `held` that are still among these cells after some throws; they lead `s`.
 
-    All orbits make a throw before one makes the next, so that the processor works on several at a time.
+    All orbits make a throw before any makes the next, so that the images of a side are computed together.
     """
-    total, left = 0.0, s.x.size
-    for cell in range(c.begin[sides]):
-        if k.held[cell]:
-            total += c.hi[cell] - c.lo[cell]
-    if total == 0.0:
-        return 0
-    _starts(sides, total, c, k, s)
-    for throw in range(THROWS):
-        for i in range(left):
-            s.x[i], s.side[i], s.code[i] = step(params, s.x[i], s.side[i])
+    left = _starts(sides, c, k, s)
+    for throw in range(THROWS if left else 0):
+        _throw_all(params, sides, left, s)
         looked, kept = throw % LOOKED == LOOKED - 1, 0
         for i in range(left):
             s.x[kept], s.side[kept] = s.x[i], s.side[i]

@@ -110,16 +110,23 @@ def _dips(left: float, here: float, right: float) -> bool:
 @kernel(entry=True, counting=False)
 def _sample(here: Any, side: int, decided: bool, bottom: float, span: float, scan: Any, s: Samples) -> None:
     for j in range(scan.size):
-        x = bottom + span * scan[j]
-        s.x[j] = x
-        s.margin[j], s.slope[j] = 0.0, 1.0
-        if decided:
-            s.margin[j], s.slope[j] = decision(here, x, side)
-            s.branch[j] = _decided(s.margin[j])
-        else:
-            s.branch[j] = branch_at(here, x, side, decided)
+        s.x[j] = bottom + span * scan[j]
+    if not decided:
+        for j in range(scan.size):
+            s.margin[j], s.slope[j] = 0.0, 1.0
+            s.branch[j] = branch_at(here, s.x[j], side, decided)
             if s.branch[j] >= 0:
-                _, _, s.slope[j] = image_on(here, x, side, s.branch[j])
+                _, _, s.slope[j] = image_on(here, s.x[j], side, s.branch[j])
+        return
+    for j in range(scan.size):
+        s.margin[j], s.slope[j], settled = decision(here, s.x[j], side)
+        s.branch[j] = _decided(s.margin[j]) if settled else codes.UNSETTLED
+    for j in range(scan.size):
+        if s.branch[j] == codes.UNSETTLED:
+            s.margin[j], s.slope[j] = margin(here, s.x[j], side), 1.0
+            s.branch[j] = _decided(s.margin[j])
+            if s.branch[j] >= 0:
+                _, _, s.slope[j] = image_on(here, s.x[j], side, s.branch[j])
 
 
 @kernel(entry=True, counting=False)

@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import Any
 
 from limitsets.graph.components import fill_components
-from limitsets.graph.ranges import ROWS, RUN, SIDE, START, Ranges
+from limitsets.graph.ranges import Runs
 from limitsets.jit import kernel
 from limitsets.topology.cells import COLLAPSES, LEAVES
 from limitsets.topology.work import MOST_ATTRACTORS, Cells, Components, Region
@@ -29,14 +29,9 @@ def find_components(sides: int, c: Cells, k: Components) -> tuple[int, bool]:
     `ends` has the bit ``FIRST << a`` of an attractor that starts may come to, and those of the ways out.
     """
     n = c.begin[sides]
-    for cell in range(n):
-        run = c.last[cell] - c.first[cell] + 1
-        k.box[cell, START], k.box[cell, RUN] = c.first[cell], max(run, 0)
-        k.box[cell, ROWS], k.box[cell, ROWS + 1], k.box[cell, SIDE] = 1, 1, 0
-        k.rank[cell], k.loops[cell], k.held[cell] = 0, False, False
-    graph = Ranges(k.zero[: n + 1], k.box[:n], True, k.stride, k.stride, c.out[:n])
+    k.rank[:n], k.loops[:n], k.held[:n], k.ends[:n] = 0, False, False, 0
     fill_components(
-        graph,
+        Runs(c.first[:n], c.last[:n]),
         k.rank[:n],
         k.label[:n],
         k.order[:n],
@@ -53,8 +48,7 @@ def find_components(sides: int, c: Cells, k: Components) -> tuple[int, bool]:
             cell = k.order[j]
             ends |= c.out[cell]
             for target in range(c.first[cell], c.last[cell] + 1):
-                if k.label[target] != label:
-                    ends |= k.ends[target]
+                ends |= k.ends[target]  # 0 yet for the component's own
             j += 1
         # a cell alone that is stretched over itself holds a repelling fixed point, which all other orbits leave
         recurs = j - i > 1 or (k.loops[k.order[i]] and not c.expands[k.order[i]])

@@ -94,9 +94,6 @@ class Cells(NamedTuple):
 class Components(NamedTuple):
     """Scratch of the search for components; of each cell where its starts may end; the label of each closed one."""
 
-    box: NDArray[np.int32]
-    zero: Ints
-    stride: Ints
     rank: NDArray[np.int32]
     label: NDArray[np.int32]
     order: NDArray[np.int32]
@@ -122,11 +119,16 @@ class Unions(NamedTuple):
 
 
 class Starts(NamedTuple):
-    """States of several orbits, and their last codes."""
+    """States of several orbits, and their last codes; those of one side together: which, before and after a step."""
 
     x: Floats
     side: Ints
     code: Ints
+    which: Ints
+    before: Floats
+    after: Floats
+    to: Ints
+    codes: Ints
 
 
 class Work(NamedTuple):
@@ -198,9 +200,6 @@ def work_for(region: Region, cells: int, samples: int) -> Work:
             np.zeros(n, np.bool_),
         ),
         Components(
-            small(n, 5),
-            ints(n + 1),
-            ints(sides),
             small(n),
             small(n),
             small(n),
@@ -221,6 +220,15 @@ def work_for(region: Region, cells: int, samples: int) -> Work:
             ints(4),
             ints(MOST_INTERVALS),
         ),
-        Starts(floats(STARTS), ints(STARTS), ints(STARTS)),
+        Starts(
+            floats(STARTS),
+            ints(STARTS),
+            ints(STARTS),
+            ints(STARTS),
+            floats(STARTS),
+            floats(STARTS),
+            ints(STARTS),
+            ints(STARTS),
+        ),
         floats(MOST_ATTRACTORS + 2),
     )
