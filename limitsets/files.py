@@ -9,8 +9,8 @@ from __future__ import annotations
 import errno
 import json
 import math
+import os
 import shutil
-import tempfile
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import fields, is_dataclass
@@ -88,6 +88,7 @@ def replaced(folder: str | Path) -> Iterator[Path]:
 
     Examples
     --------
+    >>> import tempfile
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     with replaced(folder) as draft:
     ...         _ = (draft / "numbers.txt").write_text("1 2 3")
@@ -96,8 +97,9 @@ def replaced(folder: str | Path) -> Iterator[Path]:
     """
     place = Path(folder)
     place.mkdir(parents=True, exist_ok=True)
-    draft = Path(tempfile.mkdtemp(prefix=".draft-", dir=place))
+    draft = place / f".draft-{os.urandom(4).hex()}"
     try:
+        draft.mkdir(mode=0o700)  # in here: Ctrl-C may come just after it was made
         yield draft
         drafts = sorted(draft.iterdir())
         for file in drafts:

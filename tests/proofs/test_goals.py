@@ -197,7 +197,7 @@ def test_a_side_that_is_never_left_refutes_the_order_and_is_one_by_itself(tmp_pa
 # ---------------------------------------------------------------- reaches
 
 
-@pytest.mark.parametrize("anywhere", [False, True])
+@pytest.mark.parametrize("anywhere", [False, pytest.param(True, marks=pytest.mark.sweep)])
 def test_every_orbit_gets_as_far_as_none_fails_to(tmp_path, anywhere):
     more = {"from_anywhere": True} if anywhere else {}
     goal = {"reaches": {"x": "20 in", "side": 2, "every_orbit": True}} | more
@@ -225,7 +225,7 @@ def test_every_orbit_is_refuted_by_a_periodic_one():
         assert (states[0]["x"], states[0]["side"]) == (states[-1]["x"], states[-1]["side"])
 
 
-@pytest.mark.parametrize("noise", [None, {"landing.x": "0.05 in"}])
+@pytest.mark.parametrize("noise", [None, pytest.param({"landing.x": "0.05 in"}, marks=pytest.mark.sweep)])
 def test_almost_every_orbit_gets_farther(tmp_path, noise):
     """The limit set of side 2 ends at 23.383; the periodic orbits that stay below are of no length."""
     at = 23.0 if noise is None else 22.0

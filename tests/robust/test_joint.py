@@ -65,6 +65,7 @@ def test_its_certificates_are_confirmed_and_so_is_the_orbit_that_refutes(found, 
     assert all(name in stated for name in TOLERANCE)
 
 
+@pytest.mark.sweep
 def test_the_landing_place_differs_at_every_throw():
     one = joint_margin(scene({"throw.speed": "1 %", "landing.x": "0.05 in"}), GOALS[:1], width=0.1)
     assert one.noise.keys() == {"landing.x"}

@@ -44,7 +44,9 @@ MODELS = [("small-angle", "signed"), ("exact", "energy"), ("small-angle-2", "ene
 
 
 @pytest.fixture(
-    scope="module", params=[[("exact", "signed")], pytest.param(MODELS, marks=pytest.mark.sweep)], ids=len
+    scope="module",
+    params=[pytest.param(each, marks=pytest.mark.sweep) for each in ([("exact", "signed")], MODELS)],
+    ids=len,
 )
 def fused(request, tmp_path_factory):
     # One of the processors for which LLVM by itself prefers vectors of 256 bits to those of 512 that it has.

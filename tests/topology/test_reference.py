@@ -30,7 +30,7 @@ def test_reference_knows_the_logistic_map():
     assert (lo, hi) == (pytest.approx(0.925 * (1 - 0.925) * 3.7), pytest.approx(0.925))
 
 
-@pytest.mark.parametrize("name", ["paper-designed", "paper-initial"])
+@pytest.mark.parametrize("name", ["paper-designed", pytest.param("paper-initial", marks=pytest.mark.sweep)])
 def test_a_handful(name):
     # escape of some, of all, none of either, and the collapse
     scene = ls.load(name)
