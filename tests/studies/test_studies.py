@@ -123,7 +123,6 @@ def effects_in_engine(tmp_path_factory):
     return study, study.main(seed=3, out=out, throws=60), out
 
 
-@pytest.mark.sweep
 def test_the_engine_agrees_with_the_effects(effects_in_engine):
     study, numbers, out = effects_in_engine
     assert (out / "effects.png").stat().st_size > 20_000
