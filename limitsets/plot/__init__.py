@@ -23,6 +23,7 @@ from limitsets.plot.maps import map  # noqa: A004 - ls.plot.map is the word for 
 from limitsets.plot.margins import margin_curve, tolerance_box, tornado
 from limitsets.plot.morse_graphs import morse
 from limitsets.plot.noise import noise_arrivals, noise_density, noise_levels
+from limitsets.plot.policies import policy
 
 __all__ = [
     "atlas",
@@ -40,6 +41,7 @@ __all__ = [
     "noise_arrivals",
     "noise_density",
     "noise_levels",
+    "policy",
     "robust_design",
     "tolerance_box",
     "tornado",

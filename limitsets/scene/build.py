@@ -9,6 +9,7 @@ from limitsets.scene.floats import Floats
 from limitsets.scene.purpose import resolve_effects, resolve_goal, resolve_world
 from limitsets.scene.quantities import deviation, require
 from limitsets.scene.resolve import Resolver
+from limitsets.scene.sensing import resolve_feedback
 from limitsets.scene.units import parse
 from limitsets.scene.validation import Tree, plain, validate
 
@@ -45,6 +46,9 @@ def resolved(structure: object, file: str | None) -> dict[str, Any]:
     goal = None
     if table.goal is not None:
         goal = resolve_goal(table.goal, len(body.sides), arm_length, resolver)
+    feedback = None
+    if table.feedback is not None:
+        feedback = resolve_feedback(table.feedback, len(body.sides), resolver, gravity=gravity is not None)
     return {
         "name": table.name,
         "unit": unit,
@@ -59,6 +63,7 @@ def resolved(structure: object, file: str | None) -> dict[str, Any]:
         "world": world,
         "effects": resolve_effects(table.effects, world, table.model.flight, resolver),
         "tolerance": _tolerance(tree, table, resolver),
+        "feedback": feedback,
         "file": file,
         "text": tree,
     }
