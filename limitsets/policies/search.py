@@ -78,7 +78,7 @@ class _Search:
         return bool((belief & ~self.seeing[left]).any())
 
     def solve(self, belief: Bits, left: int) -> int:
-        """Number of a solved belief that holds this one and needs no more throws than are left; -1 for none."""
+        """Find a solved belief that holds this one and needs no more throws than are left; -1 for none."""
         known = self.solved.superset(belief, left)
         if known >= 0 or left == 0 or self.hopeless(belief, left):
             return known

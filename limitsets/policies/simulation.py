@@ -125,7 +125,7 @@ def _inside(found: Synthesis, x: Floats, side: NDArray[np.int64]) -> NDArray[np.
 
 
 def _heard(found: Synthesis, x: Floats, side: NDArray[np.int64], random: np.random.Generator) -> Any:
-    """Number of the answer that the sensor gives."""
+    """Read the sensor: the numbers of the answers."""
     if found.sensor is None:
         return np.zeros(x.size, np.int64)
     yes = found.sensor.read(x, side, random.uniform(-1.0, 1.0, x.size))

@@ -170,8 +170,8 @@ def feedback(
 ) -> Synthesis:
     """Look for a policy: which throw on which answer of a sensor of one bit.
 
-    The sensor is read whenever the part lies at rest, before the first throw too.  A policy holds for every start in the
-    cells named and every sequence of the noise.
+    The sensor is read whenever the part lies at rest, before the first throw too.  A policy holds for every start in
+    the cells named and every sequence of the noise.
 
     Parameters
     ----------

@@ -38,7 +38,7 @@ class Sensor(ABC):
 
 @dataclass(frozen=True)
 class BeyondSensor(Sensor):
-    """Is the centre of mass beyond x?
+    """Ask whether the centre of mass is beyond x.
 
     Parameters
     ----------
@@ -75,7 +75,7 @@ class BeyondSensor(Sensor):
 
 @dataclass(frozen=True)
 class SideSensor(Sensor):
-    """Does the part lie on this side?
+    """Ask whether the part lies on this side.
 
     Parameters
     ----------

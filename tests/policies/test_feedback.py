@@ -4,11 +4,9 @@ import numpy as np
 import pytest
 
 import limitsets as ls
-from limitsets.errors import AnswerError, LimitsetsError
-from limitsets.policies import broken, places
+from limitsets.errors import AnswerError
 from limitsets.policies.beliefs import cells_of
 from limitsets.policies.enclosed_starts import not_within
-from limitsets.policies.simulation import simulate
 from limitsets.scene.sensing import BeyondSensor, SideSensor
 from tests.policies.recursion import as_number, least
 

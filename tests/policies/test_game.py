@@ -11,7 +11,8 @@ from tests.maps_of_tests import Contraction
 from tests.policies.recursion import as_number, least
 
 POSITIONS = Grid(ls.grid([(0.0, 3.0)], cells=3).domain, ls.grid([(0.0, 3.0)], cells=3).edges)
-# left: [0, 1] to [0.1, 0.6], [1, 2] to [0.6, 1.1], [2, 3] to [1.1, 1.6]; right: to [1.45, 1.95], [1.95, 2.45], [2.45, 2.95]
+# left: [0, 1] to [0.1, 0.6], [1, 2] to [0.6, 1.1], [2, 3] to [1.1, 1.6]
+# right: to [1.45, 1.95], [1.95, 2.45], [2.45, 2.95]
 LEFT, RIGHT = Contraction(0.5, 0.1), Contraction(0.5, 1.45)
 
 

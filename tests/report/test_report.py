@@ -13,12 +13,12 @@ import limitsets as ls
 from limitsets.analysis import GoalOutcome
 from limitsets.errors import LimitsetsError
 from limitsets.goals import OrientedBeyond
-from limitsets.report import page, write
-from limitsets.report import write as write_report
 from limitsets.report.audit_pages import audit_page
 from limitsets.report.goals import verdict_of, void_of
-from limitsets.report.pages import words
+from limitsets.report.pages import page, words
 from limitsets.report.tables import bands
+from limitsets.report.writing import write
+from limitsets.report.writing import write as write_report
 
 SCENES = Path(__file__).parents[1] / "analysis"
 SOURCES = ["paper-designed", "paper-initial", SCENES / "four-sides.toml", SCENES / "five-sides.toml"]

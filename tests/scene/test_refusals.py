@@ -73,9 +73,9 @@ TABLE: list[tuple[dict[str, Any], str, str]] = [
     ),
     ({"feedback": {"throws": [OWN], "sensor": "beyond"}}, "feedback.sensor", "a table"),
     (
-        {"feedback": {"throws": [OWN], "sensor": {"beyond": "28 in"}}},
+        {"feedback": {"throws": [OWN], "sensor": {"beyond": "-1 in"}}},
         "feedback.sensor.beyond",
-        "below the arm",
+        "from 0",
     ),
     ({"feedback": {"throws": [OWN], "sensor": {"side": 3}}}, "feedback.sensor.side", "0 to 2"),
     (
