@@ -351,7 +351,7 @@ def _cells(
     """Cut the arm into cells, with borders at the places that matter."""
     own = scene.domain
     end = min(float(box.bare[0].arm_length) for box in boxes.values())
-    plain = grid(Domain(own.lo, np.full_like(own.hi, end), own.anchor), cells=cells)
+    plain = grid(Domain(own.lo, np.full_like(own.hi, end), own.anchor), cells=cells, grading="uniform")
     sides = []
     for side, (edges,) in enumerate(plain.edges):
         wanted = [x for x in {*cuts, *starts.get(side, ())} if edges[0] < x < edges[-1]]

@@ -135,9 +135,7 @@ class Feedback:
     sensor: Sensor | None = None
 
 
-def resolve_feedback(
-    table: FeedbackTable, count: int, resolver: Resolver, *, gravity: bool
-) -> Feedback:
+def resolve_feedback(table: FeedbackTable, count: int, resolver: Resolver, *, gravity: bool) -> Feedback:
     """Resolve ``[feedback]`` for a part with `count` sides."""
     throws: list[ChosenThrow] = []
     for k, each in enumerate(table.throws):
