@@ -15,14 +15,14 @@ if TYPE_CHECKING:
 
 __all__ = ["policy"]
 
-# Rows that still can be read.
-MOST = 60
+# Rows that can be named, and the most height of a row and of all [inches].
+MOST, ROW, TALL = 60, 0.26, 16.0
 COLOURS = (style.JOG, style.FLIP, style.ROLL, style.INK)
 HATCHES = ("", "////", "....", "xxxx")
 
 
 def policy(found: Synthesis) -> Figure:
-    """Draw a policy, one row for each state and one column for each side.
+    """Draw a policy, one row for each state and one column for each side; up to 60 states are named.
 
     Parameters
     ----------
@@ -36,14 +36,15 @@ def policy(found: Synthesis) -> Figure:
     Raises
     ------
     AnswerError
-        Where there is no policy, or one of more than 60 states.
+        Where there is no policy.
     """
     table = found.found.policy
-    if table is None or table.states > MOST:
-        value = found.found.verdict if table is None else f"a policy of {table.states} states"
-        raise AnswerError("what to draw", value, f"a policy of at most {MOST} states", "read its table")
+    if table is None:
+        raise AnswerError("what to draw", found.found.verdict, "a policy", "more throws may do it")
     sides = found.grid.sides
-    figure, panels = style.canvas(3.2 * sides + 2.4, 0.34 * table.states + 1.9, 1, sides, sharey=True)
+    figure, panels = style.canvas(
+        3.2 * sides + 2.4, min(ROW * table.states, TALL) + 1.9, 1, sides, sharey=True
+    )
     beliefs, unit = found.beliefs(), found.scene.unit
     spans = [pair for belief in beliefs for parts in belief.values() for pair in parts]
     low, high = min(lo for lo, _ in spans), max(min(hi, found.scene.arm_length) for _, hi in spans)
@@ -63,7 +64,10 @@ def policy(found: Synthesis) -> Figure:
         axes.set_xlabel(f"x [{unit}]", fontsize=style.SMALL)
         axes.tick_params(labelsize=style.SMALL)
         style.open_frame(axes)
-    panels[0].set_yticks(range(table.states), [_label(table, k) for k in range(table.states)])
+    if table.states <= MOST:
+        panels[0].set_yticks(range(table.states), [_label(table, k) for k in range(table.states)])
+    else:
+        panels[0].set_ylabel("state", fontsize=style.SMALL)
     panels[0].set_ylim(table.states - 0.4, -0.6)
     style.title(figure, f"{found.scene.name}: {found.question} {found.found.throws} throws are enough")
     style.legend(figure, _keys(found), 4)

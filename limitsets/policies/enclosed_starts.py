@@ -1,8 +1,9 @@
 """What no policy can do: the same game on finitely many starts, whose images are enclosed.
 
 Cells are outer images, on which a policy may fail that would work.  Here a belief is a set of single starts that saw
-the same throws and answers.  A start of which an answer, a decision or the goal region is not certain is taken out, which
-makes the game easier; so what is not won within n throws is won by no policy, on those starts or any that hold them.
+the same throws and answers.  A start of which an answer, a decision or the goal region is not certain is taken out,
+which makes the game easier; so what is not won within n throws is won by no policy, on those starts or any that hold
+them.
 """
 
 from __future__ import annotations

@@ -161,8 +161,8 @@ def feedback(
     mode: str = "stop",
     goal: tuple[float, int] | None = None,
     starts: Starts = None,
-    throws: int = 12,
-    cells: int = 512,
+    throws: int = 30,
+    cells: int = 1024,
     noise: Mapping[str, str] | None = None,
     seconds: float = 60.0,
     beliefs: int = 400_000,
@@ -238,8 +238,8 @@ def places(
     mode: str = "stop",
     goal: tuple[float, int] | None = None,
     starts: Starts = None,
-    throws: int = 12,
-    cells: int = 512,
+    throws: int = 30,
+    cells: int = 1024,
     noise: Mapping[str, str] | None = None,
     seconds: float = 10.0,
     beliefs: int = 400_000,
@@ -277,7 +277,7 @@ def _sensor_of(scene: Scene, sensor: Sensor | str | None) -> Sensor | None:
             raise AnswerError("the sensor", sensor, 'a Sensor or "none"', "correct it")
         return None
     own = sensor if sensor is not None or scene.feedback is None else scene.feedback.sensor
-    if own is None:
+    if own is None and scene.feedback is not None:
         remedy = 'add it to the scene, choose one, or pass "none"'
         raise AnswerError("the sensor", "none", "[feedback] sensor", remedy)
     return own
@@ -389,7 +389,8 @@ def _starts(scene: Scene, cells: Grid, starts: Starts, noise: dict[str, str]) ->
         if lo < edges[0] or hi > edges[-1]:
             allowed = f"from {edges[0]:.9g} to {edges[-1]:.9g} {scene.unit} on side {side}"
             raise AnswerError("the starts", (lo, hi), allowed, "name places where the part can rest")
-        found[cells.of_side(side)] = (edges[1:] >= lo) & (edges[:-1] <= hi)
+        inside = (edges[1:] > lo) & (edges[:-1] < hi)
+        found[cells.of_side(side)] = inside if lo < hi else (edges[1:] >= lo) & (edges[:-1] <= hi)
     return found, words
 
 

@@ -112,15 +112,15 @@ def test_forged_policies_are_found_out(images):
 
 def random_game(random, n, catching):
     """Images of one to three cells, some that leave; answers that overlap; a target, and cells that lose."""
-    relation = random.random((2, n, n)) < random.choice([0.5, 1.2, 2.0]) / n
+    relation = random.random((2, n, n)) < random.choice([0.0, 0.1, 0.4]) / n
     for throw, cell in np.ndindex(2, n):
         relation[throw, cell, random.integers(n)] = True
-    leaves = random.random((2, n)) < 0.04
+    leaves = random.random((2, n)) < 0.02
     yes = random.random(n) < 0.5
     answers = {"yes": yes, "no": ~yes | (random.random(n) < 0.1)}
     target = random.random(n) < random.choice([0.1, 0.3])
     lost = (random.random(n) < 0.05) & ~target if catching else None
-    return relation, leaves, answers, target, lost, random.random(n) < random.choice([0.05, 0.2])
+    return relation, leaves, answers, target, lost, random.random(n) < random.choice([0.03, 0.1])
 
 
 def both_ways(relation, leaves, answers, target, lost, starts, depth):
@@ -161,30 +161,13 @@ def compare(seeds):
 
 
 def test_random_systems_against_the_definition():
-    ends = compare(range(120))
-    assert {None, 0, 1, 2, 3} <= set(ends)  # the examples are of all kinds
+    ends = compare(range(200))
+    assert {None, 0, 1, 2, 3, 4} <= set(ends)  # the examples are of all kinds
 
 
 @pytest.mark.sweep
 def test_many_random_systems_against_the_definition():
     assert {None, 0, 1, 2, 3, 4} <= set(compare(range(1000, 4000)))
-
-
-def test_time_and_memory_end_a_search():
-    random = np.random.default_rng(3)
-    n = 200
-    relation = np.zeros((2, n, n), dtype=bool)
-    for throw, cell in np.ndindex(2, n):
-        relation[throw, cell, random.integers(n, size=2)] = True
-    yes = random.random(n) < 0.5
-    images = {str(k): lambda mask, k=k: relation[k][mask].any(axis=0) for k in (0, 1)}
-    game = game_of(images, {"yes": yes, "no": ~yes}, cells(7, n=n))
-    found = search(game, np.ones(n, dtype=bool), 60, beliefs=500)
-    assert (found.verdict, found.policy) == ("not-decided", None)
-    assert "500 beliefs" in found.reason
-    found = search(game, np.ones(n, dtype=bool), 60, seconds=0.0)
-    assert (found.verdict, found.reason) == ("not-decided", "the time is used up")
-    assert 0 <= found.throws < 60
 
 
 def test_wrong_calls(images):
