@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -67,5 +69,5 @@ class Kept:
         return self._first(some, ~(self.rows[some] & ~belief).any(axis=1))
 
     @staticmethod
-    def _first(some: NDArray[np.int64], met: NDArray[np.bool_]) -> int:
+    def _first(some: NDArray[np.int64], met: Any) -> int:
         return int(some[int(met.argmax())]) if met.any() else -1

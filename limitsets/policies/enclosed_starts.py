@@ -175,8 +175,8 @@ def not_within(
     assert scene.feedback is not None
     boxes = [parameter_box(scene.with_values({each.quantity: each.text})) for each in scene.feedback.throws]
     most = found.found.throws + 1 if throws is None else throws
-    x = np.array([at for at, _ in starts], dtype=np.float64)
-    begin = _Parts(x, x.copy(), np.array([side for _, side in starts], dtype=np.int64))
+    places = np.array([at for at, _ in starts], dtype=np.float64)
+    begin = _Parts(places, places.copy(), np.array([side for _, side in starts], dtype=np.int64))
     run, shown, decided = _Enclosed(found, boxes, time.monotonic() + seconds), -1, True
     try:
         for left in range(most + 1):

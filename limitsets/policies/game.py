@@ -100,14 +100,13 @@ class Game:
 
     def seeing(self, throws: int) -> list[Bits]:
         """Give the cells from which one who sees the cell wins within 0, 1, ... throws: no others can be solved."""
-        beyond = None if self.wrong is None else self.wrong
-        found = [self.won if beyond is None else np.zeros_like(self.won)]
+        found = [self.won if self.wrong is None else np.zeros_like(self.won)]
         for _ in range(throws):
             inside = found[-1] | self.won
-            good = ~(self.images & ~inside).any(axis=2) & ~self.leaves
-            if beyond is not None:
-                good &= ~(self.images & beyond).any(axis=2)
-            found.append(found[-1] | packed(good.any(axis=0)))
+            good: Mask = ~(self.images & ~inside).any(axis=2) & ~self.leaves
+            if self.wrong is not None:
+                good &= ~(self.images & self.wrong).any(axis=2)
+            found.append(found[-1] | packed(np.any(good, axis=0)))
         return found
 
 

@@ -64,6 +64,7 @@ TABLE: list[tuple[dict[str, Any], str, str]] = [
         "feedback.throws[0].speed",
         "unit of length",
     ),
+    ({"throw": {"kappa": "25 in"}, "gravity": GONE}, "feedback.throws[0].speed", "add [gravity]"),
     ({"feedback": {"throws": [OWN, OWN]}}, "feedback.throws[1].name", "a name of its own"),
     ({"feedback": {"throws": [OWN], "sensor": {}}}, "feedback.sensor", "beyond or side"),
     (
