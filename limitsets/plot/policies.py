@@ -109,7 +109,8 @@ def _keys(found: Synthesis) -> list[Any]:
     ]
     if found.mode == "stop":
         keys.append(Patch(facecolor="white", edgecolor=style.GOAL, lw=1.4, label="stop: the part is there"))
-    keys.append(style.key(f"goal: side {found.goal[1]} from here on", **style.GOAL_LINE))
+    words = "side {} from here on" if found.mode == "stop" else "caught from here on: right on side {}"
+    keys.append(style.key(f"goal: {words.format(found.goal[1])}", **style.GOAL_LINE))
     if hasattr(found.sensor, "x"):
         keys.append(style.key("sensor", color=style.INK, lw=1.0, ls=(0, (5, 2))))
     return keys
