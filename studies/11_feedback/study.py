@@ -100,7 +100,9 @@ def drawn(swept: dict[str, Any]) -> Any:
     axes.yaxis.set_major_locator(MaxNLocator(integer=True))
     axes.tick_params(labelsize=style.SMALL)
     style.open_frame(axes)
-    style.title(figure, "paper-initial, one bit (is the part beyond x?); no mark: not with 30 throws")
+    style.title(
+        figure, "paper-initial, one bit (is the part beyond x?); no mark: no policy found within 30 throws"
+    )
     style.legend(figure, axes.get_legend_handles_labels()[0], 2)
     return figure
 

@@ -1,5 +1,8 @@
 """The game of beliefs: by hand, against its definition, on random systems."""
 
+import re
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -177,3 +180,22 @@ def test_wrong_calls(images):
         game_of(images, {"yes": cells(2), "no": cells(0)}, cells(1))
     with pytest.raises(AnswerError, match="the number of cells"):
         game_of(images, None, np.ones(40_000, dtype=bool))
+
+
+def test_the_example_of_the_page(capsys):
+    """docs/feedback.md: another map, which needs the bit."""
+    page = (Path(__file__).resolve().parents[2] / "docs" / "feedback.md").read_text(encoding="utf-8")
+    (code,) = re.findall(r"```python\n(.*?)```", page, re.S)
+    names = {}
+    exec(code, names)  # noqa: S102 - the page's own example
+    assert capsys.readouterr().out == "solved 10\n"
+    blind = search(game_of(names["images"], None, names["target"]), names["starts"], 12)
+    assert blind.verdict == "not-solved"
+    assert (
+        broken(
+            names["found"].policy,
+            game_of(names["images"], names["answers"], names["target"]),
+            names["starts"],
+        )
+        == ""
+    )
