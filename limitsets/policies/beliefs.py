@@ -11,7 +11,7 @@ __all__ = ["Bits", "Kept", "cells_of", "packed"]
 
 Bits = NDArray[np.uint64]
 
-# Of the beliefs that are kept the last so many are compared; a comparison that is left out only costs time.
+# Of the beliefs that are looked through for a subset the last so many: one that is not found only costs time.
 COMPARED = 4096
 
 
@@ -58,12 +58,11 @@ class Kept:
 
     def superset(self, belief: Bits, most: int) -> int:
         """Find the number of one of at most so many throws that holds the belief; -1 where none does."""
-        begin = max(0, self.size - COMPARED)
-        some = begin + np.flatnonzero(self.throws[begin : self.size] <= most)
+        some = np.flatnonzero(self.throws[: self.size] <= most)
         return self._first(some, ~(belief & ~self.rows[some]).any(axis=1))
 
     def subset(self, belief: Bits, least: int) -> int:
-        """Find the number of one of at least so many throws that lies in the belief; -1 where none does."""
+        """Find the number of one of at least so many throws that lies in the belief; -1 where none is found."""
         begin = max(0, self.size - COMPARED)
         some = begin + np.flatnonzero(self.throws[begin : self.size] >= least)
         return self._first(some, ~(self.rows[some] & ~belief).any(axis=1))

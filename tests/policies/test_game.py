@@ -9,7 +9,7 @@ import pytest
 import limitsets as ls
 from limitsets.cells import Grid
 from limitsets.errors import AnswerError
-from limitsets.policies import broken, game_of, image_of, search
+from limitsets.policies import beliefs, broken, game_of, image_of, search
 from tests.maps_of_tests import Contraction
 from tests.policies.recursion import as_number, least
 
@@ -166,6 +166,12 @@ def compare(seeds):
 def test_random_systems_against_the_definition():
     ends = compare(range(200))
     assert {None, 0, 1, 2, 3, 4} <= set(ends)  # the examples are of all kinds
+
+
+def test_what_is_not_compared_changes_no_answer(monkeypatch):
+    """Only the last of the beliefs that were not solved are looked through."""
+    monkeypatch.setattr(beliefs, "COMPARED", 1)
+    compare(range(200, 300))
 
 
 @pytest.mark.sweep
