@@ -166,6 +166,10 @@ def _text(found: Synthesis, tried: tuple[Synthesis, ...], thrown: Any, out: Path
     typer.echo(f"question: {found.question}")
     typer.echo(_verdict(found))
     policy = found.found.policy
+    if out is not None:
+        typer.echo(
+            f"written to {out}: feedback.json" + ("" if policy is None else ", policy.csv, policy.png")
+        )
     if policy is None:
         return
     rows = []
@@ -180,8 +184,6 @@ def _text(found: Synthesis, tried: tuple[Synthesis, ...], thrown: Any, out: Path
         typer.echo(
             f"thrown: {thrown.reached} of {thrown.parts} came, in {thrown.mean:.3g} throws on average{more}"
         )
-    if out is not None:
-        typer.echo(f"written to {out}: feedback.json, policy.csv, policy.png")
 
 
 def _verdict(found: Synthesis) -> str:

@@ -205,6 +205,14 @@ def test_a_side_without_a_throw_that_stays_is_told_apart():
     assert found.found.policy.throws[found.found.policy.throw[found.found.policy.first[0]]] == "own"
 
 
+def test_throws_without_a_sensor(scene):
+    """From 19.4 to 19.5 on side 2 its own throw is enough, whatever a sensor says."""
+    found = ls.feedback(scene, "none", starts={2: (19.4, 19.5)}, cells=128)
+    assert (found.found.verdict, found.found.throws, found.question) == ("solved", 1, "nothing is asked")
+    assert simulate(found, 500).throws.tolist() == [0, 500]
+    assert found.to_json()["sensor"] is None
+
+
 def test_not_within_by_enclosed_starts():
     """Starts from which one throw ends below x are not served by one, and by two where two jogs get there."""
     scene = with_throws(sensor={"side": 2})

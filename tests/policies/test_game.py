@@ -73,7 +73,10 @@ def test_what_the_bit_buys(images):
     game = game_of(images, None, cells(1))
     found = search(game, cells(0, 1, 2), 9)
     assert (found.verdict, found.throws) == ("not-solved", 9)
-    assert search(game, cells(2), 9).throws == 1
+    last = search(game, cells(2), 9)
+    assert last.throws == 1
+    assert last.policy.csv() == "state,begin,throw,next_any,left\n0,any,left,1,1\n1,,stop,,0\n"
+    assert last.policy.to_json()["first"] == {"any": 0}
 
 
 def test_caught_on_entry_by_hand(images):
