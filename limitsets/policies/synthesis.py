@@ -177,7 +177,7 @@ def places(
     throws: int = 30,
     cells: int = 1024,
     noise: Mapping[str, str] | None = None,
-    seconds: float = 10.0,
+    seconds: float = 60.0,
     beliefs: int = 400_000,
     progress: Progress = None,
 ) -> tuple[Synthesis, ...]:

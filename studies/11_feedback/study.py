@@ -149,7 +149,7 @@ def main(
         ((name, size),) = noise.items()
         numbers["noise"][f"{name} {size}"] = {mode: row(each, seed, parts) for mode, each in found.items()}
     for mode in MODES:
-        swept = places(scene, PLACES.tolist(), mode=mode, cells=cells, seconds=5.0)
+        swept = places(scene, PLACES.tolist(), mode=mode, cells=cells, beliefs=20_000)
         numbers["swept"][mode] = [
             {"x": each.sensor.x, "verdict": each.found.verdict, "throws": each.found.throws} for each in swept
         ]
