@@ -13,6 +13,7 @@ What is assumed stands in docs/feeding.md.
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import TYPE_CHECKING
@@ -23,6 +24,7 @@ from numpy.typing import ArrayLike, NDArray
 from limitsets.errors import AnswerError
 from limitsets.geometry.polygon import above_side, side_ends
 from limitsets.goals import OrientedBeyond, Reaches
+from limitsets.robust.noise.chain_solution import starts_from
 
 if TYPE_CHECKING:
     from limitsets.scene import Cavity, Scene
@@ -179,12 +181,15 @@ class ArmEnd:
         The side wanted.
     clear : tuple of (float, float)
         How far beyond the end a part on that side clears the wall [length].
+    starts : ndarray, shape (n_sides,)
+        Random starts lie from here to the end, equally likely per length on all sides [length].
     """
 
     scene: Scene
     x: float
     side: int
     clear: tuple[tuple[float, float], ...]
+    starts: NDArray[np.float64]
 
     def fate(self, x: NDArray[np.float64], side: NDArray[np.int64]) -> NDArray[np.int64]:
         """Say what becomes of parts at rest: a number of `FATES`, -1 of those that stay on the arm."""
@@ -196,8 +201,8 @@ class ArmEnd:
         return np.where(beyond >= 0.0, fed, -1)
 
 
-def arm_end_of(scene: Scene, side: int | None = None) -> ArmEnd:
-    """Read what is asked: the end of the arm and the side wanted, by default the goal's.
+def arm_end_of(scene: Scene, side: int | None = None, starts: Mapping[int, float] | None = None) -> ArmEnd:
+    """Read what is asked: the end of the arm, the side wanted, by default the goal's, and where random starts begin.
 
     Raises
     ------
@@ -216,4 +221,10 @@ def arm_end_of(scene: Scene, side: int | None = None) -> ArmEnd:
         allowed = f"above the cavity's position, {x:g} {scene.unit}"
         remedy = "arm.length is how far landings are followed: lengthen it by a part's length"
         raise AnswerError("the length of the arm", scene.arm_length, allowed, remedy)
-    return ArmEnd(scene, x, side, clear_beyond(scene, side))
+    begin = starts_from(scene)
+    for number, least in (starts or {}).items():
+        if number not in range(begin.size) or not scene.sides.a[number] <= least < x:
+            allowed = f"by side, from a of that side to below {x:g} {scene.unit}"
+            raise AnswerError("the starts", f"{number}: {least}", allowed, "name places on the arm")
+        begin[number] = least
+    return ArmEnd(scene, x, side, clear_beyond(scene, side), begin)

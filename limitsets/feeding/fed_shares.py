@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from limitsets.cells import Grid, grid
 from limitsets.feeding.falling import FATES, ArmEnd
 from limitsets.robust.noise.arrivals import random_starts, with_border
-from limitsets.robust.noise.chain_solution import ChainProblem, starts_from
+from limitsets.robust.noise.chain_solution import ChainProblem
 from limitsets.robust.noise.scattering import Scattering, kappa_strata, still_map, thrown
 from limitsets.robust.noise.ulam import transfer
 
@@ -83,8 +83,7 @@ class FeedingProblem:
     @classmethod
     def of(cls, end: ArmEnd, cells: int, strata: int) -> FeedingProblem:
         """Ask on so many cells a side, each law cut into so many strata."""
-        starts = starts_from(end.scene)
-        return cls(end, ChainProblem(end.scene, (end.x, end.side), starts, cells, strata))
+        return cls(end, ChainProblem(end.scene, (end.x, end.side), end.starts, cells, strata))
 
     def coarser(self) -> tuple[FeedingProblem, FeedingProblem]:
         """Ask on half as many cells, and with half as many strata."""

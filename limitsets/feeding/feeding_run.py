@@ -90,6 +90,7 @@ class Feeding:
             unit=scene.unit,
             position=self.end.x,
             side=self.end.side,
+            starts_from=self.end.starts,
             throw_rate=rate,
             clear=self.clear,
             tipping=self.tipping,
@@ -115,6 +116,7 @@ def feed(
     scatter: Scattering | None = None,
     *,
     side: int | None = None,
+    starts: Mapping[int, float] | None = None,
     noise: Mapping[str, str] | None = None,
     prove: bool = True,
     level: bool = True,
@@ -135,6 +137,8 @@ def feed(
         `[effects] spread`, or none.
     side : int, optional
         The side wanted; default the goal's.
+    starts : mapping of int to float, optional
+        By side the x from which random starts lie, up to the end of the arm; default a twentieth of the arm beyond a.
     noise : mapping of str to str, optional
         ``{"throw.speed": "0.3 %"}``: what may differ at every throw in the proofs, whatever the sequence.
     prove : bool
@@ -171,7 +175,7 @@ def feed(
     1000
     """
     read = scene if isinstance(scene, Scene) else load(scene)
-    end = arm_end_of(read, side)
+    end = arm_end_of(read, side, starts)
     if trials < 1:
         raise AnswerError("the trials", trials, "1 or more", "throw some parts")
     if scatter is None:

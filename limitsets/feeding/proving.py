@@ -5,7 +5,7 @@ The arm ends at X.  On enclosed images of cells an orbit goes on from cells befo
 *Safety*: a cell from which no cell beyond X on another side can be reached feeds the wanted side only, under any
 sequence of the noise.  *Progress*: where neither a recurrent cell nor an exit can be reached from a cell, before X,
 every start in it is fed, within as many throws as the longest path has.  An orbit that is never fed makes that
-impossible; then almost every start is fed where the goal `reaches` says so.
+impossible; then almost every start is fed where the starts that stay before X are proved to thin out.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from limitsets.proofs.goals import State
 from limitsets.proofs.goals.kind import above, below
 from limitsets.proofs.goals.violating_starts import one_throw
 from limitsets.proofs.parameters import parameter_box
-from limitsets.proofs.proof import Claim
+from limitsets.proofs.perron_frobenius import perron_frobenius_bound
 from limitsets.proofs.simulated import joined, scattered
 from limitsets.scene import load
 
@@ -112,6 +112,8 @@ class Fed:
         The verdict for all starts but some of total length zero; None where every start is fed.
     almost_from : str, dict or None
         For which starts that is proved: "almost-every", or those beyond some x, ``{"from": {"0": x}}``.
+    almost_share : float
+        Their share of the starts on the arm.
     never_fed : tuple of State
         A periodic orbit before the end of the arm, proved; empty where none was found.
     reason : str
@@ -124,6 +126,7 @@ class Fed:
     share: float
     almost_every: str | None = None
     almost_from: Any = None
+    almost_share: float = 0.0
     never_fed: tuple[State, ...] = ()
     reason: str = ""
 
@@ -139,8 +142,9 @@ class Fed:
             found = [f"progress: UNDECIDED, {self.reason}"]
         else:
             words = self.verdict.upper().replace("-", " ")
-            starts = "on the arm" if self.share >= 1.0 else f"beyond {_places(self.beyond, unit)}"
-            found = [f"progress: {words}, every start {starts} is fed within {self.throws} throws"]
+            whole = "every start on the arm is fed, " if self.share >= 1.0 else ""
+            within = f"every start beyond {_places(self.beyond, unit)} within {self.throws} throws"
+            found = [f"progress: {words}, {whole}{within}"]
         if self.almost_every is not None:
             words = self.almost_every.upper().replace("-", " ")
             places = (
@@ -153,7 +157,16 @@ class Fed:
 
     def to_json(self) -> dict[str, Any]:
         """Give it as JSON takes it."""
-        names = ("verdict", "throws", "beyond", "share", "almost_every", "almost_from", "never_fed")
+        names = (
+            "verdict",
+            "throws",
+            "beyond",
+            "share",
+            "almost_every",
+            "almost_from",
+            "almost_share",
+            "never_fed",
+        )
         return as_table(**picked(self, *names), reason=self.reason or None)
 
 
@@ -168,6 +181,7 @@ class _Paths:
     found: Attraction
     end: ArmEnd
     starts: Mask
+    waiting: Mask
     ends_on: NDArray[np.uint8]
     leaves: Mask
     late: Mask
@@ -190,7 +204,7 @@ class _Paths:
         late = reach(ranges, parts, stay.astype(np.uint8)) > 0
         steps = ranks(ranges, parts, np.zeros(parts.count, dtype=bool))
         ends_on = (marks & np.uint8((1 << MOST_SIDES) - 1)).astype(np.uint8)
-        return cls(found, end, ~perhaps, ends_on, marks >> MOST_SIDES > 0, late, steps)
+        return cls(found, end, ~perhaps, ~fed, ends_on, marks >> MOST_SIDES > 0, late, steps)
 
     def extents(self, some: Mask) -> Extents:
         return CellSet(self.found.cover.grid, some & self.starts).extents()
@@ -228,25 +242,42 @@ class _Paths:
             / float(self.found.cover.grid.measure[self.starts].sum()),
         )
 
-    def fed(self) -> Fed:
-        grid, late = self.found.cover.grid, self.late & self.starts
-        good = np.zeros_like(late)
-        beyond = {}
+    def from_on(self, bad: Mask) -> tuple[dict[int, float], Mask]:
+        """Name by side the x from which on there are no bad cells, and the starts from there on."""
+        grid, bad = self.found.cover.grid, bad & self.starts
+        beyond, good = {}, np.zeros_like(bad)
         for side, (edges,) in enumerate(grid.edges):
-            cells = np.arange(grid.n_cells)[grid.of_side(side)]
-            last = np.flatnonzero(late[cells])
+            last = np.flatnonzero(bad[grid.of_side(side)])
             first = int(last[-1]) + 1 if last.size else 0
             beyond[side] = float(edges[first])
-            good[cells[first:]] = True
-        good &= self.starts
-        whole = not late.any() and self.joined
-        share = 1.0 if whole else self.share(good) if good.any() else 0.0
+            good[int(grid.offset[side]) + first : int(grid.offset[side]) + edges.size - 1] = True
+        return beyond, good & self.starts
+
+    def fed(self) -> Fed:
+        """Prove of every start that it is fed."""
+        beyond, good = self.from_on(self.late)
         if not good.any():
-            place = self.found.cover.place(int(np.flatnonzero(late)[0]))
+            place = self.found.cover.place(int(np.flatnonzero(self.late & self.starts)[0]))
             return Fed("undecided", None, {}, 0.0, reason=f"an orbit from {place} may never be fed")
-        throws = int(self.steps[good].max())
+        whole = self.joined and not (self.late & self.starts).any()
+        share = 1.0 if whole else self.share(good)
         verdict = "proved" if share >= 1.0 - LITTLE else "proved-on-cells"
-        return Fed(verdict, throws, beyond, share)
+        return Fed(verdict, int(self.steps[good].max()), beyond, share)
+
+    def almost(self, fed: Fed) -> Fed:
+        """Prove of almost every start that it is fed: those leave the cells before X that cannot leave the arm."""
+        beyond, good = self.from_on(self.leaves)
+        # what cannot leave the arm comes to no cell that can: it stays among these cells until it is fed
+        reason = perron_frobenius_bound(self.found.cover, self.waiting & ~self.leaves).reason
+        if reason or not good.any():
+            return replace(fed, almost_every="undecided", reason=fed.reason or reason)
+        # next to the joint a throw rises with the start: it carries no set of positive length into one of length zero
+        rises = self.joined and all(near.rises for near in self.found.joint)
+        whole = rises and not (self.leaves & self.starts).any()
+        share = 1.0 if whole else self.share(good)
+        verdict = "proved" if share >= 1.0 - LITTLE else "proved-on-cells"
+        starts = "almost-every" if whole else {"from": {str(side): x for side, x in beyond.items()}}
+        return replace(fed, almost_every=verdict, almost_from=starts, almost_share=share)
 
 
 def proved_feeding(
@@ -294,28 +325,23 @@ def proved_feeding(
             safe = replace(safe, verdict="refuted", counterexample=shown) if shown else safe
         if fed.verdict not in ("proved", "refuted"):
             fed = paths.fed()
+        if fed.verdict != "proved":
+            tell("almost every start", step, len(LADDER) + 2)
+            fed = paths.almost(fed)
         if step == 0 and fed.verdict != "proved":
             tell("an orbit that is never fed", len(LADDER), len(LADDER) + 2)
             fed = _never_fed(end, every, fed)
-        if safe.verdict in ("proved", "refuted") and fed.verdict in ("proved", "refuted"):
+        refuted = fed.verdict == "refuted" and fed.almost_every == "proved"
+        if safe.verdict in ("proved", "refuted") and (fed.verdict == "proved" or refuted):
             break
-    if fed.verdict != "proved":
-        tell("almost every start", len(LADDER) + 1, len(LADDER) + 2)
-        found = _reaches(end, every)
-        fed = replace(fed, almost_every=found.verdict, almost_from=found.starts)
     return safe, fed
-
-
-def _reaches(end: ArmEnd, noise: Mapping[str, str], **more: bool) -> Claim:
-    """Ask whether orbits come to the end of the arm: almost every one, or every one."""
-    tree = end.scene.as_dict()
-    place = {"x": tree["cavity"]["position"], "side": end.side, **more}
-    return certify(load({**tree, "goal": {"reaches": place}}), ["goal"], noise=noise or None).claims[0]
 
 
 def _never_fed(end: ArmEnd, noise: Mapping[str, str], fed: Fed) -> Fed:
     """Look for a periodic orbit before the end of the arm."""
-    found = _reaches(end, noise, every_orbit=True)
+    tree = end.scene.as_dict()
+    goal = {"reaches": {"x": tree["cavity"]["position"], "side": end.side, "every_orbit": True}}
+    found = certify(load({**tree, "goal": goal}), ["goal"], noise=noise or None).claims[0]
     if found.verdict != "refuted" or any(state.hi > below(end.x) for state in found.counterexample):
         return fed
     return replace(

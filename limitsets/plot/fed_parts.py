@@ -28,6 +28,8 @@ LOOKS: dict[str, dict[str, Any]] = {
     "wall": {"color": style.ROLL, "ls": style.ROLL_LINE},
     "left": {"color": style.JOG, "ls": (0, (1, 1.5))},
 }
+# Shares below this are not drawn.
+LEAST = 1e-6
 WORDS = {
     "right": "side wanted, clear",
     "wrong": "another side",
@@ -56,9 +58,12 @@ def feeding(found: Feeding) -> Figure:
         panels.insert(1, _tipping)
     if found.curve is not None:
         panels.append(_levels)
-    figure, axes = style.canvas(4.0 * len(panels) + 0.4, 3.9, 1, len(panels))
-    for draw, each in zip(panels, axes, strict=True):
+    rows = math.ceil(len(panels) / 2)
+    figure, axes = style.canvas(9.6, 3.6 * rows + 0.3, rows, 2)
+    for draw, each in zip(panels, axes, strict=False):
         draw(each, found)
+    for each in axes[len(panels) :]:
+        each.set_axis_off()
     words = f"side {found.end.side} wanted beyond x = {found.end.x:g} {scene.unit}"
     style.title(figure, f"{scene.name}: {words}")
     return figure
@@ -132,7 +137,7 @@ def _throws(axes: Axes, found: Feeding) -> None:
     number = np.arange(1, min(last, rows.shape[0]) + 1)
     for column, name in enumerate(FATES[:4]):
         total = np.cumsum(rows[:, column])[: number.size]
-        if total[-1] > 0.0:
+        if total[-1] > LEAST:
             label = f"{WORDS[name]}: {100 * found.shares.shares[name]:.3g} %"
             axes.step(number, total, where="post", lw=1.3, label=label, **LOOKS[name])
         met = np.sort(trials.throws[trials.fate == column])

@@ -9,10 +9,12 @@ import argparse
 import json
 import tomllib
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import limitsets as ls
 from limitsets.feeding import Feeding
+from limitsets.feeding.falling import arm_end_of
+from limitsets.feeding.proving import proved_feeding
 from limitsets.feeding.trials import PAPER, SERIES, binomial_interval
 from limitsets.robust import Gaussian, Scattering, Uniform
 
@@ -31,24 +33,42 @@ def fed(scene: Any, name: str, rate: str | None = None, **changes: str) -> Any:
     return ls.load(tree if rate is None else {**tree, "world": {"throw_rate": rate}})
 
 
-def robust_scene() -> Any:
-    """Give the feeder of study 07: paper-designed with the values found there, its goal at its own X."""
+def robust_scene() -> tuple[Any, str]:
+    """Give the feeder of study 07, paper-designed with the values found there, and its own X, where its arm ends."""
     known = json.loads(ROBUST.read_text(encoding="utf-8"))
     scene = ls.load("paper-designed").with_values(known["values"])
     goal = {"oriented_beyond": {"x": f"{known['x']} in", "side": 2}}
     return ls.load({**scene.as_dict(), "goal": goal}), f"{known['x']} in"
 
 
-def cases() -> dict[str, tuple[Any, Scattering, dict[str, str]]]:
-    """Scenes by name, with the noise thrown and the noise of the proofs."""
+class Case(NamedTuple):
+    """A scene, the noise thrown, that of the proofs, and whether starts are those from which feeding is proved."""
+
+    scene: Any
+    scatter: Scattering
+    noise: dict[str, str]
+    named: bool = False
+
+    def starts(self) -> dict[int, float] | None:
+        """By side the x from which on almost every start is proved to be fed."""
+        if not self.named:
+            return None
+        fed = proved_feeding(arm_end_of(self.scene), self.noise)[1]
+        return {int(side): x for side, x in fed.almost_from["from"].items()}
+
+
+def cases() -> dict[str, Case]:
+    """Give the scenes by name."""
     designed, initial = ls.load("paper-designed"), ls.load("paper-initial")
     robust, x = robust_scene()
+    robust = fed(robust, "robust", position=x)
     return {
-        "robust": (fed(robust, "robust", position=x), WITHIN, BOUNDED),
-        "designed": (fed(designed, "designed"), WITHIN, BOUNDED),
-        "designed, 2 Hz": (fed(designed, "designed 2 Hz", "2 Hz"), NORMAL, {}),
-        "designed, 4 Hz": (fed(designed, "designed 4 Hz", "4 Hz"), NORMAL, {}),
-        "initial": (fed(initial, "initial"), NORMAL, {}),
+        "robust, starts named": Case(robust, WITHIN, BOUNDED, named=True),
+        "robust, all starts": Case(robust, WITHIN, BOUNDED),
+        "designed, starts named": Case(fed(designed, "designed"), WITHIN, BOUNDED, named=True),
+        "designed, 2 Hz": Case(fed(designed, "designed 2 Hz", "2 Hz"), NORMAL, {}),
+        "designed, 4 Hz": Case(fed(designed, "designed 4 Hz", "4 Hz"), NORMAL, {}),
+        "initial": Case(fed(initial, "initial"), NORMAL, {}),
     }
 
 
@@ -62,7 +82,8 @@ def row(found: Feeding) -> dict[str, Any]:
         "progress": found.fed.verdict,
         "progress of almost every start": found.fed.almost_every,
         "throws proved": found.fed.throws,
-        "proved from": found.fed.beyond,
+        "starts from": found.end.starts.tolist(),
+        "share of starts that may leave": found.safe.leaving,
         "probability": shares.shares,
         "its error": found.errors,
         "trials": trials.counts,
@@ -107,8 +128,17 @@ def main(
     """Run the study, write the figure into `out`, return the numbers."""
     out.mkdir(parents=True, exist_ok=True)
     rows = {}
-    for name, (scene, scatter, noise) in cases().items():
-        found = ls.feed(scene, scatter, noise=noise, trials=trials, seed=seed, cells=cells, level=level)
+    for name, case in cases().items():
+        found = ls.feed(
+            case.scene,
+            case.scatter,
+            starts=case.starts(),
+            noise=case.noise,
+            trials=trials,
+            seed=seed,
+            cells=cells,
+            level=level,
+        )
         rows[name] = row(found)
         if name in ("designed, 2 Hz", "initial"):
             file = "designed.png" if name.startswith("designed") else "initial.png"

@@ -92,7 +92,8 @@ def test_scattered_landings_are_fed_from_some_x_on():
     safe, fed = proved_feeding(arm_end_of(scene), {"landing.x": "0.005 in"})
     assert (safe.verdict, set(safe.possible)) == ("proved", {2})
     assert 0.99 < safe.share < 1.0
-    assert fed.almost_every == "proved"
+    assert fed.almost_every in ("proved", "proved-on-cells")
+    assert fed.almost_share > 0.97
     for side, x in fed.almost_from["from"].items():
         # the jog from there gains what the noise may take
         a = scene.sides.a[int(side)]

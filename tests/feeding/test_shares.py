@@ -117,7 +117,7 @@ def test_a_level_is_bracketed():
 
 
 KEYS = {
-    "scene", "unit", "position", "side", "throw_rate", "clear", "tipping", "safety", "progress", "noise", "scatter",
+    "scene", "unit", "position", "side", "starts_from", "throw_rate", "clear", "tipping", "safety", "progress", "noise", "scatter",
     "probabilities", "throws", "right_per_minute", "noise_cut_off", "success", "trials",
 }  # fmt: skip
 
@@ -132,7 +132,8 @@ def test_json_and_figure():
         "verdict", "possible", "only_wanted", "share", "leaving", "counterexample"
     }  # fmt: skip
     assert set(table["progress"]) == {
-        "verdict", "throws", "beyond", "share", "almost_every", "never_fed", "reason"
+        "verdict", "throws", "beyond", "share", "almost_every", "almost_from", "almost_share", "never_fed",
+        "reason",
     }  # fmt: skip
     assert set(table["trials"]) == {
         "trials", "seed", "counts", "intervals", "mean_throws", "series", "paper",
