@@ -117,7 +117,8 @@ def test_a_level_is_bracketed():
 
 
 KEYS = {
-    "scene", "unit", "position", "side", "starts_from", "throw_rate", "clear", "tipping", "safety", "progress", "noise", "scatter",
+    "scene", "unit", "position", "side", "starts_from", "throw_rate", "clear", "tipping", "safety",
+    "progress", "noise", "scatter",
     "probabilities", "throws", "right_per_minute", "noise_cut_off", "success", "trials",
 }  # fmt: skip
 
@@ -143,7 +144,16 @@ def test_json_and_figure():
     assert sum(table["trials"]["series"]["right"]) == 20
     figure = ls.plot.feeding(found)
     FigureCanvasAgg(figure).draw()
-    assert len(figure.axes) == 3
+    cavity, tipping, fates, empty = figure.axes
+    assert tipping.get_xscale() == "log"
+    assert any("2 Hz" in text.get_text() for text in tipping.texts)
+    assert not empty.axison
+    right, wall = (found.shares.shares[name] for name in ("right", "wall"))
+    words = [text.get_text() for text in fates.get_legend().get_texts()]
+    assert words == [f"side wanted, clear: {100 * right:.3g} %", f"meets the wall: {100 * wall:.3g} %"]
+    # flush on the ramp a side of the part falls under its angle
+    edges = np.diff(cavity.patches[-1].get_xy(), axis=0)
+    assert np.isclose(np.arctan2(-edges[:, 1], edges[:, 0]), found.end.scene.cavity.angle).any()
 
 
 def test_the_page_has_every_key():
