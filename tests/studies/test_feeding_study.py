@@ -28,7 +28,8 @@ def test_as_expected(ran):
         for fate, (count, trials) in wanted["trials"].items():
             # of 100 000 trials with another seed, and of these
             low, high = binomtest(count, trials).proportion_ci(0.9999, method="exact")
-            assert low - 2e-3 <= found["probability"][fate] <= high + 2e-3, (case, fate)
+            error = 2e-3 + 4.0 * found["its error"][fate]  # near the joint equal cells are too coarse
+            assert low - error <= found["probability"][fate] <= high + error, (case, fate)
             met = binomtest(found["trials"][fate], 4000).proportion_ci(0.9999, method="exact")
             assert met.low <= high, (case, fate)
             assert met.high >= low, (case, fate)
