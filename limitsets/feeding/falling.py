@@ -65,7 +65,7 @@ def time_to_tip(
     Examples
     --------
     >>> time_to_tip([0.0, 0.1], 0.7, 1.25, 193.0, 0.56).round(3)
-    array([ inf, 0.261])
+    array([  inf, 0.282])
     """
     e = np.asarray(beyond, dtype=np.float64)
     node, weight = np.polynomial.legendre.leggauss(NODES)
