@@ -114,3 +114,10 @@ def test_a_part_with_too_many_sides_is_told_so():
     )
     with pytest.raises(ls.feeding.proving.AnswerError, match="up to 7"):
         proved_feeding(arm_end_of(scene))
+
+
+def test_a_certificate_of_a_scene_with_a_cavity_is_rechecked(tmp_path):
+    """The checker knows the words, and that the claims do not speak of them."""
+    scene = with_cavity(rate="2 Hz")
+    file = ls.certify(scene, ["goal"]).save(tmp_path / "fed.proof.zip")
+    assert ls.recheck(file).verdict == "proved"

