@@ -220,15 +220,13 @@ def test_bands_tell_which_sides_occur_where():
 
 @pytest.mark.parametrize("fault", [RuntimeError, KeyboardInterrupt])
 def test_a_fault_while_drawing_leaves_the_old_files_whole(tmp_path, monkeypatch, fault):
-    import limitsets.plot
-
     write(analysed("paper-initial"), tmp_path)
     before = bytes_of(tmp_path)
 
     def fails(*_, **__):
         raise fault
 
-    monkeypatch.setattr(limitsets.plot, "basins", fails)
+    monkeypatch.setattr("limitsets.report.writing.basins", fails)
     with pytest.raises(fault):
         write(analysed("paper-designed"), tmp_path)
     assert bytes_of(tmp_path) == before
