@@ -23,6 +23,7 @@ _FILES = {
     "bifurcation": "bifurcations",
     "counterexample": "counterexamples",
     "design": "designs",
+    "feeding": "fed_parts",
     "flight": "flights",
     "limit_set": "limit_sets",
     "map": "maps",
