@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 
 from limitsets.robust.brackets.nodes import Nodes
 
-__all__ = ["Average", "Bends", "Gaps", "Span", "Swings", "Tilts", "Windows", "mean_matrix"]
+__all__ = ["Average", "Bends", "Curvature", "Gaps", "Kinks", "Span", "Swings", "Windows", "mean_matrix"]
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -74,17 +74,26 @@ class Gaps(NamedTuple):
     two: Span
 
 
-class Tilts(NamedTuple):
-    """To `cell` is added `much` times the oscillation of a number in [lo, hi] times the slope of V on a span.
+class Kinks(NamedTuple):
+    """To `cell`'s deficit comes `much` times the sum of what the slope of V falls by at the nodes within a span.
 
-    Where that says less, the total variation of V there is added instead.
+    And `bow` times the largest slope there.
     """
 
     cell: Index
     much: Array
-    lo: Array
-    hi: Array
+    bow: Array
     span: Span
+
+
+class Curvature(NamedTuple):
+    """One way to bound the deficit by curvature, for the cells that it knows."""
+
+    cells: Index
+    bends: tuple[Bends, ...] = ()
+    swings: tuple[Swings, ...] = ()
+    kinks: tuple[Kinks, ...] = ()
+    gaps: tuple[Gaps, ...] = ()
 
 
 class Windows:
@@ -151,11 +160,9 @@ class Average:
     at_nodes : tuple of Swings
         How far the means at nodes may be off.
     swings, gaps : tuple of Swings, tuple of Gaps
-        The same of means anywhere in a cell, and deficits of the chord.
-    bends : tuple of Bends
-        Deficits by curvature, h^2/8 included.
-    tilts : tuple of Tilts
-        Deficits by a slope that oscillates, h/4 included.
+        The same of means anywhere in a cell.
+    ways : tuple of Curvature
+        Deficits of the chord, h included; of several ways the best counts, for each cell.
     """
 
     source: Nodes
@@ -165,8 +172,7 @@ class Average:
     at_nodes: tuple[Swings, ...] = ()
     swings: tuple[Swings, ...] = ()
     gaps: tuple[Gaps, ...] = ()
-    bends: tuple[Bends, ...] = ()
-    tilts: tuple[Tilts, ...] = ()
+    ways: tuple[Curvature, ...] = ()
     windows: dict[int, Any] = field(default_factory=dict)
 
     def _window(self, key: Any, span: Span) -> Windows:
@@ -209,24 +215,37 @@ class Average:
 
     def _deficit(self, values: Array, slopes: Array, total: Array, n: int) -> Array:
         """How far the mean may lie above the chord, for each cell, named by its left node."""
-        found, bent = np.zeros(n), np.zeros(n)
+        found, best = np.zeros(n), np.full(n, np.inf)
         for each in self.swings:
             found += np.bincount(each.row, _variation(total, each), n)
         for gap in self.gaps:
-            low, high = self._both(gap, values)
-            found += np.bincount(gap.row, gap.much * (high - low), n)
-        for tilt in self.tilts:
-            low, high = _products(tilt.lo, tilt.hi, *self._window(tilt, tilt.span).ends(slopes))
-            variation = total[tilt.span.last + 1] - total[tilt.span.first]
-            found += np.bincount(tilt.cell, np.minimum(tilt.much * (high - low), variation), n)
-        for bend in self.bends:
-            ends = self._window(bend, bend.span).ends(slopes)
-            low, high = _products(bend.lo, bend.hi, *ends)
-            cap = bend.cap * (total[bend.span.last + 1] - total[bend.span.first])
-            wild = high - low > cap
-            bent += np.bincount(bend.cell, np.where(wild, 0.0, low), n)
-            found += np.bincount(bend.cell, np.where(wild, cap, 0.0), n)
-        return found + np.maximum(-bent, 0.0)
+            found += np.bincount(gap.row, self._difference(gap, values), n)
+        falls = np.cumsum(np.maximum(slopes - np.append(slopes[1:], 0.0), 0.0))  # up to the node after each cell
+        known = np.zeros(n, dtype=bool)
+        for way in self.ways:
+            bent, more = np.zeros(n), np.zeros(n)
+            for bend in way.bends:
+                low, high = _products(bend.lo, bend.hi, *self._window(bend, bend.span).ends(slopes))
+                cap = bend.cap * (total[bend.span.last + 1] - total[bend.span.first])
+                wild = high - low > cap
+                bent += np.bincount(bend.cell, np.where(wild, 0.0, low), n)
+                more += np.bincount(bend.cell, np.where(wild, cap, 0.0), n)
+            for each in way.swings:
+                more += np.bincount(each.row, _variation(total, each), n)
+            for kink in way.kinks:
+                low, high = self._window(kink, kink.span).ends(slopes)
+                down = kink.much * (falls[kink.span.last - 1] - falls[kink.span.first - 1])
+                more += np.bincount(kink.cell, down + kink.bow * np.maximum(high, -low), n)
+            for gap in way.gaps:
+                more += np.bincount(gap.row, self._difference(gap, values), n)
+            deficit = more + np.maximum(-bent, 0.0)
+            known[way.cells] = True
+            best[way.cells] = np.minimum(best[way.cells], deficit[way.cells])
+        return found + np.where(known, best, 0.0)
+
+    def _difference(self, gap: Gaps, values: Array) -> Array:
+        low, high = self._both(gap, values)
+        return gap.much * (high - low)  # type: ignore[no-any-return]
 
     def _both(self, gap: Gaps, values: Array) -> tuple[Array, Array]:
         if id(gap) not in self.windows:

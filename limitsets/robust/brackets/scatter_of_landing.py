@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from limitsets.robust.brackets.averages import Average, Bends, Span, Swings, mean_matrix
+from limitsets.robust.brackets.averages import Average, Bends, Curvature, Span, Swings, mean_matrix
 from limitsets.robust.brackets.densities import Staircase
 from limitsets.robust.brackets.nodes import Nodes
 
@@ -70,7 +70,7 @@ def landing_average(target: Nodes, source: Nodes, law: Staircase) -> Average:
         beyond=law.beyond,
         at_nodes=(Swings(np.arange(n), off, whole),),
         swings=tuple(swings),
-        bends=tuple(bends),
+        ways=(Curvature(cells, tuple(bends)),),
     )
 
 

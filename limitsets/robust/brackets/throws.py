@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from limitsets.proofs.intervals import Intervals
-from limitsets.robust.brackets.averages import Average, Bends, Gaps, Span, Swings, Tilts, Windows, mean_matrix
+from limitsets.robust.brackets.averages import Average, Bends, Curvature, Gaps, Kinks, Span, Swings, Windows, mean_matrix
 from limitsets.robust.brackets.decisions import Decided, decided
 from limitsets.robust.brackets.densities import Staircase
 from limitsets.robust.brackets.landings import Derivatives, OneSide, landed, slopes
@@ -31,6 +31,8 @@ Index = NDArray[np.int64]
 
 # Inflates coefficients against the rounding of the few operations that make them.
 MORE = 1.0 + 2.0**-40
+# A cap that is none.
+NEVER = 1e200
 
 
 class _Rows(NamedTuple):
@@ -96,8 +98,7 @@ class _Parts:
         self.at_nodes: list[Swings] = []
         self.swings: list[Swings] = []
         self.gaps: list[Gaps] = []
-        self.bends: list[Bends] = []
-        self.tilts: list[Tilts] = []
+        self.ways: list[Curvature] = []
 
     def average(self) -> Average:
         """Put them together."""
@@ -111,8 +112,7 @@ class _Parts:
             tuple(self.at_nodes),
             tuple(self.swings),
             tuple(self.gaps),
-            tuple(self.bends),
-            tuple(self.tilts),
+            tuple(self.ways),
         )
 
     def add(self, side: OneSide, numbers: Index) -> None:
@@ -225,14 +225,17 @@ class _Parts:
             for flips in (found.cell_below, found.cell_above):
                 span = self._span(side, flips[live], lo[live], hi[live])
                 self.swings.append(Swings(cell[live], np.full(live.size, law.ripple), span))
+        self._any_way(rows, found, live, lo, hi)
+        self._by_kinks(rows, found, all_of, live, lo, hi, density)
         # Where the speed moves the landing place by less than a cell its derivative says nothing, if it has a sign.
         rate = all_of.delta.absolute()
         spread = float(law.borders[-1] - law.borders[0]) * rate.lo
-        curved = live[((spread > 2.0 * h) & (rate.hi < 2.0 * rate.lo))[live]]
-        flat = np.setdiff1d(live, curved)
-        self._flat(rows, found, all_of, flat, lo, hi, density)
+        curved = live[((spread > h) & (rate.hi < 2.0 * rate.lo))[live]]
         if curved.size:
-            self._curved(rows, found, all_of, curved, lo, hi, density)
+            self._by_borders(rows, found, all_of, curved, lo, hi, density)
+
+    def _gaps(self, cell, much, side, flips, lo, hi, both) -> Gaps:  # type: ignore[no-untyped-def]
+        return Gaps(cell, much, self._span(side, flips, lo, hi), self._span(side, flips ^ both, lo, hi))
 
     def _gap(self, cell, much, side, flips, lo, hi, both) -> None:  # type: ignore[no-untyped-def]
         one = self._span(side, flips, lo, hi)
@@ -266,28 +269,48 @@ class _Parts:
             everything = Span(np.zeros(lost.size, np.int64), np.full(lost.size, self.target.place.size - 2))
             self.gaps.append(Gaps(lost, np.ones(lost.size), everything, everything))
 
-    def _flat(self, rows, found, all_of, some, lo, hi, density) -> None:  # type: ignore[no-untyped-def]
-        """By the oscillation of M'."""
-        if not some.size:
-            return
+    def _any_way(self, rows, found, some, lo, hi) -> None:  # type: ignore[no-untyped-def]
+        """By all that V may be where throws land."""
+        cell = rows.number[:-1][some]
+        below, above = found.cell_below[some], found.cell_above[some]
+        gaps = self._gaps(cell, np.ones(some.size), rows.side, below, lo[some], hi[some], below != above)
+        self.ways.append(Curvature(cell, gaps=(gaps,)))
+
+    def _by_kinks(self, rows, found, all_of, some, lo, hi, density) -> None:  # type: ignore[no-untyped-def]
+        """By what the slope of V falls at nodes, each met by a share of the deviations only."""
         law, side, cell = self.law, rows.side, rows.number[:-1]
         h = np.diff(rows.x)[some]
-        t_x = all_of.x[some]
-        for flips in (found.cell_below[some], found.cell_above[some]):
-            span = self._span(side, flips, lo[some], hi[some])
-            split = found.cell_below[some] != found.cell_above[some]
-            low = np.where(split, np.minimum(t_x.lo, 0.0), t_x.lo)
-            high = np.where(split, np.maximum(t_x.hi, 0.0), t_x.hi)
-            self.tilts.append(Tilts(cell[some], MORE * 0.25 * h, low, high, span))
-            if law.certain or not split.any():
-                return
-        at = some[found.cell_below[some] != found.cell_above[some]]
-        drift = MORE * 0.5 * density * np.abs(found.cut[at + 1] - found.cut[at])
-        both = np.ones(at.size, dtype=bool)
-        self._gap(cell[at], drift, side, found.cell_below[at], lo[at], hi[at], both)
+        t = Derivatives(*(each[some] for each in all_of))
+        wide, rate = t.x.absolute().hi, t.delta.absolute().lo
+        with np.errstate(divide="ignore"):
+            share = np.ones(some.size) if law.certain else np.minimum(density * wide * h / rate, 1.0)
+        below, above = found.cell_below[some], found.cell_above[some]
+        split = np.flatnonzero(below != above)
+        much, bow = MORE * 0.25 * h * wide * share, MORE * h * h / 8.0 * t.x_x.absolute().hi
+        kinks = [Kinks(cell[some], much, bow, self._span(side, below, lo[some], hi[some]))]
+        bends: list[Bends] = []
+        if split.size:
+            at = some[split]
+            kinks.append(
+                Kinks(cell[at], much[split], bow[split], self._span(side, above[split], lo[at], hi[at]))
+            )
+            # Along a border that moves with x: p g' (2 T_x + g' T_delta) G'.
+            drift = (found.cut[at + 1] - found.cut[at]) / h[split]
+            moving = Intervals(drift, drift)
+            by = h[split] ** 2 / 8.0 * density
+            much = moving * (2.0 * t.x[split] + moving * t.delta[split]) * Intervals(0.0 * by, by)
+            none = np.full(at.size, NEVER)
+            for flips, sign in ((below[split], 1.0), (above[split], -1.0)):
+                span = self._span(side, flips, lo[at], hi[at])
+                low, high = (much.lo, much.hi) if sign > 0.0 else (-much.hi, -much.lo)
+                bends.append(Bends(cell[at], low, high, none, span))
+        self.ways.append(Curvature(cell[some], tuple(bends), kinks=tuple(kinks)))
 
-    def _curved(self, rows, found, all_of, some, lo, hi, density) -> None:  # type: ignore[no-untyped-def]
-        """By M''."""
+    def _by_borders(self, rows, found, all_of, some, lo, hi, density) -> None:  # type: ignore[no-untyped-def]
+        """By the borders of strata and branches, where the densities jump."""
+        bends: list[Bends] = []
+        swings: list[Swings] = []
+        gaps: list[Gaps] = []
         law, side, cell = self.law, rows.side, rows.number[:-1]
         h = np.diff(rows.x)[some]
         t = Derivatives(*(each[some] for each in all_of))
@@ -304,7 +327,7 @@ class _Parts:
         everywhere = np.arange(some.size)
         for flips, here in ((below, everywhere), (above, np.flatnonzero(split))):
             span = self._span(side, flips[here], lo[some[here]], hi[some[here]])
-            self.swings.append(Swings(cell[some[here]], MORE * inner[here], span))
+            swings.append(Swings(cell[some[here]], MORE * inner[here], span))
         jumps = -np.diff(law.density, prepend=0.0, append=0.0)
         still = np.zeros(some.size)
         for b in np.flatnonzero(np.abs(jumps) > 1e-12 * law.density.max()):
@@ -318,14 +341,23 @@ class _Parts:
                 low = np.where(between, min(jumps[b], 0.0), jumps[b])
                 high = np.where(between, max(jumps[b], 0.0), jumps[b])
                 border = _Border(level, level, first, last, ends, still, low, high)
-                self._border(rows, some, np.flatnonzero(here), flips, border)
+                bends += self._border(rows, some, np.flatnonzero(here), flips, border)
             at = np.flatnonzero(between)
             if at.size:
                 much = MORE * 0.25 * abs(jumps[b]) * (most - least)[at]
-                self._gap(cell[some[at]], much, side, below[at], lo[some[at]], hi[some[at]], np.ones(at.size, bool))
+                both = np.ones(at.size, dtype=bool)
+                gaps.append(self._gaps(cell[some[at]], much, side, below[at], lo[some[at]], hi[some[at]], both))
         here = np.flatnonzero(split)
-        if not here.size:
-            return
+        if here.size:
+            bends += self._moving(rows, found, some, here, below, above)
+        self.ways.append(Curvature(cell[some], tuple(bends), tuple(swings), gaps=tuple(gaps)))
+
+    def _moving(self, rows, found, some, here, below, above) -> list[Bends]:  # type: ignore[no-untyped-def]
+        """What the border between the branches bends."""
+        law, side = self.law, rows.side
+        h = np.diff(rows.x)[some]
+        one_cut, two_cut = found.cut[some], found.cut[some + 1]
+        least, most = np.minimum(one_cut, two_cut), np.maximum(one_cut, two_cut)
         x_one, x_two = rows.x[some], rows.x[some + 1]
         first, last = landed(side, x_one, least).phi, landed(side, x_two, most).phi
         ends = landed(side, x_one, one_cut).place, landed(side, x_two, two_cut).place
@@ -337,15 +369,15 @@ class _Parts:
         else:
             low = high = np.full(some.size, law.density[0])
         border = _Border(least, most, first, last, ends, drift, low, high)
-        self._border(rows, some, here, below, border)
-        self._border(rows, some, here, above, border._replace(low=-high, high=-low))
+        other = border._replace(low=-high, high=-low)
+        return self._border(rows, some, here, below, border) + self._border(rows, some, here, above, other)
 
     def _border(
         self, rows: _Rows, some: Index, here: Index, flips: NDArray[np.bool_], border: _Border
-    ) -> None:
-        """Add what the jump of the density at a border, fixed or moving with x, bends."""
+    ) -> list[Bends]:
+        """Return what the jump of the density at a border, fixed or moving with x, bends."""
         if not here.size:
-            return
+            return []
         side, cell = rows.side, some[here]
         slack = np.maximum(rows.error[cell], rows.error[cell + 1])
         phi = Intervals(np.maximum(border.first[here] - slack, 0.0), border.last[here] + slack)
@@ -360,10 +392,8 @@ class _Parts:
         jump = np.maximum(np.abs(border.low[here]), np.abs(border.high[here]))
         with np.errstate(divide="ignore", invalid="ignore"):
             cap = MORE * 0.25 * h * jump * shape.absolute().hi / size.lo
-        cap = np.where(np.isfinite(cap), cap, np.inf)
+        cap = np.where(np.isfinite(cap), cap, NEVER)
         wide = slack + np.where(size.lo > 0.0, 0.0, size.hi * h)
         one, two = border.ends[0][here], border.ends[1][here]
         span = self._span(side, flips[here], np.minimum(one, two) - wide, np.maximum(one, two) + wide)
-        self.bends.append(
-            Bends(rows.number[cell], np.nextafter(much.lo, -np.inf), np.nextafter(much.hi, np.inf), cap, span)
-        )
+        return [Bends(rows.number[cell], much.lo, much.hi, cap, span)]
