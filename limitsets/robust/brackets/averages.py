@@ -77,11 +77,14 @@ class Gaps(NamedTuple):
 class Kinks(NamedTuple):
     """To `cell`'s deficit comes `much` times the sum of what the slope of V falls by at the nodes within a span.
 
-    And `bow` times the largest slope there.
+    Or `even` times the most that it falls by per length, and `once` times the largest single fall, where that is less;
+    and `bow` times the largest slope there.
     """
 
     cell: Index
     much: Array
+    even: Array
+    once: Array
     bow: Array
     span: Span
 
@@ -205,7 +208,7 @@ class Average:
             mean += np.bincount(each.row, _variation(total, each), n)
         if self.beyond:
             mean += self.beyond * most
-        deficit = self._deficit(values, slopes, total, n)
+        deficit = self._deficit(values, slopes, total, width, n)
         # Nodes close together are lifted alike: a difference would be a slope without end.
         close = np.flatnonzero(self.source.width < CLOSE_BY * np.median(self.source.width))
         for _ in range(CLUSTER):
@@ -213,14 +216,17 @@ class Average:
         worst = np.maximum(deficit, np.concatenate([[0.0], deficit[:-1]]))
         return mean + MORE * worst + size  # type: ignore[no-any-return]
 
-    def _deficit(self, values: Array, slopes: Array, total: Array, n: int) -> Array:
+    def _deficit(self, values: Array, slopes: Array, total: Array, width: Array, n: int) -> Array:
         """How far the mean may lie above the chord, for each cell, named by its left node."""
         found, best = np.zeros(n), np.full(n, np.inf)
         for each in self.swings:
             found += np.bincount(each.row, _variation(total, each), n)
         for gap in self.gaps:
             found += np.bincount(gap.row, self._difference(gap, values), n)
-        falls = np.cumsum(np.maximum(slopes - np.append(slopes[1:], 0.0), 0.0))  # up to the node after each cell
+        fall = np.maximum(slopes - np.append(slopes[1:], 0.0), 0.0)  # at the node after each cell
+        falls = np.cumsum(fall)
+        after = np.append(width[1:], np.inf)
+        bent_by = fall / (0.5 * (np.where(np.isinf(width), 0.0, width) + np.where(np.isinf(after), 0.0, after)))
         known = np.zeros(n, dtype=bool)
         for way in self.ways:
             bent, more = np.zeros(n), np.zeros(n)
@@ -235,7 +241,9 @@ class Average:
             for kink in way.kinks:
                 low, high = self._window(kink, kink.span).ends(slopes)
                 down = kink.much * (falls[kink.span.last - 1] - falls[kink.span.first - 1])
-                more += np.bincount(kink.cell, down + kink.bow * np.maximum(high, -low), n)
+                inner = self._inner(kink)
+                even = kink.even * inner.ends(bent_by)[1] + kink.once * inner.ends(fall)[1]
+                more += np.bincount(kink.cell, np.minimum(down, even) + kink.bow * np.maximum(high, -low), n)
             for gap in way.gaps:
                 more += np.bincount(gap.row, self._difference(gap, values), n)
             deficit = more + np.maximum(-bent, 0.0)
@@ -246,6 +254,13 @@ class Average:
     def _difference(self, gap: Gaps, values: Array) -> Array:
         low, high = self._both(gap, values)
         return gap.much * (high - low)  # type: ignore[no-any-return]
+
+    def _inner(self, kink: Kinks) -> Windows:
+        """Windows of the nodes within a span, named by the cells before them."""
+        if -id(kink) not in self.windows:
+            last = np.maximum(kink.span.last - 1, kink.span.first)
+            self.windows[-id(kink)] = Windows(Span(kink.span.first, last))
+        return self.windows[-id(kink)]  # type: ignore[no-any-return]
 
     def _both(self, gap: Gaps, values: Array) -> tuple[Array, Array]:
         if id(gap) not in self.windows:

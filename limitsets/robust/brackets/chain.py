@@ -30,7 +30,7 @@ EXITS = "exits"
 SPEED_STRATA, LANDING_STRATA = 16, 1
 NORMAL_SPEED, NORMAL_LANDING = 96, 192
 # Cells of the function of the landing place for one of the function of the start.
-FINER = 2
+FINER = 4
 
 
 @dataclass(frozen=True, eq=False)

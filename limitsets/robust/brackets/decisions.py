@@ -178,12 +178,20 @@ def _by_border(side, x, open_, by_x, by_delta, bounds, nodes, cells) -> None:  #
     cell_below[cell], cell_above[cell] = ~grows[left], grows[left]
     h = x[cell + 1] - x[cell]
     slope = (cut[cell + 1] - cut[cell]) / h
-    steep = by_delta[left].absolute()
-    along = (by_x[left] + Intervals(slope, slope) * by_delta[left]).absolute().hi
     off = np.maximum(*(_at(side, x[k], cut[k]).absolute().hi for k in (cell, cell + 1)))
-    with np.errstate(divide="ignore", invalid="ignore"):
-        far = (off + 0.5 * h * along) / steep.lo
-    good = (steep.lo > 0.0) & (far < bounds[1] - bounds[0])
+    far = _distance(by_x[left], by_delta[left], slope, off, h)
+    good = far < bounds[1] - bounds[0]
+    # Once more, with the derivatives near the chord alone.
+    near = np.flatnonzero(good)
+    at, reach = cell[near], far[near]
+    ends_of = cut[at], cut[at + 1]
+    least = np.maximum(np.minimum(*ends_of) - reach, bounds[0])
+    most = np.minimum(np.maximum(*ends_of) + reach, bounds[1])
+    first, last = landed(side, x[at], least), landed(side, x[at + 1], most)
+    angles = Intervals(np.maximum(first.phi - first.phi_error, 0.0), last.phi + last.phi_error)
+    _, along, across = margin(side, Intervals(x[at], x[at + 1]), angles, Intervals(least, most), steep=True)
+    again = _distance(along, across, slope[near], off[near], h[near])
+    far[near] = np.minimum(reach, np.where(first.good & last.good, again, np.inf))
     # As far as the next rounding of the chord itself.
     beta[cell] = np.where(good, far * (1.0 + 1e-9) + 1e-15, bounds[1] - bounds[0])
 
@@ -204,3 +212,12 @@ def crossings(side: OneSide, lo: float, hi: float, delta: float) -> list[float]:
 def _flips(side: OneSide, x: Array, delta: float) -> NDArray[np.bool_]:
     f = _at(side, x, np.full(x.shape, delta))
     return f.lo + f.hi > 0.0
+
+
+def _distance(by_x: Intervals, by_delta: Intervals, slope: Array, off: Array, h: Array) -> Array:
+    """Bound how far the border is from a chord along which F is `off` at the nodes; infinite where F_delta may be 0."""
+    along = (by_x + Intervals(slope, slope) * by_delta).absolute().hi
+    steep = by_delta.absolute().lo
+    with np.errstate(divide="ignore", invalid="ignore"):
+        far = (off + 0.5 * h * along) / steep
+    return np.where(steep > 0.0, far, np.inf)

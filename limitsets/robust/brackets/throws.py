@@ -287,12 +287,13 @@ class _Parts:
         below, above = found.cell_below[some], found.cell_above[some]
         split = np.flatnonzero(below != above)
         much, bow = MORE * 0.25 * h * wide * share, MORE * h * h / 8.0 * t.x_x.absolute().hi
-        kinks = [Kinks(cell[some], much, bow, self._span(side, below, lo[some], hi[some]))]
+        even, once = MORE * h * h / 8.0 * wide * wide, MORE * 0.25 * h * wide
+        kinks = [Kinks(cell[some], much, even, once, bow, self._span(side, below, lo[some], hi[some]))]
         bends: list[Bends] = []
         if split.size:
             at = some[split]
             kinks.append(
-                Kinks(cell[at], much[split], bow[split], self._span(side, above[split], lo[at], hi[at]))
+                Kinks(cell[at], much[split], even[split], once[split], bow[split], self._span(side, above[split], lo[at], hi[at]))
             )
             # Along a border that moves with x: p g' (2 T_x + g' T_delta) G'.
             drift = (found.cut[at + 1] - found.cut[at]) / h[split]
