@@ -36,7 +36,7 @@ CELLS, THROWS = 4000, 400
 # Any absorbing set or exit.
 ANY = "any"
 # The mean from above: once no state is left with a larger probability, throws without end are bounded.
-LEFT = 1e-4
+LEFT, MOST_THROWS = 1e-4, 3000
 
 
 @dataclass(frozen=True, eq=False)
@@ -166,16 +166,16 @@ def within_brackets(
     return np.stack([low, high]), np.stack([-bound[1], bound[0]])
 
 
-def mean_brackets(chain: Chain, row: Any, throws: int) -> tuple[float, float]:
-    """Bound the mean number of throws until absorption, by at most so many steps."""
+def mean_brackets(chain: Chain, row: Any) -> tuple[float, float]:
+    """Bound the mean number of throws until absorption."""
     none = chain.fixed(dict.fromkeys(chain.absorbs, 0.0))
     above, below = chain.first(none), chain.first(none)
     change = math.inf
-    for _ in range(throws):
+    for _ in range(MOST_THROWS):
         after = chain.above(above, none, 1.0)
         change, above = float((after - above)[chain.free].max()), after
         below = chain.above(below, none, -1.0)
-        if change < LEFT:
+        if change < LEFT or not change < math.inf:
             break
     # K of c V is c times K of V, so V / (1 - c) >= 1 + K V / (1 - c).
     high = _mean_above(row, above) / (1.0 - change) * (1.0 + 1e-12) if change < 1.0 else math.inf
@@ -258,7 +258,7 @@ def absorption_brackets(
         told = lambda done, total, name=name: tell(name, done, total)  # noqa: E731  # one line, bound to its name
         within[name], values[name] = within_brackets(chain, value, row, throws, told)
     tell("mean", 0, 1)
-    mean = mean_brackets(chain, row, 4 * throws)
+    mean = mean_brackets(chain, row)
     tell("mean", 1, 1)
     return AbsorptionBrackets(
         read.name,

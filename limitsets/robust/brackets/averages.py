@@ -35,6 +35,8 @@ ROUNDING = 2.0**-40
 MORE = 1.0 + 2.0**-30
 # Nodes at a jump, at most so many together, lie closer than this share of a common cell.
 CLOSE_BY, CLUSTER = 1e-4, 4
+# Where a function is constant for ever its slope does not fall; any length will do.
+FAR_APART = 1e200
 
 
 class Span(NamedTuple):
@@ -103,22 +105,25 @@ class Windows:
     """Largest and smallest values on spans of an array: by windows of 2, 4, 8 ... that overlap."""
 
     def __init__(self, span: Span) -> None:
-        self.level = np.frexp(span.last - span.first + 1)[1] - 1
-        self.first, self.last = span.first, span.last - (1 << self.level) + 1
+        level = np.frexp(span.last - span.first + 1)[1] - 1
+        last = span.last - (1 << level) + 1
+        self.count, self.groups = level.size, []
+        for each in range(int(level.max(initial=0)) + 1):
+            here = np.flatnonzero(level == each)
+            self.groups.append((here, span.first[here], last[here]))
 
     def ends(self, values: Array) -> tuple[Array, Array]:
         """Return the smallest and the largest."""
-        lo, hi = np.empty(self.first.size), np.empty(self.first.size)
+        lo, hi = np.empty(self.count), np.empty(self.count)
         least = most = values
-        for level in range(int(self.level.max(initial=0)) + 1):
+        for level, (here, first, last) in enumerate(self.groups):
             if level:
                 half = 1 << (level - 1)
                 least = np.minimum(least[:-half], least[half:])
                 most = np.maximum(most[:-half], most[half:])
-            here = np.flatnonzero(self.level == level)
-            first, last = self.first[here], self.last[here]
-            lo[here] = np.minimum(least[first], least[last])
-            hi[here] = np.maximum(most[first], most[last])
+            if here.size:
+                lo[here] = np.minimum(least[first], least[last])
+                hi[here] = np.maximum(most[first], most[last])
         return lo, hi
 
 
@@ -226,7 +231,7 @@ class Average:
         fall = np.maximum(slopes - np.append(slopes[1:], 0.0), 0.0)  # at the node after each cell
         falls = np.cumsum(fall)
         after = np.append(width[1:], np.inf)
-        bent_by = fall / (0.5 * (np.where(np.isinf(width), 0.0, width) + np.where(np.isinf(after), 0.0, after)))
+        bent_by = fall / (0.5 * np.minimum(width + after, FAR_APART))
         known = np.zeros(n, dtype=bool)
         for way in self.ways:
             bent, more = np.zeros(n), np.zeros(n)

@@ -208,7 +208,9 @@ class _Parts:
         cell = rows.number[:-1]
         h = np.diff(rows.x)
         t_x, t_delta = all_of.x.absolute().hi, all_of.delta.absolute().hi
-        reach = t_x * h + 2.0 * (rows.error[:-1] + rows.error[1:])
+        reach = np.where(all_of.x.lo > 0.0, 0.0, t_x * h) + 2.0 * (rows.error[:-1] + rows.error[1:])
+        if not law.certain:  # beyond a line between borders
+            reach = reach + all_of.delta_delta.absolute().hi * np.diff(law.borders).max() ** 2 / 8.0
         lo = np.minimum(rows.place[:-1], rows.place[1:]).min(axis=1) - reach
         hi = np.maximum(rows.place[:-1], rows.place[1:]).max(axis=1) + reach
         known = np.isfinite(t_x) & np.isfinite(t_delta) & rows.good[:-1] & rows.good[1:] & np.isfinite(lo + hi)
