@@ -37,6 +37,8 @@ CELLS, THROWS = 4000, 400
 ANY = "any"
 # The mean from above: once no state is left with a larger probability, throws without end are bounded.
 LEFT, MOST_THROWS = 1e-4, 3000
+# A bound of the mean above this grows without end: the cells are too coarse, or nothing absorbs.
+HOPELESS = 1e6
 
 
 @dataclass(frozen=True, eq=False)
@@ -169,17 +171,22 @@ def within_brackets(
 def mean_brackets(chain: Chain, row: Any) -> tuple[float, float]:
     """Bound the mean number of throws until absorption."""
     none = chain.fixed(dict.fromkeys(chain.absorbs, 0.0))
-    above, below = chain.first(none), chain.first(none)
-    change = math.inf
+    above = below = chain.first(none)
+    low, high = 0.0, math.inf
+    for _ in range(MOST_THROWS):
+        below, before = chain.above(below, none, -1.0), below
+        low = max(low, -_mean_above(row, below))
+        if not float((before - below).max()) > LEFT:
+            break
     for _ in range(MOST_THROWS):
         after = chain.above(above, none, 1.0)
         change, above = float((after - above)[chain.free].max()), after
-        below = chain.above(below, none, -1.0)
-        if change < LEFT or not change < math.inf:
+        if change < LEFT:
+            # K of c V is c times K of V, so V / (1 - c) >= 1 + K V / (1 - c).
+            return low, _mean_above(row, above) / (1.0 - change) * (1.0 + 1e-12)
+        if not float(above.max()) < HOPELESS:
             break
-    # K of c V is c times K of V, so V / (1 - c) >= 1 + K V / (1 - c).
-    high = _mean_above(row, above) / (1.0 - change) * (1.0 + 1e-12) if change < 1.0 else math.inf
-    return max(-_mean_above(row, below), 0.0), high
+    return low, high
 
 
 def absorption_brackets(

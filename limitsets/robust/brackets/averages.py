@@ -79,14 +79,12 @@ class Gaps(NamedTuple):
 class Kinks(NamedTuple):
     """To `cell`'s deficit comes `much` times the sum of what the slope of V falls by at the nodes within a span.
 
-    Or `even` times the most that it falls by per length, and `once` times the largest single fall, where that is less;
-    and `bow` times the largest slope there.
+    Or `even` times the most that it falls by per length, where that is less; and `bow` times the largest slope there.
     """
 
     cell: Index
     much: Array
     even: Array
-    once: Array
     bow: Array
     span: Span
 
@@ -246,8 +244,7 @@ class Average:
             for kink in way.kinks:
                 low, high = self._window(kink, kink.span).ends(slopes)
                 down = kink.much * (falls[kink.span.last - 1] - falls[kink.span.first - 1])
-                inner = self._inner(kink)
-                even = kink.even * inner.ends(bent_by)[1] + kink.once * inner.ends(fall)[1]
+                even = kink.even * self._inner(kink).ends(bent_by)[1]
                 more += np.bincount(kink.cell, np.minimum(down, even) + kink.bow * np.maximum(high, -low), n)
             for gap in way.gaps:
                 more += np.bincount(gap.row, self._difference(gap, values), n)

@@ -162,7 +162,12 @@ def chain_of(
     special = _special(sides, box, absorbing, speed)
     ends = [(side.spans["a"][0] - close, arm + close) for side in sides]
     flat = [[x for row in rows for x in row] for rows in special]
-    nodes = nodes_of(ends, arm / cells, flat, FAR * arm)
+    # No cells are spent on places that absorb.
+    gone = [[(x, min(y, above)) for places in absorbing.values() for k, x, y in places if k == side.number]
+            for side, (_, above) in zip(sides, ends, strict=True)]
+    length = sum(y - x for x, y in ends) - sum(y - x for row in gone for x, y in row)
+    width = length / (cells * len(sides))
+    nodes = nodes_of(ends, width, flat, FAR * arm, gone)
     target, average = nodes, None
     if not landing.certain:
         reach = float(landing.borders[-1])
@@ -171,7 +176,7 @@ def chain_of(
             for rows in special
         ]
         outer = [(low - reach - 4 * close, high + reach + 4 * close) for low, high in ends]
-        target = nodes_of(outer, arm / (FINER * cells), shifted, 2.0 * FAR * arm)
+        target = nodes_of(outer, width / FINER, shifted, 2.0 * FAR * arm)
         average = landing_average(nodes, target, landing)
     absorbs, free = _absorbing(nodes, box, absorbing)
     numbers = np.flatnonzero(free)

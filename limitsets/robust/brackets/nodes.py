@@ -65,7 +65,11 @@ class Nodes:
 
 
 def nodes_of(
-    ends: Sequence[tuple[float, float]], width: float, special: Sequence[Sequence[float]], far: float
+    ends: Sequence[tuple[float, float]],
+    width: float,
+    special: Sequence[Sequence[float]],
+    far: float,
+    without: Sequence[Sequence[tuple[float, float]]] | None = None,
 ) -> Nodes:
     """Place nodes at equal distances of at most `width`, and at special places besides.
 
@@ -79,13 +83,17 @@ def nodes_of(
         Per side further nodes.
     far : float
         The outermost nodes lie at - and + this.
+    without : sequence of sequence of (float, float), optional
+        Per side where no nodes are wanted but the special ones.
     """
     rows = []
-    for (lo, hi), more in zip(ends, special, strict=True):
+    for (lo, hi), more, gone in zip(ends, special, without or [()] * len(ends), strict=True):
         even = np.linspace(lo, hi, int(np.ceil((hi - lo) / width)) + 1)
         more = np.array([x for x in more if lo <= x <= hi])
         # No even node so near to a special one that cells of no use arise.
         near = np.searchsorted(np.sort(more), even[:, None] + np.array([-0.02, 0.02]) * width)
         keep = (near[:, 0] == near[:, 1]) | (even == lo) | (even == hi)
+        for begin, end in gone:
+            keep &= (even <= begin) | (even >= end)
         rows.append(np.unique(np.concatenate([[-far, far], even[keep], more])))
     return Nodes(np.concatenate(rows), np.cumsum([0, *(row.size for row in rows)]))

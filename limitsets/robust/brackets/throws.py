@@ -278,6 +278,10 @@ class _Parts:
         gaps = self._gaps(cell, np.ones(some.size), rows.side, below, lo[some], hi[some], below != above)
         self.ways.append(Curvature(cell, gaps=(gaps,)))
 
+    def _widest(self, span: Span) -> Array:
+        """Width of the widest cell of the target on spans."""
+        return Windows(span).ends(np.minimum(self.target.width, NEVER))[1]
+
     def _by_kinks(self, rows, found, all_of, some, lo, hi, density) -> None:  # type: ignore[no-untyped-def]
         """By what the slope of V falls at nodes, each met by a share of the deviations only."""
         law, side, cell = self.law, rows.side, rows.number[:-1]
@@ -289,13 +293,22 @@ class _Parts:
         below, above = found.cell_below[some], found.cell_above[some]
         split = np.flatnonzero(below != above)
         much, bow = MORE * 0.25 * h * wide * share, MORE * h * h / 8.0 * t.x_x.absolute().hi
-        even, once = MORE * h * h / 8.0 * wide * wide, MORE * 0.25 * h * wide
-        kinks = [Kinks(cell[some], much, even, once, bow, self._span(side, below, lo[some], hi[some]))]
+        # A function that is affine between nodes at most d apart, and whose slope falls by at most L per length, lies
+        # above no chord over a length l by more than L (l^2 + d^2) / 8: less a parabola's interpolant it is convex.
+        # With borders that move the slope of the mean falls by L (l + d), and the factor is l^2 / 8 + l d / 4.
+        span = self._span(side, below, lo[some], hi[some])
+        far = self._widest(span)
+        length = wide * h
+        even = np.where(t.x.lo > 0.0, (length**2 + far**2) / 8.0, np.inf)
+        even[split] = (length**2 / 8.0 + length * far / 4.0)[split]
+        kinks = [Kinks(cell[some], much, MORE * np.minimum(even, NEVER), bow, span)]
         bends: list[Bends] = []
         if split.size:
             at = some[split]
+            other = self._span(side, above[split], lo[at], hi[at])
+            even_too = MORE * (length[split] ** 2 / 8.0 + length[split] * self._widest(other) / 4.0)
             kinks.append(
-                Kinks(cell[at], much[split], even[split], once[split], bow[split], self._span(side, above[split], lo[at], hi[at]))
+                Kinks(cell[at], much[split], even_too, bow[split], other)
             )
             # Along a border that moves with x: p g' (2 T_x + g' T_delta) G'.
             drift = (found.cut[at + 1] - found.cut[at]) / h[split]
