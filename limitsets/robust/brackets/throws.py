@@ -160,7 +160,10 @@ class _Parts:
             number, place = self._landing(side, found.below, rows.place[:, 0])
             self.segments.append((rows.number, np.ones(n), number, place, place))
             span = self._span(side, found.below, rows.place[:, 0] - rows.error, rows.place[:, 0] + rows.error)
-            self.at_nodes.append(Swings(rows.number, np.ones(n), span))
+            # Of the variation on a cell no more is met than the share of it that the error makes.
+            narrowest = Windows(span).ends(self.target.width)[0]
+            much = np.minimum(2.0 * MORE * rows.error / narrowest, 1.0)
+            self.at_nodes.append(Swings(rows.number, much, span))
             return
         at_cut = landed(side, rows.x, found.cut).place
         step = np.diff(law.borders)
