@@ -107,7 +107,8 @@ class AbsorptionBrackets:
             within={name: {"lo": lo, "hi": hi} for name, (lo, hi) in self.within.items()},
             mean={"lo": self.mean[0], "hi": self.mean[1] if math.isfinite(self.mean[1]) else None},
             quantiles={
-                str(share): dict(zip(("lo", "hi"), self.quantile(share), strict=True)) for share in (0.5, 0.95, 0.99)
+                str(share): dict(zip(("lo", "hi"), self.quantile(share), strict=True))
+                for share in (0.5, 0.95, 0.99)
             },
         )
 
@@ -117,7 +118,9 @@ def _start_row(nodes: Nodes, starts: Sequence[Place]) -> Any:
     side, lo, hi = (np.array(column) for column in zip(*starts, strict=True))
     length = (hi - lo).astype(np.float64)
     row = np.zeros(side.size, dtype=np.int64)
-    return mean_matrix(1, nodes, row, length / length.sum(), side.astype(np.int64), lo.astype(float), hi.astype(float))
+    return mean_matrix(
+        1, nodes, row, length / length.sum(), side.astype(np.int64), lo.astype(float), hi.astype(float)
+    )
 
 
 def _mean_above(row: Any, values: Array) -> float:
@@ -265,7 +268,7 @@ def absorption_brackets(
     within, values = {}, {}
     for name in (ANY, *chain.absorbs):
         value = {each: float(name in (ANY, each)) for each in chain.absorbs}
-        told = lambda done, total, name=name: tell(name, done, total)  # noqa: E731  # one line, bound to its name
+        told = lambda done, total, name=name: tell(name, done, total)  # noqa: E731
         within[name], values[name] = within_brackets(chain, value, row, throws, told)
     tell("mean", 0, 1)
     means = mean_brackets(chain, row) if mean else (0.0, math.inf)
@@ -297,7 +300,9 @@ def _places(
         found["right"] = [(int(right[1]), float(right[0]), math.inf)]
     if wrong is not None:
         if right is None:
-            raise AnswerError("the places that are wrong", wrong, "x, with `right`", "say which side is right")
+            raise AnswerError(
+                "the places that are wrong", wrong, "x, with `right`", "say which side is right"
+            )
         found["wrong"] = [(k, float(wrong), math.inf) for k in range(len(scene.sides)) if k != int(right[1])]
     for name, places in (absorbing or {}).items():
         if name in (*found, ANY, EXITS):
@@ -311,7 +316,9 @@ def _places(
 def _require(scene: Scene, thing: str, places: Sequence[Place]) -> None:
     for place in places:
         side, lo, hi = place
-        if not (side in range(len(scene.sides)) and float(scene.sides.a[side]) < lo < min(hi, scene.arm_length)):
+        if not (
+            side in range(len(scene.sides)) and float(scene.sides.a[side]) < lo < min(hi, scene.arm_length)
+        ):
             allowed = "(side, from x, to x) with the first x on the arm and below the second"
             raise AnswerError(thing, place, allowed, "correct it")
     if not places:

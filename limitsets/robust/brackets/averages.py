@@ -255,7 +255,7 @@ class Average:
 
     def _difference(self, gap: Gaps, values: Array) -> Array:
         low, high = self._both(gap, values)
-        return gap.much * (high - low)  # type: ignore[no-any-return]
+        return gap.much * (high - low)
 
     def _inner(self, kink: Kinks) -> Windows:
         """Windows of the nodes within a span, named by the cells before them."""
@@ -273,7 +273,7 @@ class Average:
 
 
 def _variation(total: Array, each: Swings) -> Array:
-    return each.much * (total[each.span.last + 1] - total[each.span.first])  # type: ignore[no-any-return]
+    return each.much * (total[each.span.last + 1] - total[each.span.first])
 
 
 def _products(a: Array, b: Array, c: Array, d: Array) -> tuple[Array, Array]:

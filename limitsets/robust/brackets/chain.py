@@ -152,19 +152,25 @@ def chain_of(
     lo, hi = box.bare
     sides = [one_side(lo, hi, k) for k in range(lo.a.size)]
     if not speed.borders[0] > -1.0:
-        raise AnswerError("the least deviation of the speed", float(speed.borders[0]), "above -1", "lower the noise")
+        raise AnswerError(
+            "the least deviation of the speed", float(speed.borders[0]), "above -1", "lower the noise"
+        )
     least = lo.kappa / (1.0 + float(speed.borders[-1])) ** 2
     far = max(math.hypot(side.spans["a"][1], side.spans["d"][1]) for side in sides)
     if not least > far * (1.0 + 1e-9):
         allowed = f"above {far:.6g}, the distance of the centre of mass from a vertex"
-        raise AnswerError("the least kappa", least, allowed, "throw more slowly: the impact is not unique below")
+        raise AnswerError(
+            "the least kappa", least, allowed, "throw more slowly: the impact is not unique below"
+        )
     arm, close = hi.arm_length, CLOSE * hi.arm_length
     special = _special(sides, box, absorbing, speed)
     ends = [(side.spans["a"][0] - close, arm + close) for side in sides]
     flat = [[x for row in rows for x in row] for rows in special]
     # No cells are spent on places that absorb.
-    gone = [[(x, min(y, above)) for places in absorbing.values() for k, x, y in places if k == side.number]
-            for side, (_, above) in zip(sides, ends, strict=True)]
+    gone = [
+        [(x, min(y, above)) for places in absorbing.values() for k, x, y in places if k == side.number]
+        for side, (_, above) in zip(sides, ends, strict=True)
+    ]
     length = sum(y - x for x, y in ends) - sum(y - x for row in gone for x, y in row)
     width = length / (cells * len(sides))
     nodes = nodes_of(ends, width, flat, FAR * arm, gone)

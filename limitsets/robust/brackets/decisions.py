@@ -130,7 +130,14 @@ def decided(side: OneSide, x: Array, phi_lo: Array, phi_hi: Array, bounds: tuple
         _by_corners(side, x, open_, by_x, rising, falling, bounds, (yes, no, beta, cell_below, cell_above))
         if last > first:
             _by_border(
-                side, x, open_, by_x, by_delta, bounds, (cut, below, above), (yes, no, beta, cell_below, cell_above)
+                side,
+                x,
+                open_,
+                by_x,
+                by_delta,
+                bounds,
+                (cut, below, above),
+                (yes, no, beta, cell_below, cell_above),
             )
         else:
             cell_below[open_] |= flips[open_] & ~no[open_]

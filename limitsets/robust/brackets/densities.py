@@ -96,8 +96,8 @@ def staircase(law: Any, strata: int, name: str) -> Staircase:
         return Staircase(np.zeros(1), np.ones(1))
     a_side = max(strata // (2 * SIGMAS), 1)
     masses, change = _normal(a_side)
-    step = law.sigma / a_side
-    borders = step * np.arange(-SIGMAS * a_side, SIGMAS * a_side + 1)
+    steps = np.arange(-SIGMAS * a_side, SIGMAS * a_side + 1).astype(np.float64)
+    borders = law.sigma / a_side * steps
     beyond = float(np.nextafter(float(1 - 2 * sum(mass.lo for mass in masses)), 1.0))
     half = np.array([float(mass) for mass in masses])
     # osc w / 4 with osc in units of 1 / sigma and w of sigma; a jump inside leaves at most half of osc w / 2.
@@ -113,7 +113,9 @@ def _normal(a_side: int) -> tuple[list[RationalInterval], float]:
     totals = [
         RationalInterval.of(_half_series(Fraction(j, a_side))) * scale for j in range(SIGMAS * a_side + 1)
     ]
-    masses = [RationalInterval(b.lo - a.hi, b.hi - a.lo) for a, b in zip(totals[:-1], totals[1:], strict=True)]
+    masses = [
+        RationalInterval(b.lo - a.hi, b.hi - a.lo) for a, b in zip(totals[:-1], totals[1:], strict=True)
+    ]
     # The slope of the density is largest at 1, exp(-1/2)/sqrt(2 pi) = 0.24197...
     return masses, 0.24198 / a_side
 

@@ -98,14 +98,14 @@ def one_side(lo: Any, hi: Any, number: int) -> OneSide:
     spans["shift"] = (low - ROUNDED * abs(low), high + ROUNDED * abs(high))
     middle = {name: 0.5 * (ends[0] + ends[1]) for name, ends in spans.items()}
     slack = max(ends[1] - ends[0] for ends in spans.values())
-    numbers = (float(middle[name]) for name in ("a", "d", "h", "kappa", "shift"))
-    return OneSide(number, after, *numbers, spans, float(slack), lo.flight, lo.flip)
+    a, d, h, kappa, shift = (float(middle[name]) for name in ("a", "d", "h", "kappa", "shift"))
+    return OneSide(number, after, a, d, h, kappa, shift, spans, float(slack), lo.flight, lo.flip)
 
 
 def kappa_of(side: OneSide, delta: Array) -> Array:
     """Return kappa of throws whose speed deviates."""
     factor = 1.0 + delta
-    return side.kappa / (factor * factor)  # type: ignore[no-any-return]  # an array
+    return side.kappa / (factor * factor)
 
 
 def _start(side: OneSide, kappa: Array, phi: Array) -> tuple[Array, Array]:
@@ -122,7 +122,7 @@ def _jog(side: OneSide, phi: Array) -> Array:
     if not isinstance(side.flight, Exact):
         return -side.h * phi
     m = moments(phi, 0)
-    return phi * (side.a * m.s[0] - side.d * (1.0 - m.c[0]) - side.h)  # type: ignore[no-any-return]
+    return phi * (side.a * m.s[0] - side.d * (1.0 - m.c[0]) - side.h)
 
 
 def landed(side: OneSide, x: Array, delta: Array) -> Landed:
@@ -141,7 +141,9 @@ def landed(side: OneSide, x: Array, delta: Array) -> Landed:
     phi_error = (np.abs(at - x) + known) / steep
     rate = side.a + 2.0 * side.d + abs(side.h)
     place = x + _jog(side, phi)
-    error = rate * phi_error + 2.0 * phi * (size * ERROR + 2.0 * side.slack) + ROUNDED * (np.abs(x) + phi * rate)
+    error = (
+        rate * phi_error + 2.0 * phi * (size * ERROR + 2.0 * side.slack) + ROUNDED * (np.abs(x) + phi * rate)
+    )
     # The shift of a flip is known to its slack.
     error = error + 3.0 * side.slack + ROUNDED * side.shift
     good = (steep > 0.0) & (phi_error < 0.01) & (phi > phi_error) & (phi + phi_error <= 2.0 * math.pi)

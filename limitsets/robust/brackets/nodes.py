@@ -89,11 +89,11 @@ def nodes_of(
     rows = []
     for (lo, hi), more, gone in zip(ends, special, without or [()] * len(ends), strict=True):
         even = np.linspace(lo, hi, int(np.ceil((hi - lo) / width)) + 1)
-        more = np.array([x for x in more if lo <= x <= hi])
+        places = np.array([x for x in more if lo <= x <= hi])
         # No even node so near to a special one that cells of no use arise.
-        near = np.searchsorted(np.sort(more), even[:, None] + np.array([-0.02, 0.02]) * width)
+        near = np.searchsorted(np.sort(places), even[:, None] + np.array([-0.02, 0.02]) * width)
         keep = (near[:, 0] == near[:, 1]) | (even == lo) | (even == hi)
         for begin, end in gone:
             keep &= (even <= begin) | (even >= end)
-        rows.append(np.unique(np.concatenate([[-far, far], even[keep], more])))
+        rows.append(np.unique(np.concatenate([[-far, far], even[keep], places])))
     return Nodes(np.concatenate(rows), np.cumsum([0, *(row.size for row in rows)]))

@@ -12,13 +12,23 @@ M' = int p G'(T) T_x + (p g') G at the border, whose oscillation is bounded.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from limitsets.proofs.intervals import Intervals
-from limitsets.robust.brackets.averages import Average, Bends, Curvature, Gaps, Kinks, Span, Swings, Windows, mean_matrix
+from limitsets.robust.brackets.averages import (
+    Average,
+    Bends,
+    Curvature,
+    Gaps,
+    Kinks,
+    Span,
+    Swings,
+    Windows,
+    mean_matrix,
+)
 from limitsets.robust.brackets.decisions import Decided, decided
 from limitsets.robust.brackets.densities import Staircase
 from limitsets.robust.brackets.landings import Derivatives, OneSide, landed, slopes
@@ -94,7 +104,7 @@ class _Parts:
 
     def __init__(self, source: Nodes, target: Nodes, law: Staircase) -> None:
         self.source, self.target, self.law = source, target, law
-        self.segments: list[tuple[Array, ...]] = []
+        self.segments: list[tuple[Any, ...]] = []
         self.at_nodes: list[Swings] = []
         self.swings: list[Swings] = []
         self.gaps: list[Gaps] = []
@@ -123,9 +133,15 @@ class _Parts:
         begin = int(joint.sum())
         x = np.maximum(x, x[begin])  # at the joint: as from the first place beyond it
         every = landed(side, np.repeat(x, law.borders.size), np.tile(law.borders, n))
-        table = [column.reshape(n, -1) for column in every]
+        table: list[Any] = [column.reshape(n, -1) for column in every]
         rows = _Rows(
-            side, numbers, x, table[2], table[0], np.maximum(table[1], table[3]).max(axis=1), table[4].all(axis=1)
+            side,
+            numbers,
+            x,
+            table[2],
+            table[0],
+            np.maximum(table[1], table[3]).max(axis=1),
+            table[4].all(axis=1),
         )
         slack = np.maximum(rows.error[:-1], rows.error[1:])
         phi_lo = np.minimum(rows.phi[:-1, 0], rows.phi[1:, 0]) - slack
@@ -193,7 +209,9 @@ class _Parts:
                 share = np.where(some, off / np.abs(two - one), 0.0)
             far = (share > 0.5) & some
             # A place lies within `off` of at most three segments that are longer than that.
-            much = 3.0 * np.where(far, 0.0, weight * share).max(axis=1) + np.where(far, weight, 0.0).sum(axis=1)
+            much = 3.0 * np.where(far, 0.0, weight * share).max(axis=1) + np.where(far, weight, 0.0).sum(
+                axis=1
+            )
             widest = np.where(some, off, 0.0).max(axis=1)
             ends = np.where(some, one, np.inf), np.where(some, two, np.inf)
             least = np.minimum(*(end.min(axis=1) for end in ends))
@@ -216,7 +234,9 @@ class _Parts:
             reach = reach + all_of.delta_delta.absolute().hi * np.diff(law.borders).max() ** 2 / 8.0
         lo = np.minimum(rows.place[:-1], rows.place[1:]).min(axis=1) - reach
         hi = np.maximum(rows.place[:-1], rows.place[1:]).max(axis=1) + reach
-        known = np.isfinite(t_x) & np.isfinite(t_delta) & rows.good[:-1] & rows.good[1:] & np.isfinite(lo + hi)
+        known = (
+            np.isfinite(t_x) & np.isfinite(t_delta) & rows.good[:-1] & rows.good[1:] & np.isfinite(lo + hi)
+        )
         # At the joint: whatever lies between it and where the first place beyond it lands.
         lo[:begin] = np.minimum(lo[:begin], side.spans["a"][0])
         density = 1.0 if law.certain else float(law.density.max())
@@ -267,7 +287,13 @@ class _Parts:
         some = np.flatnonzero((much > 0.0) & known)
         if some.size:
             self._gap(
-                cell[some], MORE * much[some], rows.side, found.cell_below[some], lo[some], hi[some], np.ones(some.size, bool)
+                cell[some],
+                MORE * much[some],
+                rows.side,
+                found.cell_below[some],
+                lo[some],
+                hi[some],
+                np.ones(some.size, bool),
             )
         lost = cell[~known]
         if lost.size:
@@ -310,9 +336,7 @@ class _Parts:
             at = some[split]
             other = self._span(side, above[split], lo[at], hi[at])
             even_too = MORE * (length[split] ** 2 / 8.0 + length[split] * self._widest(other) / 4.0)
-            kinks.append(
-                Kinks(cell[at], much[split], even_too, bow[split], other)
-            )
+            kinks.append(Kinks(cell[at], much[split], even_too, bow[split], other))
             # Along a border that moves with x: p g' (2 T_x + g' T_delta) G'.
             drift = (found.cut[at + 1] - found.cut[at]) / h[split]
             moving = Intervals(drift, drift)
@@ -365,7 +389,9 @@ class _Parts:
             if at.size:
                 much = MORE * 0.25 * abs(jumps[b]) * (most - least)[at]
                 both = np.ones(at.size, dtype=bool)
-                gaps.append(self._gaps(cell[some[at]], much, side, below[at], lo[some[at]], hi[some[at]], both))
+                gaps.append(
+                    self._gaps(cell[some[at]], much, side, below[at], lo[some[at]], hi[some[at]], both)
+                )
         here = np.flatnonzero(split)
         if here.size:
             bends += self._moving(rows, found, some, here, below, above)
@@ -381,7 +407,9 @@ class _Parts:
         first, last = landed(side, x_one, least).phi, landed(side, x_two, most).phi
         ends = landed(side, x_one, one_cut).place, landed(side, x_two, two_cut).place
         drift = (two_cut - one_cut) / h
-        stratum = [np.clip(np.searchsorted(law.borders, cut) - 1, 0, law.weight.size - 1) for cut in (least, most)]
+        stratum = [
+            np.clip(np.searchsorted(law.borders, cut) - 1, 0, law.weight.size - 1) for cut in (least, most)
+        ]
         if law.ripple:
             window = Windows(Span(stratum[0], stratum[1]))
             low, high = window.ends(law.density)
