@@ -29,7 +29,8 @@ def test_moments_of_sine_and_cosine_are_within_their_error():
     for k in range(3):
         for p, c, s in zip(phi, found.c[k], found.s[k], strict=True):
             exact = [
-                mpmath.quad(lambda t, f=f: t**k * f(p * t), [0, 0.5, 1]) for f in (mpmath.cos, mpmath.sin)
+                mpmath.quad(lambda t, f=f, k=k, p=p: t**k * f(p * t), [0, 0.5, 1])
+                for f in (mpmath.cos, mpmath.sin)
             ]
             assert abs(c - exact[0]) < ERROR
             assert abs(s - exact[1]) < ERROR
@@ -246,7 +247,8 @@ def test_the_mean_and_the_quantiles_hold_for_a_ladder_of_throws():
     assert found.mean[0] <= mean + 1e-9
     assert found.mean[1] >= mean - 1e-9
     first, last = found.quantile(0.5, "right")
-    assert first is not None and last is not None
+    assert first is not None
+    assert last is not None
     assert first <= last
 
 

@@ -212,10 +212,6 @@ class Average:
         if self.beyond:
             mean += self.beyond * most
         deficit = self._deficit(values, slopes, total, width, n)
-        # Nodes close together are lifted alike: a difference would be a slope without end.
-        close = np.flatnonzero(self.source.width < CLOSE_BY * np.median(self.source.width))
-        for _ in range(CLUSTER):
-            deficit[close] = np.maximum(deficit[close], np.maximum(deficit[close - 1], deficit[close + 1]))
         worst = np.maximum(deficit, np.concatenate([[0.0], deficit[:-1]]))
         return mean + MORE * worst + size  # type: ignore[no-any-return]
 
@@ -251,7 +247,12 @@ class Average:
             deficit = more + np.maximum(-bent, 0.0)
             known[way.cells] = True
             best[way.cells] = np.minimum(best[way.cells], deficit[way.cells])
-        return found + np.where(known, best, 0.0)
+        best[~known] = 0.0
+        # Nodes close together are lifted alike: a difference would be a slope without end.
+        close = np.flatnonzero(self.source.width < CLOSE_BY * np.median(self.source.width))
+        for _ in range(CLUSTER):
+            best[close] = np.maximum(best[close], np.maximum(best[close - 1], best[close + 1]))
+        return found + best
 
     def _difference(self, gap: Gaps, values: Array) -> Array:
         low, high = self._both(gap, values)

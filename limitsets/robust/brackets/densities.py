@@ -13,6 +13,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cache
+from itertools import pairwise
 from math import factorial
 from typing import Any
 
@@ -113,9 +114,7 @@ def _normal(a_side: int) -> tuple[list[RationalInterval], float]:
     totals = [
         RationalInterval.of(_half_series(Fraction(j, a_side))) * scale for j in range(SIGMAS * a_side + 1)
     ]
-    masses = [
-        RationalInterval(b.lo - a.hi, b.hi - a.lo) for a, b in zip(totals[:-1], totals[1:], strict=True)
-    ]
+    masses = [RationalInterval(b.lo - a.hi, b.hi - a.lo) for a, b in pairwise(totals)]
     # The slope of the density is largest at 1, exp(-1/2)/sqrt(2 pi) = 0.24197...
     return masses, 0.24198 / a_side
 

@@ -398,7 +398,7 @@ class _Parts:
         self.ways.append(Curvature(cell[some], tuple(bends), tuple(swings), gaps=tuple(gaps)))
 
     def _moving(self, rows, found, some, here, below, above) -> list[Bends]:  # type: ignore[no-untyped-def]
-        """What the border between the branches bends."""
+        """Return what the border between the branches bends."""
         law, side = self.law, rows.side
         h = np.diff(rows.x)[some]
         one_cut, two_cut = found.cut[some], found.cut[some + 1]
