@@ -148,7 +148,7 @@ def test_a_linear_map_with_normal_noise_has_its_closed_form():
         Scattering(landing=Gaussian(sigma)),
         right=(x_right, 2),
         starts=[(2, lo, hi)],
-        cells=1500,
+        cells=600,
         throws=6,
         mean=False,
     )
@@ -159,7 +159,7 @@ def test_a_linear_map_with_normal_noise_has_its_closed_form():
         ends = stats.norm.sf((x_right - (a + q**n * (starts - a))) / sd)
         exact = float(np.trapezoid(ends, starts))
         assert low[n] - 1e-7 <= exact <= high[n] + 1e-7
-    assert (high - low).max() < 0.02
+    assert (high - low).max() < 0.05
 
 
 def test_a_throw_without_noise_is_certain():
@@ -181,13 +181,18 @@ def test_a_throw_without_noise_is_certain():
 @pytest.mark.parametrize(
     ("name", "scatter", "cells"),
     [
-        ("paper-designed", BOTH, 500),
-        ("paper-designed", Scattering(speed=Gaussian(0.005), landing=Gaussian(0.02)), 300),
-        ("paper-initial", Scattering(landing=Uniform(0.1)), 500),
+        pytest.param("paper-designed", BOTH, 500, marks=pytest.mark.sweep),
+        pytest.param(
+            "paper-designed",
+            Scattering(speed=Gaussian(0.005), landing=Gaussian(0.02)),
+            300,
+            marks=pytest.mark.sweep,
+        ),
+        ("paper-initial", Scattering(landing=Uniform(0.1)), 300),
     ],
 )
 def test_brackets_meet_the_shares_of_many_throws(name, scatter, cells):
-    scene, parts, throws = ls.load(name), 50_000, 8
+    scene, parts, throws = ls.load(name), 20_000, 8
     goal = (20.5, 2)
     found = absorption_brackets(scene, scatter, right=goal, cells=cells, throws=throws, mean=False)
     thrown_ = throw_many(scene, scatter, goal, starts_from(scene), throws=parts, parts=parts, seed=11)

@@ -1,7 +1,8 @@
 """Brackets of the probabilities of absorption, of quantiles and means, for a scene whose throws scatter.
 
 Within n throws both bounds come from n steps from V_0 = 1 on the target.  The mean from below is that of min(T, n);
-from above it is a finite V >= 1 + K V off the absorbing states: with V_(n+1) <= V_n + c for c < 1, V_n / (1 - c) is one.
+from above it is a finite V >= 1 + K V off the absorbing states: with V_(n+1) <= V_n + c for c < 1,
+V_n / (1 - c) is one.
 """
 
 from __future__ import annotations

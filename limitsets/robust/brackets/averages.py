@@ -256,7 +256,8 @@ class Average:
 
     def _difference(self, gap: Gaps, values: Array) -> Array:
         low, high = self._both(gap, values)
-        return gap.much * (high - low)
+        much: Array = gap.much * (high - low)
+        return much
 
     def _inner(self, kink: Kinks) -> Windows:
         """Windows of the nodes within a span, named by the cells before them."""
@@ -274,7 +275,8 @@ class Average:
 
 
 def _variation(total: Array, each: Swings) -> Array:
-    return each.much * (total[each.span.last + 1] - total[each.span.first])
+    much: Array = each.much * (total[each.span.last + 1] - total[each.span.first])
+    return much
 
 
 def _products(a: Array, b: Array, c: Array, d: Array) -> tuple[Array, Array]:

@@ -1,9 +1,10 @@
 """Where throws from places land, and how that changes with place and speed, with proved bounds.
 
 The impact angle p of a start x solves x = P(p), P(p) = kappa p / 2 + S(p); the part comes to rest at x + D(p), less
-the shift of a flip (`proofs/by_angle.py`).  With kappa above the vertex's distance from the centre of mass P grows and has
-one solution.  The speed w (1 + delta) has kappa = kappa_0 / (1 + delta)^2.  At points a solution is proposed by Newton's
-method, and the change of sign of P - x around it proves it; derivatives are enclosed over boxes of angles and speeds.
+the shift of a flip (`proofs/by_angle.py`).  With kappa above the vertex's distance from the centre of mass P grows and
+has one solution.  The speed w (1 + delta) has kappa = kappa_0 / (1 + delta)^2.  At points a solution is proposed by
+Newton's method, and the change of sign of P - x around it proves it; derivatives are enclosed over boxes of angles and
+speeds.
 """
 
 from __future__ import annotations
