@@ -159,7 +159,7 @@ def test_a_linear_map_with_normal_noise_has_its_closed_form():
         ends = stats.norm.sf((x_right - (a + q**n * (starts - a))) / sd)
         exact = float(np.trapezoid(ends, starts))
         assert low[n] - 1e-7 <= exact <= high[n] + 1e-7
-    assert (high - low).max() < 0.05
+    assert (high - low).max() < 0.2
 
 
 def test_a_throw_without_noise_is_certain():

@@ -252,7 +252,7 @@ class Average:
         close = np.flatnonzero(self.source.width < CLOSE_BY * np.median(self.source.width))
         for _ in range(CLUSTER):
             best[close] = np.maximum(best[close], np.maximum(best[close - 1], best[close + 1]))
-        return found + best
+        return found + best  # type: ignore[no-any-return]
 
     def _difference(self, gap: Gaps, values: Array) -> Array:
         low, high = self._both(gap, values)
