@@ -26,6 +26,7 @@ if TYPE_CHECKING:  # each from the file that holds it: most rooms have a file of
     from limitsets.graph.transitions import transitions
     from limitsets.inverse import design, robust_design
     from limitsets.maps import critical_points, orbit, register
+    from limitsets.policies import feedback
     from limitsets.proofs.certify import certify
     from limitsets.proofs.confirm import recheck
     from limitsets.robust.margins.finding import margin
@@ -56,6 +57,7 @@ _ROOMS = {
     "design": "inverse",
     "dump": "scene",
     "engine": "engine",
+    "feedback": "policies",
     "grid": "cells",
     "interval": "interval",
     "limit_set": "sets.limit_set",
@@ -88,6 +90,7 @@ __all__ = [
     "design",
     "dump",
     "engine",
+    "feedback",
     "grid",
     "interval",
     "limit_set",
