@@ -124,17 +124,22 @@ class _Parts(Deficits):
         places = x.copy()
         places[:begin] = self.source.place[numbers[:begin]]
         found = decided(side, places, phi_lo, phi_hi, (float(law.borders[0]), float(law.borders[-1])))
+        at_cut = landed(side, x, np.full(n, law.borders[0]) if law.certain else found.cut)
+        rows = rows._replace(
+            error=np.maximum(rows.error, np.maximum(at_cut.phi_error, at_cut.error)),
+            good=rows.good & at_cut.good,
+        )
         all_of = slopes(
             side,
             Intervals(phi_lo, phi_hi),
             Intervals(np.full(n - 1, law.borders[0]), np.full(n - 1, law.borders[-1])),
         )
-        self._nodes(rows, found, all_of)
+        self._nodes(rows, found, all_of, at_cut.place)
         self._cells(rows, found, all_of, begin)
 
     # ------------------------------------------------------------ nodes
 
-    def _nodes(self, rows: Rows, found: Decided, all_of: Derivatives) -> None:
+    def _nodes(self, rows: Rows, found: Decided, all_of: Derivatives, at_cut: Array) -> None:
         """Segments between the places of borders, and how far the places between them may be off a line."""
         law, side, n = self.law, rows.side, rows.x.size
         if law.certain:
@@ -148,7 +153,6 @@ class _Parts(Deficits):
             much = np.minimum(2.0 * MORE * rows.error / narrowest, 1.0)
             self.at_nodes.append(Swings(rows.number, much, span))
             return
-        at_cut = landed(side, rows.x, found.cut).place
         step = np.diff(law.borders)
         bend = all_of.delta_delta.absolute().hi
         bend = np.nan_to_num(np.maximum(np.append(bend, bend[-1]), np.insert(bend, 0, bend[0])), nan=np.inf)
