@@ -20,7 +20,7 @@ def test_words_files_and_exit(capfd):
     assert code == 0
     assert "the arm ends at x = 20 in, side 2 is wanted" in out
     assert "safety: PROVED" in out
-    assert "fed within 786 throws" in out
+    assert "within 786 throws" in out
     assert {path.name for path in Path("fed").iterdir()} == {"feeding.json", "feeding.png"}
     assert json.loads(Path("fed/feeding.json").read_text())["scene"] == "paper-designed"
 
