@@ -12,8 +12,7 @@ from limitsets.cells import Grid, grid
 from limitsets.feeding.falling import FATES, ArmEnd
 from limitsets.robust.noise.arrivals import random_starts, with_border
 from limitsets.robust.noise.chain_solution import ChainProblem
-from limitsets.robust.noise.scattering import Scattering, kappa_strata, still_map, thrown
-from limitsets.robust.noise.ulam import transfer
+from limitsets.robust.noise.scattering import Scattering
 
 __all__ = ["Curve", "FedShares", "FeedingProblem", "success_curve"]
 
@@ -100,19 +99,11 @@ class FeedingProblem:
 
     def solve(self, scatter: Scattering) -> FedShares:
         """Move random starts on until nearly all have ended."""
-        scene, asked, cover = self.end.scene, self.chain, self.cover()
-        factors = kappa_strata(scatter, scene, asked.strata)
-        chain = transfer(
-            thrown(still_map(scene)),
-            cover,
-            parameter=factors,
-            landing=scatter.landing,
-            strata=asked.strata,
-            cutter=asked.cutter(factors),
-        )
+        cover = self.cover()
+        chain = self.chain.chain(cover, scatter)
         x = np.concatenate([cover.centres(side) for side in range(cover.sides)])
         fate = self.end.fate(x, cover.side_of(np.arange(cover.n_cells)))
-        masses = random_starts(cover, asked.starts, self.end.x)
+        masses = random_starts(cover, self.chain.starts, self.end.x)
         rows: list[list[float]] = []
         while masses.sum() > UNDER_WAY and len(rows) < MOST_THROWS:
             left = float((masses @ chain.sinks).sum())

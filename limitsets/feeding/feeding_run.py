@@ -10,8 +10,9 @@ from typing import Any
 from limitsets.errors import AnswerError
 from limitsets.feeding.falling import ArmEnd, arm_end_of, clear_beyond, time_to_tip
 from limitsets.feeding.fed_shares import Curve, FedShares, FeedingProblem, success_curve
-from limitsets.feeding.proving import Fed, Safe, proved_feeding
+from limitsets.feeding.proving import proved_feeding
 from limitsets.feeding.trials import Trials, run_trials
+from limitsets.feeding.verdicts import Fed, Safe
 from limitsets.files import as_table, picked
 from limitsets.robust.noise.scattering import Scattering, scattering_of
 from limitsets.robust.sheet.noise_input import still
