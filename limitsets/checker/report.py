@@ -15,6 +15,7 @@ import flint
 
 from .balls import PRECISION
 from .cells import Crew, extents
+from .chances import Chances, chances_in_words, check_chances, holds_chances, read_chances
 from .claims import check_box_claims, read_claims, statement_of
 from .file import Cells, open_certificate, read_cells
 from .goals import content_of_goal, goal_of_scene
@@ -174,6 +175,9 @@ def check_certificate(
     if holds_plane(header):
         recheck_plane(read_plane(header, entries), header, workers, progress, report)
         return
+    if holds_chances(header):
+        recheck_chances(read_chances(header, entries), header, progress, report)
+        return
     file = read_certificate(header, entries)
     gap = describe(report, file)
     own = goal_of_scene(file.raw[0], len(file.scenes[0].sides))
@@ -218,6 +222,26 @@ def recheck_plane(
     report.verdict = "failed" if bad else "proved"
     report.claims = [("region", report.verdict, bad)]
     report.reason = f"region: {bad}" if bad else ""
+
+
+def recheck_chances(
+    c: Chances, header: dict[str, Any], progress: Callable[[int, int], None] | None, report: Report
+) -> None:
+    """Check probabilities, and fill in the report."""
+    model = c.raw["model"]["flight"], c.raw["model"]["flip"]
+    require(model == (header["map"]["flight"], header["map"]["flip"]), "map and scene name different models")
+    tell_model(report, model)
+    for name, value in quantities(c.raw):
+        report.parameters[plain(name)] = value_in_words(value, name)
+    for name, text in c.laws.items():
+        report.parameters[f"law of {name}"] = f"uniform, within {quantity(text, KINDS, name)}"
+    if goal_of_scene(c.raw, len(c.scene.sides)) is not None:
+        report.statement.append("of the scene's own goal nothing is claimed")
+    bad, report.cells = check_chances(c, progress)
+    report.statement = chances_in_words(c) + report.statement
+    report.verdict = "failed" if bad else "proved"
+    report.claims = [("probabilities", report.verdict, bad)]
+    report.reason = f"probabilities: {bad}" if bad else ""
 
 
 def describe(report: Report, file: Certificate) -> str:

@@ -10,108 +10,33 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from limitsets.errors import AnswerError
-from limitsets.files import as_table, picked
 from limitsets.interval import guard
 from limitsets.proofs.parameters import parameter_box
 from limitsets.robust.brackets.averages import ROUNDING, mean_matrix
 from limitsets.robust.brackets.chain import EXITS, Chain, Place, chain_of
 from limitsets.robust.brackets.nodes import Nodes
+from limitsets.robust.brackets.result import ANY, AbsorptionBrackets
 from limitsets.robust.noise.chain_solution import starts_from
 from limitsets.robust.noise.scattering import Scattering, scattering_of
 
 if TYPE_CHECKING:
     from limitsets.scene import Scene
 
-__all__ = ["ANY", "AbsorptionBrackets", "absorption_brackets", "mean_brackets", "within_brackets"]
+__all__ = ["absorption_brackets", "mean_brackets", "within_brackets"]
 
 Array = NDArray[np.float64]
 
 CELLS, THROWS = 4000, 200
-# Any absorbing set or exit.
-ANY = "any"
 # The mean from above: once no state is left with a larger probability, throws without end are bounded.
 LEFT, MOST_THROWS = 1e-4, 3000
 # A bound of the mean above this grows without end: the cells are too coarse, or nothing absorbs.
 HOPELESS = 1e6
-
-
-@dataclass(frozen=True, eq=False)
-class AbsorptionBrackets:
-    """Proved brackets of where a noisy chain ends, and when; T is the throw of the first absorption.
-
-    Attributes
-    ----------
-    scene, unit : str
-        Name of the scene, unit of lengths.
-    scatter : Scattering
-        The laws of what differs at every throw.
-    absorbing : dict of str to tuple of (int, float, float)
-        By name side, from x, to x of the places that absorb [length]; the exits ("exits") do too.
-    starts : tuple of (int, float, float)
-        Side, from x, to x: starts are equally likely per length on all of these [length].
-    nodes : Nodes
-        The cells: functions are affine between neighbouring nodes of a side.
-    strata : dict of str to ndarray
-        By quantity the ends of the strata into which its law is cut.
-    within : dict of str to ndarray, shape (2, throws + 1)
-        By name bounds of the probability of having ended there after 0, 1, ... throws; "any" is that of T <= n.
-    values : dict of str to ndarray, shape (2, n_nodes)
-        By name the bounds at the nodes after the last throw, for starts there.
-    mean : (float, float)
-        Bounds of the mean of T; the upper one is infinite where none was found.
-    seconds : float
-        Time it took.
-    how : str
-        "proved".
-    """
-
-    scene: str
-    unit: str
-    scatter: Scattering
-    absorbing: dict[str, tuple[Place, ...]]
-    starts: tuple[Place, ...]
-    nodes: Nodes
-    strata: dict[str, Array]
-    within: dict[str, Array]
-    values: dict[str, Array]
-    mean: tuple[float, float]
-    seconds: float
-    how: str = "proved"
-
-    def quantile(self, share: float, name: str = ANY) -> tuple[int | None, int | None]:
-        """Bound the number of throws within which `share` of the starts end there; None beyond the throws counted.
-
-        Parameters
-        ----------
-        share : float
-            From 0 to 1.
-        name : str
-            Of the places; all of them by default.
-        """
-        low, high = self.within[name]
-        first, last = np.flatnonzero(high >= share), np.flatnonzero(low >= share)
-        return (int(first[0]) if first.size else None), (int(last[0]) if last.size else None)
-
-    def to_json(self) -> dict[str, Any]:
-        """Give the brackets as JSON takes them."""
-        return as_table(
-            **picked(self, "scene", "unit", "how", "absorbing", "starts", "seconds"),
-            scatter=self.scatter.words(),
-            cells=int(np.isfinite(self.nodes.width).sum()),
-            within={name: {"lo": lo, "hi": hi} for name, (lo, hi) in self.within.items()},
-            mean={"lo": self.mean[0], "hi": self.mean[1] if math.isfinite(self.mean[1]) else None},
-            quantiles={
-                str(share): dict(zip(("lo", "hi"), self.quantile(share), strict=True))
-                for share in (0.5, 0.95, 0.99)
-            },
-        )
 
 
 def _start_row(nodes: Nodes, starts: Sequence[Place]) -> Any:
@@ -275,6 +200,7 @@ def absorption_brackets(
     means = mean_brackets(chain, row) if mean else (0.0, math.inf)
     tell("mean", 1, 1)
     return AbsorptionBrackets(
+        read,
         read.name,
         read.unit,
         noise,

@@ -1,0 +1,359 @@
+"""The claim `probabilities`: brackets of where a noisy chain ends, and when, found anew.
+
+docs/certificates.md, "Probabilities".  The file holds laws, starts, places that absorb, nodes and strata; the checker
+makes the steps itself, and its own brackets have to lie within those claimed.
+"""
+
+import itertools
+import math
+from collections.abc import Callable
+from fractions import Fraction
+from typing import Any, NamedTuple
+
+import numpy as np
+from flint import arb
+
+from .averages import FAR, INFLATE, Mesh, Rows, Spread, mean_rows
+from .balls import Array, exact
+from .chain import Chain
+from .file import read_array
+from .links import ABSORBED, HARD, LIVE, MOST_PLACE, Noisy, chain_of
+from .scene import Scene, read_noise, read_scene
+from .texts import (
+    LENGTHS,
+    hex_float,
+    number_and_unit,
+    plain,
+    quantity,
+    read_side,
+    require,
+    rounded,
+    rows,
+    table,
+)
+
+ANY, LEFT = "any", "exits"
+MOST_NODES, MOST_STRATA, MOST_BRACKETS, MOST_MEAN = 300_000, 64, 2_000, 5_000
+# A mean is bounded from above once no state's bound grows by more than this share of a throw.
+GROWTH = 0.5
+Place = tuple[int, Fraction, Fraction]  # side, from x, to x
+
+
+class Chances(NamedTuple):
+    """What is claimed: read, and not yet believed; lengths in the scene's unit."""
+
+    raw: dict[str, Any]
+    laws: dict[str, str]
+    scene: Scene
+    noisy: Noisy
+    starts: list[Place]
+    absorbing: dict[str, list[Place]]
+    edges: list[Array]
+    within: dict[str, Array]  # by name two columns: lower and upper bound after 0, 1, ... throws
+    quantiles: list[tuple[str, Fraction, int, int]]
+    mean: tuple[float, float] | None
+
+
+def holds_chances(header: dict[str, Any]) -> bool:
+    """Whether a file claims probabilities."""
+    claims = header.get("claims")
+    return isinstance(claims, list) and any(
+        isinstance(c, dict) and c.get("claim") == "probabilities" for c in claims
+    )
+
+
+def read_chances(header: dict[str, Any], entries: dict[str, memoryview]) -> Chances:
+    """Read a file; raises BadFileError."""
+    (claim,) = rows(header["claims"], "claims of probabilities", 1, 1)
+    table(claim, "a claim", "claim section")
+    keys = "scene laws starts absorbing strata names quantiles mean"
+    section = table(claim["section"], "section of probabilities", keys)
+    alone = header["boxes"] == [] and header["noise"] is None and header["tolerance"] is None
+    require(alone, "a file of probabilities has no boxes, no other noise and no tolerance")
+    laws = read_laws(section["laws"])
+    scene = read_scene(section["scene"], laws)
+    require(
+        all(side.concave for side in scene.sides), "kappa > ell is not given: the impact may not be unique"
+    )
+    require(scene.arm[0] == scene.arm[1] and not scene.cuts(), "a quantity of the scene is an interval")
+    still = read_scene({k: v for k, v in scene.raw.items() if k != "effects"}, None)
+    speed = read_noise(laws, "throw.speed", "share")
+    landing = read_noise(laws, "landing.x", "length").lo / LENGTHS[scene.unit]
+    require(landing > 0, "landing.x: without scatter of the landing place nothing is rechecked")
+    strata = section["strata"]
+    require(type(strata) is int and 1 <= strata <= MOST_STRATA, f"strata is not from 1 to {MOST_STRATA}")
+    noisy = Noisy(still.sides, still.k_lo.union(still.k_hi), speed.lo, landing, strata)
+    n_sides = len(scene.sides)
+    places = {
+        plain(name): read_places(some, name, scene)
+        for name, some in table_of(section["absorbing"], "absorbing").items()
+    }
+    require(not {ANY, LEFT} & set(places), f"{ANY} and {LEFT} name no places")
+    require(not overlapping(places), "two places that absorb overlap")
+    starts = read_places(section["starts"], "starts", scene)
+    names = rows(section["names"], "names", 1, 100)
+    known = all(isinstance(name, str) and name in (ANY, LEFT, *places) for name in names)
+    require(known and len(set(names)) == len(names), "names are not those of places that absorb")
+    said = header["arrays"]
+    wanted = {**{f"edges.{i}": 1 for i in range(n_sides)}, **{f"within.{k}": 2 for k in range(len(names))}}
+    there = isinstance(said, dict) and set(said) == set(wanted)
+    require(
+        there and {f"{name}.npy" for name in wanted} == set(entries), "the arrays are others than expected"
+    )
+    read = {
+        name: read_array(entries[f"{name}.npy"], name, "<f8", columns, said[name])
+        for name, columns in wanted.items()
+    }
+    edges = [read[f"edges.{i}"] for i in range(n_sides)]
+    require_edges(edges, scene)
+    within = {name: read[f"within.{k}"] for k, name in enumerate(names)}
+    lengths = {len(each) for each in within.values()}
+    require(len(lengths) == 1 and 1 <= lengths.pop() <= MOST_BRACKETS + 1, "the brackets are not alike many")
+    quantiles = [read_quantile(each, names) for each in rows(section["quantiles"], "quantiles", 0, 1000)]
+    mean = None if section["mean"] is None else read_mean(section["mean"])
+    return Chances(scene.raw, laws, scene, noisy, starts, places, edges, within, quantiles, mean)
+
+
+def table_of(value: object, where: str) -> dict[str, Any]:
+    """Read an object whose keys are names."""
+    known = table(value, where, "", " ".join(value) if isinstance(value, dict) else "")
+    require(len(known) <= 100 and all(k and plain(k) == k for k in known), f"{where}: an odd name")
+    return known
+
+
+def read_laws(value: object) -> dict[str, str]:
+    """Read the laws, of which one kind is known: uniform, within a deviation."""
+    laws = table(value, "laws", "landing.x", "throw.speed")
+    for name, law in laws.items():
+        kind = table(law, f"law of {name}", "", " ".join(law) if isinstance(law, dict) else "")
+        require(list(kind) == ["uniform"], f"law of {name}: this checker knows uniform laws only")
+        require(isinstance(kind["uniform"], str), f"law of {name}: its bound is not a text")
+    return {name: law["uniform"] for name, law in laws.items()}
+
+
+def read_places(value: object, where: str, scene: Scene) -> list[Place]:
+    """Read places: side, from x, to x; null for the end of the arm."""
+    found: list[Place] = []
+    where = plain(where)
+    for row in rows(value, where, 1, 1000):
+        number, lo, hi = rows(row, where, 3, 3)
+        side = read_side(number, len(scene.sides))
+        first = length_of(lo, where, scene)
+        last = scene.arm[0] if hi is None else length_of(hi, where, scene)
+        on = first < last <= scene.arm[0] and bool(exact(first) > scene.sides[side].a)
+        require(on, f"{where}: a place is not one of the arm")
+        found.append((side, first, last))
+    return found
+
+
+def length_of(value: object, where: str, scene: Scene) -> Fraction:
+    """Read a length in the scene's unit."""
+    q = quantity(value, "length", where)
+    require(q.lo == q.hi, f"{where}: an interval is no place")
+    return q.lo / LENGTHS[scene.unit]
+
+
+def overlapping(places: dict[str, list[Place]]) -> bool:
+    """Whether two of the places have inner points in common."""
+    every = sorted(place for some in places.values() for place in some)
+    return any(a[0] == b[0] and b[1] < a[2] for a, b in itertools.pairwise(every))
+
+
+def require_edges(edges: list[Array], scene: Scene) -> None:
+    """Require that the nodes of each side ascend, and reach from before the joint to beyond the arm's end."""
+    require(sum(len(e) for e in edges) <= MOST_NODES, f"more than {MOST_NODES} nodes")
+    for i, e in enumerate(edges):
+        require(len(e) >= 2 and bool((np.diff(e) > 0).all()), f"side {i}: the nodes do not ascend")
+        whole = bool(arb(float(e[0])) <= scene.sides[i].a) and Fraction(float(e[-1])) >= scene.arm[0]
+        require(whole and float(np.abs(e).max()) < MOST_PLACE / 2, f"side {i}: the nodes do not span the arm")
+
+
+def read_quantile(value: object, names: list[Any]) -> tuple[str, Fraction, int, int]:
+    """Read one quantile: name, share, and between which numbers of throws."""
+    name, share, lo, hi = rows(value, "a quantile", 4, 4)
+    part, _ = number_and_unit(share if isinstance(share, str) else "", "share", "a quantile")
+    counts = type(lo) is int and type(hi) is int and 0 <= lo <= hi
+    require(name in names and 0 < part < 1 and counts, "a quantile is none")
+    return name, part, lo, hi
+
+
+def read_mean(value: object) -> tuple[float, float]:
+    """Read the bounds of a mean; null where there is no upper one."""
+    lo, hi = rows(value, "mean", 2, 2)
+    low, high = hex_float(lo, "mean"), math.inf if hi is None else hex_float(hi, "mean")
+    require(0 <= low <= high, "the bounds of the mean are none")
+    return low, high
+
+
+# ------------------------------------------------------------------------------------------------- the chain
+
+
+def mesh_of(edges: list[Array]) -> Mesh:
+    """Put the nodes of all sides together, with one far out at either end."""
+    whole = [np.concatenate([[-FAR], each, [FAR]]) for each in edges]
+    return Mesh(np.concatenate(whole), np.concatenate([[0], np.cumsum([len(each) for each in whole])]))
+
+
+def kinds_of(c: Chances, mesh: Mesh) -> tuple[Array, dict[str, Array]]:
+    """Find what each cell is, exactly, and by name the nodes of the cells that absorb, or may do so in part."""
+    kinds = np.full(len(mesh.place), -1)
+    absorbed: dict[str, set[int]] = {name: set() for name in (LEFT, *c.absorbing)}
+    for i, side in enumerate(c.scene.sides):
+        own = [(name, place) for name, some in c.absorbing.items() for place in some if place[0] == i]
+        for cell in range(int(mesh.first[i]), int(mesh.first[i + 1]) - 1):
+            lo, hi = float(mesh.place[cell]), float(mesh.place[cell + 1])
+            a, b = Fraction(lo), Fraction(hi)
+            met = {name for name, (_, begin, end) in own if a < end and begin < b}
+            inside = any(begin <= a and b <= end for _, (_, begin, end) in own)
+            if bool(arb(hi) <= side.a) or a >= c.scene.arm[0]:
+                kinds[cell], met = ABSORBED, {LEFT}
+            elif not (bool(arb(lo) > side.a) and b <= c.scene.arm[0]):
+                kinds[cell], met = HARD, met | {LEFT}
+            else:
+                kinds[cell] = ABSORBED if inside else HARD if met else LIVE
+            for name in met:
+                absorbed[name] |= {cell, cell + 1}
+    return kinds, {name: np.array(sorted(nodes), dtype=np.int64) for name, nodes in absorbed.items()}
+
+
+def start_row(c: Chances, mesh: Mesh) -> Rows:
+    """Build the row that makes the mean over the starts, which are equally likely per length."""
+    side, lo, hi = (np.array(column) for column in zip(*c.starts, strict=True))
+    length = hi - lo
+    weight = (length / length.sum()).astype(float)
+    row = np.zeros(len(side), dtype=np.int64)
+    spread = Spread(row, weight, side.astype(np.int64), lo.astype(float), hi.astype(float))
+    return mean_rows(1, mesh, spread, 0.0)
+
+
+def mean_above(row: Rows, values: Array) -> float:
+    """Bound the mean over the starts from above."""
+    return float(row.times(values)[0]) + row.off * float(np.abs(values).max())
+
+
+def check_within(chain: Chain, row: Rows, name: str, said: Array) -> tuple[str, Array]:
+    """Check the brackets of one name; "" or the reason, and the brackets found."""
+    value = {each: float(name in (ANY, each)) for each in chain.absorbed}
+    fixed = [chain.fixed({each: sign * v for each, v in value.items()}) for sign in (-1.0, 1.0)]
+    bound = [chain.first(each) for each in fixed]
+    found = np.empty(said.shape)
+    for n in range(len(said)):
+        if n:
+            bound = [chain.above(values, each) for values, each in zip(bound, fixed, strict=True)]
+        found[n] = -mean_above(row, bound[0]), mean_above(row, bound[1])
+    # to have ended is for ever: a lower bound holds later on, an upper one earlier
+    found[:, 0] = np.maximum(np.maximum.accumulate(found[:, 0]), 0.0)
+    found[:, 1] = np.minimum(np.minimum.accumulate(found[::-1, 1])[::-1], 1.0)
+    wrong = np.flatnonzero(~((said[:, 0] <= found[:, 0]) & (found[:, 1] <= said[:, 1])))
+    if not len(wrong):
+        return "", found
+    n = int(wrong[0])
+    lo, hi = rounded(float(found[n, 0]), up=False), rounded(float(found[n, 1]), up=True)
+    claimed = f"[{float(said[n, 0])!r}, {float(said[n, 1])!r}]"
+    return f"P({plain(name)} within {n} throws): {claimed} is claimed, [{lo}, {hi}] is proved", found
+
+
+def check_quantiles(c: Chances, found: dict[str, Array]) -> str:
+    """Check the quantiles by the brackets found; "" or the reason."""
+    for name, share, lo, hi in c.quantiles:
+        low, high = found[name].T
+        none_before = lo == 0 or (lo <= len(high) and Fraction(float(high[lo - 1])) < share)
+        there = hi < len(low) and Fraction(float(low[hi])) >= share
+        if not (none_before and there):
+            return f"the quantile of {float(share):.6g}, {lo} to {hi} throws, is not proved"
+    return ""
+
+
+def check_mean(chain: Chain, row: Rows, said: tuple[float, float]) -> str:
+    """Check the bounds of the mean number of throws; "" or the reason.
+
+    From below it is at least the mean of the lesser of T and n.  From above: with V >= 0 and 1 + K V <= U <= V + c on
+    the cells from which throws are made, V / (1 - c) is a bound.
+    """
+    none = chain.fixed(dict.fromkeys(chain.absorbed, 0.0))
+    below, low = chain.first(none), 0.0
+    for _ in range(MOST_MEAN):
+        if low >= said[0]:
+            break
+        before, below = below, chain.above(below, none, -1.0)
+        low = max(low, -mean_above(row, below))
+        if not float((before - below).max()) > 1e-9:
+            break
+    if low < said[0]:
+        return f"the mean is at least {said[0]!r}: only {rounded(low, up=False)} is proved"
+    if said[1] == math.inf:
+        return ""
+    made = np.unique(np.concatenate([chain.live, chain.live + 1, chain.hard.at, chain.hard.at + 1]))
+    above, best = chain.first(none), math.inf
+    for _ in range(MOST_MEAN):
+        after = chain.above(above, none, 1.0)
+        growth = float((after - above)[made].max())
+        if growth < GROWTH and bool((above >= 0.0).all()):
+            best = min(best, mean_above(row, above) / (1.0 - growth) * INFLATE)
+        if best <= said[1] or growth <= 1e-9 or not float(after.max()) < 1e6:
+            break
+        above = after
+    return "" if best <= said[1] else f"the mean is at most {said[1]!r}: only {best!r} is proved"
+
+
+def check_chances(c: Chances, progress: Callable[[int, int], None] | None) -> tuple[str, int]:
+    """Check everything that is claimed; "" or the reason, and the number of cells."""
+    mesh = mesh_of(c.edges)
+    kinds, absorbed = kinds_of(c, mesh)
+    work, done = len(mesh.place) + len(c.within) * len(mesh.place), 0
+
+    def told(more: int) -> None:
+        nonlocal done
+        done = min(done + more, work - 1)
+        if progress is not None:
+            progress(done, work)
+
+    chain, row = chain_of(c.noisy, mesh, kinds, absorbed, told), start_row(c, mesh)
+    found: dict[str, Array] = {}
+    bad = ""
+    for name, said in c.within.items():
+        bad, found[name] = check_within(chain, row, name, said)
+        told(len(mesh.place))
+        if bad:
+            break
+    bad = bad or check_quantiles(c, found)
+    if not bad and c.mean is not None:
+        bad = check_mean(chain, row, c.mean)
+    if progress is not None:
+        progress(work, work)
+    return bad, sum(len(e) - 1 for e in c.edges)
+
+
+def chances_in_words(c: Chances) -> list[str]:
+    """Put the claim in words, from the numbers that were checked."""
+    last = len(next(iter(c.within.values()))) - 1
+    unit = c.scene.unit
+    lines = [
+        "probabilities: T is the throw with which a part first comes to rest at a place named below, or leaves the arm",
+        "    all deviations are independent of each other",
+        f"    starts, equally likely per length: {places_in_words(c.starts, unit)}",
+    ]
+    for name, places in c.absorbing.items():
+        lines.append(f"    {name}: {places_in_words(places, unit)}")
+    for name, said in c.within.items():
+        lo, hi = (float(end) for end in said[-1])
+        what = "P(T <= n)" if name == ANY else f'P(ended "{name}" within n throws)'
+        lines.append(
+            f"    {what} for n = 0 to {last}; for n = {last} between {rounded(lo, up=False)} and"
+            f" {rounded(hi, up=True)}"
+        )
+    for name, share, lo, hi in c.quantiles:
+        what = "have ended" if name == ANY else f'have ended "{name}"'
+        count = f"exactly {lo}" if lo == hi else f"between {lo} and {hi}"
+        lines.append(
+            f"    the least number of throws within which {float(100 * share):.6g} % {what}: {count}"
+        )
+    if c.mean is not None:
+        most = f", at most {rounded(c.mean[1], up=True)}" if math.isfinite(c.mean[1]) else ""
+        lines.append(f"    the mean of T: at least {rounded(c.mean[0], up=False)}{most}")
+    return lines
+
+
+def places_in_words(places: list[Place], unit: str) -> str:
+    """Name places."""
+    return ", ".join(f"side {side} from {float(lo)!r} to {float(hi)!r} {unit}" for side, lo, hi in places)
