@@ -32,6 +32,7 @@ from .speeds import (
 )
 
 ABSORBED, LIVE, HARD = 0, 1, 2  # what a cell is: all of it absorbs, none of it does, or anything else
+PIECES = 8  # of the speeds, where what decides is not seen to rise or fall with them at once
 MOST_PLACE = 200.0  # no landing is followed farther out
 
 
@@ -160,9 +161,8 @@ class Links:
     def border_of(self, cell: int, ends: tuple[float, float]) -> Border | None:
         """Prove how far from a chord the branch changes, where what decides rises or falls with the speed."""
         s, kappa = self.side, self.noisy.kappa
-        phi, deviations = self.box(cell)
         x = arb(ends[0]).union(arb(ends[1]))
-        _, by_d = deciding_slopes(s, phi, x, kappa_at(kappa, deviations), 1 + deviations)
+        by_d = self.by_speed(cell, ends, x)
         rises = bool(by_d > 0)
         if not (rises or by_d < 0):
             return None
@@ -179,19 +179,73 @@ class Links:
             for hit, end, g in zip(hits, ends, cut.tolist(), strict=True)
         ]
         near = corners[0].before.union(corners[1].after)
-        levels = arb(float(cut.min())).union(arb(float(cut.max())))
+        low, high = float(cut.min()), float(cut.max())
+        far = self.distance(near, x, (low, high), (by_d, values), ends, cut)
+        if 0.0 < far < most:  # once more, with the derivative near the chord alone
+            levels = max(low - far, -most), min(high + far, most)
+            first, last = self.hit_at(ends[0], levels[0]), self.hit_at(ends[1], levels[1])
+            if first is not None and last is not None:
+                angles, deviations = first.before.union(last.after), arb(levels[0]).union(arb(levels[1]))
+                _, steep = deciding_slopes(s, angles, x, kappa_at(kappa, deviations), 1 + deviations)
+                far = min(far, self.distance(near, x, (low, high), (steep, values), ends, cut))
+        gap = min(INFLATE * far / (2.0 * most), 1.0)
+        places = (hits[0].place, hits[1].place)
+        return Border((float(cut[0]), float(cut[1])), int(not rises), int(rises), gap, near, places)
+
+    def by_speed(self, cell: int, ends: tuple[float, float], x: Arb) -> Arb:
+        """Enclose how what decides changes with the speed, over all speeds; in pieces where its sign is not seen at once."""
+        phi, deviations = self.box(cell)
+        _, whole = deciding_slopes(self.side, phi, x, kappa_at(self.noisy.kappa, deviations), 1 + deviations)
+        if whole > 0 or whole < 0:
+            return whole
+        cuts = np.linspace(-float(self.deltas[-1]), float(self.deltas[-1]), PIECES + 1).tolist()
+        found = []
+        for k, (low, high) in enumerate(itertools.pairwise(cuts)):
+            first, last = self.hit_at(ends[0], low), self.hit_at(ends[1], high)
+            if first is None or last is None:
+                return whole
+            # the ends of the law themselves, which are no floats
+            low_end = -self.most if k == 0 else arb(low)
+            high_end = self.most if k == PIECES - 1 else arb(high)
+            before = self.outer[cell][0].before if k == 0 else first.before
+            after = self.outer[cell + 1][1].after if k == PIECES - 1 else last.after
+            some = low_end.union(high_end)
+            angles = before.union(after)
+            found.append(deciding_slopes(self.side, angles, x, kappa_at(self.noisy.kappa, some), 1 + some)[1])
+        together = found[0]
+        for each in found[1:]:
+            together = together.union(each)
+        return together
+
+    def distance(
+        self,
+        phi: Arb,
+        x: Arb,
+        levels: tuple[float, float],
+        known: tuple[Arb, list[Arb]],
+        ends: tuple[float, float],
+        cut: Array,
+    ) -> float:
+        """Bound how far the branch changes from the chord, on both sides together.
+
+        What decides, turned so that it rises with the speed, has the values known at the two nodes.  Along the chord it
+        rises or falls, or it varies by at most half the cell times its slope.
+        """
+        by_d, values = known
+        between = arb(levels[0]).union(arb(levels[1]))
         h = arb(ends[1]) - arb(ends[0])
         slope = (arb(float(cut[1])) - arb(float(cut[0]))) / h
-        along_x, along_d = deciding_slopes(s, near, x, kappa_at(kappa, levels), 1 + levels)
+        along_x, along_d = deciding_slopes(
+            self.side, phi, x, kappa_at(self.noisy.kappa, between), 1 + between
+        )
         along = along_x + slope * along_d
         extra = 0.0 if along > 0 or along < 0 else upper(HALF * h * abs(along))
         over = max(max(upper(v) for v in values) + extra, 0.0)
         under = max(max(upper(-v) for v in values) + extra, 0.0)
-        steep = -upper(-abs(by_d))
-        wrong = min(over / steep, float(cut.max()) + most) + min(under / steep, most - float(cut.min()))
-        gap = min(INFLATE * wrong / (2.0 * most), 1.0)
-        places = (hits[0].place, hits[1].place)
-        return Border((float(cut[0]), float(cut[1])), int(not rises), int(rises), gap, near, places)
+        steep, most = -upper(-abs(by_d)), float(self.deltas[-1])
+        if not steep > 0.0:
+            return 2.0 * most
+        return min(over / steep, levels[1] + most) + min(under / steep, most - levels[0])
 
     def hit_at(self, x: float, delta: float) -> Hit | None:
         """Enclose a throw with a deviation that is a float."""

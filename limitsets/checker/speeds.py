@@ -129,17 +129,25 @@ def slopes_over(s: Side, phi: Arb, kappa: Arb, factor: Arb) -> Slopes:
     )
 
 
+def signed_square(z: Any) -> Any:
+    """Evaluate z |z|, whose derivative 2 |z| is narrower than that of a product."""
+    if isinstance(z, Rising):
+        return Rising(z.x * abs(z.x), [2 * abs(z.x) * d for d in z.by])
+    return z * abs(z)
+
+
 def deciding(s: Side, phi: Any, x: Any, kappa: Any) -> Any:
     """Evaluate the number that is positive where the part flips, in any arithmetic."""
     if s.exact:
         sin, cos = phi.sin_cos()
         X, H = s.a * cos - s.d * sin, s.a * sin + s.d * cos
         spin = s.rho2 + X * (x - kappa * phi) + H * s.hd
-        V = kappa * barrier(s.ell, X, H, s.signed)
+        over = s.ell + H
+        V = kappa * (signed_square(X) / over if s.signed and H > 0 else barrier(s.ell, X, H, s.signed))
     else:
         spin = s.rho2 - s.a * x + 2 * s.a * s.a + s.d * s.d + s.d * s.h
         V = kappa * (s.ell - s.d) - 2 * s.a * (x - s.a)
-    return (spin * abs(spin) if s.signed else spin * spin) * s.over_2m - V
+    return (signed_square(spin) if s.signed else spin * spin) * s.over_2m - V
 
 
 def deciding_slopes(s: Side, phi: Arb, x: Arb, kappa: Arb, factor: Arb) -> tuple[Arb, Arb]:

@@ -15,7 +15,7 @@ from limitsets.robust.brackets.averages import Average
 from limitsets.robust.brackets.decisions import crossings
 from limitsets.robust.brackets.densities import Staircase, staircase
 from limitsets.robust.brackets.landings import OneSide, one_side
-from limitsets.robust.brackets.nodes import CLOSE, FAR, Nodes, nodes_of
+from limitsets.robust.brackets.nodes import CLOSE, FAR, Nodes, extra, nodes_of
 from limitsets.robust.brackets.scatter_of_landing import landing_average
 from limitsets.robust.brackets.throws import throw_average
 from limitsets.robust.noise.scattering import Scattering
@@ -31,6 +31,8 @@ SPEED_STRATA, LANDING_STRATA = 16, 1
 NORMAL_SPEED, NORMAL_LANDING = 96, 192
 # Cells of the function of the landing place for one of the function of the start.
 FINER = 4
+# Cells are narrower near the joint, up to this share of the arm, where no scatter of the landing smooths functions.
+GRADED = 0.43
 
 
 @dataclass(frozen=True, eq=False)
@@ -171,9 +173,10 @@ def chain_of(
         [(x, min(y, above)) for places in absorbing.values() for k, x, y in places if k == side.number]
         for side, (_, above) in zip(sides, ends, strict=True)
     ]
-    length = sum(y - x for x, y in ends) - sum(y - x for row in gone for x, y in row)
+    graded = GRADED * arm if landing.certain else 0.0
+    length = sum(y - x + extra(graded) for x, y in ends) - sum(y - x for row in gone for x, y in row)
     width = length / (cells * len(sides))
-    nodes = nodes_of(ends, width, flat, FAR * arm, gone)
+    nodes = nodes_of(ends, width, flat, FAR * arm, gone, graded)
     target, average = nodes, None
     if not landing.certain:
         reach = float(landing.borders[-1])

@@ -21,6 +21,8 @@ Index = NDArray[np.int64]
 CLOSE = 2.0**-33
 # Beyond the arm functions are constant up to so many arms' lengths; nothing lands farther.
 FAR = 100.0
+# The narrowest cells near the joint, and places at which the graded ones are counted.
+NARROWEST, TABLE = 0.11, 4097
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,14 +66,38 @@ class Nodes:
         return found
 
 
+def extra(graded: float) -> float:
+    """Return by how much longer a side is, counted in cells, where those near the joint are narrower."""
+    return graded * float(np.log(1.0 / NARROWEST))
+
+
+def _even(lo: float, hi: float, width: float, graded: float) -> tuple[Array, Array]:
+    """Places whose distances grow in proportion to that from the joint up to `graded`, and the distances."""
+    if not 0.0 < graded < hi - lo:
+        count = int(np.ceil((hi - lo) / width))
+        return np.linspace(lo, hi, count + 1), np.full(count + 1, width)
+    x = np.unique(np.concatenate([np.linspace(0.0, graded, TABLE), [NARROWEST * graded, hi - lo]]))
+    share = np.clip(x / graded, NARROWEST, 1.0)
+    steps = np.diff(x) / share[:-1]
+    inner = (x[:-1] >= NARROWEST * graded) & (x[1:] <= graded)
+    steps[inner] = graded * np.diff(np.log(np.maximum(x, 1e-300)))[inner]
+    total = np.concatenate([[0.0], np.cumsum(steps)])
+    count = int(np.ceil(total[-1] / width))
+    at = np.interp(np.linspace(0.0, total[-1], count + 1), total, x)
+    places = np.clip(lo + at, lo, hi)
+    places[0], places[-1] = lo, hi
+    return places, width * np.clip(at / graded, NARROWEST, 1.0)
+
+
 def nodes_of(
     ends: Sequence[tuple[float, float]],
     width: float,
     special: Sequence[Sequence[float]],
     far: float,
     without: Sequence[Sequence[tuple[float, float]]] | None = None,
+    graded: float = 0.0,
 ) -> Nodes:
-    """Place nodes at equal distances of at most `width`, and at special places besides.
+    """Place nodes at distances of about `width`, less near the joint, and at special places besides.
 
     Parameters
     ----------
@@ -85,13 +111,16 @@ def nodes_of(
         The outermost nodes lie at - and + this.
     without : sequence of sequence of (float, float), optional
         Per side where no nodes are wanted but the special ones.
+    graded : float
+        So far beyond the joint cells are narrower, by at most `NARROWEST`: a function of the start varies the more
+        quickly the more throws are to come.
     """
     rows = []
     for (lo, hi), more, gone in zip(ends, special, without or [()] * len(ends), strict=True):
-        even = np.linspace(lo, hi, int(np.ceil((hi - lo) / width)) + 1)
+        even, own = _even(lo, hi, width, graded)
         places = np.array([x for x in more if lo <= x <= hi])
         # No even node so near to a special one that cells of no use arise.
-        near = np.searchsorted(np.sort(places), even[:, None] + np.array([-0.02, 0.02]) * width)
+        near = np.searchsorted(np.sort(places), even[:, None] + np.array([-0.02, 0.02]) * own[:, None])
         keep = (near[:, 0] == near[:, 1]) | (even == lo) | (even == hi)
         for begin, end in gone:
             keep &= (even <= begin) | (even >= end)

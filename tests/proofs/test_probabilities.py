@@ -1,0 +1,373 @@
+"""The claim `probabilities`: the checker's own brackets against a chain solved by hand and against throws, and forgeries.
+
+The certificates are put together here, not by the package.
+"""
+
+import sys
+from itertools import product
+
+import mpmath
+import numpy as np
+import pytest
+
+pytest.importorskip("flint", reason="the checker needs python-flint")
+
+import flint
+from scipy import stats
+
+import limitsets as ls
+from limitsets.proofs.confirm import DeniedError
+from limitsets.robust import Gaussian, Scattering, Uniform, absorption_brackets
+from limitsets.robust.noise.sampling import ManyParts, scattering_map
+from tests.proofs import forge
+from tests.proofs.test_recheck import checker, verdict
+
+pytestmark = pytest.mark.usefixtures("precision")
+
+CLOSE = 1e-8
+# a of the three sides, from the table of the paper's scenes, to five places: nodes begin before them
+FEET = {"small": (1.74394, 1.65101, 4.41796), "initial": (1.37302, 3.05205, 3.98670)}
+
+
+def mesh(model, steps, special):
+    """Nodes by side: even ones, and close ones where functions jump."""
+    arm = forge.magnitude(forge.scene(model)["arm"]["length"])
+    found = []
+    for side, foot in enumerate(FEET[model]):
+        ends = [foot - 1e-4, foot + 1e-4, arm - CLOSE, arm]
+        some = [x + k * CLOSE for x in special.get(side, ()) for k in (-1, 0, 1)]
+        even = [x for x in steps[side] if foot + 1e-3 < x < arm - 1e-3]
+        even = [x for x in even if all(abs(x - s) > 2 * CLOSE for s in some)]
+        found.append(np.unique(np.array(ends + some + even)))
+    return found
+
+
+def certificate(model, laws, starts, absorbing, edges, within, **more):
+    """Put a certificate together; `within`: by name two columns."""
+    scene = forge.scene(model)
+    section = {
+        "scene": scene,
+        "laws": {name: {"uniform": bound} for name, bound in laws.items()},
+        "starts": starts,
+        "absorbing": absorbing,
+        "strata": 8,
+        "names": list(within),
+        "quantiles": [],
+        "mean": None,
+    } | more
+    header = {
+        "format": "limitsets-proof",
+        "version": 2,
+        "map": {"name": "throw", "version": 1, **scene["model"]},
+        "noise": None,
+        "tolerance": None,
+        "boxes": [],
+        "claims": [{"claim": "probabilities", "section": section}],
+    }
+    arrays = {f"edges.{side}": each for side, each in enumerate(edges)}
+    arrays |= {f"within.{k}": np.asarray(each, dtype=float) for k, each in enumerate(within.values())}
+    return forge.Forged(header, arrays).seal()
+
+
+def section_of(forged):
+    return forged.header["claims"][0]["section"]
+
+
+# ------------------------------------------------------------------------------------------------- solved by hand
+
+
+def sum_of_uniforms(widths, t):
+    """P(sum of independent uniform numbers on [0, w_i] <= t)."""
+    with mpmath.workdps(60):
+        n, total = len(widths), mpmath.mpf(0)
+        for signs in product((0, 1), repeat=n):
+            rest = mpmath.mpf(t) - sum(w for s, w in zip(signs, widths, strict=True) if s)
+            if rest > 0:
+                total += (-1) ** sum(signs) * rest**n
+        return float(total / (mpmath.factorial(n) * mpmath.fprod(widths)))
+
+
+def ladder():
+    """P(x_n >= 18 in) where each jog stretches x - a by q and scatters it by 0.05 in: n = 0 to 7, from 15 to 16 in."""
+    a, q = 4.4179581, 1.0 + 2.0 / 48.6228609
+    lo, hi, b = 15.0, 16.0, 0.05
+    exact = []
+    for n in range(8):
+        widths = [q**n * (hi - lo)] + [2.0 * b * q**k for k in range(n)]
+        least = a + q**n * (lo - a) - b * sum(q**k for k in range(n))
+        exact.append(1.0 - sum_of_uniforms(widths, 18.0 - least))
+    return np.array(exact)
+
+
+def by_hand(off_lo=0.0, off_hi=0.0):
+    """The ladder's certificate, its brackets 0.002 wide and off by so much."""
+    exact = ladder()
+    said = np.stack([exact - 1e-3 + off_lo, exact + 1e-3 + off_hi], axis=1)
+    said = np.stack([np.minimum(*said.T), np.maximum(*said.T)], axis=1)
+    steps = [np.linspace(2, 40, 20), np.linspace(2, 40, 20), np.linspace(14.5, 18.5, 1200)]
+    return certificate(
+        "small",
+        {"landing.x": "0.05 in"},
+        [[2, "15 in", "16 in"]],
+        {"right": [[2, "18 in", None]]},
+        mesh("small", steps, {2: [18.0]}),
+        {"right": said},
+    )
+
+
+def test_a_chain_solved_by_hand_is_proved(tmp_path):
+    assert 0.1 < ladder()[5] < 0.9
+    report = verdict(by_hand(), tmp_path)
+    assert (report.verdict, report.reason) == ("proved", "")
+    assert report.parameters["law of landing.x"] == "uniform, within 0.05 in"
+    assert any("right: side 2 from 18.0 to 40.0 in" in line for line in report.statement)
+
+
+@pytest.mark.parametrize(("off_lo", "off_hi"), [(2e-3, 2e-3), (-2e-3, -2e-3)])
+def test_a_probability_raised_or_lowered_is_not_proved(tmp_path, off_lo, off_hi):
+    report = verdict(by_hand(off_lo, off_hi), tmp_path)
+    assert report.verdict == "failed"
+    assert "is claimed" in report.reason
+
+
+# ------------------------------------------------------------------------------------------------- throws
+
+THROWS, PARTS = 10, 400_000
+LAWS = {"landing.x": "0.2 in", "throw.speed": "1 %"}
+SPANS = [(0, 6.0, 20.0), (1, 6.0, 20.0), (2, 6.0, 20.0)]
+
+
+@pytest.fixture(scope="module")
+def thrown():
+    """Counts of 400 000 parts of paper-initial that ended right and wrong within n throws, and their throws."""
+    scene, random = ls.load("paper-initial"), np.random.default_rng(2)
+    scatter = Scattering(speed=Uniform(0.01), landing=Uniform(0.2))
+    side = random.integers(0, 3, PARTS)
+    many = ManyParts(scattering_map(scene, scatter, 7), random.uniform(6.0, 20.0, PARTS), side)
+    right, wrong, times = np.zeros(THROWS + 1, int), np.zeros(THROWS + 1, int), []
+    for n in range(1, 200):
+        code = many.throw()
+        far = (many.x >= 20.0) & (code >= 0)
+        there = far & (many.side == 2)
+        if n <= THROWS:
+            right[n:] += int(there.sum())
+            wrong[n:] += int((far & ~there).sum())
+        times.append(np.full(int((far | (code < 0)).sum()), n))
+        many.keep(~far & (code >= 0))
+    times.append(np.full(many.x.size, 200))
+    return right, wrong, np.concatenate(times)
+
+
+def interval(count):
+    """Clopper and Pearson, 99.99 %."""
+    low = stats.beta.ppf(0.5e-4, count, PARTS - count + 1)
+    high = stats.beta.ppf(1.0 - 0.5e-4, count + 1, PARTS - count)
+    return np.nan_to_num(low, nan=0.0), np.nan_to_num(high, nan=1.0)
+
+
+def noisy(within=None, **more):
+    """A certificate of paper-initial, of which nothing is said by default."""
+    nothing = np.tile([0.0, 1.0], (THROWS + 1, 1))
+    steps = [np.linspace(1, 28, 700)] * 3
+    return certificate(
+        "initial",
+        LAWS,
+        [[side, f"{lo} in", f"{hi} in"] for side, lo, hi in SPANS],
+        {"right": [[2, "20 in", None]], "wrong": [[0, "20 in", None], [1, "20 in", None]]},
+        mesh("initial", steps, {side: [20.0] for side in range(3)}),
+        within or {"right": nothing, "wrong": nothing, "any": nothing},
+        **more,
+    )
+
+
+def entries_of(forged, tmp_path):
+    path = forged.write(tmp_path / "x.proof.zip")
+    return checker.report.open_and_look(path)
+
+
+@pytest.fixture(scope="module")
+def good(tmp_path_factory):
+    """The certificate that claims what the checker finds, and no more."""
+    with flint.ctx.workprec(checker.balls.PRECISION):
+        module, links = (sys.modules[f"{checker.__name__}.{name}"] for name in ("chances", "links"))
+        claim = module.read_chances(*entries_of(noisy(), tmp_path_factory.mktemp("probabilities")))
+        whole = module.mesh_of(claim.edges)
+        chain = links.chain_of(claim.noisy, whole, *module.kinds_of(claim, whole), lambda more: None)
+        row = module.start_row(claim, whole)
+        found = {name: module.check_within(chain, row, name, said)[1] for name, said in claim.within.items()}
+    return noisy(found, quantiles=[["any", "50 %", *median_of(found["any"])]], mean=[(2.0).hex(), None])
+
+
+def median_of(pair):
+    return int(np.flatnonzero(pair[:, 1] >= 0.5)[0]), int(np.flatnonzero(pair[:, 0] >= 0.5)[0])
+
+
+def test_brackets_of_the_checker_hold_what_is_thrown(good, thrown, tmp_path):
+    right, wrong, times = thrown
+    claimed = dict(
+        zip(section_of(good)["names"], (good.arrays[f"within.{k}"] for k in range(3)), strict=True)
+    )
+    for name, counts in (("right", right), ("wrong", wrong)):
+        low, high = interval(counts)
+        assert (low <= claimed[name][:, 1]).all()
+        assert (high >= claimed[name][:, 0]).all()
+        assert (claimed[name][:, 1] - claimed[name][:, 0]).max() < 0.02
+    assert claimed["any"][0].max() < 1e-8
+    _, _, lo, hi = section_of(good)["quantiles"][0]
+    assert lo <= np.median(times) <= hi
+    report = verdict(good, tmp_path)
+    assert (report.verdict, report.reason) == ("proved", "")
+
+
+# ------------------------------------------------------------------------------------------------- forgeries
+
+
+def changed(word, value, *path):
+    """Change an entry of the section."""
+
+    def change(forged):
+        at = section_of(forged)
+        for key in path:
+            at = at[key]
+        at[word] = value
+
+    return change
+
+
+def moved(name, column, by):
+    """Move a column of brackets from some throw on, where there is room."""
+
+    def change(forged):
+        forged.arrays[name][3:, column] += by
+
+    return change
+
+
+def quantile_of(by):
+    """Say that the median is one throw less, or one more."""
+
+    def change(forged):
+        row = section_of(forged)["quantiles"][0]
+        row[2:] = [0, row[2] - 1] if by < 0 else [row[3] + 1, row[3] + 1]
+
+    return change
+
+
+def without_edges(forged):
+    """A lying mesh: every other node is left out."""
+    for side in range(3):
+        forged.arrays[f"edges.{side}"] = forged.arrays[f"edges.{side}"][::2].copy()
+        forged.arrays[f"edges.{side}"][-1] = 28.0
+
+
+def fewer_sides(forged):
+    del forged.arrays["edges.2"]
+
+
+def shifted(forged):
+    """Brackets of n throws said of n + 1."""
+    forged.arrays["within.0"] = np.concatenate(
+        [forged.arrays["within.0"][:1], forged.arrays["within.0"][:-1]]
+    )
+
+
+def swapped(forged):
+    section_of(forged)["names"][:2] = "wrong", "right"
+
+
+FALSE = {
+    "landing narrower": changed("uniform", "0.1 in", "laws", "landing.x"),
+    "speed narrower": changed("uniform", "0.2 %", "laws", "throw.speed"),
+    "start law moved": changed(1, "10 in", "starts", 0),
+    "a start dropped": lambda forged: section_of(forged)["starts"].pop(),
+    "nodes dropped": without_edges,
+    "P lower end raised": moved("within.0", 0, 0.02),
+    "P upper end lowered": moved("within.0", 1, -0.02),
+    "quantile lowered": quantile_of(-1),
+    "quantile raised": quantile_of(1),
+    "share raised": changed(1, "99 %", "quantiles", 0),
+    "mean raised": changed("mean", [(200.0).hex(), None]),
+    "mean bounded": changed("mean", [(2.0).hex(), (3.0).hex()]),
+    "X moved": changed(1, "19 in", "absorbing", "right", 0),
+    "side swapped": changed(0, 1, "starts", 2),
+    "names swapped": swapped,
+    "n shifted": shifted,
+    "kappa changed": changed("kappa", "30 in", "scene", "throw"),
+    "strata few": changed("strata", 1),
+}
+
+
+@pytest.mark.parametrize("name", FALSE)
+def test_what_has_become_false_is_not_proved(good, tmp_path, name):
+    forged = good.copy()
+    FALSE[name](forged)
+    report = verdict(forged.seal(), tmp_path)
+    assert report.verdict == "failed", report.reason
+    assert report.reason.startswith("probabilities: ")
+
+
+ODD = {
+    "uniform laws only": changed("landing.x", {"gaussian": "0.2 in"}, "laws"),
+    "landing.x missing": lambda forged: section_of(forged)["laws"].pop("landing.x"),
+    "nothing is rechecked": changed("uniform", "0 in", "laws", "landing.x"),
+    "reaches 100": changed("uniform", "120 %", "laws", "throw.speed"),
+    "overlap": changed("wrong", [[2, "21 in", None]], "absorbing"),
+    "name no places": changed("exits", [[2, "10 in", "11 in"]], "absorbing"),
+    "names are not": changed("names", ["right", "elsewhere", "any"]),
+    "a place is not one of the arm": changed(1, "1 in", "starts", 2),
+    "the arrays are others": fewer_sides,
+    "do not span the arm": lambda f: f.arrays.update({"edges.0": f.arrays["edges.0"][10:].copy()}),
+    "do not ascend": lambda f: f.arrays.update({"edges.0": f.arrays["edges.0"][::-1].copy()}),
+    "strata is not": changed("strata", 65),
+    "kappa > ell": changed("kappa", "3 in", "scene", "throw"),
+    "a quantile is none": changed(1, "120 %", "quantiles", 0),
+    "bounds of the mean": changed("mean", [(3.0).hex(), (2.0).hex()]),
+    "has no boxes": lambda forged: forged.header.update(noise={"landing.x": "0.2 in"}),
+    "claims of probabilities": lambda forged: forged.header["claims"].append(
+        {"claim": "invariant", "section": {}}
+    ),
+    "different models": lambda forged: forged.header["map"].update(flip="energy"),
+    "not the one the header describes": None,
+}
+
+
+@pytest.mark.parametrize("said", ODD)
+def test_what_is_odd_is_refused_in_words(good, tmp_path, said):
+    forged = good.copy()
+    if ODD[said] is None:
+        forged.arrays["within.1"][4, 0] -= 1e-9
+    else:
+        ODD[said](forged)
+        forged.seal()
+    report = verdict(forged, tmp_path)
+    assert report.verdict == "bad file"
+    assert said in report.reason
+
+
+# ------------------------------------------------------------------------------------------------- from the package
+
+
+def test_brackets_are_saved_and_rechecked(tmp_path):
+    found = absorption_brackets(
+        "paper-initial",
+        Scattering(speed=Uniform(0.005), landing=Uniform(0.2)),
+        right=(20.0, 2),
+        wrong=20.0,
+        cells=150,
+        throws=4,
+        mean=False,
+    )
+    file = found.save(tmp_path / "initial.proof.zip")
+    report = ls.recheck(file)
+    assert (report.verdict, report.claims) == ("proved", [("probabilities", "proved", "")])
+    with pytest.raises(DeniedError, match="is claimed"):
+        found.save(file, allowance=-0.02)
+    assert ls.recheck(file).verdict == "proved"
+    assert ls.recheck(tmp_path / "initial.denied.zip").verdict == "failed"
+
+
+def test_laws_that_are_not_rechecked_are_refused(tmp_path):
+    for scatter in (Scattering(landing=Gaussian(0.1)), Scattering(speed=Uniform(0.01))):
+        found = absorption_brackets("paper-initial", scatter, right=(20.0, 2), cells=60, throws=1, mean=False)
+        with pytest.raises(ls.errors.AnswerError, match="uniform law of the landing place"):
+            found.save(tmp_path / "x.proof.zip")
