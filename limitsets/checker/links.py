@@ -193,7 +193,7 @@ class Links:
         return Border((float(cut[0]), float(cut[1])), int(not rises), int(rises), gap, near, places)
 
     def by_speed(self, cell: int, ends: tuple[float, float], x: Arb) -> Arb:
-        """Enclose how what decides changes with the speed, over all speeds; in pieces where its sign is not seen at once."""
+        """Enclose how what decides changes with the speed, over all speeds, in pieces where need be."""
         phi, deviations = self.box(cell)
         _, whole = deciding_slopes(self.side, phi, x, kappa_at(self.noisy.kappa, deviations), 1 + deviations)
         if whole > 0 or whole < 0:

@@ -1,4 +1,4 @@
-"""The claim `probabilities`: the checker's own brackets against a chain solved by hand and against throws, and forgeries.
+"""The claim `probabilities`: the checker's brackets against a chain solved by hand and against throws; forgeries.
 
 The certificates are put together here, not by the package.
 """
