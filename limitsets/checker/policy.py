@@ -1,0 +1,417 @@
+"""A policy for a sensor of one bit: how its file is read, and that its table does what it says.
+
+docs/certificates.md, "Policies".  The table is checked by whole numbers (17 and 18); what it rests on is that the image
+of each cell of a belief lies in the cells named, which is checked in balls for every throw that is made (2 to 4).
+"""
+
+import re
+from collections.abc import Callable
+from fractions import Fraction
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from .balls import Array
+from .cells import Crew, first_bad, tasks_of
+from .file import Cells, read_array
+from .model import FULL_TURN
+from .scene import Scene, read_scene
+from .texts import LENGTHS, Quantity, hex_float, plain, quantity, read_side, require, rounded, rows, table
+
+STOP = NONE = -1  # no throw, or no state: the answer cannot come, or the part is caught
+MOST_STATES = 100_000
+MOST_CHOICES = 16  # throws to choose from
+MODES = ("stop", "catch")
+WORDS = r"[^\x00-\x1f\x7f]{1,64}"
+
+
+class Sensor(NamedTuple):
+    """A question: about a side, or whether the part is beyond a place, told to within an error; both None: nothing."""
+
+    side: int | None
+    place: Quantity | None
+    error: Quantity | None
+
+
+class Choice(NamedTuple):
+    """A throw to choose: its name, the quantity that is given, and the scene in which it is made."""
+
+    name: str
+    given: str
+    scene: Scene
+
+
+class Policy(NamedTuple):
+    """The content of a file: read, and not yet believed."""
+
+    raw: dict[str, Any]
+    noise: object
+    choices: list[Choice]
+    sensor: Sensor
+    mode: str
+    x: Quantity
+    side: int
+    starts: list[tuple[int, float, float]]
+    within: int
+    first: list[int]  # by answer the state to begin in
+    cells: list[Cells]  # of each throw: the same borders, other images
+    throw: Array
+    left: Array
+    after: Array
+    belief: Array  # state, first and last cell
+
+    def at(self, where: Quantity) -> Fraction:
+        """Give a place in the unit of the arm's length."""
+        return where.lo / LENGTHS[self.choices[0].scene.unit]
+
+
+def holds_policy(header: dict[str, Any]) -> bool:
+    """Whether a file claims a policy."""
+    claims = header.get("claims")
+    return isinstance(claims, list) and any(
+        isinstance(c, dict) and c.get("claim") == "policy" for c in claims
+    )
+
+
+# ------------------------------------------------------------------------------------------------- reading
+
+
+def read_policy(header: dict[str, Any], entries: dict[str, memoryview]) -> Policy:
+    """Read a file; raises BadFileError."""
+    (claim,) = rows(header["claims"], "claims of a policy", 1, 1)
+    table(claim, "a claim", "claim section")
+    section = table(claim["section"], "section of policy", "scene mode goal starts within first")
+    alone = header["boxes"] == [] and header["tolerance"] is None
+    require(alone, "a policy has no boxes and no tolerance")
+    raw, noise = section["scene"], header["noise"]
+    require(isinstance(raw, dict) and "feedback" in raw, "the scene has no feedback")
+    require("goal" not in raw, "the scene has a goal of its own")
+    has = table(raw["feedback"], "feedback", "throws", "sensor")
+    choices = [read_choice(each, raw, noise) for each in rows(has["throws"], "throws", 1, MOST_CHOICES)]
+    require(len({each.name for each in choices}) == len(choices), "two throws have one name")
+    n_sides = len(choices[0].scene.sides)
+    sensor = read_sensor(has.get("sensor"), n_sides)
+    goal = table(section["goal"], "goal of policy", "x side")
+    x, side = one_length(goal["x"], "goal.x"), read_side(goal["side"], n_sides)
+    mode = section["mode"]
+    require(mode in MODES, "mode is neither stop nor catch")
+    check_cavity(raw, mode, x)
+    within = section["within"]
+    require(type(within) is int and within >= 0, "within is not a number of throws")
+    words = answers_of_sensor(sensor)
+    begin = table(section["first"], "first", " ".join(words))
+    first = [NONE if begin[word] is None else begin[word] for word in words]
+    require(all(type(k) is int for k in first), "first holds no number of a state")
+    cells, own = read_arrays(header["arrays"], entries, len(choices), n_sides, len(words))
+    starts = [read_start(row, n_sides) for row in rows(section["starts"], "starts", 1, MOST_STATES)]
+    return Policy(raw, noise, choices, sensor, mode, x, side, starts, within, first, cells, *own)
+
+
+def read_choice(value: object, raw: dict[str, Any], noise: object) -> Choice:
+    """Read a throw: it stands in the place of the scene's own."""
+    one = table(value, "a throw to choose", "name", "kappa speed")
+    name = one["name"]
+    require(isinstance(name, str) and re.fullmatch(WORDS, name) is not None, "a throw has no name")
+    given = {key: text for key, text in one.items() if key != "name"}
+    require(len(given) == 1, "a throw to choose: either kappa or speed")
+    ((key, text),) = given.items()
+    value = quantity(text, "length" if key == "kappa" else "speed", f"{plain(name)}.{key}")
+    require(value.lo == value.hi, "a throw to choose is not one number")
+    return Choice(plain(name), f"{key} = {value}", read_scene({**raw, "throw": given}, noise))
+
+
+def read_sensor(value: object, n_sides: int) -> Sensor:
+    """Read what is asked."""
+    if value is None:
+        return Sensor(None, None, None)
+    asked = table(value, "sensor", "", "beyond error side")
+    if "side" in asked:
+        require(len(asked) == 1, "the sensor asks two questions, or a side has an error")
+        return Sensor(read_side(asked["side"], n_sides), None, None)
+    require("beyond" in asked, "the sensor asks nothing")
+    place = one_length(asked["beyond"], "sensor.beyond")
+    none = place._replace(lo=Fraction(0), hi=Fraction(0))
+    error = one_length(asked["error"], "sensor.error") if "error" in asked else none
+    require(error.lo >= 0, "the sensor's error is negative")
+    return Sensor(None, place, error)
+
+
+def answers_of_sensor(sensor: Sensor) -> list[str]:
+    """Name the answers, in the order of the arrays."""
+    return ["any"] if sensor.side is None and sensor.place is None else ["yes", "no"]
+
+
+def one_length(value: object, where: str) -> Quantity:
+    """Read a length that is no interval."""
+    length = quantity(value, "length", where)
+    require(length.lo == length.hi, f"{where} is not one number")
+    return length
+
+
+def check_cavity(raw: dict[str, Any], mode: str, x: Quantity) -> None:
+    """Require that parts are caught where the scene has its cavity."""
+    cavity = raw.get("cavity")
+    if mode == "catch" and cavity is not None:
+        require(isinstance(cavity, dict) and "position" in cavity, "the cavity has no position")
+        at = one_length(cavity["position"], "cavity.position")
+        require(at.lo == x.lo, "parts are caught elsewhere than where the cavity begins")
+
+
+def read_start(value: object, n_sides: int) -> tuple[int, float, float]:
+    """Read an interval of starts."""
+    side, lo, hi = rows(value, "starts", 3, 3)
+    ends = hex_float(lo, "starts"), hex_float(hi, "starts")
+    require(ends[0] <= ends[1], "an interval of starts is empty")
+    return read_side(side, n_sides), *ends
+
+
+def read_arrays(
+    said: object, entries: dict[str, memoryview], throws: int, n_sides: int, answers: int
+) -> tuple[list[Cells], tuple[Array, Array, Array, Array]]:
+    """Read the cells with the images under every throw, and the table."""
+    require(isinstance(said, dict), "arrays is not an object")
+    assert isinstance(said, dict)
+    read = set[str]()
+
+    def array(name: str, dtype: str, columns: int = 1) -> Array:
+        require(f"{name}.npy" in entries, f"array {name} is missing")
+        read.add(name)
+        return read_array(entries[f"{name}.npy"], name, dtype, columns, said.get(name))
+
+    edges = [array(f"edges.{i}", "<f8") for i in range(n_sides)]
+    require(all(len(e) >= 2 and bool((np.diff(e) > 0).all()) for e in edges), "the borders do not ascend")
+    n = sum(len(e) - 1 for e in edges)
+    cells = []
+    for k in range(throws):
+        jog, flip, phi = (array(f"{k}.{name}", dtype, 2) for name, dtype in IMAGES)
+        require(len(jog) == len(flip) == len(phi) == n, "the images do not fit the cells")
+        nothing = np.zeros(n, dtype=np.int64)
+        cells.append(
+            Cells(edges, jog.astype(np.int64), flip.astype(np.int64), nothing, nothing, nothing, phi)
+        )
+    throw, left, after = array("throw", "<i4"), array("left", "<i4"), array("after", "<i4", answers)
+    belief = array("belief", "<i4", 3)
+    require(0 < len(throw) <= MOST_STATES, "there are no states, or too many")
+    require(len(throw) == len(left) == len(after), "the table does not have one row for each state")
+    named = read == set(said) and {f"{name}.npy" for name in read} == set(entries)
+    require(named, "there are other arrays too")
+    return cells, (throw, left, after.reshape(len(throw), answers), belief)
+
+
+IMAGES = (("jog", "<i4"), ("flip", "<i4"), ("phi", "<f8"))
+
+
+# ------------------------------------------------------------------------------------------------- the table
+
+
+class Board(NamedTuple):
+    """Sets of cells: where each answer may come, where the part is wanted, and where it may be caught wrongly."""
+
+    answers: list[Array]
+    won: Array
+    lost: Array
+
+
+def board_of(policy: Policy) -> Board:
+    """Compare the borders of the cells with the places of sensor and goal, as exact numbers."""
+    c = policy.cells[0]
+    x, on = policy.at(policy.x), c.side == policy.side
+    won = on & reaching(c.lower(), x)
+    lost = ~on & beyond(c.upper(), x) & (policy.mode == "catch")
+    place, error = policy.sensor.place, policy.sensor.error
+    if place is not None and error is not None:
+        nearest, farthest = policy.at(place) - policy.at(error), policy.at(place) + policy.at(error)
+        return Board([beyond(c.upper(), nearest), ~beyond(c.lower(), farthest)], won, lost)
+    if policy.sensor.side is not None:
+        asked = c.side == policy.sensor.side
+        return Board([asked, ~asked], won, lost)
+    return Board([np.ones(len(on), dtype=bool)], won, lost)
+
+
+def beyond(values: Array, limit: Fraction) -> Array:
+    """Tell which floats are above a rational number."""
+    return np.array([Fraction(value) > limit for value in values.tolist()], dtype=bool)
+
+
+def reaching(values: Array, limit: Fraction) -> Array:
+    """Tell which floats are not below a rational number."""
+    return np.array([Fraction(value) >= limit for value in values.tolist()], dtype=bool)
+
+
+def check_policy(
+    policy: Policy, workers: int, progress: Callable[[int, int], None] | None
+) -> tuple[str, int]:
+    """Check the table, and the images that it rests on; "" or the reason, and the number of boxes looked at."""
+    bad = check_ranges(policy)
+    if bad:
+        return bad, 0
+    board = board_of(policy)
+    bad = check_starts(policy, board)
+    if bad:
+        return bad, 0
+    made = [np.zeros(len(board.won), dtype=bool) for _ in policy.choices]
+    for state in range(len(policy.throw)):
+        bad = check_state(policy, board, state)
+        if bad:
+            return f"state {state}: {bad}", 0
+        if policy.throw[state] != STOP:
+            made[policy.throw[state]] |= mask_of(policy, state)
+    return check_images(policy, made, workers, progress)
+
+
+def check_ranges(policy: Policy) -> str:
+    """Check that all numbers of states, throws and cells are those of one; "" or the reason."""
+    n, states = len(policy.cells[0].side), len(policy.throw)
+    state, first, last = policy.belief.T
+    for good, what in (
+        (
+            ((policy.throw >= STOP) & (policy.throw < len(policy.choices))),
+            "a throw is none of those to choose from",
+        ),
+        (((policy.after >= NONE) & (policy.after < states)), "a next state is none"),
+        (policy.left >= 0, "a number of throws left is negative"),
+        ((state >= 0) & (state < states), "a belief is that of no state"),
+        (np.diff(state) >= 0, "the beliefs are not in the order of the states"),
+        ((first >= 0) & (first <= last) & (last < n), "a belief names cells that are none"),
+        (np.array([NONE <= k < states for k in policy.first]), "the state to begin in is none"),
+    ):
+        if not good.all():
+            return what
+    return ""
+
+
+def mask_of(policy: Policy, state: int) -> Array:
+    """Give the cells in which the part may lie in a state."""
+    begin, end = np.searchsorted(policy.belief[:, 0], [state, state + 1])
+    return spread(policy.belief[begin:end, 1:], len(policy.cells[0].side))
+
+
+def spread(ranges: Array, n: int) -> Array:
+    """Mark the cells of ranges."""
+    steps = np.zeros(n + 1, dtype=np.int64)
+    np.add.at(steps, ranges[:, 0], 1)
+    np.add.at(steps, ranges[:, 1] + 1, -1)
+    return np.asarray(np.cumsum(steps[:-1]) > 0)
+
+
+def check_starts(policy: Policy, board: Board) -> str:
+    """Check that the starts lie on the cells, and in the beliefs to begin with; "" or the reason."""
+    c = policy.cells[0]
+    begin = np.zeros(len(c.side), dtype=bool)
+    for side, lo, hi in policy.starts:
+        edges = c.edges[side]
+        if not edges[0] <= lo <= hi <= edges[-1]:
+            return f"the starts [{lo!r}, {hi!r}] on side {side} do not lie on the cells"
+        inside = (c.upper() > lo) & (c.lower() < hi) if lo < hi else (c.upper() >= lo) & (c.lower() <= hi)
+        begin |= (c.side == side) & inside
+    if policy.mode == "catch" and (begin & beyond(c.upper(), policy.at(policy.x))).any():
+        return "parts in some of the starts are caught at once"
+    for answer, state in zip(board.answers, policy.first, strict=True):
+        heard = begin & answer
+        if heard.any() and (state == NONE or (heard & ~mask_of(policy, state)).any()):
+            return "the state to begin in does not hold all starts with its answer"
+        if state != NONE and policy.left[state] > policy.within:
+            return f"more than {policy.within} throws may be needed"
+    return ""
+
+
+def check_state(policy: Policy, board: Board, state: int) -> str:
+    """Check that a state stops in the goal region, or that its throw leads to states that hold what may be; "" or why.
+
+    The number of throws left falls with every throw, so that no policy goes round for ever.
+    """
+    throw, belief = int(policy.throw[state]), mask_of(policy, state)
+    if throw == STOP:
+        known = policy.mode == "stop" and not (belief & ~board.won).any()
+        return "" if known else "it stops where the part may lie off the goal region"
+    c = policy.cells[throw]
+    bad = check_targets(c, belief)
+    if bad:
+        return bad
+    ranges = np.concatenate([each[belief & (each[:, 0] >= 0)] for each in (c.jog, c.flip)])
+    image = spread(ranges, len(belief))
+    if (image & board.lost).any():
+        return "its throw may bring the part down on a wrong side"
+    if policy.mode == "catch":
+        image &= ~board.won
+    if policy.left[state] < 1:
+        return "it throws, and no throw is left"
+    for answer, after in zip(board.answers, policy.after[state].tolist(), strict=True):
+        heard = image & answer
+        if heard.any() and (after == NONE or (heard & ~mask_of(policy, after)).any()):
+            return "the state after an answer does not hold all that may be"
+        if after != NONE and not policy.left[after] < policy.left[state]:
+            return "the number of throws left does not fall"
+    return ""
+
+
+def check_targets(c: Cells, some: Array) -> str:
+    """Check the brackets of the angle and the target cells of some cells; "" or the reason."""
+    lo, hi = c.phi.T
+    checks = [(~some | ((lo > 0) & (lo < hi) & (hi <= FULL_TURN)), "the bracket of phi is not one")]
+    n_sides = len(c.edges)
+    for array, target in ((c.jog, c.side), (c.flip, (c.side + 1) % n_sides)):
+        first, last = array.T
+        inside = (first >= c.start[target]) & (first <= last) & (last < c.start[target + 1])
+        none = (first == -1) & (last == -1)
+        checks.append((~some | inside | none, "its target cells are not those of one side"))
+    return first_bad(c, checks)
+
+
+def check_images(
+    policy: Policy, made: list[Array], workers: int, progress: Callable[[int, int], None] | None
+) -> tuple[str, int]:
+    """Check decision, landing and image of every cell from which a throw is made; "" or why, and the boxes."""
+    total = sum(int(some.sum()) for some in made)
+    told = None if progress is None else (lambda done: progress(done, total))
+    crew = Crew([each.scene.raw for each in policy.choices], policy.noise, workers, told)
+    try:
+        for k, some in enumerate(made):
+            found = crew.run(
+                list(tasks_of(policy.cells[k], policy.choices[k].scene, k, np.flatnonzero(some), None))
+            )
+            if found is not None:
+                name = f"the throw {policy.choices[k].name}"
+                return f"{name}, {policy.cells[k].name(found[0])}: {found[1].text}", crew.boxes
+    finally:
+        crew.close()
+    return "", crew.boxes
+
+
+# ------------------------------------------------------------------------------------------------- words
+
+
+def policy_in_words(policy: Policy) -> list[str]:
+    """Say what is claimed."""
+    there = f"on side {policy.side} at x >= {policy.x}"
+    ends = {
+        "stop": f"is brought to lie {there}, and the controller, which stops then, knows it",
+        "catch": f"comes to rest {there}, where it is caught, and nowhere before at x >= {policy.x} on another side",
+    }[policy.mode]
+    noisy = "for every sequence of throws, " if policy.noise is not None else ""
+    starts = "; ".join(
+        f"side {side}: [{rounded(lo, up=True)}, {rounded(hi, up=False)}]"
+        for side, lo, hi in policy.starts[:12]
+    )
+    caught = f" (those at x < {policy.x}: the others are caught at once)" if policy.mode == "catch" else ""
+    more = " ..." if len(policy.starts) > 12 else ""
+    return [
+        f"policy: {noisy}from every start named the part {ends}, after {policy.within} throws at most (an upper bound)",
+        f"starts{caught}: {starts}{more}",
+        "throws to choose from: " + "; ".join(f"{each.name}: {each.given}" for each in policy.choices),
+        f"asked before the first throw and after each: {question_in_words(policy)}",
+        f"states of the policy: {len(policy.throw)}",
+    ]
+
+
+def question_in_words(policy: Policy) -> str:
+    """Say what the sensor is asked, and how well it answers."""
+    sensor = policy.sensor
+    if sensor.place is not None and sensor.error is not None:
+        told = (
+            f", where it is farther from there than {sensor.error}; nearer any answer"
+            if sensor.error.lo
+            else ""
+        )
+        return f"is the part beyond {sensor.place}?{told}"
+    return "nothing" if sensor.side is None else f"does the part lie on side {sensor.side}?"
