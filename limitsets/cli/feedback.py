@@ -77,7 +77,7 @@ def feedback(
             tried = list(zip(at, places(chosen, at, error=place(chosen, error), **options), strict=True))
             found = min((each for _, each in tried), key=lambda each: (not each.solved, each.found.throws))
         written = None
-        if certificate is not None and found.solved:
+        if certificate is not None:
             tell("recheck", 0, 1)
             found, written = _certified(found, certificate, recheck=not no_recheck)
         thrown = simulate(found, parts) if found.solved else None
@@ -102,6 +102,8 @@ def _certified(found: Synthesis, file: Path, *, recheck: bool) -> tuple[Synthesi
     """Write the certificate; what is left where the checker denies it, and what is said of the file."""
     from limitsets.proofs.confirm import DeniedError
 
+    if not found.solved:
+        return found, {"file": None, "denied": False, "recheck": None}
     begin = time.perf_counter()
     with saved(file) as draft:
         try:
@@ -221,6 +223,8 @@ def _text(
 
 def _said(written: dict[str, Any]) -> str:
     file, seconds = written["file"], written["recheck"]
+    if file is None:
+        return "no certificate is written: there is no policy"
     if written["denied"]:
         return f"the checker denies the certificate: it is kept as {file}"
     done = "not rechecked" if seconds is None else f"rechecked in {seconds:.2g} s"

@@ -80,7 +80,7 @@ class BeyondSensor(Sensor):
 
     @property
     def cuts(self) -> tuple[float, float]:
-        """The largest floats not above s - error and s + error: borders of cells; between them either answer may come."""
+        """The largest floats not above s - error and s + error; between them either answer may come."""
         place, error = Fraction(self.x), Fraction(repr(self.error))
         return _below(place - error), _below(place + error)
 
