@@ -1,7 +1,7 @@
 """A policy for a sensor of one bit: how its file is read, and that its table does what it says.
 
-docs/certificates.md, "Policies".  The table is checked by whole numbers (17 and 18); what it rests on is that the image
-of each cell of a belief lies in the cells named, which is checked in balls for every throw that is made (2 to 4).
+docs/certificates.md, "Policies" and "Tables of a policy".  The table is checked by whole numbers.  It rests on the images
+of the cells, which are checked in balls for every throw that is made (2 to 4).
 """
 
 import re
@@ -18,11 +18,11 @@ from .model import FULL_TURN
 from .scene import Scene, read_scene
 from .texts import LENGTHS, Quantity, hex_float, plain, quantity, read_side, require, rounded, rows, table
 
-STOP = NONE = -1  # no throw, or no state: the answer cannot come, or the part is caught
+STOP = NO_STATE = -1  # no throw; no state: the answer cannot come, or the part is caught
 MOST_STATES = 100_000
 MOST_CHOICES = 16  # throws to choose from
 MODES = ("stop", "catch")
-WORDS = r"[^\x00-\x1f\x7f]{1,64}"
+NAME_OF_THROW = r"[^\x00-\x1f\x7f]{1,64}"
 
 
 class Sensor(NamedTuple):
@@ -100,7 +100,7 @@ def read_policy(header: dict[str, Any], entries: dict[str, memoryview]) -> Polic
     require(type(within) is int and within >= 0, "within is not a number of throws")
     words = answers_of_sensor(sensor)
     begin = table(section["first"], "first", " ".join(words))
-    first = [NONE if begin[word] is None else begin[word] for word in words]
+    first = [NO_STATE if begin[word] is None else begin[word] for word in words]
     require(all(type(k) is int for k in first), "first holds no number of a state")
     cells, own = read_arrays(header["arrays"], entries, len(choices), n_sides, len(words))
     starts = [read_start(row, n_sides) for row in rows(section["starts"], "starts", 1, MOST_STATES)]
@@ -111,7 +111,7 @@ def read_choice(value: object, raw: dict[str, Any], noise: object) -> Choice:
     """Read a throw: it stands in the place of the scene's own."""
     one = table(value, "a throw to choose", "name", "kappa speed")
     name = one["name"]
-    require(isinstance(name, str) and re.fullmatch(WORDS, name) is not None, "a throw has no name")
+    require(isinstance(name, str) and re.fullmatch(NAME_OF_THROW, name) is not None, "a throw has no name")
     given = {key: text for key, text in one.items() if key != "name"}
     require(len(given) == 1, "a throw to choose: either kappa or speed")
     ((key, text),) = given.items()
@@ -246,7 +246,7 @@ def check_policy(
     if bad:
         return bad, 0
     board = board_of(policy)
-    bad = check_starts(policy, board)
+    bad = check_begin(policy, board)
     if bad:
         return bad, 0
     made = [np.zeros(len(board.won), dtype=bool) for _ in policy.choices]
@@ -268,12 +268,12 @@ def check_ranges(policy: Policy) -> str:
             ((policy.throw >= STOP) & (policy.throw < len(policy.choices))),
             "a throw is none of those to choose from",
         ),
-        (((policy.after >= NONE) & (policy.after < states)), "a next state is none"),
+        (((policy.after >= NO_STATE) & (policy.after < states)), "a next state is none"),
         (policy.left >= 0, "a number of throws left is negative"),
         ((state >= 0) & (state < states), "a belief is that of no state"),
         (np.diff(state) >= 0, "the beliefs are not in the order of the states"),
         ((first >= 0) & (first <= last) & (last < n), "a belief names cells that are none"),
-        (np.array([NONE <= k < states for k in policy.first]), "the state to begin in is none"),
+        (np.array([NO_STATE <= k < states for k in policy.first]), "the state to begin in is none"),
     ):
         if not good.all():
             return what
@@ -294,7 +294,7 @@ def spread(ranges: Array, n: int) -> Array:
     return np.asarray(np.cumsum(steps[:-1]) > 0)
 
 
-def check_starts(policy: Policy, board: Board) -> str:
+def check_begin(policy: Policy, board: Board) -> str:
     """Check that the starts lie on the cells, and in the beliefs to begin with; "" or the reason."""
     c = policy.cells[0]
     begin = np.zeros(len(c.side), dtype=bool)
@@ -308,9 +308,9 @@ def check_starts(policy: Policy, board: Board) -> str:
         return "parts in some of the starts are caught at once"
     for answer, state in zip(board.answers, policy.first, strict=True):
         heard = begin & answer
-        if heard.any() and (state == NONE or (heard & ~mask_of(policy, state)).any()):
+        if heard.any() and (state == NO_STATE or (heard & ~mask_of(policy, state)).any()):
             return "the state to begin in does not hold all starts with its answer"
-        if state != NONE and policy.left[state] > policy.within:
+        if state != NO_STATE and policy.left[state] > policy.within:
             return f"more than {policy.within} throws may be needed"
     return ""
 
@@ -338,9 +338,9 @@ def check_state(policy: Policy, board: Board, state: int) -> str:
         return "it throws, and no throw is left"
     for answer, after in zip(board.answers, policy.after[state].tolist(), strict=True):
         heard = image & answer
-        if heard.any() and (after == NONE or (heard & ~mask_of(policy, after)).any()):
+        if heard.any() and (after == NO_STATE or (heard & ~mask_of(policy, after)).any()):
             return "the state after an answer does not hold all that may be"
-        if after != NONE and not policy.left[after] < policy.left[state]:
+        if after != NO_STATE and not policy.left[after] < policy.left[state]:
             return "the number of throws left does not fall"
     return ""
 

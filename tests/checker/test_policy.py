@@ -399,7 +399,7 @@ def test_a_lie_is_denied(tmp_path, known, name, spoil):
 
 
 def test_where_it_is_caught_is_no_matter_of_choice(tmp_path, known):
-    """The place is that of the scene's cavity; without one, a part at 20 in goes on where it is caught from 25 in on."""
+    """The place is that of the scene's cavity; without one, a part is not caught at 20 in but at 25 in."""
     forged = known["catch"][1].copy()
     section_of(forged)["goal"]["x"] = "25 in"
     assert verdict_of(forged, tmp_path)[0] == "bad file"
@@ -407,6 +407,14 @@ def test_where_it_is_caught_is_no_matter_of_choice(tmp_path, known):
     verdict, reason = verdict_of(forged, tmp_path)
     assert verdict == "failed"
     assert "does not hold all that may be" in reason
+
+
+def test_a_wrong_side_is_not_caught_on(tmp_path, known):
+    forged = known["catch"][1].copy()
+    section_of(forged)["goal"]["side"] = 1
+    verdict, reason = verdict_of(forged, tmp_path)
+    assert verdict == "failed"
+    assert "down on a wrong side" in reason
 
 
 def test_what_is_weaker_is_still_true(tmp_path, known):
