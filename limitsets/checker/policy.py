@@ -1,7 +1,7 @@
 """A policy for a sensor of one bit: how its file is read, and that its table does what it says.
 
-docs/certificates.md, "Policies" and "Tables of a policy".  The table is checked by whole numbers.  It rests on the images
-of the cells, which are checked in balls for every throw that is made (2 to 4).
+docs/certificates.md, "Policies" and "Tables of a policy".  The table is checked by whole numbers.  It rests on the
+images of the cells, which are checked in balls for every throw that is made (2 to 4).
 """
 
 import re
