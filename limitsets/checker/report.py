@@ -14,6 +14,7 @@ from typing import Any
 import flint
 
 from .balls import PRECISION
+from .beliefs import check_policy
 from .cells import Crew, extents
 from .claims import check_box_claims, read_claims, statement_of
 from .file import Cells, open_certificate, read_cells
@@ -31,7 +32,7 @@ from .plane import (
     raster_of,
     read_plane,
 )
-from .policy import Policy, check_policy, holds_policy, policy_in_words, read_policy
+from .policy import Policy, holds_policy, policy_in_words, read_policy
 from .scene import Scene, check_parameters, check_tolerance, over_halves, quantities, read_scene
 from .starts import ATTRACTING, first_version_starts, shares
 from .texts import KINDS, BadFileError, plain, quantity, require, rows, table
