@@ -14,8 +14,9 @@ pytest.importorskip("flint", reason="the checker needs python-flint")
 
 import limitsets as ls
 from limitsets.errors import AnswerError
-from limitsets.policies import broken, places
+from limitsets.policies import Policy, broken, places
 from limitsets.policies.enclosed_starts import not_within
+from limitsets.policies.writing import write
 from limitsets.proofs.confirm import DeniedError
 from limitsets.scene.sensing import BeyondSensor, SideSensor
 from tests.proofs.forge import Forged
@@ -415,6 +416,35 @@ def test_a_wrong_side_is_not_caught_on(tmp_path, known):
     verdict, reason = verdict_of(forged, tmp_path)
     assert verdict == "failed"
     assert "down on a wrong side" in reason
+
+
+def test_starts_that_are_caught_at_once_are_none(tmp_path, known):
+    forged = known["catch"][1].copy()
+    section_of(forged)["starts"][0][2] = (20.5).hex()
+    verdict, reason = verdict_of(forged, tmp_path)
+    assert verdict == "failed"
+    assert "caught at once" in reason
+
+
+def test_what_goes_on_for_ever_is_no_policy(tmp_path):
+    """Every image holds: cells that the part's own throw maps into themselves, and a state that comes after itself."""
+    found = ls.feedback(scene_with(), "none", cells=256, throws=1)  # from the limit set of its own throw
+    assert not found.solved
+    forever = Policy(
+        answers=("",),
+        throws=("own", "fast"),
+        first=np.array([0]),
+        belief=found.starts.mask[None],
+        throw=np.array([0]),
+        after=np.array([[0]]),
+        left=np.array([1]),
+    )
+    file = write(tmp_path / "x.proof.zip", found, None, forever, recheck=False, workers=1)
+    report = ls.recheck(file)
+    assert (report.verdict, report.reason) == (
+        "failed",
+        "policy: state 0: the number of throws left does not fall",
+    )
 
 
 def test_what_is_weaker_is_still_true(tmp_path, known):
