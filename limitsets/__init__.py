@@ -22,6 +22,7 @@ if TYPE_CHECKING:  # each from the file that holds it: most rooms have a file of
     from limitsets.analysis import analyse
     from limitsets.auditing import audit
     from limitsets.cells import grid
+    from limitsets.fitting import fit
     from limitsets.graph.morse import morse_graph
     from limitsets.graph.transitions import transitions
     from limitsets.inverse import design, robust_design
@@ -56,6 +57,7 @@ _ROOMS = {
     "design": "inverse",
     "dump": "scene",
     "engine": "engine",
+    "fit": "fitting",
     "grid": "cells",
     "interval": "interval",
     "limit_set": "sets.limit_set",
@@ -88,6 +90,7 @@ __all__ = [
     "design",
     "dump",
     "engine",
+    "fit",
     "grid",
     "interval",
     "limit_set",

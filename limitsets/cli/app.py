@@ -11,6 +11,7 @@ from limitsets.cli.atlas import atlas
 from limitsets.cli.audit import audit
 from limitsets.cli.certify import certify
 from limitsets.cli.design import design
+from limitsets.cli.fit import fit
 from limitsets.cli.margin import margin
 from limitsets.cli.plot import plot
 from limitsets.cli.recheck import recheck
@@ -48,5 +49,18 @@ def limitsets(
     """
 
 
-for command in (scenes, analyse, throw, plot, certify, recheck, audit, margin, robustness, design, atlas):
+for command in (
+    scenes,
+    analyse,
+    throw,
+    plot,
+    certify,
+    recheck,
+    audit,
+    margin,
+    robustness,
+    design,
+    atlas,
+    fit,
+):
     app.command()(command)

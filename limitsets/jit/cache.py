@@ -52,6 +52,7 @@ KERNEL_FREE = {
     "resilience",
     "robust",
     "regions",
+    "fitting",
     "inverse",
     "sweep",
     "plot",

@@ -23,6 +23,7 @@ from limitsets.plot.maps import map  # noqa: A004 - ls.plot.map is the word for 
 from limitsets.plot.margins import margin_curve, tolerance_box, tornado
 from limitsets.plot.morse_graphs import morse
 from limitsets.plot.noise import noise_arrivals, noise_density, noise_levels
+from limitsets.plot.residuals import fit_residuals
 
 __all__ = [
     "atlas",
@@ -32,6 +33,7 @@ __all__ = [
     "bifurcation",
     "counterexample",
     "design",
+    "fit_residuals",
     "flight",
     "limit_set",
     "map",

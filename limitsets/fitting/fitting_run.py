@@ -1,0 +1,329 @@
+"""`limitsets.fit`: speed, centre of mass, surface height and radius of gyration from filmed throws."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from limitsets.errors import AnswerError, DataError
+from limitsets.fitting.fit_result import Fit, Fitted, Scatter, fitted_scene
+from limitsets.fitting.further import further_throws
+from limitsets.fitting.likelihood import SCATTERS, Likelihood, whitened
+from limitsets.fitting.maximising import End, Maximum, end_of_profile, maximised
+from limitsets.fitting.misfit import Misfit, misfit
+from limitsets.fitting.rows import Rows, as_recorded, assigned
+from limitsets.fitting.starting import (
+    RADIUS,
+    Start,
+    jacobian,
+    robust_start,
+    spread_of,
+    units_of_change,
+)
+from limitsets.fitting.throws import Throws, length_of, read_throws
+from limitsets.scene import Scene, load
+from limitsets.scene.quantities import base_unit, find
+
+__all__ = ["fit"]
+
+# Share of the region's volume over all repetitions of the film.
+LEVEL = 0.95
+# Differences of readings of one place from which an error of measurement is taken.
+READ_TWICE = 10
+# Values of the radius of gyration that are tried first, as shares of the scene's.
+RADII = np.linspace(0.4, 1.8, 57)
+# Rounds of taking the rows anew, and of better maxima met on the way along a profile.
+ROUNDS = 4
+
+Array = NDArray[np.float64]
+Progress = Callable[[str, int, int], None]
+
+
+def fit(
+    scene: Scene | str | Path,
+    throws: Throws | str | Path,
+    *,
+    error: float | str | None = None,
+    progress: Progress | None = None,
+) -> Fit:
+    """Fit a scene to filmed throws.
+
+    Parameters
+    ----------
+    scene : Scene, str or Path
+        The machine as far as it is known, in the minimal model; the sides of the part stay as they are.
+    throws : str, Path or Throws
+        A CSV file (`limitsets.fitting.read_throws`), or throws that were read.
+    error : str or float, optional
+        Standard deviation of a measured place, "0.5 mm" or in the scene's unit, where the file has no such column.
+        Where neither is given it is taken from places that were read twice (column `run`), and without these it counts
+        as unknown: the scatter is then an upper bound.
+    progress : callable, optional
+        Called with what is done, how much of it, and of how much.
+
+    Returns
+    -------
+    Fit
+        Values with 95 % intervals, scatter, misrecorded sides, whether the model fits, the scene that has it all.
+
+    Raises
+    ------
+    DataError
+        A file that cannot be read, or throws that cannot be; the first thing wrong, with its row and column.
+    AnswerError
+        A scene with effects.
+
+    Examples
+    --------
+    >>> import limitsets as ls
+    >>> import numpy as np
+    >>> from limitsets.fitting import simulated_throws
+    >>> truth = ls.load("paper-designed")
+    >>> film = simulated_throws(truth, np.linspace(8, 23, 48), [0, 1, 2] * 16, error=0.02, speed=0.002, seed=1)
+    >>> found = ls.fit(truth.with_values({"throw.speed": "155 deg/s"}), film)
+    >>> bool(found["throw.speed"].lo < truth.value("throw.speed") < found["throw.speed"].hi)
+    True
+    """
+    begin = time.perf_counter()
+    chosen = scene if isinstance(scene, Scene) else load(scene)
+    if chosen.effects.on():
+        raise AnswerError(
+            "the scene's effects", ", ".join(chosen.effects.on()), "the minimal model", "leave [effects] out"
+        )
+    film = throws if isinstance(throws, Throws) else read_throws(throws, chosen)
+    known, errors = _errors(film, error, chosen)
+
+    def tell(step: str, done: int, of: int) -> None:
+        if progress is not None:
+            progress(step, done, of)
+
+    tell("robust least squares", 0, 3)
+    start = robust_start(chosen, as_recorded(film, errors, known, len(chosen.sides)))
+    tell("maximum likelihood", 1, 3)
+    own, best = _largest(chosen, start)
+    tell("profiles", 2, 3)
+    threshold = threshold_of(1, len(film), len(start.names))
+    best, ends = _profiles(own, best, threshold, start)
+    return _answer(chosen, own, best, ends, start, threshold, begin)
+
+
+def _errors(film: Throws, error: float | str | None, scene: Scene) -> tuple[bool, Array]:
+    """Return whether the errors of measured places are known, and their standard deviations [length]."""
+    column = bool(np.isfinite(film.error).all())
+    if error is not None:
+        if column:
+            remedy = "leave --error or the column out"
+            raise DataError(
+                "the error", "given twice", "an option or a column", remedy, file=film.file or None
+            )
+        return True, np.full(len(film), length_of(error, scene, "the error"))
+    if column:
+        return True, film.error
+    if film.read_twice.size >= READ_TWICE:
+        return True, np.full(len(film), spread_of(film.read_twice) / math.sqrt(2.0))
+    return False, np.zeros(len(film))
+
+
+def threshold_of(together: int, rows: int, fitted: int) -> float:
+    """Say by how much twice the log-likelihood may fall: of normal residuals with a scatter that is fitted as well.
+
+    rows ln(1 + q F / (rows - fitted)), with the 95 % point of F(q, rows - fitted): exact for linear models, and for
+    many rows that of chi-square.
+    """
+    from scipy.stats import f as f_law
+
+    spare = rows - fitted
+    return float(rows * math.log1p(together * f_law.ppf(LEVEL, together, spare) / spare))
+
+
+def _largest(scene: Scene, start: Start) -> tuple[Likelihood, Maximum]:
+    """Maximise the likelihood, and take the rows anew, until they stay what they are."""
+    names, values, sizes = start.names, start.values, start.errors
+    if "radius_of_gyration" in scene.text["part"]["mass"]:
+        radius = scene.value(RADIUS)
+        names, values, sizes = (*names, RADIUS), np.append(values, radius), np.append(sizes, 0.02 * radius)
+    rows, best = start.rows, None
+    scatter = np.full(SCATTERS, start.spread / math.sqrt(2.0))
+    own = Likelihood(scene, rows, names, np.append(values, np.zeros(SCATTERS)), np.append(sizes, scatter))
+    told = own.told(own.centre[None])
+    known = rows.error**2 * (1.0 + told.slope[0] ** 2)
+    left = math.sqrt(max(start.spread**2 - float(known.mean()), 0.01 * start.spread**2) / 2.0)
+    share = left / max(float(np.median(np.abs(told.per_log_speed[0]))), 1e-12)
+    own = replace(own, scale=np.append(sizes, [share, left]))
+    at = np.append(np.zeros(len(names)), [1.0, 1.0])
+    for _ in range(ROUNDS):
+        if RADIUS in names:
+            at = _best_radius(own, at)
+        best = maximised(own, at)
+        found = dict(zip(names, own.values(best.at)[0].tolist(), strict=False))
+        again = assigned(own.rows, scene, found, start.spread)
+        same = (again.side == own.rows.side).all() and (again.branch == own.rows.branch).all()
+        if same:
+            break
+        own, at = replace(own, rows=again), best.at
+    return own, best
+
+
+def _best_radius(own: Likelihood, at: Array) -> Array:
+    k = own.names.index(RADIUS)
+    tries = np.repeat(at[None], RADII.size + 1, axis=0)
+    tries[1:, k] = (RADII * own.scene.value(RADIUS) - own.centre[k]) / own.scale[k]
+    return np.asarray(tries[int(np.argmax(own(tries)))])
+
+
+def _limits(own: Likelihood, best: Maximum, k: int, way: float) -> float:
+    """Return how far a number may be followed: a radius of gyration within the part, a scatter to 0."""
+    value = float(own.values(best.at)[0, k])
+    if k >= len(own.names):
+        return abs(best.at[k]) if way < 0 else 1e4
+    if own.names[k] == RADIUS:
+        scene = own.scene
+        farthest = float(np.hypot(*(scene.vertices - np.array(scene.centre)).T).max())
+        return (value * 0.98 if way < 0 else max(farthest - value, 0.02 * value)) / own.scale[k]
+    return 1e4
+
+
+def _profiles(
+    own: Likelihood, best: Maximum, threshold: float, start: Start
+) -> tuple[Maximum, list[tuple[float, float]]]:
+    """Follow every number both ways; from the start again where a larger likelihood is met."""
+    for _ in range(ROUNDS):
+        best = best._replace(at=np.append(best.at[:-SCATTERS], np.abs(best.at[-SCATTERS:])))
+        bend = np.linalg.eigh(-best.hessian)
+        variance = (bend[1] ** 2 / np.maximum(bend[0], 1e-2)).sum(axis=1)
+        better, ends = None, []
+        for k in range(best.at.size):
+            first = math.sqrt(threshold * variance[k])
+            pair: list[End] = []
+            for way in (-1.0, 1.0):
+                limit = _limits(own, best, k, way)
+                if k >= len(own.names) and way < 0 and limit < 1e-3:
+                    pair.append(End(-math.inf))
+                    continue
+                pair.append(end_of_profile(own, best, k, way, threshold, first, limit))
+                better = pair[-1].better or better
+            if better is not None:
+                break
+            ends.append((pair[0].at, pair[1].at))
+        if better is None:
+            break
+        best = better
+    return best, ends
+
+
+def _answer(
+    scene: Scene,
+    own: Likelihood,
+    best: Maximum,
+    ends: list[tuple[float, float]],
+    start: Start,
+    threshold: float,
+    begin: float,
+) -> Fit:
+    values = own.values(best.at)[0]
+    held, quantities = dict(start.held), []
+    for k, name in enumerate(own.names):
+        lo, hi = (float(own.centre[k] + own.scale[k] * end) for end in ends[k])
+        if name == RADIUS and math.isinf(lo) and math.isinf(hi):
+            held[name] = "no decision between jog and flip depends on it closely enough"
+            values[k] = scene.value(name)
+            continue
+        value = float(values[k])
+        if name == RADIUS and math.isfinite(lo) and math.isfinite(hi):
+            value = 0.5 * (lo + hi)  # between a jog and a flip nothing is more likely than the rest
+        quantities.append(Fitted(name, value, lo, hi, base_unit(find(name).dimension, scene.unit)))
+    scatters = []
+    for k in range(SCATTERS):
+        j = len(own.names) + k
+        lo, hi = (float(own.scale[j] * end) for end in ends[j])
+        scatters.append(Scatter(float(values[j]), max(lo, 0.0), hi, not own.rows.known))
+    found = tuple(quantities)
+    speed, landing = scatters
+    new = fitted_scene(scene, found, speed.value, landing.value)
+    told = own.told(values[None])
+    loose = np.sqrt(values[None, -1:] ** 2 + (1e-7 * scene.arm_length) ** 2)
+    white = whitened(own.rows, told, values[None, -2:-1], loose)
+    misses = own.rows.throws.x_after - told.after[0]
+    sizes = np.sqrt(
+        own.rows.error**2 * (1.0 + told.slope[0] ** 2)
+        + (told.per_log_speed[0] * values[-2]) ** 2
+        + loose[0, 0] ** 2
+    )
+    names = tuple(each.name for each in found)
+    error = own.rows.error
+    if not own.rows.known:  # what the answer may be sharpened to is then told with all scatter as one
+        error = np.full(len(error), landing.value / math.sqrt(2.0))
+    throws = own.rows.throws
+    more = further_throws(
+        new,
+        names,
+        units_of_change(new, names),
+        throws.x_before,
+        own.rows.side,
+        error,
+        (speed.value, landing.value),
+    )
+    return Fit(
+        new,
+        scene,
+        own.rows,
+        found,
+        held,
+        speed,
+        landing,
+        float(np.mean(own.rows.error)) if own.rows.known else None,
+        *_misread(own.rows, len(scene.sides)),
+        _misfit(own, start.names, values, white.residual[0], told),
+        misses,
+        sizes,
+        more,
+        time.perf_counter() - begin,
+        own,
+        best,
+        threshold,
+    )
+
+
+def _misfit(own: Likelihood, names: tuple[str, ...], values: Array, residual: Array, told: object) -> Misfit:
+    rows, scene = own.rows, own.scene
+    here = scene.with_values(dict(zip(own.names, values.tolist(), strict=False)))
+    slopes = jacobian(here, rows, names, values[: len(names)], units_of_change(here, names))
+    predictions = own.told(values[None])
+    loose = np.sqrt(values[None, -1:] ** 2 + (1e-7 * scene.arm_length) ** 2)
+    columns = np.stack(
+        [
+            whitened(rows, predictions, values[None, -2:-1], loose, column[None]).residual[0]
+            for column in slopes.T
+        ],
+        axis=1,
+    )
+    throws = rows.throws
+    return misfit(residual, columns, 2 * rows.side + rows.branch, throws.x_before, throws.row)
+
+
+def _misread(
+    rows: Rows, sides: int
+) -> tuple[tuple[tuple[int, str, int, int], ...], tuple[float, float, float]]:
+    """Name misrecorded sides, and give their share with its exact interval (Clopper and Pearson)."""
+    from scipy.stats import beta
+
+    throws, after = rows.throws, rows.side_after(sides)
+    lines = [
+        (int(throws.row[k]), "side_before", int(throws.side_before[k]), int(rows.side[k]))
+        for k in np.flatnonzero(rows.misread_before())
+    ]
+    lines += [
+        (int(throws.row[k]), "side_after", int(throws.side_after[k]), int(after[k]))
+        for k in np.flatnonzero(rows.misread_after(sides))
+    ]
+    wrong, count = rows.misread(sides)
+    tail = 0.5 * (1.0 - LEVEL)
+    lo = float(beta.ppf(tail, wrong, count - wrong + 1)) if wrong else 0.0
+    hi = float(beta.ppf(1.0 - tail, wrong + 1, count - wrong))
+    return tuple(sorted(lines)), (wrong / count, lo, hi)
