@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from contextlib import nullcontext
+from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -86,7 +87,8 @@ def _text(found: Fit, judged: Enough | None, files: list[Path]) -> None:
     from limitsets.report.fits import lines_of
 
     rows = [
-        (name, f"{value:.6g}", f"{lo:.6g}", f"{hi:.6g}", unit) for name, value, lo, hi, unit in _rows(found)
+        (name, *(f"{x:.6g}" if isfinite(x) else "open" for x in (value, lo, hi)), unit)
+        for name, value, lo, hi, unit in _rows(found)
     ]
     table(("quantity", "value", "from", "to (95 %)", "unit"), rows)
     for line in lines_of(found):

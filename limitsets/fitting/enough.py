@@ -115,7 +115,12 @@ def enough(found: Fit, *, width: float = 0.02, progress: Progress | None = None)
         if beyond is not None:
             sentences.append(f"Beyond X = {beyond:.4g} {unit} it would be.")
     else:
-        together = _together(scene, noise, progress)
+        open_ended = [each.name for each in found.quantities if not math.isfinite(each.half)]
+        if open_ended:
+            sentences.append(
+                f"The film sets no bound to {' and '.join(open_ended)} on one side: film more throws."
+            )
+        together = "undecided" if open_ended else _together(scene, noise, progress)
         verdict = "enough" if together == "proved" else "undecided"
         sentences.append(_all_of_it(together))
     return Enough(verdict, tuple(sentences), repeats, tuple(margins), together, beyond)
@@ -136,7 +141,8 @@ def _sentence(name: str, one: Margin, sizes: tuple[float, float], unit: str, ver
         "undecided": "film more throws to tell" if sizes[0] <= one.proved else "not proved to be enough",
     }
     safe = f"up to {bound(one.proved, unit)} is proved safe" if one.proved > 0 else "nothing is proved safe"
-    return f"Your {WORDS[name]} to {likely} (three standard deviations; {most} at most); {safe}{fails}: {ends[verdict]}."
+    repeats = f"Your {WORDS[name]} to {likely} (three standard deviations; {most} at most)"
+    return f"{repeats}; {safe}{fails}: {ends[verdict]}."
 
 
 def _together(scene: Scene, noise: dict[str, str], progress: Progress | None) -> str:

@@ -65,11 +65,7 @@ def simulated_throws(
     n = places.size
     # faster by a share: kappa = g / w^2 goes the other way, twice
     kappa = scene.kappa / (1.0 + speed * draw.standard_normal(n)) ** 2
-    params = throw_stack(scene, {}).params
-    params = type(params)(
-        *(np.repeat(each, n, axis=0) if isinstance(each, np.ndarray) else each for each in params)
-    )
-    params = params._replace(kappa=kappa)
+    params = throw_stack(scene, {"throw.kappa": kappa}).params
     jogs, _, decides = (each.diagonal() for each in at_points(params, places, sides, np.zeros(n, np.int64)))
     flips = at_points(params, places, sides, np.ones(n, np.int64))[0].diagonal()
     flipped, count = decides > 0.0, len(scene.sides)

@@ -17,6 +17,7 @@ from limitsets.fitting.further import further_throws
 from limitsets.fitting.likelihood import SCATTERS, Likelihood, whitened
 from limitsets.fitting.maximising import End, Maximum, end_of_profile, maximised
 from limitsets.fitting.misfit import Misfit, misfit
+from limitsets.fitting.predicting import Predicted
 from limitsets.fitting.rows import Rows, as_recorded, assigned
 from limitsets.fitting.starting import (
     RADIUS,
@@ -148,7 +149,7 @@ def _largest(scene: Scene, start: Start) -> tuple[Likelihood, Maximum]:
     if "radius_of_gyration" in scene.text["part"]["mass"]:
         radius = scene.value(RADIUS)
         names, values, sizes = (*names, RADIUS), np.append(values, radius), np.append(sizes, 0.02 * radius)
-    rows, best = start.rows, None
+    rows = start.rows
     scatter = np.full(SCATTERS, start.spread / math.sqrt(2.0))
     own = Likelihood(scene, rows, names, np.append(values, np.zeros(SCATTERS)), np.append(sizes, scatter))
     told = own.told(own.centre[None])
@@ -157,20 +158,21 @@ def _largest(scene: Scene, start: Start) -> tuple[Likelihood, Maximum]:
     share = left / max(float(np.median(np.abs(told.per_log_speed[0]))), 1e-12)
     own = replace(own, scale=np.append(sizes, [share, left]))
     at = np.append(np.zeros(len(names)), [1.0, 1.0])
+    best = maximised(own, _best_radius(own, at))
     for _ in range(ROUNDS):
-        if RADIUS in names:
-            at = _best_radius(own, at)
-        best = maximised(own, at)
         found = dict(zip(names, own.values(best.at)[0].tolist(), strict=False))
         again = assigned(own.rows, scene, found, start.spread)
         same = (again.side == own.rows.side).all() and (again.branch == own.rows.branch).all()
         if same:
             break
-        own, at = replace(own, rows=again), best.at
+        own = replace(own, rows=again)
+        best = maximised(own, _best_radius(own, best.at))
     return own, best
 
 
 def _best_radius(own: Likelihood, at: Array) -> Array:
+    if RADIUS not in own.names:
+        return at
     k = own.names.index(RADIUS)
     tries = np.repeat(at[None], RADII.size + 1, axis=0)
     tries[1:, k] = (RADII * own.scene.value(RADIUS) - own.centre[k]) / own.scale[k]
@@ -181,11 +183,12 @@ def _limits(own: Likelihood, best: Maximum, k: int, way: float) -> float:
     """Return how far a number may be followed: a radius of gyration within the part, a scatter to 0."""
     value = float(own.values(best.at)[0, k])
     if k >= len(own.names):
-        return abs(best.at[k]) if way < 0 else 1e4
+        return abs(float(best.at[k])) if way < 0 else 1e4
     if own.names[k] == RADIUS:
         scene = own.scene
         farthest = float(np.hypot(*(scene.vertices - np.array(scene.centre)).T).max())
-        return (value * 0.98 if way < 0 else max(farthest - value, 0.02 * value)) / own.scale[k]
+        room = value * 0.98 if way < 0 else max(farthest - value, 0.02 * value)
+        return room / float(own.scale[k])
     return 1e4
 
 
@@ -235,8 +238,8 @@ def _answer(
             values[k] = scene.value(name)
             continue
         value = float(values[k])
-        if name == RADIUS and math.isfinite(lo) and math.isfinite(hi):
-            value = 0.5 * (lo + hi)  # between a jog and a flip nothing is more likely than the rest
+        if name == RADIUS:  # between a jog and a flip nothing is more likely than the rest
+            value = 0.5 * (lo + hi) if math.isfinite(hi - lo) else min(max(scene.value(name), lo), hi)
         quantities.append(Fitted(name, value, lo, hi, base_unit(find(name).dimension, scene.unit)))
     scatters = []
     for k in range(SCATTERS):
@@ -290,17 +293,15 @@ def _answer(
     )
 
 
-def _misfit(own: Likelihood, names: tuple[str, ...], values: Array, residual: Array, told: object) -> Misfit:
+def _misfit(
+    own: Likelihood, names: tuple[str, ...], values: Array, residual: Array, told: Predicted
+) -> Misfit:
     rows, scene = own.rows, own.scene
     here = scene.with_values(dict(zip(own.names, values.tolist(), strict=False)))
     slopes = jacobian(here, rows, names, values[: len(names)], units_of_change(here, names))
-    predictions = own.told(values[None])
     loose = np.sqrt(values[None, -1:] ** 2 + (1e-7 * scene.arm_length) ** 2)
     columns = np.stack(
-        [
-            whitened(rows, predictions, values[None, -2:-1], loose, column[None]).residual[0]
-            for column in slopes.T
-        ],
+        [whitened(rows, told, values[None, -2:-1], loose, column[None]).residual[0] for column in slopes.T],
         axis=1,
     )
     throws = rows.throws

@@ -1,7 +1,7 @@
 """Which further throws would sharpen the answer most: the gain in information of a throw from each place and side.
 
-The information of a throw is that of its landing and of its decision; near a critical point the decision tells most, and
-about the radius of gyration it alone tells anything.
+The information of a throw is that of its landing and of its decision; near a critical point the decision tells most,
+and about the radius of gyration it alone tells anything.
 """
 
 from __future__ import annotations

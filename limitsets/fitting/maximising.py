@@ -97,7 +97,7 @@ class End(NamedTuple):
     Attributes
     ----------
     at : float
-        Where the deviance reaches its threshold; infinite, with the sign of the way, where it does not within the limit.
+        Where the deviance reaches its threshold; infinite, with the way's sign, where it does not within the limit.
     better : Maximum or None
         A larger value of the function that was met on the way.
     """

@@ -1,6 +1,6 @@
 """Does the model fit at all?  Tests of what is left of the landings, at a level of 5 %.
 
-Two tests, each at half the level.  Outliers: the likelihood ratio of "some landings scatter more than the others" against
+Two tests, each at half the level.  Outliers: the likelihood ratio of "some landings scatter more than others" against
 "all alike", its law found by drawing from the fitted model.  Structure: do residuals depend on side, branch and place
 beyond what the fitted quantities can take up (F test)?
 """

@@ -59,11 +59,11 @@ class Rows:
 
     def misread_before(self) -> NDArray[np.bool_]:
         """Where the side before is misrecorded, in a reading of its own."""
-        return (self.side != self.throws.side_before) & ~self.throws.shared
+        return np.asarray((self.side != self.throws.side_before) & ~self.throws.shared)
 
     def misread_after(self, sides: int) -> NDArray[np.bool_]:
         """Where the side after is misrecorded."""
-        return self.side_after(sides) != self.throws.side_after
+        return np.asarray(self.side_after(sides) != self.throws.side_after)
 
     def misread(self, sides: int) -> tuple[int, int]:
         """Count the misrecorded sides, and all readings of a side."""

@@ -59,14 +59,14 @@ class Start(NamedTuple):
 
 
 def quantities_of(scene: Scene) -> tuple[str, ...]:
-    """Name what the landings depend on: the speed, or kappa where gravity is not given, and what the scene is written in."""
+    """Name what landings depend on: the speed, or kappa without gravity, and what the scene is written in."""
     thrown = "throw.kappa" if scene.gravity is None else "throw.speed"
     centre = "center" in scene.text["part"]["mass"]
     return (thrown, *(QUANTITIES if centre else QUANTITIES[2:]))
 
 
 def units_of_change(scene: Scene, names: tuple[str, ...]) -> Array:
-    """Return what counts as a large change of each quantity: its value for the throw, a side of the part for lengths."""
+    """Return what counts as a large change of each quantity: its value for the throw, a side for lengths."""
     side = float(np.mean(scene.sides.length))
     return np.array([scene.value(name) if name.startswith("throw.") else side for name in names])
 

@@ -76,11 +76,12 @@ class Throws:
         """Differences of two readings of one place: a row that follows another with a reading of its own [length]."""
         again = np.flatnonzero(self.follows & ~self.shared)
         again = again[self.side_before[again] == self.side_after[again - 1]]
-        return self.x_before[again] - self.x_after[again - 1]
+        found: Array = self.x_before[again] - self.x_after[again - 1]
+        return found
 
 
 def read_throws(file: str | Path, scene: Scene) -> Throws:
-    """Read the throws of a part from a CSV file.
+    r"""Read the throws of a part from a CSV file.
 
     Parameters
     ----------
@@ -104,7 +105,7 @@ def read_throws(file: str | Path, scene: Scene) -> Throws:
     --------
     >>> import tempfile
     >>> import limitsets as ls
-    >>> text = "x_before [in],side_before,x_after [in],side_after\\n" + "8,2,8.26,2\\n" * 8
+    >>> text = "x_before [in],side_before,x_after [in],side_after\n" + "8,2,8.26,2\n" * 8
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     path = Path(folder) / "throws.csv"
     ...     _ = path.write_text(text)

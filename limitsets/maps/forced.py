@@ -95,7 +95,7 @@ def at_points(
     Returns
     -------
     x, slope, margin : ndarray, shape (m, n)
-        Where they end, the derivative with respect to the start, and the number whose sign decides between the branches.
+        Where they end, the derivative with respect to the start, and the number whose sign decides the branch.
 
     Examples
     --------

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -49,7 +49,7 @@ def fit_residuals(found: Fit) -> Figure:
             here = own & (rows.branch == branch)
             axes.plot(x[here], found.residuals[here], ls="", marker=marker, color=colour, ms=4.5, zorder=3)
         for some, marker, size in ((own & misread, "s", 10.0), (own & strange, "x", 9.0)):
-            look = {"mfc": "none", "mec": style.INK, "mew": 1.1}
+            look: dict[str, Any] = {"mfc": "none", "mec": style.INK, "mew": 1.1}
             axes.plot(x[some], found.residuals[some], ls="", marker=marker, ms=size, zorder=4, **look)
         axes.set_title(f"side {side}: {int(own.sum())} throws", loc="left", fontsize=style.TEXT)
         axes.set_xlabel(f"x before [{unit}]", fontsize=style.SMALL)

@@ -108,7 +108,8 @@ def table(numbers: dict[str, Any]) -> str:
     for share, found in numbers["many"].items():
         for name, each in found.items():
             lines.append(
-                f"| {name} | {100 * float(share):g} % | {each['told']} | {100 * each['held'] / each['told']:.1f} % | {each['half']:.4f} |"
+                f"| {name} | {100 * float(share):g} % | {each['told']} "
+                f"| {100 * each['held'] / each['told']:.1f} % | {each['half']:.4f} |"
             )
     return "\n".join(lines)
 

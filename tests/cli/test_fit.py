@@ -73,7 +73,7 @@ def test_a_table_and_files(capfd, throws):
     code, out, _ = run(capfd, *words)
     assert code == 0
     assert {path.name for path in Path("out").iterdir()} == {"fitted.toml", "fit.json", "residuals.png"}
-    rows = list(csv.DictReader(Path("t.csv").open(encoding="utf-8")))
+    rows = list(csv.DictReader(Path("t.csv").read_text(encoding="utf-8").splitlines()))
     speed = rows[0]
     assert speed["quantity"] == "throw.speed"
     wanted = np.sqrt(193.045 / TRUTH["throw.kappa"])
