@@ -17,7 +17,7 @@ from limitsets.fitting.further import further_throws
 from limitsets.fitting.likelihood import SCATTERS, Likelihood, whitened
 from limitsets.fitting.maximising import End, Maximum, end_of_profile, maximised
 from limitsets.fitting.misfit import Misfit, misfit
-from limitsets.fitting.predicting import Predicted
+from limitsets.fitting.predicting import predicted
 from limitsets.fitting.rows import Rows, as_recorded, assigned
 from limitsets.fitting.starting import (
     RADIUS,
@@ -196,7 +196,7 @@ def _profiles(
     own: Likelihood, best: Maximum, threshold: float, start: Start
 ) -> tuple[Maximum, list[tuple[float, float]]]:
     """Follow every number both ways; from the start again where a larger likelihood is met."""
-    for _ in range(ROUNDS):
+    for left in reversed(range(ROUNDS)):
         best = best._replace(at=np.append(best.at[:-SCATTERS], np.abs(best.at[-SCATTERS:])))
         bend = np.linalg.eigh(-best.hessian)
         variance = (bend[1] ** 2 / np.maximum(bend[0], 1e-2)).sum(axis=1)
@@ -211,10 +211,10 @@ def _profiles(
                     continue
                 pair.append(end_of_profile(own, best, k, way, threshold, first, limit))
                 better = pair[-1].better or better
-            if better is not None:
+            if better is not None and left:
                 break
             ends.append((pair[0].at, pair[1].at))
-        if better is None:
+        if better is None or not left:
             break
         best = better
     return best, ends
@@ -251,7 +251,6 @@ def _answer(
     new = fitted_scene(scene, found, speed.value, landing.value)
     told = own.told(values[None])
     loose = np.sqrt(values[None, -1:] ** 2 + (1e-7 * scene.arm_length) ** 2)
-    white = whitened(own.rows, told, values[None, -2:-1], loose)
     misses = own.rows.throws.x_after - told.after[0]
     sizes = np.sqrt(
         own.rows.error**2 * (1.0 + told.slope[0] ** 2)
@@ -282,7 +281,7 @@ def _answer(
         landing,
         float(np.mean(own.rows.error)) if own.rows.known else None,
         *_misread(own.rows, len(scene.sides)),
-        _misfit(own, start.names, values, white.residual[0], told),
+        _misfit(own, start, values),
         misses,
         sizes,
         more,
@@ -293,19 +292,20 @@ def _answer(
     )
 
 
-def _misfit(
-    own: Likelihood, names: tuple[str, ...], values: Array, residual: Array, told: Predicted
-) -> Misfit:
-    rows, scene = own.rows, own.scene
-    here = scene.with_values(dict(zip(own.names, values.tolist(), strict=False)))
-    slopes = jacobian(here, rows, names, values[: len(names)], units_of_change(here, names))
-    loose = np.sqrt(values[None, -1:] ** 2 + (1e-7 * scene.arm_length) ** 2)
-    columns = np.stack(
-        [whitened(rows, told, values[None, -2:-1], loose, column[None]).residual[0] for column in slopes.T],
-        axis=1,
-    )
+def _misfit(own: Likelihood, start: Start, values: Array) -> Misfit:
+    """Test the model by the robust fit: the most likely machine leans towards throws that no machine makes."""
+    scene, rows = own.scene, own.rows
+    landing = np.sqrt(values[None, -1:] ** 2 + (1e-7 * scene.arm_length) ** 2)
+    points = {name: np.array([value]) for name, value in zip(start.names, start.values, strict=True)}
+    told = predicted(scene, points, rows.throws.x_before, rows.side, rows.branch)
+    slopes = jacobian(scene, rows, start.names, start.values, units_of_change(scene, start.names))
+
+    def white(miss: Array | None) -> Array:
+        return whitened(rows, told, values[None, -2:-1], landing, miss).residual[0]
+
+    columns = np.stack([white(column[None]) for column in slopes.T], axis=1)
     throws = rows.throws
-    return misfit(residual, columns, 2 * rows.side + rows.branch, throws.x_before, throws.row)
+    return misfit(white(None), columns, 2 * rows.side + rows.branch, throws.x_before, throws.row)
 
 
 def _misread(

@@ -114,7 +114,9 @@ def assigned(rows: Rows, scene: Scene, values: Mapping[str, float], spread: floa
     for k in range(count):
         # one reading for both rows: it is as right or wrong as it was in the row before
         recorded = (before[k - 1] + own[k - 1]) % sides if shared[k] else throws.side_before[k]
-        price = np.where(side == recorded, right, wrong if not shared[k] else -np.inf)
+        # wrong before and after at once would be a way out for whatever lands where no throw can
+        single = (after[:, 0] == throws.side_after[k]) & ~shared[k]
+        price = np.where(side == recorded, right, np.where(single, wrong, -np.inf))
         best = int(np.argmax(fits[:, k] + price))
         before[k], own[k] = side[best], branch[best]
     return Rows(throws, before, own, rows.error, rows.known)

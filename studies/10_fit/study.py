@@ -1,6 +1,6 @@
 """Fifty filmed throws of machines of known truth: what the fit says of them, and how often it is right.
 
-Run it as ``python studies/10_fit/study.py [--seed 0] [--machines 200] [--bootstrap 200] [--out FOLDER]``.
+Run it as ``python studies/10_fit/study.py [--seed 0] [--machines 40] [--bootstrap 40] [--out FOLDER]``.
 """
 
 from __future__ import annotations
@@ -86,7 +86,7 @@ def one(seed: int, out: Path, films: int) -> dict[str, Any]:
     }
 
 
-def main(seed: int = 0, out: Path = HERE, machines: int = 200, films: int = 200) -> dict[str, Any]:
+def main(seed: int = 0, out: Path = HERE, machines: int = 40, films: int = 40) -> dict[str, Any]:
     """Run the study, write its figure, and return its numbers."""
     return {
         "one": one(seed, out, films),
@@ -117,8 +117,8 @@ def table(numbers: dict[str, Any]) -> str:
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description="Fits of machines of known truth.")
     parser.add_argument("--seed", type=int, default=0, help="of machines and films")
-    parser.add_argument("--machines", type=int, default=200, help="in each row of the table")
-    parser.add_argument("--bootstrap", type=int, default=200, help="films of the one machine")
+    parser.add_argument("--machines", type=int, default=40, help="in each row of the table")
+    parser.add_argument("--bootstrap", type=int, default=40, help="films of the one machine")
     parser.add_argument("--out", type=Path, default=HERE, help="folder of the figure")
     parser.add_argument("--json", action="store_true", help="print all numbers as JSON")
     words = parser.parse_args()

@@ -85,6 +85,7 @@ def test_a_table_and_files(capfd, throws):
     assert again.tolerance
 
 
+@pytest.mark.sweep
 def test_whether_the_margin_is_enough(capfd, throws):
     code, out, _ = run(capfd, "fit", "paper-designed", str(throws), "--error", "0.508 mm", "--json")
     judged = json.loads(out)["enough"]

@@ -70,7 +70,7 @@ def test_sides_recorded_wrong_are_named_and_move_nothing():
     truth = machine(draw)
     seed = int(draw.integers(1 << 30))
     clean, flipped = (
-        ls.fit(aimed_at(), film(np.random.default_rng(seed), truth, flipped=share)) for share in (0.0, 0.05)
+        ls.fit(aimed_at(), film(np.random.default_rng(seed), truth, flipped=share)) for share in (0.0, 0.1)
     )
     right = clean.rows.throws.side_after
     wrong = flipped.rows.throws.row[flipped.rows.throws.side_after != right]

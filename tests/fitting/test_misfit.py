@@ -51,9 +51,9 @@ def spoiled_film(draw, one, other, strange=5, n=50):
 def test_a_machine_with_an_effect_is_told_apart(effects):
     one, other = with_effect(**effects)
     draw = np.random.default_rng(21)
-    lacking = [ls.fit(one, spoiled_film(draw, one, other)).misfit.lacking for _ in range(20)]
+    lacking = [ls.fit(one, spoiled_film(draw, one, other)).misfit.lacking for _ in range(6)]
     # of a power of 90 % fewer than this come once in a thousand times
-    assert sum(lacking) >= binom.ppf(1e-3, 20, 0.9)
+    assert sum(lacking) >= binom.ppf(1e-3, 6, 0.9)
 
 
 @pytest.mark.sweep
@@ -71,7 +71,7 @@ def rejected(count, seed):
 
 
 def test_a_machine_without_one_is_left_alone():
-    assert rejected(15, seed=23) <= binom.ppf(0.9999, 15, 0.05)
+    assert rejected(10, seed=23) <= binom.ppf(0.9999, 10, 0.05)
 
 
 @pytest.mark.sweep

@@ -33,6 +33,7 @@ def test_the_table_of_the_page_is_that_of_the_study(study):
         assert line in page
 
 
+@pytest.mark.sweep
 def test_the_figure_and_the_bootstrap(study, tmp_path):
     numbers = study.one(0, tmp_path, 4)
     assert (tmp_path / "residuals.png").stat().st_size > 20_000
