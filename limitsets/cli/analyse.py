@@ -41,7 +41,7 @@ def analyse(
     with progress() as tell:
         chosen, folder = opened(scene, out, "analysis")
         from limitsets.analysis import analyse as run
-        from limitsets.report import write
+        from limitsets.report.writing import write
 
         analysis = run(chosen, cells, error=error, progress=tell, announce=_announce)
         files = write(analysis, folder, progress=tell)

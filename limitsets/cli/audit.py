@@ -31,7 +31,7 @@ def audit(
         found = run(chosen)
         files = []
         if out is not None:
-            from limitsets.report import write_audit
+            from limitsets.report.audit_pages import write_audit
 
             tell("files", 1, 2)
             files = write_audit(found, out)

@@ -51,7 +51,7 @@ def robustness(
     """
     with progress() as tell:
         chosen, folder = opened(scene, out, "robustness")
-        from limitsets.report import write_robustness
+        from limitsets.report.robust_files import write_robustness
         from limitsets.robust.sheet.noise_input import scattering_from
         from limitsets.robust.sheet.sheet_run import robustness as run
 

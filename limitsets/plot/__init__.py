@@ -7,42 +7,44 @@ One file per family; `style.py` holds what they share.  Colours are safe for col
 is in colour alone: lines have styles, areas hatches, points markers.  No window and no pyplot: figures are made
 with the object interface.  A file never has the name of a function of the room: after an
 import of that file `plot.map` would be a module.
+
+A file is imported where one of its functions is first asked for: what the maps of an atlas need is not loaded for a
+limit set.
 """
 
-from limitsets.plot.atlas_maps import atlas
-from limitsets.plot.atlas_surfaces import atlas_surface
-from limitsets.plot.audit_strips import audit
-from limitsets.plot.basin import basins
-from limitsets.plot.bifurcations import bifurcation
-from limitsets.plot.counterexamples import counterexample
-from limitsets.plot.designs import design
-from limitsets.plot.flights import flight
-from limitsets.plot.fronts import robust_design
-from limitsets.plot.limit_sets import limit_set
-from limitsets.plot.maps import map  # noqa: A004 - ls.plot.map is the word for it
-from limitsets.plot.margins import margin_curve, tolerance_box, tornado
-from limitsets.plot.morse_graphs import morse
-from limitsets.plot.noise import noise_arrivals, noise_density, noise_levels
-from limitsets.plot.residuals import fit_residuals
+from importlib import import_module
+from typing import Any
 
-__all__ = [
-    "atlas",
-    "atlas_surface",
-    "audit",
-    "basins",
-    "bifurcation",
-    "counterexample",
-    "design",
-    "fit_residuals",
-    "flight",
-    "limit_set",
-    "map",
-    "margin_curve",
-    "morse",
-    "noise_arrivals",
-    "noise_density",
-    "noise_levels",
-    "robust_design",
-    "tolerance_box",
-    "tornado",
-]
+_FILES = {
+    "atlas": "atlas_maps",
+    "atlas_surface": "atlas_surfaces",
+    "audit": "audit_strips",
+    "basins": "basin",
+    "bifurcation": "bifurcations",
+    "counterexample": "counterexamples",
+    "design": "designs",
+    "fit_residuals": "residuals",
+    "flight": "flights",
+    "limit_set": "limit_sets",
+    "map": "maps",
+    "margin_curve": "margins",
+    "morse": "morse_graphs",
+    "noise_arrivals": "noise",
+    "noise_density": "noise",
+    "noise_levels": "noise",
+    "robust_design": "fronts",
+    "tolerance_box": "margins",
+    "tornado": "margins",
+}
+
+__all__ = [*_FILES]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _FILES:
+        raise AttributeError(f"module 'limitsets.plot' has no attribute {name!r}")
+    return getattr(import_module(f"limitsets.plot.{_FILES[name]}"), name)
+
+
+def __dir__() -> list[str]:
+    return sorted(_FILES)

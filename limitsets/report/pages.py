@@ -98,7 +98,7 @@ def page(analysis: Analysis, figures: Mapping[str, str]) -> str:
     Examples
     --------
     >>> import limitsets as ls
-    >>> from limitsets.report import page
+    >>> from limitsets.report.pages import page
     >>> page(ls.analyse("paper-designed"), {}).splitlines()[0]
     '# paper-designed: where the throws lead'
     """

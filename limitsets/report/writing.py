@@ -8,10 +8,14 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from limitsets import plot
 from limitsets.errors import LimitsetsError
 from limitsets.files import as_json, replaced
 from limitsets.maps import FLIP
+from limitsets.plot.basin import basins
+from limitsets.plot.flights import flight
+from limitsets.plot.limit_sets import limit_set
+from limitsets.plot.maps import map as map_of_scene
+from limitsets.plot.morse_graphs import morse
 from limitsets.plot.style import stretch
 from limitsets.report.pages import page
 
@@ -62,15 +66,15 @@ def figure(analysis: Analysis, kind: str, throw: tuple[float, int] | None = None
     """
     scene, sets = analysis.scene, analysis.extents
     if kind == "limit-set":
-        return plot.limit_set(scene, sets)
+        return limit_set(scene, sets)
     if kind == "map":
-        return plot.map(scene, sets)
+        return map_of_scene(scene, sets)
     if kind == "basins":
-        return plot.basins(scene, analysis.basins, sets)
+        return basins(scene, analysis.basins, sets)
     if kind == "morse":
-        return plot.morse(analysis.morse, scene.name)
+        return morse(analysis.morse, scene.name)
     if kind == "flight":
-        return plot.flight(scene, *(throw or _typical_throw(analysis)))
+        return flight(scene, *(throw or _typical_throw(analysis)))
     raise LimitsetsError("the kind of figure", kind, ", ".join(FIGURES), "correct the word")
 
 
@@ -173,7 +177,7 @@ def write(analysis: Analysis, folder: str | Path, *, progress: Progress | None =
     Examples
     --------
     >>> import tempfile, limitsets as ls
-    >>> from limitsets.report import write
+    >>> from limitsets.report.writing import write
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     [path.name for path in write(ls.analyse("paper-designed"), folder)][:2]
     ['report.md', 'analysis.json']

@@ -217,6 +217,7 @@ def test_against_mechanics_written_apart(name):
                 assert math.isinf(got[Assumed.HOLD_FRICTION, 1])
 
 
+@pytest.mark.sweep
 def test_the_friction_a_landing_needs_is_that_from_which_on_it_does_not_slip():
     scene, random = (
         told("paper-designed", {"friction": 1.0}, landing=True, slip=True),

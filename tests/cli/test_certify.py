@@ -80,6 +80,7 @@ def test_refuted_is_exit_1_with_the_orbit_and_a_certificate_of_the_rest(capfd):
     assert "of the scene's own goal nothing is claimed" in out
 
 
+@pytest.mark.sweep
 def test_noise_and_tolerance(capfd):
     code, out, _ = run(capfd, "certify", "paper-designed", "--noise", "throw.speed=0.41 %", "-o", "a.zip")
     assert code == 1

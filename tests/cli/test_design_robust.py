@@ -9,6 +9,7 @@ import limitsets as ls
 from tests.cli.command import run
 
 
+@pytest.mark.sweep
 def test_a_search_writes_scene_answer_and_figure(here, capfd):
     tree = ls.load("paper-designed").as_dict() | {"tolerance": {"throw.speed": "1 %"}}
     ls.dump(ls.load(tree), "given.toml")

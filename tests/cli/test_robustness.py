@@ -150,6 +150,7 @@ def test_bad_input_is_exit_2(capfd, words, said):
     assert not list(Path().glob("*-robustness"))
 
 
+@pytest.mark.sweep
 def test_an_own_part_in_millimetres(capfd):
     """A tolerance in inches; the margin of the landing place is 0.105 to 0.107 of the unit of length, here mm."""
     ls.dump(ls.load("paper-designed"), "part.toml")

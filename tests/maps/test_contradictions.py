@@ -172,6 +172,7 @@ def test_an_orbit_names_what_it_met():
         ls.orbit(misspelling(1.0), 0.95, 0, 3)
 
 
+@pytest.mark.sweep
 def test_kernels_that_agree_are_taken():
     case = made("Case", image=tent, image_on=tent_on, image_box=tent_box, branches=TWO)
     for method in (None, "boxes"):

@@ -165,6 +165,7 @@ class Turned(NamedTuple):
 ls.register(Turned, image=_turned, dimension=3)
 
 
+@pytest.mark.sweep
 def test_three_dimensions_with_parameters_by_side_in_a_nested_class():
     params = maps.coerce(Turned(At([0.6, 0.0], [0.8, 1.0]), [1.0, 0.0], 0.25))
     lo, hi = (np.array([0.0]),) * 3, (np.array([1.0]),) * 3

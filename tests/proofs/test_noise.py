@@ -119,6 +119,7 @@ def test_the_margin_of_the_landing_place_is_the_same_by_a_formula_and_by_reachab
     assert reached_with(sharp * 0.999) < GOAL_AT < reached_with(sharp * 1.001)
 
 
+@pytest.mark.sweep
 def test_the_landing_place_is_proved_below_its_margin_and_refuted_above(tmp_path):
     sharp = sharp_landing()
     proof = ls.certify("paper-designed", EVERYWHERE_INSIDE, noise={"landing.x": f"{0.97 * sharp:.6f} in"})

@@ -82,6 +82,7 @@ def test_a_period_two_orbit_and_the_fixed_point_that_keeps_all_from_being_attrac
     assert cycle.attracts
 
 
+@pytest.mark.sweep
 def test_a_user_map_of_two_branches_expands_for_a_box_of_parameters():
     grid = ls.grid([(0.15, 0.93)], cells=2048)
     proof = ls.certify(Tent(1.80), grid, ["invariant", "expanding"], upper=Tent(1.81))

@@ -13,12 +13,12 @@ import limitsets as ls
 from limitsets.analysis import GoalOutcome
 from limitsets.errors import LimitsetsError
 from limitsets.goals import OrientedBeyond
-from limitsets.report import page, write
-from limitsets.report import write as write_report
 from limitsets.report.audit_pages import audit_page
 from limitsets.report.goals import verdict_of, void_of
-from limitsets.report.pages import words
+from limitsets.report.pages import page, words
 from limitsets.report.tables import bands
+from limitsets.report.writing import write
+from limitsets.report.writing import write as write_report
 
 SCENES = Path(__file__).parents[1] / "analysis"
 SOURCES = ["paper-designed", "paper-initial", SCENES / "four-sides.toml", SCENES / "five-sides.toml"]
@@ -220,15 +220,13 @@ def test_bands_tell_which_sides_occur_where():
 
 @pytest.mark.parametrize("fault", [RuntimeError, KeyboardInterrupt])
 def test_a_fault_while_drawing_leaves_the_old_files_whole(tmp_path, monkeypatch, fault):
-    import limitsets.plot
-
     write(analysed("paper-initial"), tmp_path)
     before = bytes_of(tmp_path)
 
     def fails(*_, **__):
         raise fault
 
-    monkeypatch.setattr(limitsets.plot, "basins", fails)
+    monkeypatch.setattr("limitsets.report.writing.basins", fails)
     with pytest.raises(fault):
         write(analysed("paper-designed"), tmp_path)
     assert bytes_of(tmp_path) == before

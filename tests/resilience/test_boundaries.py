@@ -49,6 +49,7 @@ def test_open_maps_have_exponent_one_minus_the_dimension(params, dimension):
     assert all(each.error < 0.02 for each in found)
 
 
+@pytest.mark.sweep
 def test_an_open_map_in_the_plane_has_the_same_exponent_along_its_steep_axis():
     """Starts apart along x_1 come to the same exit: the mean over both axes is half, with the same exponent."""
     found = ls.resilience.uncertainty_exponent(*setting(Sheet(2.0, 0.0), UNIT * 2, (2003, 410)))

@@ -41,6 +41,18 @@ def test_a_handful(name):
         assert compared(stack, found, i, 40_000) == {}
 
 
+def test_throws_that_the_fast_search_for_the_impact_cannot_vouch_for():
+    # kappa below the radius of the struck vertex on side 2, hypot(a, d) = 4.28 in: several impacts, and grazing
+    scene = ls.load("paper-designed").with_values({"throw.kappa": "3.5 in"})
+    assert maps.images(scene.map, np.linspace(5.0, 28.0, 100), 2).second_pass == 1.0
+    stack = throw_stack(scene, {"arm.surface_height": [-0.6, 0.1]})
+    found = topologies(stack.params, stack.lo, stack.hi, stack.anchor)
+    assert found.attractors.tolist() == [1, 0]
+    for i in range(2):
+        assert found.undecided[i] == 0
+        assert compared(stack, found, i, 40_000) == {}
+
+
 def test_differences_are_seen():
     t = topologies(stacked([maps.Logistic(3.7)]), [[0.0]], [[1.0]])
     r = reference(maps.Logistic(3.69), [0.0], [1.0], cells=40_000)

@@ -116,6 +116,7 @@ def test_throws_end_where_an_independent_simulation_sees_them_end() -> None:
     assert [case for case in cases(60, 12) if not agree(case, names)] == []
 
 
+@pytest.mark.sweep
 def test_all_together_end_where_an_independent_simulation_sees_them_end() -> None:
     names = ("landing", "roll", "slip", "pivot", "bounce")
     assert [case for case in cases(60, 13) if not agree(case, names)] == []

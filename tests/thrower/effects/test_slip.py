@@ -279,6 +279,7 @@ def test_the_rest_slides_on_by_its_braking_distance() -> None:
     assert math.isinf(slid(Slip(0.0), 0.0, part, Face(0, 0.0, 0, 0.0, 2.0)))
 
 
+@pytest.mark.sweep
 def test_painleves_paradox_is_outside_the_model() -> None:
     # sliding left with X = 1/5, H = 7/5 and rho^2 = 1/25: rho^2 + X^2 - mu X H = 0.08 - 0.28 mu
     psi = turn(math.asin(0.6))
