@@ -57,7 +57,7 @@ def simulated_throws(
     >>> import limitsets as ls
     >>> film = simulated_throws(ls.load("paper-designed"), [8.0, 21.0], [2, 2])
     >>> film.x_after.round(6).tolist(), film.side_after.tolist()
-    ([8.262013, 16.345602], [2, 0])
+    ([8.262013, 16.552531], [2, 0])
     """
     draw = np.random.default_rng(seed)
     places = np.asarray(x, dtype=np.float64)

@@ -301,7 +301,8 @@ def _misfit(own: Likelihood, start: Start, values: Array) -> Misfit:
     slopes = jacobian(scene, rows, start.names, start.values, units_of_change(scene, start.names))
 
     def white(miss: Array | None) -> Array:
-        return whitened(rows, told, values[None, -2:-1], landing, miss).residual[0]
+        found: Array = whitened(rows, told, values[None, -2:-1], landing, miss).residual[0]
+        return found
 
     columns = np.stack([white(column[None]) for column in slopes.T], axis=1)
     throws = rows.throws
