@@ -115,10 +115,14 @@ def enough(found: Fit, *, width: float = 0.02, progress: Progress | None = None)
         if beyond is not None:
             sentences.append(f"Beyond X = {beyond:.4g} {unit} it would be.")
     else:
-        open_ended = [each.name for each in found.quantities if not math.isfinite(each.half)]
+        open_ended = [
+            each.name
+            for each in found.quantities
+            if each.name.replace("kappa", "speed") not in scene.tolerance
+        ]
         if open_ended:
             sentences.append(
-                f"The film sets no bound to {' and '.join(open_ended)} on one side: film more throws."
+                f"The film bounds {' and '.join(open_ended)} on one side at most: film more throws."
             )
         together = "undecided" if open_ended else _together(scene, noise, progress)
         verdict = "enough" if together == "proved" else "undecided"

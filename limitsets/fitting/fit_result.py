@@ -22,6 +22,9 @@ from limitsets.scene.quantities import base_unit, find
 
 __all__ = ["Fit", "Fitted", "Scatter"]
 
+# A larger share of a value is no tolerance: what is fitted is then not known at all.
+MOST = 0.99
+
 Array = NDArray[np.float64]
 
 
@@ -201,18 +204,18 @@ def fitted_scene(given: Scene, quantities: tuple[Fitted, ...], speed: float, lan
     tree = scene.as_dict()
     tolerance = {}
     for each in quantities:
-        if math.isfinite(each.half):
-            name = "throw.speed" if each.name == "throw.kappa" else each.name
-            share = deviation_scale(scene, name).relative
-            # the speed goes as the inverse square root of kappa
-            half = (
-                each.half / each.value * (0.5 if each.name == "throw.kappa" else 1.0) if share else each.half
-            )
+        name = "throw.speed" if each.name == "throw.kappa" else each.name
+        share = deviation_scale(scene, name).relative
+        # the speed goes as the inverse square root of kappa
+        per = (0.5 if each.name == "throw.kappa" else 1.0) / each.value if share else 1.0
+        half = per * each.half
+        if half < (MOST if share else math.inf):
             unit = "%" if share else base_unit(find(name).dimension, given.unit)
             tolerance[name] = f"{rounded_up(100.0 * half if share else half)} {unit}"
-    tree["tolerance"] = {
-        name: text for name, text in tree.get("tolerance", {}).items() if name not in tolerance
-    } | tolerance
-    scatter = {"speed": f"{rounded_up(100.0 * speed)} %", "landing": f"{rounded_up(landing)} {given.unit}"}
+    kept = {name: text for name, text in tree.get("tolerance", {}).items() if name not in tolerance}
+    tree["tolerance"] = kept | tolerance
+    scatter = {"landing": f"{rounded_up(landing)} {given.unit}"}
+    if speed < MOST:
+        scatter["speed"] = f"{rounded_up(100.0 * speed)} %"
     tree["world"] = {**tree.get("world", {}), "scatter": scatter}
     return Scene.of(tree, given.file)

@@ -41,6 +41,8 @@ READ_TWICE = 10
 RADII = np.linspace(0.4, 1.8, 57)
 # Rounds of taking the rows anew, and of better maxima met on the way along a profile.
 ROUNDS = 4
+# A scatter this small beside the end of its interval is none.
+NOTHING = 1e-3
 
 Array = NDArray[np.float64]
 Progress = Callable[[str, int, int], None]
@@ -245,6 +247,8 @@ def _answer(
     for k in range(SCATTERS):
         j = len(own.names) + k
         lo, hi = (float(own.scale[j] * end) for end in ends[j])
+        if math.isinf(lo) and values[j] < NOTHING * hi:
+            values[j] = 0.0
         scatters.append(Scatter(float(values[j]), max(lo, 0.0), hi, not own.rows.known))
     found = tuple(quantities)
     speed, landing = scatters

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 import limitsets as ls
+from limitsets.files import as_plain
 from limitsets.fitting import bootstrap, enough, fit, simulated_throws
 
 HERE = Path(__file__).resolve().parent
@@ -88,17 +89,22 @@ def one(seed: int, out: Path, films: int) -> dict[str, Any]:
 
 def main(seed: int = 0, out: Path = HERE, machines: int = 40, films: int = 40) -> dict[str, Any]:
     """Run the study, write its figure, and return its numbers."""
-    return {
+    found = {
         "one": one(seed, out, films),
         "many": {str(flipped): many(machines, seed + 1, flipped) for flipped in (0.0, 0.05)},
     }
+    return dict(as_plain(found))  # null for what is open
+
+
+def _said(value: float | None) -> str:
+    return "open" if value is None else f"{value:.4f}"
 
 
 def table(numbers: dict[str, Any]) -> str:
     """Write the numbers as Markdown tables."""
     lines = ["| quantity | truth | fitted | 95 % interval |", "|---|---|---|---|"]
     for name, each in numbers["one"]["quantities"].items():
-        interval = f"{each['lo']:.4f} to {each['hi']:.4f}"
+        interval = f"{_said(each['lo'])} to {_said(each['hi'])}"
         lines.append(f"| {name} | {each['truth']:.4f} | {each['value']:.4f} | {interval} |")
     lines += [
         "",
@@ -109,7 +115,7 @@ def table(numbers: dict[str, Any]) -> str:
         for name, each in found.items():
             lines.append(
                 f"| {name} | {100 * float(share):g} % | {each['told']} "
-                f"| {100 * each['held'] / each['told']:.1f} % | {each['half']:.4f} |"
+                f"| {100 * each['held'] / each['told']:.1f} % | {_said(each['half'])} |"
             )
     return "\n".join(lines)
 
