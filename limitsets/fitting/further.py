@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from limitsets.fitting.likelihood import SHARPEST
 from limitsets.fitting.predicting import predicted
 from limitsets.scene import Scene
 
@@ -62,7 +63,7 @@ def information(
     moves = np.concatenate([np.zeros((1, len(names))), np.diag(units), -np.diag(units)]) * STEP
     points = dict(zip(names, (centre + moves).T, strict=True))
     jog, flip = (predicted(scene, points, x, side, np.full(side.size, b, np.int64)) for b in (0, 1))
-    speed, landing = scatter
+    speed, landing = scatter[0], max(scatter[1], SHARPEST * scene.arm_length)
     size = np.sqrt((jog.decides_slope * error) ** 2 + (jog.decides_per_log_speed * speed) ** 2)[0]
     z = jog.decides / np.maximum(size, 1e-9)
     flips = norm.cdf(z[0])
