@@ -27,6 +27,7 @@ if TYPE_CHECKING:  # each from the file that holds it: most rooms have a file of
     from limitsets.graph.transitions import transitions
     from limitsets.inverse import design, robust_design
     from limitsets.maps import critical_points, orbit, register
+    from limitsets.policies import feedback
     from limitsets.proofs.certify import certify
     from limitsets.proofs.confirm import recheck
     from limitsets.robust.margins.finding import margin
@@ -57,6 +58,7 @@ _ROOMS = {
     "design": "inverse",
     "dump": "scene",
     "engine": "engine",
+    "feedback": "policies",
     "fit": "fitting",
     "grid": "cells",
     "interval": "interval",
@@ -90,6 +92,7 @@ __all__ = [
     "design",
     "dump",
     "engine",
+    "feedback",
     "fit",
     "grid",
     "interval",

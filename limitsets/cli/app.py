@@ -11,6 +11,7 @@ from limitsets.cli.atlas import atlas
 from limitsets.cli.audit import audit
 from limitsets.cli.certify import certify
 from limitsets.cli.design import design
+from limitsets.cli.feedback import feedback
 from limitsets.cli.fit import fit
 from limitsets.cli.margin import margin
 from limitsets.cli.plot import plot
@@ -61,6 +62,7 @@ for command in (
     robustness,
     design,
     atlas,
+    feedback,
     fit,
 ):
     app.command()(command)

@@ -49,6 +49,7 @@ KERNEL_FREE = {
     "engine",
     "auditing",
     "analysis",
+    "policies",
     "resilience",
     "robust",
     "regions",

@@ -32,6 +32,7 @@ _FILES = {
     "noise_arrivals": "noise",
     "noise_density": "noise",
     "noise_levels": "noise",
+    "policy": "policies",
     "robust_design": "fronts",
     "tolerance_box": "margins",
     "tornado": "margins",

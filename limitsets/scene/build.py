@@ -9,6 +9,7 @@ from limitsets.scene.floats import Floats
 from limitsets.scene.purpose import resolve_effects, resolve_goal, resolve_world
 from limitsets.scene.quantities import deviation, require
 from limitsets.scene.resolve import Resolver
+from limitsets.scene.sensing import Feedback, resolve_feedback
 from limitsets.scene.units import parse
 from limitsets.scene.validation import Tree, plain, validate
 
@@ -59,6 +60,7 @@ def resolved(structure: object, file: str | None) -> dict[str, Any]:
         "world": world,
         "effects": resolve_effects(table.effects, world, table.model.flight, resolver),
         "tolerance": _tolerance(tree, table, resolver),
+        "feedback": _feedback(table, len(body.sides), resolver, gravity=gravity is not None),
         "file": file,
         "text": tree,
     }
@@ -83,3 +85,9 @@ def _tolerance(tree: Tree, table: SceneTable, resolver: Resolver) -> dict[str, D
         scales[name] = deviation(text, name, resolver.unit, key=key, file=resolver.file)
         require(tree, name, key, resolver.file)
     return scales
+
+
+def _feedback(table: SceneTable, count: int, resolver: Resolver, *, gravity: bool) -> Feedback | None:
+    if table.feedback is None:
+        return None
+    return resolve_feedback(table.feedback, count, resolver, gravity=gravity)

@@ -16,6 +16,7 @@ from limitsets.errors import SceneError
 from limitsets.geometry import RestingSides
 from limitsets.goals import Goal
 from limitsets.scene.facts import Deviation, Effects, World
+from limitsets.scene.sensing import Feedback
 
 if TYPE_CHECKING:
     from limitsets.cells import Domain
@@ -70,6 +71,8 @@ class Scene:
         What is simulated beyond the minimal model.
     tolerance : mapping of str to Deviation
         Scales of a joint margin, by quantity.
+    feedback : Feedback or None
+        The throws that a controller can choose from, and its sensor.
     file : str or None
         The file it was read from, or the name of a built-in scene.
     text : mapping
@@ -92,6 +95,7 @@ class Scene:
     world: World
     effects: Effects
     tolerance: Mapping[str, Deviation]
+    feedback: Feedback | None
     file: str | None
     text: Mapping[str, Any] = field(repr=False)
 

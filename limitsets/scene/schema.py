@@ -190,6 +190,29 @@ class GoalTable(Table):
     from_anywhere: Flag = False
 
 
+class SensorTable(Table):
+    """A question that is answered with yes or no: beyond a place, or on a side."""
+
+    beyond: Length | None = None
+    error: Length | None = None
+    side: SideNumber | None = None
+
+
+class ChosenThrowTable(Table):
+    """A throw to choose, by kappa or by its angular speed."""
+
+    name: Name
+    kappa: Length | None = None
+    speed: AngularSpeed | None = None
+
+
+class FeedbackTable(Table):
+    """What a controller has: a sensor of one bit, and throws."""
+
+    sensor: SensorTable | None = None
+    throws: Annotated[list[ChosenThrowTable], Field(min_length=1, max_length=16)]
+
+
 class ScatterTable(Table):
     """Noise at every throw."""
 
@@ -223,6 +246,7 @@ class SceneTable(Table):
     world: WorldTable = Field(default_factory=WorldTable)
     effects: EffectsTable = Field(default_factory=EffectsTable)
     tolerance: dict[str, Deviation] = Field(default_factory=dict)
+    feedback: FeedbackTable | None = None
 
 
 WRITTEN: dict[str, Any] = {

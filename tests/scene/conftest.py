@@ -29,6 +29,10 @@ _WHOLE = {
     },
     "effects": {"auto": True},
     "tolerance": {"throw.speed": "1 %", "part.sides[1]": "0.01 in"},
+    "feedback": {
+        "sensor": {"beyond": "20 in", "error": "0.1 in"},
+        "throws": [{"name": "own", "speed": "158.02 deg/s"}, {"name": "slow", "kappa": "30 in"}],
+    },
 }
 _PLATE = {
     "name": "plate",

@@ -11,6 +11,7 @@ import pytest
 
 from limitsets.goals import AttractsAll, FlipOrder, OrientedBeyond, Reaches, StaysOnArm
 from limitsets.scene import Deviation, Effects, Scatter, Scene, World, dump, load, scenes
+from limitsets.scene.sensing import BeyondSensor, ChosenThrow, Feedback
 
 # kappa, speed for information [deg/s], arm's length, height, flight, flip (docs/model.md, the four paper scenes)
 PAPER = {
@@ -55,6 +56,10 @@ def test_every_section(whole: dict[str, Any]) -> None:
         "throw.speed": Deviation(0.01, relative=True),
         "part.sides[1]": Deviation(0.01, relative=False),
     }
+    assert scene.feedback == Feedback(
+        (ChosenThrow("own", "throw.speed", "158.02 deg/s"), ChosenThrow("slow", "throw.kappa", "30 in")),
+        BeyondSensor(20.0, 0.1),
+    )
 
 
 def test_plate_with_a_point_mass(plate: dict[str, Any]) -> None:
@@ -160,6 +165,7 @@ def assert_same_numbers(one: Scene, other: Scene) -> None:
         "arm_length",
         "gravity",
         "tolerance",
+        "feedback",
     ):
         assert getattr(one, name) == getattr(other, name)
     for name in ("a", "d", "length", "right", "corner"):

@@ -15,6 +15,8 @@ from limitsets.thrower.effects import EFFECTS
 GONE = object()
 BOTH = {"sides": ["3 in", "4 in", "5 in"], "vertices": [["0 in", "0 in"], ["1 in", "0 in"], ["0 in", "1 in"]]}
 
+OWN = {"name": "own", "kappa": "25 in"}
+
 
 def changed(table: dict[str, Any], key: str, value: Any) -> dict[str, Any]:
     """Put a value at a dotted key; GONE deletes."""
@@ -48,8 +50,50 @@ TABLE: list[tuple[dict[str, Any], str, str]] = [
     ({"part/mass": GONE}, "part.mass", "required"),
     ({"part/mass/center/side": GONE}, "part.mass.center.side", "required"),
     ({"cavity": {}}, "cavity", "this version does not have it"),
-    ({"feedback": {"throws": [{}]}}, "feedback", "this version does not have it"),
     ({"tray": {"rows": 1}}, "tray", "this version does not have it"),
+    # feedback
+    ({"feedback": {}}, "feedback.throws", "required"),
+    ({"feedback": {"throws": []}}, "feedback.throws", "at least 1"),
+    ({"feedback": {"throws": [{}]}}, "feedback.throws[0].name", "required"),
+    ({"feedback": {"throws": [{"name": "own"}]}}, "feedback.throws[0]", "kappa or speed"),
+    ({"feedback": {"throws": [OWN | {"speed": "9 rpm"}]}}, "feedback.throws[0]", "kappa and speed"),
+    ({"feedback": {"throws": [OWN | {"kapa": "2 in"}]}}, "feedback.throws[0].kapa", "did you mean 'kappa'"),
+    ({"feedback": {"throws": [{"name": "a", "kappa": "0 in"}]}}, "feedback.throws[0].kappa", "above 0"),
+    (
+        {"feedback": {"throws": [{"name": "a", "speed": "2 in"}]}},
+        "feedback.throws[0].speed",
+        "unit of length",
+    ),
+    ({"throw": {"kappa": "25 in"}, "gravity": GONE}, "feedback.throws[0].speed", "add [gravity]"),
+    ({"feedback": {"throws": [OWN, OWN]}}, "feedback.throws[1].name", "a name of its own"),
+    ({"feedback": {"throws": [OWN], "sensor": {}}}, "feedback.sensor", "beyond or side"),
+    (
+        {"feedback": {"throws": [OWN], "sensor": {"near": "2 in"}}},
+        "feedback.sensor.near",
+        "beyond, error, side",
+    ),
+    ({"feedback": {"throws": [OWN], "sensor": "beyond"}}, "feedback.sensor", "a table"),
+    (
+        {"feedback": {"throws": [OWN], "sensor": {"beyond": "-1 in"}}},
+        "feedback.sensor.beyond",
+        "from 0",
+    ),
+    ({"feedback": {"throws": [OWN], "sensor": {"side": 3}}}, "feedback.sensor.side", "0 to 2"),
+    (
+        {"feedback": {"throws": [OWN], "sensor": {"side": 1, "beyond": "2 in"}}},
+        "feedback.sensor",
+        "one question",
+    ),
+    (
+        {"feedback": {"throws": [OWN], "sensor": {"side": 1, "error": "2 in"}}},
+        "feedback.sensor.error",
+        "leave it",
+    ),
+    (
+        {"feedback": {"throws": [OWN], "sensor": {"beyond": "2 in", "error": "-1 in"}}},
+        "feedback.sensor.error",
+        "0 or more",
+    ),
     # quantities
     ({"arm/length": 28}, "arm.length", "write it as text with its unit"),
     ({"arm/length": 28.0}, "arm.length", "write it as text with its unit"),

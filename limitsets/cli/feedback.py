@@ -1,0 +1,205 @@
+"""`limitsets feedback`: which throw on which answer of a sensor of one bit brings the part to the goal."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from limitsets.cli.arguments import deviations, place
+from limitsets.cli.output import Json, Scene, Words, answer, opened, option, progress, saved, table
+from limitsets.errors import LimitsetsError
+
+if TYPE_CHECKING:
+    from limitsets.policies import Synthesis
+
+__all__ = ["feedback"]
+
+HELP_STARTS = "Where the part may lie at first, like 2=16:18; repeatable. Default: the limit sets of [throw]."
+
+
+def feedback(
+    scene: Scene,
+    mode: Annotated[
+        str, option("--mode", "MODE", "stop (the controller knows) or catch (a cavity).")
+    ] = "stop",
+    x: Annotated[str | None, option("--x", "X", "Of the goal region; default that of the goal.")] = None,
+    beyond: Annotated[str | None, option("--beyond", "X", "Ask instead: is the part beyond X?")] = None,
+    error: Annotated[str, option("--error", "E", "Of the sensor at --beyond or --sweep.")] = "0",
+    side: Annotated[int | None, option("--side", "I", "Ask instead: does the part lie on side I?")] = None,
+    blind: Annotated[bool, typer.Option("--blind", help="Ask nothing.")] = False,
+    sweep: Annotated[str | None, option("--sweep", "LO:HI:N", "Try N places of the sensor.")] = None,
+    start: Annotated[Words, option("--starts", "SIDE=LO:HI", HELP_STARTS)] = None,
+    begin: Annotated[str | None, option("--from", "X", "Every start from X on, on all sides.")] = None,
+    throws: Annotated[int, option("--throws", "N", "The most throws.", min=0, max=100)] = 30,
+    cells: Annotated[int, option("--cells", "N", "Cells per side.", min=8, max=10_000)] = 1024,
+    noise: Annotated[Words, option("--noise", "Q=DEV", "At every throw, like throw.speed='0.3 %'.")] = None,
+    seconds: Annotated[float, option("--seconds", "S", "The most time of a search.", min=0.0)] = 60.0,
+    parts: Annotated[int, option("--parts", "N", "Parts thrown by the policy.", min=1)] = 10_000,
+    csv: Annotated[Path | None, option("--csv", "FILE", "Write the policy as a table.")] = None,
+    out: Annotated[
+        Path | None, option("--out -o", "DIR", "Write feedback.json, policy.csv and policy.png there.")
+    ] = None,
+    json: Json = False,
+) -> None:
+    """Find a policy for a sensor that answers one question, and throw it.
+
+    Exit 1 where none is found: there is none within so many throws on these cells, or it is not decided.
+    """
+    with progress() as tell:
+        chosen, _ = opened(scene, out)
+        from limitsets.policies import feedback as run
+        from limitsets.policies import places
+        from limitsets.policies.simulation import simulate
+
+        goal = None if x is None else _goal_at(chosen, place(chosen, x))
+        options: dict[str, Any] = {
+            "mode": mode,
+            "goal": goal,
+            "starts": _starts(chosen, start, begin),
+            "throws": throws,
+            "cells": cells,
+            "noise": deviations("--noise", noise),
+            "seconds": seconds,
+            "progress": tell,
+        }
+        tried: tuple[Synthesis, ...] = ()
+        if sweep is None:
+            found = run(chosen, _sensor(chosen, beyond, error, side, blind=blind), **options)
+        else:
+            tried = places(chosen, _places(chosen, sweep), error=place(chosen, error), **options)
+            found = min(tried, key=lambda each: (not each.solved, each.found.throws))
+        thrown = simulate(found, parts) if found.solved else None
+        record = found.to_json() | {
+            "simulated": thrown,
+            "places": [
+                {"x": each.sensor.x, "verdict": each.found.verdict, "within": each.found.throws}  # type: ignore[union-attr]  # a place has one
+                for each in tried
+            ],
+        }
+        if out is not None:
+            _write(found, record, out)
+    policy = found.found.policy
+    if csv is not None and policy is not None:
+        with saved(csv) as draft:
+            draft.write_text(policy.csv(), encoding="utf-8", newline="\n")
+    answer(record, json, lambda: _text(found, tried, thrown, out))
+    raise typer.Exit(0 if found.solved else 1)
+
+
+def _goal_at(scene: Any, x: float) -> tuple[float, int]:
+    from limitsets.goals import OrientedBeyond, Reaches
+
+    if not isinstance(scene.goal, OrientedBeyond | Reaches):
+        kind = None if scene.goal is None else scene.goal.kind
+        raise LimitsetsError("the goal", kind, "one with x and side", "leave --x out", key="--x")
+    return x, scene.goal.side
+
+
+def _sensor(scene: Any, beyond: str | None, error: str, side: int | None, *, blind: bool) -> Any:
+    from limitsets.scene.sensing import BeyondSensor, SideSensor
+
+    if (beyond is not None) + (side is not None) + blind > 1:
+        raise LimitsetsError("the sensor", "several", "one question", "give one of --beyond, --side, --blind")
+    if blind:
+        return "none"
+    if side is not None:
+        if not 0 <= side < len(scene.sides):
+            allowed = f"0 to {len(scene.sides) - 1}"
+            raise LimitsetsError("the side", side, allowed, "name a side of this part", key="--side")
+        return SideSensor(side)
+    return None if beyond is None else BeyondSensor(place(scene, beyond), place(scene, error))
+
+
+def _starts(scene: Any, words: list[str] | None, begin: str | None) -> Any:
+    if begin is not None:
+        if words:
+            raise LimitsetsError("the starts", "--from and --starts", "one of them", "leave one out")
+        return place(scene, begin)
+    found = {}
+    for word in words or []:
+        side, sign, span = word.partition("=")
+        lo, colon, hi = span.partition(":")
+        if not (sign and colon and side.strip().isdigit()) or int(side) in found:
+            remedy = "name each side once, and two places with : between"
+            raise LimitsetsError("the starts", word, "SIDE=LO:HI", remedy, key="--starts")
+        found[int(side)] = (place(scene, lo), place(scene, hi))
+    return found or None
+
+
+def _places(scene: Any, text: str) -> list[float]:
+    words = text.split(":")
+    if len(words) != 3 or not words[2].strip().isdigit() or not 1 <= int(words[2]) <= 1000:
+        raise LimitsetsError("the places", text, "LO:HI:N, N from 1 to 1000", "correct it", key="--sweep")
+    lo, hi, count = place(scene, words[0]), place(scene, words[1]), int(words[2])
+    return [lo + (hi - lo) * k / max(count - 1, 1) for k in range(count)]
+
+
+def _write(found: Synthesis, record: dict[str, Any], out: Path) -> None:
+    from limitsets.files import as_json
+    from limitsets.report.writing import laid
+
+    policy = found.found.policy
+    drawn = []
+    if policy is not None:
+        from limitsets.plot.policies import policy as draw
+
+        drawn = [("policy", draw(found))]
+    text = {"feedback.json": as_json(record)}
+    if policy is not None:
+        text["policy.csv"] = policy.csv()
+    laid(out, drawn, lambda _: text)
+
+
+def _text(found: Synthesis, tried: tuple[Synthesis, ...], thrown: Any, out: Path | None) -> None:
+    unit = found.scene.unit
+    x, side = found.goal
+    wanted = {"stop": "known to lie", "catch": "to be caught"}[found.mode]
+    typer.echo(f"{found.scene.name}: the part is {wanted} on side {side} at x = {x:.9g} {unit} or beyond")
+    typer.echo(f"starts: {found.starts_are}: {_spans(found.starts.extents())}")
+    if tried:
+        table(
+            ("sensor at", ""),
+            [(f"{each.sensor.x:.6g} {unit}", _verdict(each)) for each in tried],  # type: ignore[union-attr]  # each has one
+        )
+    typer.echo(f"question: {found.question}")
+    typer.echo(_verdict(found))
+    policy = found.found.policy
+    if out is not None:
+        typer.echo(
+            f"written to {out}: feedback.json" + ("" if policy is None else ", policy.csv, policy.png")
+        )
+    if policy is None:
+        return
+    rows = []
+    for state, belief in zip(policy.to_json()["states"], found.beliefs(), strict=True):
+        after = ", ".join(f"{word}: {at}" for word, at in state["after"].items() if at is not None)
+        rows.append([state["state"], _spans(belief), state["throw"] or "stop", after, state["left"]])
+    table(("state", "the part lies on", "throw", "next", "throws left"), rows)
+    first = policy.to_json()["first"]
+    typer.echo("begin: " + ", ".join(f"{word}: state {at}" for word, at in first.items() if at is not None))
+    if thrown is not None:
+        more = "".join(f", {count} {what}" for what, count in thrown.failures.items())
+        typer.echo(
+            f"thrown: {thrown.reached} of {thrown.parts} came, in {thrown.mean:.3g} throws on average{more}"
+        )
+
+
+def _verdict(found: Synthesis) -> str:
+    what = found.found
+    if found.solved:
+        return f"solved: {what.throws} throws are enough (proved, for every start and every noise named)"
+    least = f"no policy of {what.throws} throws" if what.throws >= 0 else "nothing shown"
+    if what.verdict == "not-solved":
+        return f"not with {what.throws} throws on these cells ({what.beliefs} beliefs)"
+    return (
+        f"not decided: {what.reason} ({what.beliefs} beliefs, {what.seconds:.3g} s); {least} on these cells"
+    )
+
+
+def _spans(extents: Any) -> str:
+    return "; ".join(
+        f"side {side}: " + ", ".join(f"{lo:.4g} to {hi:.4g}" for lo, hi in parts)
+        for side, parts in extents.items()
+    )

@@ -1,0 +1,219 @@
+"""One bit of feedback: which throw on which answer brings the part to a wanted side and place."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from limitsets.cells import CellSet, Grid
+from limitsets.errors import AnswerError
+from limitsets.files import as_table
+from limitsets.policies.board import Board, Progress, Starts, board_of
+from limitsets.policies.search import SOLVED, Found, search
+from limitsets.scene import Scene, load
+from limitsets.scene.sensing import BeyondSensor, Sensor
+
+__all__ = ["Synthesis", "feedback", "places"]
+
+
+@dataclass(frozen=True, eq=False)
+class Synthesis(Board):
+    """What one bit of feedback was found to do, and the game in which: its sensor included.
+
+    Attributes
+    ----------
+    sensor : Sensor or None
+        What is asked; None: nothing.
+    found : Found
+        How the search ended.
+    """
+
+    sensor: Sensor | None
+    found: Found
+
+    @property
+    def solved(self) -> bool:
+        """Whether there is a policy."""
+        return self.found.verdict == SOLVED
+
+    @property
+    def grid(self) -> Grid:
+        """The cells."""
+        return self.starts.grid
+
+    @property
+    def question(self) -> str:
+        """What the sensor is asked, a clause."""
+        return "nothing is asked" if self.sensor is None else self.sensor.question(self.scene.unit)
+
+    def beliefs(self) -> list[dict[int, list[tuple[float, float]]]]:
+        """Give per state of the policy where the part may lie: intervals by side [length]."""
+        policy = self.found.policy
+        return [] if policy is None else [CellSet(self.grid, mask).extents() for mask in policy.belief]
+
+    def to_json(self) -> dict[str, Any]:
+        """Give its tables for JSON."""
+        policy = None
+        if self.found.policy is not None:
+            policy = self.found.policy.to_json()
+            for state, belief in zip(policy["states"], self.beliefs(), strict=True):
+                state["belief"] = as_table(belief=belief)["belief"]
+        return as_table(
+            scene=self.scene.as_dict(),
+            unit=self.scene.unit,
+            throws=[
+                {"name": name, "kappa": [box.bare[0].kappa, box.bare[1].kappa]}
+                for name, box in self.throws.items()
+            ],
+            sensor=self.sensor,
+            question=self.question,
+            mode=self.mode,
+            goal={"x": self.goal[0], "side": self.goal[1]},
+            starts={"are": self.starts_are, "extents": self.starts.extents()},
+            noise=self.noise,
+            cells=self.grid.n_cells,
+            verdict=self.found.verdict,
+            within=self.found.throws,
+            policy=policy,
+            beliefs=self.found.beliefs,
+            seconds=self.found.seconds,
+            reason=self.found.reason,
+        )
+
+
+def _play(
+    board: Board, sensor: Sensor | None, throws: int, seconds: float, beliefs: int, progress: Progress
+) -> Synthesis:
+    game = board.game.asking(None if sensor is None else sensor.answers(board.starts.grid))
+    found = search(game, board.starts.mask, throws, seconds=seconds, beliefs=beliefs, progress=progress)
+    return Synthesis(**{**vars(board), "game": game}, sensor=sensor, found=found)
+
+
+def feedback(
+    scene: Scene | str,
+    sensor: Sensor | str | None = None,
+    *,
+    mode: str = "stop",
+    goal: tuple[float, int] | None = None,
+    starts: Starts = None,
+    throws: int = 30,
+    cells: int = 1024,
+    noise: Mapping[str, str] | None = None,
+    seconds: float = 60.0,
+    beliefs: int = 400_000,
+    progress: Progress = None,
+) -> Synthesis:
+    """Look for a policy: which throw on which answer of a sensor of one bit.
+
+    The sensor is read whenever the part lies at rest, before the first throw too.  A policy holds for every start in
+    the cells named and every sequence of the noise.
+
+    Parameters
+    ----------
+    scene : Scene or str
+        A scene with the table ``[feedback]``.
+    sensor : Sensor or "none", optional
+        Instead of the scene's; "none" asks nothing.
+    mode : {"stop", "catch"}
+        "stop": the controller stops where it knows that the part is in the goal region.  "catch": a part that comes to
+        rest at the goal's x or beyond falls in; on another side than the goal's it is lost.
+    goal : (float, int), optional
+        x and side of the goal region [length]; default those of the scene's goal.
+    starts : float or mapping of int to (float, float), optional
+        Every start from this x on, or from one x to another by side [length].  Default: the limit sets of the scene's
+        own throw, so far as parts there are not yet caught.
+    throws : int
+        The most throws.
+    cells : int
+        Cells per side.
+    noise : mapping of str to str, optional
+        What differs at every throw: ``{"throw.speed": "0.3 %"}``, besides what the scene scatters.
+    seconds : float
+        The most time for the search [s].
+    beliefs : int
+        The most beliefs to remember.
+    progress : callable, optional
+        Told the step, its number and how many there are.
+
+    Returns
+    -------
+    Synthesis
+
+    Raises
+    ------
+    AnswerError
+        For a scene without throws to choose from, a goal without a place, an unknown mode, or starts that are none.
+
+    Source: docs/feedback.md.
+
+    Examples
+    --------
+    >>> import limitsets as ls
+    >>> scene = ls.load("paper-designed").as_dict()
+    >>> scene["feedback"] = {
+    ...     "sensor": {"beyond": "20 in"},
+    ...     "throws": [{"name": "own", "kappa": "25.3778518 in"}],
+    ... }
+    >>> found = ls.feedback(ls.load(scene), starts={2: (16.0, 16.5)}, cells=256)
+    >>> found.found.verdict, found.found.throws
+    ('solved', 2)
+    """
+    chosen = load(scene) if isinstance(scene, str) else scene
+    asked = _sensor_of(chosen, sensor)
+    cuts = [] if not isinstance(asked, BeyondSensor) else [asked.x - asked.error, asked.x + asked.error]
+    board = board_of(chosen, mode, goal, starts, cells, noise, cuts, progress)
+    return _play(board, asked, throws, seconds, beliefs, progress)
+
+
+def places(
+    scene: Scene | str,
+    at: Sequence[float],
+    *,
+    error: float = 0.0,
+    mode: str = "stop",
+    goal: tuple[float, int] | None = None,
+    starts: Starts = None,
+    throws: int = 30,
+    cells: int = 1024,
+    noise: Mapping[str, str] | None = None,
+    seconds: float = 60.0,
+    beliefs: int = 400_000,
+    progress: Progress = None,
+) -> tuple[Synthesis, ...]:
+    """Try the sensor "is the part beyond x?" at several places; the images of the cells are computed once.
+
+    Parameters
+    ----------
+    at : sequence of float
+        The places [length].
+    error : float
+        The sensor's error [length].
+    scene, mode, goal, starts, throws, cells, noise, seconds, beliefs, progress
+        As in `feedback`; the time is that for each place.
+
+    Returns
+    -------
+    tuple of Synthesis
+        One for each place.
+    """
+    chosen = load(scene) if isinstance(scene, str) else scene
+    board = board_of(chosen, mode, goal, starts, cells, noise, at, progress)
+    found = []
+    for k, x in enumerate(at):
+        if progress is not None:
+            progress("places of the sensor", k, len(at))
+        found.append(_play(board, BeyondSensor(x, error), throws, seconds, beliefs, None))
+    return tuple(found)
+
+
+def _sensor_of(scene: Scene, sensor: Sensor | str | None) -> Sensor | None:
+    if isinstance(sensor, str):
+        if sensor != "none":
+            raise AnswerError("the sensor", sensor, 'a Sensor or "none"', "correct it")
+        return None
+    own = sensor if sensor is not None or scene.feedback is None else scene.feedback.sensor
+    if own is None and scene.feedback is not None:
+        remedy = 'add it to the scene, choose one, or pass "none"'
+        raise AnswerError("the sensor", "none", "[feedback] sensor", remedy)
+    return own

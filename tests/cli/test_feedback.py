@@ -1,0 +1,153 @@
+"""`limitsets feedback`: words, JSON as docs/json.md has it, files, exit codes."""
+
+import csv
+import json
+import re
+from pathlib import Path
+
+import pytest
+
+import limitsets as ls
+from tests.cli.command import run
+
+PAGE = (Path(__file__).resolve().parents[2] / "docs" / "json.md").read_text(encoding="utf-8")
+SCENE = "one-bit.toml"
+FEW = ("--starts", "2=17:18", "--cells", "256")
+
+
+@pytest.fixture(autouse=True)
+def _scene(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    tree = ls.load("paper-initial").as_dict()
+    throws = [{"name": "own", **tree["throw"]}, {"name": "fast", "kappa": "27.57073926 in"}]
+    tree["feedback"] = {"sensor": {"beyond": "20 in"}, "throws": throws}
+    ls.dump(ls.load(tree), SCENE)
+
+
+def documented():
+    """Keys of the table of the page; those in one cell before the first full stop or colon belong together."""
+    section = PAGE.split("## feedback", 1)[1].split("\n## ", 1)[0]
+    cells = re.findall(r"^\| (`[^|]*`) \|", section, re.M)
+    return {name for cell in cells for name in re.findall(r"`(\w+)`", cell)} | {"question"}
+
+
+def test_a_policy_in_words(capfd):
+    code, out, _ = run(capfd, "feedback", SCENE, *FEW)
+    assert code == 0
+    assert "the part is known to lie on side 2 at x = 20 in or beyond" in out
+    assert "starts: those named: side 2: 17 to 18" in out
+    assert "is the part beyond 20 in?" in out
+    assert re.search(r"solved: [0-9]+ throws are enough", out)
+    assert "thrown: 10000 of 10000 came" in out
+    assert [path.name for path in Path().iterdir()] == [SCENE]
+
+
+def test_json_has_the_keys_of_the_page(capfd):
+    code, out, _ = run(capfd, "feedback", SCENE, *FEW, "--json", "--parts", "500")
+    record = json.loads(out)
+    assert code == 0
+    assert set(record) == documented()
+    assert ls.load(record["scene"]).feedback.sensor.x == 20.0
+    assert record["sensor"] == {"x": 20.0, "error": 0.0}
+    assert record["goal"] == {"x": 20.0, "side": 2}
+    assert record["starts"]["extents"] == {"2": [[17.0, 18.0]]}
+    assert record["verdict"] == "solved"
+    assert set(record["policy"]) == {"first", "states"}
+    assert all(
+        set(state) == {"state", "throw", "after", "left", "belief"} for state in record["policy"]["states"]
+    )
+    assert [state["state"] for state in record["policy"]["states"]] == list(
+        range(len(record["policy"]["states"]))
+    )
+    assert (
+        record["simulated"]["reached"]
+        == record["simulated"]["parts"]
+        == sum(record["simulated"]["throws"])
+        == 500
+    )
+    assert record["places"] == []
+
+
+def runs(rows, states, x, side):
+    """Run the table of the CSV as a controller would: it knows the answers only."""
+
+    def heard():
+        return "yes" if x > 20.0 else "no"
+
+    state = next(k for k, row in enumerate(rows) if heard() in row["begin"].split())
+    for made in range(int(rows[state]["left"]) + 1):
+        if rows[state]["throw"] == "stop":
+            return x, side, made
+        path = ls.orbit(states[rows[state]["throw"]], x, side, 1)
+        x, side = float(path.x[1]), int(path.side[1])
+        state = int(rows[state][f"next_{heard()}"])
+    return None
+
+
+def test_the_files_can_be_run_by_a_controller(capfd):
+    code, out, _ = run(capfd, "feedback", SCENE, *FEW, "--csv", "table.csv", "-o", "out")
+    assert code == 0
+    assert "written to out" in out
+    assert sorted(path.name for path in Path("out").iterdir()) == [
+        "feedback.json",
+        "policy.csv",
+        "policy.png",
+    ]
+    assert Path("out/policy.png").stat().st_size > 10_000
+    text = Path("table.csv").read_text(encoding="utf-8")
+    assert text == Path("out/policy.csv").read_text(encoding="utf-8")
+    rows = list(csv.DictReader(text.splitlines()))
+    assert list(rows[0]) == ["state", "begin", "throw", "next_yes", "next_no", "left"]
+    scene = ls.load(SCENE)
+    maps = {each.name: scene.with_values({each.quantity: each.text}).map for each in scene.feedback.throws}
+    for k in range(40):
+        x, side, made = runs(rows, maps, 17.0 + k / 40, 2)
+        assert (side, x >= 20.0) == (2, True)
+        assert made <= max(int(row["left"]) for row in rows)
+
+
+def test_no_policy_is_exit_1(capfd):
+    code, out, _ = run(
+        capfd, "feedback", SCENE, "--cells", "128", "--blind", "--throws", "3", "--csv", "t.csv"
+    )
+    assert code == 1
+    assert "nothing is asked" in out
+    assert "not with 3 throws on these cells" in out
+    assert not Path("t.csv").exists()
+    code, out, _ = run(capfd, "feedback", SCENE, "--cells", "256", "--seconds", "0", "--json", "--side", "2")
+    record = json.loads(out)
+    assert (code, record["verdict"], record["policy"], record["simulated"]) == (1, "not-decided", None, None)
+
+
+def test_a_sweep_names_the_best_place(capfd):
+    words = ("feedback", SCENE, *FEW, "--sweep", "18:20:3", "--parts", "100")
+    code, out, _ = run(capfd, *words, "--json")
+    record = json.loads(out)
+    assert code == 0
+    assert [place["x"] for place in record["places"]] == [18.0, 19.0, 20.0]
+    assert all(set(place) == {"x", "verdict", "within"} for place in record["places"])
+    assert record["within"] == min(
+        place["within"] for place in record["places"] if place["verdict"] == "solved"
+    )
+    _, out, _ = run(capfd, *words)
+    assert "19 in" in out
+
+
+@pytest.mark.parametrize(
+    ("words", "reason"),
+    [
+        (("--beyond", "19", "--side", "2"), "one question"),
+        (("--side", "4"), "0 to 2"),
+        (("--starts", "2=17"), "SIDE=LO:HI"),
+        (("--starts", "2=17:18", "--starts", "2=18:19"), "SIDE=LO:HI"),
+        (("--starts", "2=17:18", "--from", "17"), "leave one out"),
+        (("--sweep", "1:2"), "LO:HI:N"),
+        (("--beyond", "19 deg"), "deg is a unit of angle"),
+        (("--mode", "hold"), "stop or catch"),
+        (("--from", "40"), "the starts"),
+    ],
+)
+def test_bad_input_is_exit_2(capfd, words, reason):
+    code, out, err = run(capfd, "feedback", SCENE, "--cells", "32", *words)
+    assert (code, out) == (2, "")
+    assert reason in err

@@ -1,0 +1,228 @@
+"""`ls.feedback` on scenes: against the definition on coarse cells, against throws, and what it refuses."""
+
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import limitsets as ls
+from limitsets.errors import AnswerError
+from limitsets.policies import broken, places
+from limitsets.policies.beliefs import cells_of
+from limitsets.policies.enclosed_starts import not_within
+from limitsets.policies.simulation import simulate
+from limitsets.scene.sensing import BeyondSensor, SideSensor
+from tests.policies.recursion import as_number, least
+
+
+def with_throws(name="paper-initial", sensor=None, fast="27.57073926 in"):
+    """A built-in scene with its own throw and one at 110 % of its speed: kappa over 1.21."""
+    tree = ls.load(name).as_dict()
+    tree["feedback"] = {"throws": [{"name": "own", **tree["throw"]}, {"name": "fast", "kappa": fast}]}
+    if sensor is not None:
+        tree["feedback"]["sensor"] = sensor
+    return ls.load(tree)
+
+
+@pytest.fixture(scope="module")
+def scene():
+    return with_throws(sensor={"beyond": "20 in"})
+
+
+@pytest.mark.parametrize(
+    ("mode", "starts", "sensor"),
+    [
+        ("stop", {2: (17.0, 18.0)}, None),
+        ("stop", {1: (19.0, 19.9)}, SideSensor(2)),
+        ("stop", None, None),
+        ("stop", {2: (16.3, 21.0)}, BeyondSensor(18.0, 0.2)),
+        ("catch", {2: (16.3, 19.0)}, None),
+        ("catch", {0: (13.5, 15.0)}, SideSensor(0)),
+        ("catch", {0: (18.0, 19.0)}, "none"),
+    ],
+)
+def test_coarse_cells_against_the_definition(scene, mode, starts, sensor):
+    """13 cells a side, the borders at places that matter added; depth 6."""
+    found = ls.feedback(scene, sensor, mode=mode, starts=starts, throws=6, cells=13)
+    game = found.game
+    numbers = [
+        [
+            None if game.leaves[k, cell] else sum(1 << int(c) for c in cells_of(game.images[k, cell]))
+            for cell in range(game.n_cells)
+        ]
+        for k in range(2)
+    ]
+    lost = None if game.lost is None else as_number(game.lost)
+    plain = least(
+        numbers,
+        [as_number(mask) for mask in game.answers.values()],
+        as_number(game.target),
+        lost,
+        as_number(found.starts.mask),
+        6,
+    )
+    assert found.found.verdict == ("not-solved" if plain is None else "solved")
+    assert plain is None or found.found.throws == plain
+
+
+@pytest.fixture(scope="module")
+def known(scene):
+    """From the limit set of the part's own throw to side 2 beyond 20 in, asked whether it is beyond 20 in."""
+    return ls.feedback(scene, cells=512)
+
+
+def test_the_initial_part_is_brought_to_its_goal_with_one_bit(scene, known):
+    """Its goal fails without a sensor: thrown by itself the part lies on every side beyond 20 in."""
+    assert max(hi for side in (0, 1) for _, hi in known.starts.extents()[side]) > 20.5
+    assert known.solved
+    assert broken(known.found.policy, known.game, known.starts.mask) == ""
+    blind = ls.feedback(scene, "none", cells=512)
+    assert (blind.found.verdict, blind.found.policy) == ("not-solved", None)
+
+
+def test_the_part_is_caught_on_its_side_and_never_on_another(scene):
+    found = ls.feedback(scene, SideSensor(2), mode="catch", cells=512)
+    assert found.solved
+    assert broken(found.found.policy, found.game, found.starts.mask) == ""
+    thrown = simulate(found, 10_000, seed=1)
+    assert (thrown.reached, thrown.failures, int(thrown.throws.sum())) == (10_000, {}, 10_000)
+
+
+@pytest.mark.parametrize(
+    ("noise", "error"),
+    [({}, 0.0), ({"throw.speed": "0.1 %"}, 0.0), ({}, 0.05), ({"landing.x": "0.005 in"}, 0.0)],
+)
+def test_a_policy_that_is_thrown_never_fails(scene, noise, error):
+    """Random starts, and noise and errors of the sensor anywhere within their bounds."""
+    found = ls.feedback(scene, BeyondSensor(20.0, error), noise=noise, cells=1024, starts={2: (16.5, 17.5)})
+    assert found.solved
+    thrown = simulate(found, 10_000, seed=2)
+    assert (thrown.reached, thrown.failures) == (10_000, {})
+    assert 0 < thrown.mean <= found.found.throws
+
+
+def test_a_forged_policy_fails_when_it_is_thrown(known):
+    """Stopping at once, wherever the part is; and a throw too many."""
+    policy = known.found.policy
+    throw = policy.throw.copy()
+    throw[policy.first[1]] = -1
+
+    def thrown_by(**parts):
+        forged = replace(known, found=replace(known.found, policy=replace(policy, **parts)))
+        return simulate(forged, 1000).failures
+
+    assert thrown_by(throw=throw).keys() == {"stopped elsewhere"}
+    after = policy.after.copy()
+    after[policy.first[1]] = policy.first[1]
+    assert thrown_by(after=after)
+
+
+def test_the_place_of_the_sensor_matters(scene):
+    found = places(scene, [10.0, 18.0, 20.0], cells=512)
+    assert [each.sensor.x for each in found] == [10.0, 18.0, 20.0]
+    assert [each.solved for each in found] == [False, True, True]
+    alone = ls.feedback(scene, BeyondSensor(18.0), cells=512)
+    assert abs(alone.found.throws - found[1].found.throws) <= 1  # its cells have other borders
+
+
+def test_more_noise_than_a_policy_can_bear(scene):
+    found = ls.feedback(scene, noise={"throw.speed": "3 %"}, cells=512)
+    assert found.found.verdict == "not-solved"
+    assert found.to_json()["policy"] is None
+
+
+def test_time_and_memory_end_a_search(scene):
+    side = SideSensor(2)
+    found = ls.feedback(scene, side, cells=512, beliefs=500)
+    assert (found.found.verdict, found.found.policy) == ("not-decided", None)
+    assert "500 beliefs" in found.found.reason
+    assert 0 <= found.found.throws < 30
+    found = ls.feedback(scene, side, cells=512, seconds=0.0)
+    assert (found.found.verdict, found.found.reason) == ("not-decided", "the time is used up")
+
+
+def test_cells_hold_the_images_of_their_points(scene):
+    """Random states and throws: where they come to rest is in the image of their cell."""
+    found = ls.feedback(scene, cells=128, starts={2: (17.0, 18.0)}, throws=1)
+    random = np.random.default_rng(0)
+    for throw, box in enumerate(found.throws.values()):
+        for side in range(3):
+            x = random.uniform(12.0, 27.9, 500)
+            landed = ls.maps.images(box.lo, x, side)
+            begin = found.grid.index(x, side)
+            for k in np.flatnonzero(landed.code >= 0):
+                end = found.grid.index([landed.x[k]], int(landed.side[k]))[0]
+                assert found.game.leaves[throw, begin[k]] or end in cells_of(
+                    found.game.images[throw, begin[k]]
+                )
+
+
+def test_a_certificate_of_a_scene_with_feedback_is_about_its_own_throw(scene, tmp_path):
+    pytest.importorskip("flint", reason="the checker needs python-flint")
+    proof = ls.certify(scene, ["invariant"])
+    proof.save(tmp_path / "own.proof.zip")
+    assert ls.recheck(tmp_path / "own.proof.zip").verdict == "proved"
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"mode": "hold"}, "the mode is 'hold'"),
+        ({"sensor": "some"}, "the sensor is 'some'"),
+        ({"goal": (30.0, 2)}, "the goal is"),
+        ({"goal": (20.0, 3)}, "the goal is"),
+        ({"starts": {2: (1.0, 18.0)}}, "the starts is"),
+        ({"starts": {5: (17.0, 18.0)}}, "the starts is"),
+        ({"starts": {1: (21.0, 22.0)}, "mode": "catch"}, "the starts is"),
+        ({"noise": {"arm.length": "1 %"}}, "the noise is"),
+    ],
+)
+def test_wrong_calls(scene, options, words):
+    with pytest.raises(AnswerError, match=re.escape(words)):
+        ls.feedback(scene, cells=64, **options)
+
+
+def test_scenes_without_what_it_needs():
+    with pytest.raises(AnswerError, match="the throws to choose from"):
+        ls.feedback("paper-initial")
+    with pytest.raises(AnswerError, match="the sensor"):
+        ls.feedback(with_throws())
+    tree = with_throws().as_dict()
+    tree["goal"] = {"attracts_all": True}
+    with pytest.raises(AnswerError, match="the goal is 'attracts_all'"):
+        ls.feedback(tree_scene := ls.load(tree), "none", cells=64)
+    assert ls.feedback(tree_scene, "none", goal=(20.0, 2), cells=64, throws=1).goal == (20.0, 2)
+
+
+def test_a_side_without_a_throw_that_stays_is_told_apart():
+    """Small cases with answers from the map itself: one jog from 19.5 on side 2 lands beyond 20, and no flip does."""
+    scene = with_throws(sensor={"side": 2})
+    after = [float(ls.orbit(scene.map, x, 2, 1).x[1]) for x in (19.4, 19.5)]
+    assert min(after) > 20.0
+    found = ls.feedback(scene, starts={2: (19.4, 19.5)}, cells=128)
+    assert (found.found.verdict, found.found.throws) == ("solved", 1)
+    assert found.found.policy.throws[found.found.policy.throw[found.found.policy.first[0]]] == "own"
+
+
+def test_throws_without_a_sensor(scene):
+    """From 19.4 to 19.5 on side 2 its own throw is enough, whatever a sensor says."""
+    found = ls.feedback(scene, "none", starts={2: (19.4, 19.5)}, cells=128)
+    assert (found.found.verdict, found.found.throws, found.question) == ("solved", 1, "nothing is asked")
+    assert simulate(found, 500).throws.tolist() == [0, 500]
+    assert found.to_json()["sensor"] is None
+
+
+def test_not_within_by_enclosed_starts():
+    """Starts from which one throw ends below x are not served by one, and by two where two jogs get there."""
+    scene = with_throws(sensor={"side": 2})
+    path = ls.orbit(scene.map, 16.5, 2, 4).x
+    needed = int(np.argmax(path >= 20.0))
+    assert needed > 1
+    found = ls.feedback(scene, starts={2: (16.4, 16.6)}, cells=128, throws=1)
+    assert found.found.verdict == "not-solved"
+    assert not_within(found, [(16.5, 2)], needed - 1).throws >= 1
+    shown = not_within(found, [(16.5, 2)], needed)
+    assert (shown.throws < needed, shown.decided) == (True, False)
+    with pytest.raises(AnswerError, match="one of the starts"):
+        not_within(found, [(19.0, 2)])
