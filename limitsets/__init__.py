@@ -22,6 +22,7 @@ if TYPE_CHECKING:  # each from the file that holds it: most rooms have a file of
     from limitsets.analysis import analyse
     from limitsets.auditing import audit
     from limitsets.cells import grid
+    from limitsets.feeding import feed
     from limitsets.fitting import fit
     from limitsets.graph.morse import morse_graph
     from limitsets.graph.transitions import transitions
@@ -58,6 +59,7 @@ _ROOMS = {
     "design": "inverse",
     "dump": "scene",
     "engine": "engine",
+    "feed": "feeding",
     "feedback": "policies",
     "fit": "fitting",
     "grid": "cells",
@@ -92,6 +94,7 @@ __all__ = [
     "design",
     "dump",
     "engine",
+    "feed",
     "feedback",
     "fit",
     "grid",

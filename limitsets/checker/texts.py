@@ -32,7 +32,7 @@ def plain(text: object, most: int = 80) -> str:
 
 
 DECIMAL = r"[+-]?(?:[0-9]{1,100}(?:\.[0-9]{0,100})?|\.[0-9]{1,100})(?:[eE][+-]?[0-9]{1,3})?"
-NUMBER = re.compile(rf" *({DECIMAL})(?: +|(?=%))([a-z%/^0-9]{{1,8}}) *")  # as a scene writes a quantity
+NUMBER = re.compile(rf" *({DECIMAL})(?: +|(?=%))([a-zH%/^0-9]{{1,8}}) *")  # as a scene writes a quantity
 INCH = Fraction(254, 10_000)
 METRIC = {"m": Fraction(1), "cm": Fraction(1, 100), "mm": Fraction(1, 1000), "um": Fraction(1, 10**6)}
 LENGTHS = {**METRIC, "in": INCH, "ft": 12 * INCH}
@@ -51,6 +51,7 @@ UNITS: dict[str, dict[str, Fraction]] = {
     },
     "density": {"kg/m^2": Fraction(1), "g/cm^2": Fraction(10)},  # mass per area of a plate
     "bulk": {"kg/m^3": Fraction(1), "g/cm^3": Fraction(1000)},  # mass per volume
+    "frequency": {"Hz": Fraction(1)},
     "share": {"%": Fraction(1, 100)},
 }
 KINDS = " ".join(UNITS)

@@ -11,6 +11,7 @@ from limitsets.cli.atlas import atlas
 from limitsets.cli.audit import audit
 from limitsets.cli.certify import certify
 from limitsets.cli.design import design
+from limitsets.cli.feed import feed
 from limitsets.cli.feedback import feedback
 from limitsets.cli.fit import fit
 from limitsets.cli.margin import margin
@@ -62,6 +63,7 @@ for command in (
     robustness,
     design,
     atlas,
+    feed,
     feedback,
     fit,
 ):

@@ -64,18 +64,18 @@ def feedback(
             "seconds": seconds,
             "progress": tell,
         }
-        tried: tuple[Synthesis, ...] = ()
+        tried: list[tuple[float, Synthesis]] = []
         if sweep is None:
             found = run(chosen, _sensor(chosen, beyond, error, side, blind=blind), **options)
         else:
-            tried = places(chosen, _places(chosen, sweep), error=place(chosen, error), **options)
-            found = min(tried, key=lambda each: (not each.solved, each.found.throws))
+            at = _places(chosen, sweep)
+            tried = list(zip(at, places(chosen, at, error=place(chosen, error), **options), strict=True))
+            found = min((each for _, each in tried), key=lambda each: (not each.solved, each.found.throws))
         thrown = simulate(found, parts) if found.solved else None
         record = found.to_json() | {
             "simulated": thrown,
             "places": [
-                {"x": each.sensor.x, "verdict": each.found.verdict, "within": each.found.throws}  # type: ignore[union-attr]  # a place has one
-                for each in tried
+                {"x": x, "verdict": each.found.verdict, "within": each.found.throws} for x, each in tried
             ],
         }
         if out is not None:
@@ -152,7 +152,7 @@ def _write(found: Synthesis, record: dict[str, Any], out: Path) -> None:
     laid(out, drawn, lambda _: text)
 
 
-def _text(found: Synthesis, tried: tuple[Synthesis, ...], thrown: Any, out: Path | None) -> None:
+def _text(found: Synthesis, tried: list[tuple[float, Synthesis]], thrown: Any, out: Path | None) -> None:
     unit = found.scene.unit
     x, side = found.goal
     wanted = {"stop": "known to lie", "catch": "to be caught"}[found.mode]
@@ -161,7 +161,7 @@ def _text(found: Synthesis, tried: tuple[Synthesis, ...], thrown: Any, out: Path
     if tried:
         table(
             ("sensor at", ""),
-            [(f"{each.sensor.x:.6g} {unit}", _verdict(each)) for each in tried],  # type: ignore[union-attr]  # each has one
+            [(f"{place:.6g} {unit}", _verdict(each)) for place, each in tried],
         )
     typer.echo(f"question: {found.question}")
     typer.echo(_verdict(found))

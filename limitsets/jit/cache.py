@@ -53,6 +53,7 @@ KERNEL_FREE = {
     "resilience",
     "robust",
     "regions",
+    "feeding",
     "fitting",
     "inverse",
     "sweep",

@@ -23,6 +23,7 @@ _FILES = {
     "bifurcation": "bifurcations",
     "counterexample": "counterexamples",
     "design": "designs",
+    "feeding": "fed_parts",
     "fit_residuals": "residuals",
     "flight": "flights",
     "limit_set": "limit_sets",

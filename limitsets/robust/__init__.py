@@ -7,6 +7,8 @@ approximations, never proofs, and say so.
 
 from __future__ import annotations
 
+from limitsets.robust.brackets.absorption import AbsorptionBrackets as AbsorptionBrackets
+from limitsets.robust.brackets.absorption import absorption_brackets as absorption_brackets
 from limitsets.robust.margins.finding import Margin as Margin
 from limitsets.robust.margins.finding import margin as margin
 from limitsets.robust.noise.absorbing import absorption as absorption

@@ -6,6 +6,7 @@ that later rooms read.  Every refusal is one `limitsets.errors.SceneError` with 
 what to do.  Lengths stay in the scene's own unit, that of the arm's length.
 """
 
+from limitsets.scene.cavity import Cavity
 from limitsets.scene.facts import Deviation, Effects, Scatter, World
 from limitsets.scene.quantities import NAMES, deviation
 from limitsets.scene.reading import load, scenes
@@ -14,6 +15,7 @@ from limitsets.scene.writing import dump
 
 __all__ = [
     "NAMES",
+    "Cavity",
     "Deviation",
     "Effects",
     "Scatter",

@@ -16,6 +16,7 @@ import numpy.typing as npt
 from limitsets.errors import SceneError
 from limitsets.geometry import Mass, OnSide, heights_inside, is_convex, is_triangle, triangle_of
 from limitsets.geometry.polygon import Scalar, Vector
+from limitsets.scene.cavity import Cavity
 from limitsets.scene.floats import SIGNED, SIGNED_POINT
 from limitsets.scene.numbers import Numbers
 from limitsets.scene.quantities import base_unit, in_units, replaced, text_at
@@ -91,7 +92,7 @@ def throw_stack(scene: Scene, values: Mapping[str, npt.ArrayLike]) -> ThrowStack
     count = max(each.size for each in arrays.values()) if arrays else 1
     with np.errstate(all="ignore"):  # where there is no such scene; those points are flagged
         reader = _Arrays(tree, scene.unit, arrays, count)
-        numbers = reader.numbers(scene.goal)
+        numbers = reader.numbers(scene.goal, scene.cavity)
     possible = reader.possible
 
     def kept(found: Array, present: Any) -> Array:
@@ -197,7 +198,7 @@ class _Arrays(Numbers):
         for height in heights:
             self.require(height >= -slack)
 
-    def numbers(self, goal: Any) -> dict[str, Array]:
+    def numbers(self, goal: Any, cavity: Cavity | None) -> dict[str, Array]:
         """Return the fields of the throw map as arrays; the flags are complete then."""
         arm_length = self.number("arm.length")
         a, d, length, right, corner = (
@@ -213,6 +214,11 @@ class _Arrays(Numbers):
             self.require((kappa >= LEAST) & (kappa <= 1 / LEAST))
         if hasattr(goal, "x"):  # a goal beyond the arm is refused
             self.require(goal.x < arm_length)
+        if cavity is not None:  # so is one that the arm overlaps, or that the part does not fit in
+            wanted = getattr(goal, "side", None)
+            fitted = length.min(axis=-1) if wanted is None else length[:, wanted]
+            self.require((cavity.position <= arm_length) & (cavity.position > a.max(axis=-1)))
+            self.require(cavity.width >= fitted)
         found = {
             "kappa": kappa,
             "surface_height": self.number("arm.surface_height"),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from limitsets.scene.cavity import resolve_cavity
 from limitsets.scene.facts import Deviation
 from limitsets.scene.floats import Floats
 from limitsets.scene.purpose import resolve_effects, resolve_goal, resolve_world
@@ -46,6 +47,10 @@ def resolved(structure: object, file: str | None) -> dict[str, Any]:
     goal = None
     if table.goal is not None:
         goal = resolve_goal(table.goal, len(body.sides), arm_length, resolver)
+    cavity = None
+    if table.cavity is not None:
+        feet, lengths = body.sides.a.tolist(), body.sides.length.tolist()
+        cavity = resolve_cavity(table.cavity, feet, lengths, arm_length, goal, resolver)
     return {
         "name": table.name,
         "unit": unit,
@@ -57,6 +62,7 @@ def resolved(structure: object, file: str | None) -> dict[str, Any]:
         "flight": table.model.flight,
         "flip": table.model.flip,
         "goal": goal,
+        "cavity": cavity,
         "world": world,
         "effects": resolve_effects(table.effects, world, table.model.flight, resolver),
         "tolerance": _tolerance(tree, table, resolver),

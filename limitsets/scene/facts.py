@@ -79,6 +79,7 @@ FACTS: dict[str, Fact] = {
     "restitution": Fact("the coefficient of restitution", most=1.0, words="0.4"),
     "bounce_threshold": Fact("the threshold", "length"),
     "stroke": Fact("the stroke", "angle", math.pi / 2, "above 0 and below 90 deg"),
+    "throw_rate": Fact("the rate of throws", "frequency"),
 }
 """The numbers that `[world]` may have, by name; what an effect needs that none needed before is added here."""
 

@@ -124,6 +124,7 @@ def base_unit(dimension: str, unit: str) -> str:
         "mass": "kg",
         "mass per area": f"kg/{unit}^2",
         "mass per volume": f"kg/{unit}^3",
+        "frequency": "Hz",
         "share": "",
     }.get(dimension, unit)
 

@@ -15,6 +15,7 @@ import numpy.typing as npt
 from limitsets.errors import SceneError
 from limitsets.geometry import RestingSides
 from limitsets.goals import Goal
+from limitsets.scene.cavity import Cavity
 from limitsets.scene.facts import Deviation, Effects, World
 from limitsets.scene.sensing import Feedback
 
@@ -65,6 +66,8 @@ class Scene:
         Which formulas.
     goal : Goal or None
         What is asked.
+    cavity : Cavity or None
+        Where the arm ends, and what lies beyond its end; only `limitsets.feed` asks for it.
     world : World
         Facts, whether or not an effect uses them.
     effects : Effects
@@ -92,6 +95,7 @@ class Scene:
     flight: str
     flip: str
     goal: Goal | None
+    cavity: Cavity | None
     world: World
     effects: Effects
     tolerance: Mapping[str, Deviation]

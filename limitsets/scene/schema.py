@@ -226,6 +226,15 @@ class WorldTable(Table):
     scatter: ScatterTable | None = None
 
 
+class CavityTable(Table):
+    """The cavity at the end of the arm."""
+
+    position: Length
+    width: Length
+    depth: Length
+    angle: Angle
+
+
 class EffectsTable(Table):
     """What is simulated beyond the minimal model: effects of those declared."""
 
@@ -243,6 +252,7 @@ class SceneTable(Table):
     gravity: GravityTable | None = None
     model: ModelTable = Field(default_factory=ModelTable)
     goal: GoalTable | None = None
+    cavity: CavityTable | None = None
     world: WorldTable = Field(default_factory=WorldTable)
     effects: EffectsTable = Field(default_factory=EffectsTable)
     tolerance: dict[str, Deviation] = Field(default_factory=dict)

@@ -37,6 +37,7 @@ UNITS: dict[str, tuple[str, ...]] = {
     "mass": ("kg", "g", "lb", "t", "mg"),
     "mass per area": ("kg/m^2", "g/cm^2"),
     "mass per volume": ("kg/m^3", "g/cm^3"),
+    "frequency": ("Hz",),
     "share": ("%",),
 }
 """The units a scene may use, by dimension."""
@@ -67,6 +68,7 @@ _EXAMPLES = {
     "mass": "20 g",
     "mass per area": "1.5 kg/m^2",
     "mass per volume": "7850 kg/m^3",
+    "frequency": "2 Hz",
     "share": "1 %",
 }
 
@@ -83,6 +85,7 @@ _OTHER_NAMES = {
     "rad/min": "1/60 rad/s",
     "oz": "28.349523125 g",
     "ug": "1/1000000 g",
+    "hz": "1 Hz",
     **dict.fromkeys(("meter", "metre", "meters", "metres"), "1 m"),
     **dict.fromkeys(("inch", "inches", '"'), "1 in"),
     **dict.fromkeys(("foot", "feet"), "1 ft"),

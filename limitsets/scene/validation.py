@@ -18,7 +18,7 @@ Tree: TypeAlias = dict[str, Any]
 """A scene as TOML holds it: tables, lists, text, switches and numbers."""
 
 _DEEPEST = 8
-_LATER = ("cavity", "tray")
+_LATER = ("tray",)
 _TABLES = {"model_type": "a table", "dict_type": "a table", "list_type": "a list", "missing": "a value"}
 
 

@@ -20,7 +20,9 @@ _WHOLE = {
     "gravity": {"tilt": "30 deg"},
     "model": {"flight": "exact", "flip": "signed"},
     "goal": {"oriented_beyond": {"x": "20 in", "side": 2}},
+    "cavity": {"position": "20 in", "width": "9.3 in", "depth": "5.8633 in", "angle": "32.23 deg"},
     "world": {
+        "throw_rate": "2 Hz",
         "friction": 0.9,
         "restitution": 0.4,
         "bounce_threshold": "0.01 in",

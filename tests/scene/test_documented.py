@@ -12,7 +12,19 @@ from limitsets.thrower.effects import EFFECTS
 PAGE = (Path(__file__).resolve().parents[2] / "docs" / "scene.md").read_text(encoding="utf-8")
 
 
-TABLES = ("part", "part.mass", "arm", "throw", "gravity", "model", "goal", "world", "effects", "feedback")
+TABLES = (
+    "part",
+    "part.mass",
+    "arm",
+    "throw",
+    "gravity",
+    "model",
+    "goal",
+    "cavity",
+    "world",
+    "effects",
+    "feedback",
+)
 
 
 def keys(model, path=""):

@@ -50,6 +50,7 @@ def test_every_section(whole: dict[str, Any]) -> None:
         0.01,
         math.radians(5),
         Scatter(Deviation(0.01, relative=True), Deviation(0.05, relative=False)),
+        {"throw_rate": 2.0},
     )
     assert scene.effects == Effects(auto=True)
     assert scene.tolerance == {

@@ -13,6 +13,7 @@ from limitsets.scene import dump, load
 from limitsets.thrower.effects import EFFECTS
 
 GONE = object()
+CAVITY = {"position": "20 in", "width": "9.3 in", "depth": "5.8633 in", "angle": "32.23 deg"}
 BOTH = {"sides": ["3 in", "4 in", "5 in"], "vertices": [["0 in", "0 in"], ["1 in", "0 in"], ["0 in", "1 in"]]}
 
 OWN = {"name": "own", "kappa": "25 in"}
@@ -49,7 +50,6 @@ TABLE: list[tuple[dict[str, Any], str, str]] = [
     ({"throw": GONE}, "throw", "required"),
     ({"part/mass": GONE}, "part.mass", "required"),
     ({"part/mass/center/side": GONE}, "part.mass.center.side", "required"),
-    ({"cavity": {}}, "cavity", "this version does not have it"),
     ({"tray": {"rows": 1}}, "tray", "this version does not have it"),
     # feedback
     ({"feedback": {}}, "feedback.throws", "required"),
@@ -184,6 +184,20 @@ TABLE: list[tuple[dict[str, Any], str, str]] = [
     ),
     ({"goal": {"flip_order": [0, 3]}}, "goal.flip_order[1]", "0 to 2"),
     ({"goal": {"flip_order": []}}, "goal.flip_order", "at least 1"),
+    # cavity
+    ({"cavity": {}}, "cavity.position", "required"),
+    ({"cavity": CAVITY | {"size": "1 in"}}, "cavity.size", "angle, depth, position, width"),
+    ({"cavity": CAVITY | {"position": "28.001 in"}}, "cavity.position", "up to the arm's length, 28 in"),
+    ({"cavity": CAVITY | {"position": "4.2 in"}}, "cavity.position", "the part resting on side 2 needs"),
+    ({"cavity": CAVITY | {"width": "6.7 in"}}, "cavity.width", "at least 6.75 in, the length of side 2"),
+    ({"cavity": CAVITY | {"depth": "5.87 in"}}, "cavity.depth", "the ramp is longer than the cavity"),
+    ({"cavity": CAVITY | {"depth": "0 in"}}, "cavity.depth", "above 0"),
+    ({"cavity": CAVITY | {"angle": "0 deg"}}, "cavity.angle", "below 90 deg"),
+    ({"cavity": CAVITY | {"angle": "90 deg"}}, "cavity.angle", "below 90 deg"),
+    ({"cavity": CAVITY | {"angle": "-5 deg"}}, "cavity.angle", "below 90 deg"),
+    ({"world/throw_rate": "2"}, "world.throw_rate", "add the unit"),
+    ({"world/throw_rate": "2 hz"}, "world.throw_rate", "did you mean 'Hz'"),
+    ({"world/throw_rate": "0 Hz"}, "world.throw_rate", "above 0"),
     # world, effects, tolerance
     ({"world/friction": "0.9"}, "world.friction", "without a unit"),
     ({"world/friction": -0.1}, "world.friction", "from 0"),

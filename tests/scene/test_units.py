@@ -116,7 +116,8 @@ def test_refuses(text: object, words: str) -> None:
         ("25 RPM", "angular speed", "did you mean 'rpm'?"),
         ("158 \u00b0/s", "angular speed", "did you mean 'deg/s'?"),
         ("6 rad/min", "angular speed", 'write "0.1 rad/s"'),
-        ("25 Hz", "angular speed", "convert the value"),  # of what, is not said
+        ("25 Hz", "angular speed", "Hz is a unit of frequency: the dimension is wrong"),
+        ("25 kHz", "angular speed", "convert the value"),  # of what, is not said
         ("45 \u00ba", "angle", "did you mean 'deg'?"),  # the sign of an ordinal
         ("3 km", "length", 'write "3000 m"'),
         ("3 dm", "length", 'write "0.3 m"'),

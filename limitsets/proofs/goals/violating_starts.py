@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 
 import numpy as np
@@ -28,11 +29,12 @@ __all__ = ["one_throw", "start_that_leaves"]
 STARTS, UNTIL_GONE, TRIED = 256, 400, 8
 
 
-def one_throw(found: Attraction, wrong: Wrong) -> tuple[State, ...]:
-    """Find a start on the arm whose next landing violates the goal, and prove it; empty if none is found."""
+def one_throw(found: Attraction, wrong: Wrong, up_to: float = math.inf) -> tuple[State, ...]:
+    """Find a start on the arm, up to some x, whose next landing violates the goal, and prove it; empty if none is."""
     grid, box = found.cover.grid, found.cover.box
     x = np.concatenate([0.5 * (edges[:-1] + edges[1:]) for (edges,) in grid.edges])
     side = np.repeat(np.arange(grid.sides), [edges.size - 1 for (edges,) in grid.edges])
+    x, side = x[x < up_to], side[x < up_to]
     options = throw_choices(box, 3)
     thrown = throws(box, x, side, options)
     bad = violation(thrown, wrong)

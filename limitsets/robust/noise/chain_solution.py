@@ -88,6 +88,18 @@ class ChainProblem:
         self.cutters[lo, hi] = InterpolatedPieces(thrown(params), self.scene.domain, values)
         return self.cutters[lo, hi]
 
+    def chain(self, cover: Grid, scatter: Scattering) -> Transfer:
+        """Build the transfer operator on some cells."""
+        factors = kappa_strata(scatter, self.scene, self.strata)
+        return transfer(
+            thrown(still_map(self.scene)),
+            cover,
+            parameter=factors,
+            landing=scatter.landing,
+            strata=self.strata,
+            cutter=self.cutter(factors),
+        )
+
 
 @dataclass(frozen=True, eq=False)
 class ChainSolution:
@@ -107,15 +119,7 @@ def solve(problem: ChainProblem, scatter: Scattering) -> ChainSolution:
     scene, (x, side) = problem.scene, problem.goal
     # Uniform: noise makes grading towards the joint needless, and cells are wanted where the part is.
     cover = with_border(grid(scene.domain, cells=problem.cells, grading="uniform"), x)
-    factors = kappa_strata(scatter, scene, problem.strata)
-    chain = transfer(
-        thrown(still_map(scene)),
-        cover,
-        parameter=factors,
-        landing=scatter.landing,
-        strata=problem.strata,
-        cutter=problem.cutter(factors),
-    )
+    chain = problem.chain(cover, scatter)
     beyond = np.concatenate([cover.centres(k) > x for k in range(cover.sides)])
     goal = beyond & (cover.side_of(np.arange(cover.n_cells)) == side)
     starts = random_starts(cover, problem.starts, x)

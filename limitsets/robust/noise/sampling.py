@@ -22,7 +22,7 @@ from limitsets.robust.noise.scattering import Scattering, still_map
 if TYPE_CHECKING:
     from limitsets.scene import Scene
 
-__all__ = ["SampledStatistics", "scattering_map", "throw_many"]
+__all__ = ["ManyParts", "SampledStatistics", "scattering_map", "throw_many", "uniform_starts"]
 
 # Throws that are not counted: the part comes onto the limit set first.
 BEFORE = 400
@@ -91,7 +91,7 @@ def _scale(law: Any) -> float:
     return 0.0 if law is None else float(law.sigma if isinstance(law, Gaussian) else law.bound)
 
 
-class _Many:
+class ManyParts:
     """Parts under way; every throw of every part draws numbers of its own."""
 
     def __init__(self, params: Any, x: NDArray[np.float64], side: NDArray[np.int64]) -> None:
@@ -144,20 +144,21 @@ def throw_many(
         Told (done, all) now and then.
     """
     random = np.random.default_rng(seed)
-    x, side = _starts(random, starts_from, goal[0], parts)
+    x, side = uniform_starts(random, starts_from, goal[0], parts)
     rounds = max(throws // parts, 1)
-    many = _Many(scattering_map(scene, scatter, seed), x, side)
+    many = ManyParts(scattering_map(scene, scatter, seed), x, side)
     long_run, density, borders = _long_run(many, scene, goal, rounds, bins, progress)
-    x, side = _starts(random, starts_from, goal[0], parts)
-    fed, arrived = _to_goal(_Many(scattering_map(scene, scatter, seed + 1), x, side), goal)
+    x, side = uniform_starts(random, starts_from, goal[0], parts)
+    fed, arrived = _to_goal(ManyParts(scattering_map(scene, scatter, seed + 1), x, side), goal)
     answers = {**long_run, **fed}
     numbers, errors = ({name: pair[k] for name, pair in answers.items()} for k in (0, 1))
     return SampledStatistics(rounds * parts, numbers, errors, density, borders, arrived, parts)
 
 
-def _starts(
+def uniform_starts(
     random: np.random.Generator, lo: NDArray[np.float64], hi: float, count: int
 ) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """Draw starts that lie anywhere from `lo[side]` to `hi`, equally likely per length on all sides."""
     length = np.maximum(hi - lo, 0.0)
     side = random.choice(lo.size, size=count, p=length / length.sum())
     return random.uniform(lo[side], hi), side.astype(np.int64)
@@ -177,7 +178,7 @@ def _ratio(over: NDArray[np.float64], under: NDArray[np.float64]) -> tuple[float
 
 
 def _long_run(
-    many: _Many, scene: Scene, goal: tuple[float, int], rounds: int, bins: int, progress: Any
+    many: ManyParts, scene: Scene, goal: tuple[float, int], rounds: int, bins: int, progress: Any
 ) -> tuple[Answers, tuple[Any, ...], tuple[Any, ...]]:
     """Divide the time: on sides, branches, beyond the goal's x; densities per side and the borders of their bins."""
     names = kind_of(many.params).branches
@@ -218,7 +219,7 @@ def _share(count: int, parts: int) -> tuple[float, float]:
     return share, math.sqrt(max(share * (1.0 - share), 1.0 / parts) / parts)
 
 
-def _to_goal(many: _Many, goal: tuple[float, int]) -> tuple[Answers, NDArray[np.int64]]:
+def _to_goal(many: ManyParts, goal: tuple[float, int]) -> tuple[Answers, NDArray[np.int64]]:
     """Throw until all are at the goal or gone: shares, throws that it takes, and those of each part."""
     parts = many.x.size
     arrived, first_wrong, first_far = [], 0, 0

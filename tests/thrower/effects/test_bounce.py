@@ -111,6 +111,7 @@ def test_bounces_without_end_are_outside_the_model() -> None:
     assert case.mapped(("bounce",)) is None
 
 
+@pytest.mark.sweep
 def test_throws_end_where_an_independent_simulation_sees_them_end() -> None:
     names = ("landing", "bounce")
     assert [case for case in cases(60, 12) if not agree(case, names)] == []

@@ -1,0 +1,116 @@
+"""`limitsets feed`: what falls into the cavity at the end of the arm, proved, under noise, and in trials."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from limitsets.cli.arguments import deviations
+from limitsets.cli.output import Json, Scene, Words, answer, opened, option, progress, table
+
+if TYPE_CHECKING:
+    from limitsets.feeding import Feeding
+
+__all__ = ["feed"]
+
+HELP_SCATTER = (
+    "Random noise at every throw, like throw.speed='0.5 %'; repeatable. Default: that of the scene, if any."
+)
+HELP_NOISE = "What may differ at every throw in the proofs, like throw.speed='0.3 %'; repeatable."
+HEADS = ("a part is fed", "probability", "its error", "trials", "95 % interval")
+WORDS = {
+    "right": "on the wanted side, clear of the wall",
+    "wrong": "on another side",
+    "wall": "on the wanted side, but meets the wall",
+    "left": "not: it leaves the arm otherwise",
+    "never": "not: it stays on the arm",
+}
+
+
+def feed(
+    scene: Scene,
+    side: Annotated[int | None, option("--side", "I", "The side wanted. Default: the goal's.")] = None,
+    scatter: Annotated[Words, option("--scatter", "Q=DEV", HELP_SCATTER)] = None,
+    law: Annotated[
+        str, option("--law", "LAW", "Of --scatter: gaussian (standard deviations) or bounded.")
+    ] = "gaussian",
+    noise: Annotated[Words, option("--noise", "Q=DEV", HELP_NOISE)] = None,
+    trials: Annotated[int, option("--trials", "N", "Parts thrown from random starts.", min=1)] = 10_000,
+    seed: Annotated[int, option("--seed", "N", "Of the trials.", min=0)] = 0,
+    cells: Annotated[
+        int, option("--cells", "N", "Cells per side, for the probabilities.", min=8, max=100_000)
+    ] = 1024,
+    no_proof: Annotated[bool, typer.Option("--no-proof", help="Probabilities and trials only.")] = False,
+    out: Annotated[
+        Path | None, option("--out -o", "DIR", "Write feeding.json and feeding.png there.")
+    ] = None,
+    json: Json = False,
+) -> None:
+    """Say which side is fed from the end of the arm, from which starts, how surely and how fast.
+
+    Exit 1 where it is not proved that only the wanted side is fed, and that almost every start is.
+    """
+    with progress() as tell:
+        chosen, _ = opened(scene, out)
+        from limitsets.feeding import feed as run
+        from limitsets.robust.sheet.noise_input import scattering_from
+
+        random = deviations("--scatter", scatter)
+        found = run(
+            chosen,
+            scattering_from(chosen, random, law) if random else None,
+            side=side,
+            noise=deviations("--noise", noise),
+            prove=not no_proof,
+            trials=trials,
+            seed=seed,
+            cells=cells,
+            progress=tell,
+        )
+        files = []
+        if out is not None:
+            from limitsets import plot
+            from limitsets.files import as_json
+            from limitsets.report.writing import laid
+
+            files = laid(out, [("feeding", plot.feeding(found))], lambda _: {"feeding.json": as_json(found)})
+    answer(found, json, lambda: _text(found, files))
+    raise typer.Exit(0 if no_proof or found.proved else 1)
+
+
+def _text(found: Feeding, files: list[Path]) -> None:
+    from limitsets.feeding.trials import binomial_interval
+
+    end, unit = found.end, found.end.scene.unit
+    typer.echo(f"{end.scene.name}: the arm ends at x = {end.x:g} {unit}, side {end.side} is wanted")
+    parts = ", ".join(f"{lo:.4g} to {hi:.4g} {unit}" for lo, hi in end.clear) or "nowhere"
+    typer.echo(f"clear of the wall beyond the end: {parts}")
+    if found.safe is not None and found.fed is not None:
+        for line in (*found.safe.lines(end.side), *found.fed.lines(unit)):
+            typer.echo(line)
+    rows = []
+    count = found.trials.fate.size
+    for name, share in found.shares.shares.items():
+        met = found.trials.counts[name]
+        low, high = binomial_interval(met, count)
+        rows.append(
+            [WORDS[name], f"{share:.6f}", f"{found.errors[name]:.1e}", met, f"{low:.4f} to {high:.4f}"]
+        )
+    table(HEADS, rows)
+    most = found.shares.quantile(0.95)
+    until = "" if most is None else f", 95 % of the starts after {most}"
+    typer.echo(f"throws until a part is fed: {found.shares.mean_throws:.1f} in the mean{until}")
+    rate = found.shares.per_minute(end.scene.world.throw_rate)
+    if rate is not None:
+        typer.echo(f"{rate:.2f} parts per minute are fed on the wanted side, one after the other")
+    series = found.trials.series()
+    if series.size:
+        typer.echo(
+            f"{series[0]} right in the first series of 20 trials, {series.mean():.2f} in the mean; the paper: 19"
+        )
+    if found.curve is not None:
+        typer.echo(found.curve.line())
+    if files:
+        typer.echo(f"written: {', '.join(map(str, files))}")

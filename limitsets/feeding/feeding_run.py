@@ -1,0 +1,204 @@
+"""All answers about feeding a scene: `limitsets.feed`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, fields, replace
+from pathlib import Path
+from typing import Any
+
+from limitsets.errors import AnswerError
+from limitsets.feeding.falling import ArmEnd, arm_end_of, clear_beyond, time_to_tip
+from limitsets.feeding.fed_shares import Curve, FedShares, FeedingProblem, success_curve
+from limitsets.feeding.proving import proved_feeding
+from limitsets.feeding.trials import Trials, run_trials
+from limitsets.feeding.verdicts import Fed, Safe
+from limitsets.files import as_table, picked
+from limitsets.robust.noise.scattering import Scattering, scattering_of
+from limitsets.robust.sheet.noise_input import still
+from limitsets.scene import Scene, load
+
+__all__ = ["Feeding", "feed"]
+
+Progress = Callable[[str, int, int], None]
+
+CELLS, STRATA, TRIALS = 1024, 24, 10_000
+
+
+@dataclass(frozen=True, eq=False)
+class Feeding:
+    """What becomes of parts at the end of the arm.
+
+    Attributes
+    ----------
+    end : ArmEnd
+        Where the arm ends, the side wanted, and how far beyond the end a part on it clears the wall.
+    clear : dict of int to tuple of (float, float)
+        The same of every side: intervals of the distance beyond the end [length].
+    safe : Safe or None
+        Which sides can be fed from which starts, proved; None where it was not asked for.
+    fed : Fed or None
+        Whether every start is fed, and after how many throws, proved.
+    noise : dict of str to str
+        What differs at every throw in these proofs, and by how much.
+    scatter : Scattering
+        The noise of the probabilities and of the trials; none in a scene without it.
+    shares : FedShares
+        Probabilities of all fates from random starts, throw by throw; sampled.
+    errors : dict of str to float
+        How much the probabilities change from half as many cells, and half as many strata of the noise.
+    curve : Curve or None
+        The share of right feeds against the level of the noise; None without noise.
+    trials : Trials
+        Parts thrown.
+    """
+
+    end: ArmEnd
+    clear: dict[int, tuple[tuple[float, float], ...]]
+    safe: Safe | None
+    fed: Fed | None
+    noise: dict[str, str]
+    scatter: Scattering
+    shares: FedShares
+    errors: dict[str, float]
+    curve: Curve | None
+    trials: Trials
+
+    @property
+    def tipping(self) -> dict[int, float] | None:
+        """Seconds in which a part 1 % of its a beyond the end tips onto the ramp, by side; None without gravity."""
+        scene = self.end.scene
+        if scene.gravity is None or scene.cavity is None:
+            return None
+        radius, angle = scene.radius_of_gyration, scene.cavity.angle
+        pairs = zip(scene.sides.a.tolist(), scene.sides.d.tolist(), strict=True)
+        times = (float(time_to_tip(0.01 * a, d, radius, scene.gravity, angle)) for a, d in pairs)
+        return dict(enumerate(times))
+
+    @property
+    def proved(self) -> bool:
+        """Whether it is proved that only the wanted side is fed, and that every or almost every start is."""
+        if self.safe is None or self.fed is None:
+            return False
+        return self.safe.verdict == "proved" and "proved" in (self.fed.verdict, self.fed.almost_every)
+
+    def to_json(self) -> dict[str, Any]:
+        """Give it as JSON takes it: docs/json.md."""
+        scene, shares = self.end.scene, self.shares
+        rate = scene.world.throw_rate
+        return as_table(
+            scene=scene.name,
+            unit=scene.unit,
+            position=self.end.x,
+            side=self.end.side,
+            starts_from=self.end.starts,
+            throw_rate=rate,
+            clear=self.clear,
+            tipping=self.tipping,
+            safety=self.safe,
+            progress=self.fed,
+            noise=self.noise or None,
+            scatter=self.scatter.words() or None,
+            probabilities={
+                name: {"value": share, "error": self.errors[name]} for name, share in shares.shares.items()
+            },
+            throws={"mean": shares.mean_throws, "quantile_95": shares.quantile(0.95), "ended": shares.ended},
+            right_per_minute=shares.per_minute(rate),
+            noise_cut_off=shares.cut,
+            success=None
+            if self.curve is None
+            else as_table(**picked(self.curve, *(each.name for each in fields(Curve)))),
+            trials=self.trials,
+        )
+
+
+def feed(
+    scene: Scene | str | Path | Mapping[str, Any],
+    scatter: Scattering | None = None,
+    *,
+    side: int | None = None,
+    starts: Mapping[int, float] | None = None,
+    noise: Mapping[str, str] | None = None,
+    prove: bool = True,
+    level: bool = True,
+    trials: int = TRIALS,
+    seed: int = 0,
+    cells: int = CELLS,
+    strata: int = STRATA,
+    progress: Progress | None = None,
+) -> Feeding:
+    """Say what becomes of parts that are thrown along an arm with a cavity at its end.
+
+    Parameters
+    ----------
+    scene : Scene, str, Path or mapping
+        A scene with [cavity], or what `limitsets.load` takes.
+    scatter : Scattering, optional
+        Random noise of every throw, for probabilities and trials; default that of the scene, `[world] scatter` with
+        `[effects] spread`, or none.
+    side : int, optional
+        The side wanted; default the goal's.
+    starts : mapping of int to float, optional
+        By side the x from which random starts lie, up to the end of the arm; default a twentieth of the arm beyond a.
+    noise : mapping of str to str, optional
+        ``{"throw.speed": "0.3 %"}``: what may differ at every throw in the proofs, whatever the sequence.
+    prove : bool
+        Whether to prove safety and progress.
+    level : bool
+        Whether to look for the level of the noise at which 95 % are fed rightly.
+    trials : int
+        Parts thrown from random starts.
+    seed : int
+        Of the trials.
+    cells, strata : int
+        Cells per side, and pieces into which each law of the noise is cut, for the probabilities.
+    progress : callable, optional
+        Told (stage, done, all).
+
+    Returns
+    -------
+    Feeding
+
+    Raises
+    ------
+    AnswerError
+        For a scene without a cavity or a wanted side, no trials, or noise of which nothing can be proved.
+
+    Examples
+    --------
+    >>> import limitsets as ls
+    >>> cavity = {"position": "20 in", "width": "9.3 in", "depth": "5.8633 in", "angle": "32.23 deg"}
+    >>> scene = ls.load({**ls.load("paper-designed").as_dict(), "cavity": cavity})
+    >>> found = ls.feed(scene, trials=1000, cells=256)
+    >>> found.safe.verdict, found.fed.throws
+    ('proved', 786)
+    >>> found.trials.counts["right"]
+    1000
+    """
+    read = scene if isinstance(scene, Scene) else load(scene)
+    end = arm_end_of(read, side, starts)
+    if trials < 1:
+        raise AnswerError("the trials", trials, "1 or more", "throw some parts")
+    if scatter is None:
+        scatter = Scattering() if read.effects.spread is None else scattering_of(read)
+    # normal deviations have no bound, so that nothing holds for every sequence: the proofs are of the still scene then
+    proved = end if read.effects.spread != "gaussian" else replace(end, scene=still(read))
+    safe, fed = proved_feeding(proved, noise, progress=progress) if prove else (None, None)
+    problem = FeedingProblem.of(end, cells, strata)
+    if progress is not None:
+        progress("probabilities", 0, 3)
+    shares = problem.solve(scatter)
+    errors = problem.errors(scatter, shares)
+    curve = success_curve(problem, scatter, progress=progress) if level and scatter.given() else None
+    return Feeding(
+        end,
+        {number: clear_beyond(read, number) for number in range(len(read.sides))},
+        safe,
+        fed,
+        dict(noise or {}),
+        scatter,
+        shares,
+        errors,
+        curve,
+        run_trials(end, scatter, trials, seed=seed, progress=progress),
+    )

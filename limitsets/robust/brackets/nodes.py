@@ -1,0 +1,99 @@
+"""Cells of a function that is continuous and affine on each: nodes per side, and those where it may jump.
+
+Where a function jumps (the border of an absorbing set, the joint, the arm's end) there are nodes so close together that
+a continuous bound from either side costs nothing.  Beyond the last places a function is constant: one long cell.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["CLOSE", "Nodes", "nodes_of"]
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+
+# How near to a jump the next nodes lie, relative to the arm.
+CLOSE = 2.0**-33
+# Beyond the arm functions are constant up to so many arms' lengths; nothing lands farther.
+FAR = 100.0
+
+
+@dataclass(frozen=True, eq=False)
+class Nodes:
+    """Nodes of all sides in one row.
+
+    Attributes
+    ----------
+    place : ndarray, shape (n,)
+        Places x, growing on each side [length].
+    first : ndarray of int, shape (n_sides + 1,)
+        Number of the first node of each side.
+    """
+
+    place: Array
+    first: Index
+
+    @property
+    def width(self) -> Array:
+        """Width of the cell to the right of each node; infinite to the right of the last one of a side."""
+        width = np.diff(self.place, append=np.inf)
+        width[self.first[1:] - 1] = np.inf
+        return width
+
+    def of_side(self, side: int) -> slice:
+        """Return the nodes of a side."""
+        return slice(int(self.first[side]), int(self.first[side + 1]))
+
+    def side(self) -> Index:
+        """Return the side of each node."""
+        return np.repeat(np.arange(self.first.size - 1), np.diff(self.first))
+
+    def cell(self, side: Index, x: Array) -> Index:
+        """Return the cells, named by their left nodes, in which places lie."""
+        found = np.empty(x.shape, dtype=np.int64)
+        for k in range(self.first.size - 1):
+            here = side == k
+            row = self.place[self.of_side(k)]
+            inside = np.searchsorted(row, x[here], side="right") - 1
+            found[here] = self.first[k] + np.clip(inside, 0, row.size - 2)
+        return found
+
+
+def nodes_of(
+    ends: Sequence[tuple[float, float]],
+    width: float,
+    special: Sequence[Sequence[float]],
+    far: float,
+    without: Sequence[Sequence[tuple[float, float]]] | None = None,
+) -> Nodes:
+    """Place nodes at equal distances of at most `width`, and at special places besides.
+
+    Parameters
+    ----------
+    ends : sequence of (float, float)
+        Per side where functions begin and cease to vary.
+    width : float
+        Widest cell between them.
+    special : sequence of sequence of float
+        Per side further nodes.
+    far : float
+        The outermost nodes lie at - and + this.
+    without : sequence of sequence of (float, float), optional
+        Per side where no nodes are wanted but the special ones.
+    """
+    rows = []
+    for (lo, hi), more, gone in zip(ends, special, without or [()] * len(ends), strict=True):
+        even = np.linspace(lo, hi, int(np.ceil((hi - lo) / width)) + 1)
+        places = np.array([x for x in more if lo <= x <= hi])
+        # No even node so near to a special one that cells of no use arise.
+        near = np.searchsorted(np.sort(places), even[:, None] + np.array([-0.02, 0.02]) * width)
+        keep = (near[:, 0] == near[:, 1]) | (even == lo) | (even == hi)
+        for begin, end in gone:
+            keep &= (even <= begin) | (even >= end)
+        rows.append(np.unique(np.concatenate([[-far, far], even[keep], places])))
+    return Nodes(np.concatenate(rows), np.cumsum([0, *(row.size for row in rows)]))

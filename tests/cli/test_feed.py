@@ -1,0 +1,51 @@
+"""`limitsets feed`: words, JSON, files, exit codes."""
+
+import json
+from pathlib import Path
+
+import limitsets as ls
+from tests.cli.command import run
+from tests.feeding.scenes import with_cavity
+
+
+def written(name, **changes):
+    ls.dump(with_cavity(name, **changes), "fed.toml")
+    return "fed.toml"
+
+
+def test_words_files_and_exit(capfd):
+    file = written("paper-designed", rate="2 Hz")
+    quick = ("--trials", "200", "--cells", "64")
+    code, out, _ = run(capfd, "feed", file, *quick, "-o", "fed")
+    assert code == 0
+    assert "the arm ends at x = 20 in, side 2 is wanted" in out
+    assert "safety: PROVED" in out
+    assert "within 786 throws" in out
+    assert {path.name for path in Path("fed").iterdir()} == {"feeding.json", "feeding.png"}
+    assert json.loads(Path("fed/feeding.json").read_text())["scene"] == "paper-designed"
+
+
+def test_json_alone_and_noise(capfd):
+    file = written("paper-designed")
+    code, out, _ = run(
+        capfd, "feed", file, "--json", "--no-proof", "--scatter", "landing.x=0.1 in", "--law", "bounded",
+        "--trials", "50", "--cells", "32", "--seed", "4",
+    )  # fmt: skip
+    assert code == 0
+    table = json.loads(out)
+    assert table["safety"] is None
+    assert table["scatter"] == {"landing": "Uniform(bound=0.1)"}
+    assert table["trials"]["seed"] == 4
+    assert table["success"]["wanted"] == 0.95
+
+
+def test_not_proved_is_exit_1(capfd):
+    code, out, _ = run(capfd, "feed", written("paper-initial"), "--trials", "50", "--cells", "32")
+    assert code == 1
+    assert "safety: REFUTED" in out
+
+
+def test_a_scene_without_a_cavity_is_told_so(capfd):
+    code, _, err = run(capfd, "feed", "paper-designed")
+    assert code == 2
+    assert "add [cavity]" in err

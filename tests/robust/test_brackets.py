@@ -1,0 +1,279 @@
+"""Proved brackets of absorption: closed forms, throws, quadrature of the operator at any place, monotone facts."""
+
+import math
+from itertools import product
+
+import mpmath
+import numpy as np
+import pytest
+from scipy import stats
+
+import limitsets as ls
+from limitsets.errors import AnswerError
+from limitsets.maps import advance
+from limitsets.proofs.parameters import parameter_box
+from limitsets.robust import Gaussian, Given, Scattering, Uniform, absorption_brackets
+from limitsets.robust.brackets.chain import chain_of
+from limitsets.robust.brackets.densities import staircase
+from limitsets.robust.brackets.moments import ERROR, moments
+from limitsets.robust.noise.chain_solution import starts_from
+from limitsets.robust.noise.sampling import throw_many
+from limitsets.robust.noise.scattering import thrown
+
+BOTH = Scattering(speed=Uniform(0.003), landing=Uniform(0.02))
+
+
+def test_moments_of_sine_and_cosine_are_within_their_error():
+    phi = np.array([0.0, 1e-9, 1e-3, 0.7, 1.9, 3.2, 6.283])
+    found = moments(phi)
+    for k in range(3):
+        for p, c, s in zip(phi, found.c[k], found.s[k], strict=True):
+            exact = [
+                mpmath.quad(lambda t, f=f, k=k, p=p: t**k * f(p * t), [0, 0.5, 1])
+                for f in (mpmath.cos, mpmath.sin)
+            ]
+            assert abs(c - exact[0]) < ERROR
+            assert abs(s - exact[1]) < ERROR
+
+
+def test_normal_strata_have_the_masses_of_the_law():
+    law = staircase(Gaussian(0.5), 48, "x")
+    exact = np.diff(stats.norm(scale=0.5).cdf(law.borders))
+    assert np.abs(law.weight - exact).max() < 1e-15
+    assert 1.9e-9 < law.beyond < 2.0e-9  # 2 (1 - Phi(6)) = 1.973e-9
+    # The density on a stratum differs from its mean by the ripple at most: integral of |p - step| over the law.
+    fine = np.linspace(-3.0, 3.0, 48 * 50 + 1)
+    middle = 0.5 * (fine[1:] + fine[:-1])
+    off = np.abs(stats.norm(scale=0.5).pdf(middle).reshape(48, -1) - law.density[:, None]).sum(axis=1)
+    assert (0.5 * off * (fine[1] - fine[0])).max() <= law.ripple
+
+
+# ------------------------------------------------------------ one throw of any function, at any place
+
+
+def _operator(scene, scatter, chain, values, x, side, count):
+    """Mean of a function, affine between the nodes of the chain, after one throw: by midpoints of the laws."""
+    nodes, total = chain.nodes, np.zeros(x.size)
+    share = (np.arange(count) + 0.5) / count
+    speed = [0.0] if scatter.speed is None else scatter.speed.bound * (2.0 * share - 1.0)
+    landing = [0.0] if scatter.landing is None else scatter.landing.bound * (2.0 * share - 1.0)
+    at = thrown(scene.map)
+    for delta in speed:
+        after, turned, code, _ = advance(at(1.0 / (1.0 + delta) ** 2), x, side, 1)
+        assert (code >= 0).all()
+        for k in range(len(scene.sides)):
+            here, row = turned == k, nodes.of_side(k)
+            for off in landing:
+                total[here] += np.interp(after[here] + off, nodes.place[row], values[row])
+    return total / (len(speed) * len(landing))
+
+
+NOISES = [BOTH, Scattering(landing=Uniform(0.05)), Scattering(speed=Uniform(0.01))]
+
+
+@pytest.mark.parametrize("scatter", NOISES)
+@pytest.mark.parametrize("name", ["paper-designed", "paper-initial"])
+def test_one_throw_is_bounded_at_every_place(name, scatter):
+    scene = ls.load(name)
+    chain = chain_of(parameter_box(scene), scatter, {"right": [(2, 25.0, math.inf)]}, 250)
+    random = np.random.default_rng(3)
+    x, side = random.uniform(6.0, 22.0, 3000), random.integers(0, 3, 3000)
+    waves = np.sin(3.0 * chain.nodes.place + chain.nodes.side()) + (chain.nodes.place > 17.3)
+    found = _operator(scene, scatter, chain, waves, x, side, 40)
+    none = np.full(chain.free.size, -np.inf)
+    above, below = chain.above(waves, none), -chain.above(-waves, none)
+    high, low = np.empty(x.size), np.empty(x.size)
+    for k in range(3):
+        here, row = side == k, chain.nodes.of_side(k)
+        high[here] = np.interp(x[here], chain.nodes.place[row], above[row])
+        low[here] = np.interp(x[here], chain.nodes.place[row], below[row])
+    # Midpoints of a function whose slope is at most 12 per length, a cell of it 0.1 wide; a flip at one of 40 speeds.
+    assert ((found <= high + 1e-4) & (found >= low - 1e-4)).mean() > 0.95
+    slack = 0.03 if scatter.speed is not None else 1e-4
+    assert (found <= high + slack).all()
+    assert (found >= low - slack).all()
+    assert np.median(high - low) < 0.05
+
+
+# ------------------------------------------------------------ closed forms
+
+
+def _sum_of_uniforms(widths, t):
+    """P(sum of independent uniform numbers on [0, w_i] <= t), in rationals' place by 50 digits."""
+    with mpmath.workdps(60):
+        n, total = len(widths), mpmath.mpf(0)
+        for signs in product((0, 1), repeat=n):
+            rest = mpmath.mpf(t) - sum(w for s, w in zip(signs, widths, strict=True) if s)
+            if rest > 0:
+                total += (-1) ** sum(signs) * rest**n
+        return float(total / (mpmath.factorial(n) * mpmath.fprod(widths)))
+
+
+def _stretched(scene):
+    """a_2, and the factor by which a jog of the small-angle model stretches R - a."""
+    return float(scene.sides.a[2]), 1.0 + 2.0 * abs(scene.map.surface_height) / scene.map.kappa
+
+
+def test_a_linear_map_with_uniform_noise_has_its_closed_form():
+    scene = ls.load("paper-designed-small-angle")
+    a, q = _stretched(scene)
+    b, x_right, lo, hi = 0.05, 18.0, 15.0, 16.0
+    # Each jog leads farther than the noise back: absorbed within n throws is x_n >= X, a sum of uniform numbers.
+    assert (q - 1.0) * (lo - a) > 2.0 * b
+    for cells in (60, 1500):
+        found = absorption_brackets(
+            scene,
+            Scattering(landing=Uniform(b)),
+            right=(x_right, 2),
+            starts=[(2, lo, hi)],
+            cells=cells,
+            throws=7,
+            mean=False,
+        )
+        low, high = found.within["right"]
+        for n in range(8):
+            widths = [q**n * (hi - lo)] + [2.0 * b * q**k for k in range(n)]
+            least = a + q**n * (lo - a) - b * sum(q**k for k in range(n))
+            exact = 1.0 - _sum_of_uniforms(widths, x_right - least) if x_right > least else 1.0
+            assert low[n] - 1e-12 <= exact <= high[n] + 1e-12
+        assert (high - low).max() < (1.01 if cells == 60 else 0.01)
+
+
+def test_a_linear_map_with_normal_noise_has_its_closed_form():
+    scene = ls.load("paper-designed-small-angle")
+    a, q = _stretched(scene)
+    sigma, x_right, lo, hi = 0.02, 18.0, 15.0, 16.0
+    found = absorption_brackets(
+        scene,
+        Scattering(landing=Gaussian(sigma)),
+        right=(x_right, 2),
+        starts=[(2, lo, hi)],
+        cells=600,
+        throws=6,
+        mean=False,
+    )
+    low, high = found.within["right"]
+    starts = np.linspace(lo, hi, 20001)
+    for n in range(1, 7):
+        sd = sigma * math.sqrt(sum(q ** (2 * k) for k in range(n)))
+        ends = stats.norm.sf((x_right - (a + q**n * (starts - a))) / sd)
+        exact = float(np.trapezoid(ends, starts))
+        assert low[n] - 1e-7 <= exact <= high[n] + 1e-7
+    assert (high - low).max() < 0.2
+
+
+def test_a_throw_without_noise_is_certain():
+    scene = ls.load("paper-designed")
+    found = absorption_brackets(
+        scene, Scattering(), right=(8.5, 2), starts=[(2, 8.0, 8.4)], cells=300, throws=3, mean=False
+    )
+    # (8, side 2) -> 8.262013 -> 8.557124; what starts beyond x_1 with x_1 -> 8.5 arrives with the first throw.
+    low, high = found.within["right"]
+    assert low[2] > 1.0 - 1e-3 or high[2] >= 1.0 - 1e-9
+    after, *_ = advance(scene.map, np.linspace(8.0, 8.4, 40001), np.full(40001, 2), 1)
+    exact = float((after >= 8.5).mean())
+    assert low[1] - 1e-4 <= exact <= high[1] + 1e-4
+
+
+# ------------------------------------------------------------ throws
+
+
+@pytest.mark.parametrize(
+    ("name", "scatter", "cells"),
+    [
+        pytest.param("paper-designed", BOTH, 500, marks=pytest.mark.sweep),
+        pytest.param(
+            "paper-designed",
+            Scattering(speed=Gaussian(0.005), landing=Gaussian(0.02)),
+            300,
+            marks=pytest.mark.sweep,
+        ),
+        ("paper-initial", Scattering(landing=Uniform(0.1)), 300),
+    ],
+)
+def test_brackets_meet_the_shares_of_many_throws(name, scatter, cells):
+    scene, parts, throws = ls.load(name), 20_000, 8
+    goal = (20.5, 2)
+    found = absorption_brackets(scene, scatter, right=goal, cells=cells, throws=throws, mean=False)
+    thrown_ = throw_many(scene, scatter, goal, starts_from(scene), throws=parts, parts=parts, seed=11)
+    low, high = found.within["right"]
+    for n in range(1, throws + 1):
+        count = int((thrown_.arrived <= n).sum())
+        lower = stats.beta.ppf(0.5e-4, count, parts - count + 1) if count else 0.0
+        upper = stats.beta.ppf(1.0 - 0.5e-4, count + 1, parts - count)
+        assert lower <= high[n]
+        assert upper >= low[n]
+    assert found.how == "proved"
+    assert (high - low)[3] < 0.2
+    for name_ in found.within:
+        below, above = found.values[name_]
+        assert (below <= above + 1e-12).all()
+        assert (np.diff(found.within[name_], axis=1) >= 0.0).all()
+
+
+def test_right_and_wrong_add_up_and_narrow_with_the_cells():
+    wide, narrow = (
+        absorption_brackets(
+            "paper-initial",
+            Scattering(landing=Uniform(0.1)),
+            right=(20.0, 2),
+            wrong=20.0,
+            cells=cells,
+            throws=6,
+            mean=False,
+        )
+        for cells in (200, 600)
+    )
+    for name in ("right", "wrong", "any"):
+        (lo, hi), (low, high) = wide.within[name], narrow.within[name]
+        assert (np.maximum(lo, low) <= np.minimum(hi, high)).all()
+        assert (high - low).max() < 0.5 * (hi - lo).max() + 1e-9
+    parts = [narrow.within[name] for name in ("right", "wrong", "exits")]
+    assert (sum(low for low, _ in parts) <= narrow.within["any"][1] + 1e-12).all()
+    assert (sum(high for _, high in parts) >= narrow.within["any"][0] - 1e-12).all()
+    json = narrow.to_json()
+    assert json["how"] == "proved"
+    assert set(json["within"]) == {"any", "right", "wrong", "exits"}
+
+
+def test_the_mean_and_the_quantiles_hold_for_a_ladder_of_throws():
+    scene = ls.load("paper-designed-small-angle")
+    a, q = _stretched(scene)
+    lo, hi, x_right, b = 15.0, 15.2, 18.0, 0.02
+    found = absorption_brackets(
+        scene, Scattering(landing=Uniform(b)), right=(x_right, 2), starts=[(2, lo, hi)], cells=300, throws=12
+    )
+    # The mean is the sum of P(T > n), each in closed form.
+    mean = 0.0
+    for n in range(9):
+        widths = [q**n * (hi - lo)] + [2.0 * b * q**k for k in range(n)]
+        least = a + q**n * (lo - a) - b * sum(q**k for k in range(n))
+        mean += min(_sum_of_uniforms(widths, x_right - least), 1.0) if x_right > least else 0.0
+    assert found.mean[0] <= mean + 1e-9
+    assert found.mean[1] >= mean - 1e-9
+    first, last = found.quantile(0.5, "right")
+    assert first is not None
+    assert last is not None
+    assert first <= last
+
+
+# ------------------------------------------------------------ errors
+
+
+@pytest.mark.parametrize(
+    ("scatter", "more", "said"),
+    [
+        (Scattering(speed=Given(stats.t(5, scale=0.004))), {}, "the law of the speed"),
+        (Scattering(tilt=Uniform(0.01)), {}, "speed and landing place"),
+        (BOTH, {"right": None, "wrong": 20.0}, "right"),
+        (BOTH, {"right": (40.0, 2)}, "on the arm"),
+        (BOTH, {"starts": [(2, 9.0, 8.0)]}, "a start"),
+        (BOTH, {"absorbing": {"exits": [(2, 9.0, 10.0)]}}, "not taken"),
+        (Scattering(speed=Uniform(1.5)), {}, "above -1"),
+    ],
+)
+def test_what_cannot_be_is_refused(scatter, more, said):
+    with pytest.raises(AnswerError, match=said):
+        absorption_brackets(
+            "paper-designed", scatter, **{"right": (20.5, 2), "cells": 50, "throws": 2, **more}
+        )
