@@ -2,9 +2,9 @@
 
     found = limitsets.fit("paper-designed", "throws.csv", error="0.5 mm")
 
-`throws` reads the film, `rows` says what each throw was, `likelihood` how likely it all is; `starting` and `maximising`
-find the most likely machine and how far it may be from the true one; `misfit` tests the model itself; `further` says
-what to film next, `enough` whether the goal's margin is larger than what was found.
+`throws` reads the film, `rows` says what each throw was, `likelihood` how likely it all is; `starting`, `searching` and
+`maximising` find the most likely machine and how far it may be from the true one; `misfit` tests the model itself;
+`further` says what to film next, `enough` whether the goal's margin is larger than what was found.
 """
 
 from limitsets.fitting.enough import Enough, enough

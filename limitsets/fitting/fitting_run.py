@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -15,10 +14,11 @@ from limitsets.errors import AnswerError, DataError
 from limitsets.fitting.fit_result import Fit, Fitted, Scatter, fitted_scene
 from limitsets.fitting.further import further_throws
 from limitsets.fitting.likelihood import SCATTERS, Likelihood, whitened
-from limitsets.fitting.maximising import End, Maximum, end_of_profile, maximised
+from limitsets.fitting.maximising import Maximum
 from limitsets.fitting.misfit import Misfit, misfit
 from limitsets.fitting.predicting import predicted
-from limitsets.fitting.rows import Rows, as_recorded, assigned
+from limitsets.fitting.rows import Rows, as_recorded
+from limitsets.fitting.searching import LEVEL, largest, profiles, threshold_of
 from limitsets.fitting.starting import (
     RADIUS,
     Start,
@@ -33,14 +33,8 @@ from limitsets.scene.quantities import base_unit, find
 
 __all__ = ["fit"]
 
-# Share of the region's volume over all repetitions of the film.
-LEVEL = 0.95
 # Differences of readings of one place from which an error of measurement is taken.
 READ_TWICE = 10
-# Values of the radius of gyration that are tried first, as shares of the scene's.
-RADII = np.linspace(0.4, 1.8, 57)
-# Rounds of taking the rows anew, and of better maxima met on the way along a profile.
-ROUNDS = 4
 # A scatter this small beside the end of its interval is none.
 NOTHING = 1e-3
 
@@ -109,10 +103,10 @@ def fit(
     tell("robust least squares", 0, 3)
     start = robust_start(chosen, as_recorded(film, errors, known, len(chosen.sides)))
     tell("maximum likelihood", 1, 3)
-    own, best = _largest(chosen, start)
+    own, best = largest(chosen, start)
     tell("profiles", 2, 3)
     threshold = threshold_of(1, len(film), len(start.names))
-    best, ends = _profiles(own, best, threshold, start)
+    best, ends = profiles(own, best, threshold, start)
     return _answer(chosen, own, best, ends, start, threshold, begin)
 
 
@@ -131,95 +125,6 @@ def _errors(film: Throws, error: float | str | None, scene: Scene) -> tuple[bool
     if film.read_twice.size >= READ_TWICE:
         return True, np.full(len(film), spread_of(film.read_twice) / math.sqrt(2.0))
     return False, np.zeros(len(film))
-
-
-def threshold_of(together: int, rows: int, fitted: int) -> float:
-    """Say by how much twice the log-likelihood may fall: of normal residuals with a scatter that is fitted as well.
-
-    rows ln(1 + q F / (rows - fitted)), with the 95 % point of F(q, rows - fitted): exact for linear models, and for
-    many rows that of chi-square.
-    """
-    from scipy.stats import f as f_law
-
-    spare = rows - fitted
-    return float(rows * math.log1p(together * f_law.ppf(LEVEL, together, spare) / spare))
-
-
-def _largest(scene: Scene, start: Start) -> tuple[Likelihood, Maximum]:
-    """Maximise the likelihood, and take the rows anew, until they stay what they are."""
-    names, values, sizes = start.names, start.values, start.errors
-    if "radius_of_gyration" in scene.text["part"]["mass"]:
-        radius = scene.value(RADIUS)
-        names, values, sizes = (*names, RADIUS), np.append(values, radius), np.append(sizes, 0.02 * radius)
-    rows = start.rows
-    scatter = np.full(SCATTERS, start.spread / math.sqrt(2.0))
-    own = Likelihood(scene, rows, names, np.append(values, np.zeros(SCATTERS)), np.append(sizes, scatter))
-    told = own.told(own.centre[None])
-    known = rows.error**2 * (1.0 + told.slope[0] ** 2)
-    left = math.sqrt(max(start.spread**2 - float(known.mean()), 0.01 * start.spread**2) / 2.0)
-    share = left / max(float(np.median(np.abs(told.per_log_speed[0]))), 1e-12)
-    own = replace(own, scale=np.append(sizes, [share, left]))
-    at = np.append(np.zeros(len(names)), [1.0, 1.0])
-    best = maximised(own, _best_radius(own, at))
-    for _ in range(ROUNDS):
-        found = dict(zip(names, own.values(best.at)[0].tolist(), strict=False))
-        again = assigned(own.rows, scene, found, start.spread)
-        same = (again.side == own.rows.side).all() and (again.branch == own.rows.branch).all()
-        if same:
-            break
-        own = replace(own, rows=again)
-        best = maximised(own, _best_radius(own, best.at))
-    return own, best
-
-
-def _best_radius(own: Likelihood, at: Array) -> Array:
-    if RADIUS not in own.names:
-        return at
-    k = own.names.index(RADIUS)
-    tries = np.repeat(at[None], RADII.size + 1, axis=0)
-    tries[1:, k] = (RADII * own.scene.value(RADIUS) - own.centre[k]) / own.scale[k]
-    return np.asarray(tries[int(np.argmax(own(tries)))])
-
-
-def _limits(own: Likelihood, best: Maximum, k: int, way: float) -> float:
-    """Return how far a number may be followed: a radius of gyration within the part, a scatter to 0."""
-    value = float(own.values(best.at)[0, k])
-    if k >= len(own.names):
-        return abs(float(best.at[k])) if way < 0 else 1e4
-    if own.names[k] == RADIUS:
-        scene = own.scene
-        farthest = float(np.hypot(*(scene.vertices - np.array(scene.centre)).T).max())
-        room = value * 0.98 if way < 0 else max(farthest - value, 0.02 * value)
-        return room / float(own.scale[k])
-    return 1e4
-
-
-def _profiles(
-    own: Likelihood, best: Maximum, threshold: float, start: Start
-) -> tuple[Maximum, list[tuple[float, float]]]:
-    """Follow every number both ways; from the start again where a larger likelihood is met."""
-    for left in reversed(range(ROUNDS)):
-        best = best._replace(at=np.append(best.at[:-SCATTERS], np.abs(best.at[-SCATTERS:])))
-        bend = np.linalg.eigh(-best.hessian)
-        variance = (bend[1] ** 2 / np.maximum(bend[0], 1e-2)).sum(axis=1)
-        better, ends = None, []
-        for k in range(best.at.size):
-            first = math.sqrt(threshold * variance[k])
-            pair: list[End] = []
-            for way in (-1.0, 1.0):
-                limit = _limits(own, best, k, way)
-                if k >= len(own.names) and way < 0 and limit < 1e-3:
-                    pair.append(End(-math.inf))
-                    continue
-                pair.append(end_of_profile(own, best, k, way, threshold, first, limit))
-                better = pair[-1].better or better
-            if better is not None and left:
-                break
-            ends.append((pair[0].at, pair[1].at))
-        if better is None or not left:
-            break
-        best = better
-    return best, ends
 
 
 def _answer(

@@ -5,7 +5,7 @@ import pytest
 from scipy.stats import binom
 
 import limitsets as ls
-from limitsets.fitting.fitting_run import threshold_of
+from limitsets.fitting.searching import threshold_of
 from tests.fitting.machines import ABOVE, ALONG, HEIGHT, KAPPA, RADIUS, described, film, machine, run_film
 from tests.proofs.forge import scene
 
