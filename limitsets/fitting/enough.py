@@ -1,7 +1,7 @@
 """Whether the goal's margin is larger than what the machine does: the question that matters.
 
 The margins of the fitted scene, at every throw another speed or landing, stand against the fitted scatter; and
-the goal is asked of all scenes of the region together with that scatter at once.
+the goal is asked of all scenes within the fitted intervals together with that scatter at once.
 """
 
 from __future__ import annotations
@@ -37,8 +37,8 @@ class Enough:
     Attributes
     ----------
     verdict : str
-        "enough": the goal is proved for every scene of the region with the scatter; "not-enough": the scatter exceeds a
-        deviation at which an orbit violates the goal; "undecided".
+        "enough": the goal is proved for every scene within the intervals with the scatter; "not-enough": the scatter
+        exceeds a deviation at which an orbit violates the goal; "undecided".
     sentences : tuple of str
         The answer in words.
     repeats : dict of str to (float, float)
@@ -46,7 +46,7 @@ class Enough:
     margins : tuple of Margin
         Of the same, per throw.
     together : str
-        Verdict on all scenes of the region with all of the scatter: "proved", "refuted" or "undecided".
+        Verdict on all scenes within the intervals with all of the scatter: "proved", "refuted" or "undecided".
     beyond : float or None
         An X beyond which the goal is proved with this scatter, where it is not for the goal's own.
     """
@@ -103,6 +103,8 @@ def enough(found: Fit, *, width: float = 0.02, progress: Progress | None = None)
         margins.append(one)
         verdicts.append(_judged(one, *sizes))
         sentences.append(_sentence(name, one, sizes, units[name], verdicts[-1]))
+    if all(each.refuted == 0 for each in margins):
+        sentences = ["Without any scatter an orbit of the fitted machine violates the goal: not enough."]
     noise = {
         name: f"{rounded_up(most)} {units[name]}"
         for name, (_, most) in repeats.items()
@@ -150,7 +152,7 @@ def _sentence(name: str, one: Margin, sizes: tuple[float, float], unit: str, ver
 
 
 def _together(scene: Scene, noise: dict[str, str], progress: Progress | None) -> str:
-    """Ask the goal of every scene of the region with the whole scatter."""
+    """Ask the goal of every scene within the intervals with the whole scatter."""
     tolerance = scene.as_dict().get("tolerance", {})
     tolerance = {name: text for name, text in tolerance.items() if name != "landing.x"}
     proof = certify(scene, ["goal"], noise=noise, tolerance=tolerance, progress=progress)
@@ -159,9 +161,9 @@ def _together(scene: Scene, noise: dict[str, str], progress: Progress | None) ->
 
 def _all_of_it(together: str) -> str:
     said = {
-        "proved": "The goal is proved for every machine of the region with all of this scatter: safe.",
-        "refuted": "A machine of the region with this scatter violates the goal: not safe.",
-        "undecided": "For every machine of the region with all of this scatter together the goal is not decided.",
+        "proved": "The goal is proved for every machine within these intervals with all of this scatter: safe.",
+        "refuted": "A machine within these intervals with this scatter violates the goal: not safe.",
+        "undecided": "For every machine within these intervals with all of this scatter the goal is not decided.",
     }
     return said[together]
 

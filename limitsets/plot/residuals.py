@@ -39,7 +39,7 @@ def fit_residuals(found: Fit) -> Figure:
     misread = np.isin(rows.throws.row, [row for row, *_ in found.misread])
     strange = np.isin(rows.throws.row, found.misfit.strange)
     width = min(3.4 * len(sides) + 0.8, 12.0)
-    figure, panels = style.canvas(width, 3.6, 1, len(sides), sharey=True)
+    figure, panels = style.canvas(width, 3.6, 1, len(sides), sharex=True, sharey=True)
     for side, axes in zip(sides, panels, strict=True):
         own = rows.side == side
         size = 2.0 * found.deviations[own]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import isfinite
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -33,8 +34,8 @@ def lines_of(found: Fit) -> list[str]:
         lines.append(f"the model fits: such residuals or larger ones have probability {test.p:.2g}")
     for each in found.further[:1]:
         name, factor = max(each.shrinks.items(), key=lambda pair: pair[1])
-        lines.append(
-            f"film next: throws from x = {each.x:.3g} {unit} on side {each.side};"
-            f" ten of them shorten the interval of {name} {factor:.2g} times"
-        )
+        gain = f"ten of them shorten the interval of {name} {factor:.2g} times"
+        if not isfinite(found[name].half):
+            gain = f"they tell most of {name}, whose interval is open"
+        lines.append(f"film next: throws from x = {each.x:.3g} {unit} on side {each.side}; {gain}")
     return lines

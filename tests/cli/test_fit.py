@@ -10,7 +10,7 @@ import pytest
 
 import limitsets as ls
 from tests.cli.command import run
-from tests.fitting.machines import ABOVE, ALONG, HEIGHT, RADIUS, film
+from tests.fitting.machines import ABOVE, ALONG, HEIGHT, RADIUS, farthest, film
 
 DOCS = Path(__file__).resolve().parents[2] / "docs" / "json.md"
 TRUTH = {"throw.kappa": 25.6, ALONG: 4.25, ABOVE: 0.69, HEIGHT: -0.21, RADIUS: 1.25}
@@ -88,12 +88,16 @@ def test_a_table_and_files(capfd, throws):
 @pytest.mark.sweep
 def test_whether_the_margin_is_enough(capfd, throws):
     code, out, _ = run(capfd, "fit", "paper-designed", str(throws), "--error", "0.508 mm", "--json")
-    judged = json.loads(out)["enough"]
+    record = json.loads(out)
+    judged = record["enough"]
     assert set(judged) == {"verdict", "sentences", "repeats", "margins", "together", "beyond"}
-    assert code == (0 if judged["verdict"] == "enough" else 1)
-    speed = judged["margins"]["throw.speed"]
-    assert judged["sentences"][0].startswith("Your speed repeats to ")
-    assert speed["proved"] < speed["refuted"]
+    # an orbit of this very machine lies beyond 20 in on another side than 2, by other formulas as well
+    machine = {name: each["value"] for name, each in record["quantities"].items()}
+    machine["throw.kappa"] = 193.045 / machine.pop("throw.speed") ** 2
+    assert farthest(np.random.default_rng(32), machine)[:2].max() > 20.0
+    assert (code, judged["verdict"]) == (1, "not-enough")
+    assert judged["margins"]["throw.speed"] == {"proved": 0.0, "refuted": 0.0}
+    assert judged["sentences"][0].startswith("Without any scatter an orbit of the fitted machine violates")
 
 
 @pytest.mark.parametrize(

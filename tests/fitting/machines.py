@@ -83,3 +83,17 @@ def run_film(draw, truth, n=50, *, error=0.02, landing=0.01, twice=False) -> Thr
     return Throws(
         read_before, sides[0], read_after, sides[1], np.full(n, np.nan), follows, np.arange(2, n + 2)
     )
+
+
+def farthest(draw, truth, *, speed=0.0, landing=0.0) -> np.ndarray:
+    """Where parts lie farthest out on each side once they have settled; scatter is one bound or the other."""
+    plain, n = Plain(described(truth)), 1000
+    side = draw.integers(0, 3, n)
+    x, out = draw.uniform(plain.a[side] + 2.0, ARM - 1.0), np.zeros(3)
+    for count in range(200):
+        share = 1.0 + speed * draw.choice([-1.0, 1.0], n)
+        x, side = thrown(plain, x, side, truth[KAPPA] / share**2)
+        x = x + landing * draw.choice([-1.0, 1.0], n)
+        if count >= 100:
+            np.maximum.at(out, side, x)
+    return out
