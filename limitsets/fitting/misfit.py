@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["LEVEL", "Misfit", "misfit"]
+__all__ = ["LEVEL", "NAMED", "Misfit", "misfit"]
 
 LEVEL = 0.05
 DRAWS = 1999
@@ -22,6 +22,8 @@ WIDER = np.array([2.0, 4.0, 8.0, 20.0, 100.0])
 # Weight of a number of that many standard deviations, in the robust fit of what is left (Huber's).
 BEND = 1.345
 ROUNDS = 8
+# Residuals that are all this small, in standard deviations, are none.
+NOTHING = 1e-9
 # Beyond so many robust standard deviations a row is named.
 NAMED = 3.5
 
@@ -90,7 +92,7 @@ def _cleared(residual: Array, slopes: Array) -> Array:
         normal = np.einsum("mn,np,nq->mpq", weight, slopes, slopes)
         pull = np.einsum("mn,np,mn->mp", weight, slopes, residual)
         left = residual - np.linalg.solve(normal, pull[..., None])[..., 0] @ slopes.T
-        size = np.median(np.abs(left), axis=1, keepdims=True) / 0.6744897501960817
+        size = np.maximum(np.median(np.abs(left), axis=1, keepdims=True) / 0.6744897501960817, NOTHING)
         weight = np.minimum(1.0, BEND * size / np.maximum(np.abs(left), 1e-300))
     scaled: Array = left / size
     return scaled

@@ -40,7 +40,7 @@ def threshold_of(together: int, rows: int, fitted: int) -> float:
 
 def largest(scene: Scene, start: Start) -> tuple[Likelihood, Maximum]:
     """Maximise the likelihood, and take the rows anew, until they stay what they are."""
-    names, values, sizes = start.names, start.values, start.errors
+    names, values, sizes = start.names, start.values, start.errors.copy()
     if "radius_of_gyration" in scene.text["part"]["mass"]:
         radius = scene.value(RADIUS)
         names, values, sizes = (*names, RADIUS), np.append(values, radius), np.append(sizes, 0.02 * radius)
@@ -51,6 +51,8 @@ def largest(scene: Scene, start: Start) -> tuple[Likelihood, Maximum]:
     known = rows.error**2 * (1.0 + told.slope[0] ** 2)
     left = math.sqrt(max(start.spread**2 - float(known.mean()), 0.01 * start.spread**2) / 2.0)
     share = left / max(float(np.median(np.abs(told.per_log_speed[0]))), 1e-12)
+    # landings that happen to agree better than their errors of measurement tell no more than these let them
+    sizes[: len(start.names)] *= max(1.0, math.sqrt(float(known.mean())) / start.spread)
     own = replace(own, scale=np.append(sizes, [share, left]))
     at = np.append(np.zeros(len(names)), [1.0, 1.0])
     best = maximised(own, _best_radius(own, at))

@@ -142,10 +142,10 @@ def robust_start(scene: Scene, rows: Rows) -> Start:
         keep = [k for k in range(len(names)) if k != out]
         if not keep:
             raise DataError(
-                "the throws",
-                "too much alike",
-                "throws that differ",
-                "film throws from other places",
+                "what the landings tell",
+                "nothing",
+                "one quantity at least",
+                "film throws from other places; check units and sides",
                 file=rows.throws.file,
             )
         names, units = tuple(names[k] for k in keep), units[keep]

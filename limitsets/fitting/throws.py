@@ -125,9 +125,8 @@ def read_throws(file: str | Path, scene: Scene) -> Throws:
             continue
         if len(cells) != len(heads):
             allowed = f"{len(heads)}, one for each column"
-            raise DataError(
-                "the number of cells", len(cells), allowed, "correct the row", key=f"row {line}", file=name
-            )
+            remedy = "correct the row; decimals have a point"
+            raise DataError("the number of cells", len(cells), allowed, remedy, key=f"row {line}", file=name)
         lines.append(line)
         for (column, (head, unit)), cell in zip(heads.items(), cells, strict=True):
             values[column].append(_cell(cell, column, unit, f"row {line}, column {head}", scene, name))
@@ -180,11 +179,9 @@ def _heads(cells: Sequence[str], name: str) -> dict[str, tuple[str, str]]:
         key = f"row 1, column {shown(cell)}"
         if column not in COLUMNS:
             near = difflib.get_close_matches(column, COLUMNS, n=1)
-            remedy = (
-                f"did you mean {near[0]!r}?"
-                if near
-                else "name it so, or leave it out; commas separate columns"
-            )
+            remedy = "name it so, or leave it out; commas separate columns"
+            if near:
+                remedy = f"did you mean '{near[0]}{' [mm]' if near[0] in WITH_UNIT else ''}'?"
             raise DataError("the column", shown(cell), _header(), remedy, key="row 1", file=name)
         if column in heads:
             raise DataError("the column", column, "each column once", "leave one out", key=key, file=name)
@@ -230,9 +227,10 @@ def _cell(cell: str, column: str, unit: str, key: str, scene: Scene, name: str) 
         raise DataError("the number", shown(text), allowed, "correct it", key=key, file=name) from None
     if column == "error" and value <= 0:
         raise DataError("the error", shown(text), "above 0", "give a standard deviation", key=key, file=name)
-    if column == "x_before" and not 0 < value <= 1.05 * scene.arm_length:  # it is measured
+    if column in PLACES and not 0 < value <= 1.05 * scene.arm_length:  # it is measured
         allowed = f"above 0 and up to the arm's length, {scene.arm_length:g} {scene.unit}"
-        raise DataError("the place", f"{text} {unit}", allowed, "correct it", key=key, file=name)
+        remedy = "correct it" if column == "x_before" else "correct it, or leave out a throw off the arm"
+        raise DataError("the place", f"{text} {unit}", allowed, remedy, key=key, file=name)
     return value
 
 

@@ -1,5 +1,6 @@
 """Films as CSV files: units, and one clear line for whatever is wrong, with its row and column."""
 
+import numpy as np
 import pytest
 
 import limitsets as ls
@@ -65,7 +66,10 @@ def test_a_reading_shared_by_two_rows_is_known_by_its_number(write):
         ("nan,2,256,2", "row 4, column x_before [mm]", "'nan'"),
         ("-3,2,256,2", "row 4, column x_before [mm]", "arm's length, 28 in"),
         ("2540,2,256,2", "row 4, column x_before [mm]", "arm's length, 28 in"),
+        ("254,2,-3,2", "row 4, column x_after [mm]", "leave out a throw off the arm"),
+        ("254,2,2540,2", "row 4, column x_after [mm]", "arm's length, 28 in"),
         ("254,2,256", "row 4", "4, one for each column"),
+        ("254,3,2,256,5,2", "row 4", "decimals have a point"),
         ("254,2,256,2,1", "row 4", "4, one for each column"),
         ('254,2,"256,5",2', "row 4, column x_after [mm]", "'256,5'"),
     ],
@@ -87,7 +91,9 @@ def test_a_bad_cell_is_one_line_with_file_row_and_column(write, bad, place, said
         ("x_before [mn],side_before,x_after [mm],side_after", "'mn'"),
         ("x_before [deg],side_before,x_after [mm],side_after", "'deg'"),
         ("x_before [mm],side_before [mm],x_after [mm],side_after", "none in this column"),
-        ("x_befor [mm],side_before,x_after [mm],side_after", "did you mean 'x_before'"),
+        ("x_befor [mm],side_before,x_after [mm],side_after", "did you mean 'x_before [mm]'"),
+        ("x_before (mm),side_before,x_after [mm],side_after", "did you mean 'x_before [mm]'"),
+        ("x_before [mm],sid_before,x_after [mm],side_after", "did you mean 'side_before'"),
         ("x_before [mm],side_before,x_after [mm],x_after [mm]", "each column once"),
         ("x_before [mm],side_before,x_after [mm],run", "side_after missing"),
         ("x_before [mm];side_before;x_after [mm];side_after", "commas separate columns"),
@@ -127,6 +133,21 @@ def test_a_throw_from_where_no_part_flies_names_the_row(write):
         DataError, match=r"row 10: the place before is '1.574\S* in'.*beyond the left vertex of side 2"
     ):
         ls.fit("paper-designed", path)
+
+
+def test_landings_that_tell_nothing_are_an_error(write):
+    text = "\n".join(
+        [HEAD] + [f"{150 + k * 37 % 400},{k % 3},{100 + k * 91 % 500},{k * 7 % 3}" for k in range(40)]
+    )
+    with pytest.raises(DataError, match="check units and sides"):
+        ls.fit("paper-designed", write(text), error="0.5 mm")
+
+
+def test_one_throw_again_and_again_tells_one_quantity(write):
+    found = ls.fit("paper-designed", write("\n".join([HEAD] + [ROW] * 20)), error="0.5 mm")
+    assert [np.isfinite(each.half) for each in found.quantities] == [True]
+    assert len(found.held) == 4
+    assert not found.misfit.lacking
 
 
 def test_the_error_is_given_once(write):
