@@ -42,7 +42,7 @@ def moved(effect, count=4000):
 
 
 def spoiled_film(draw, effect, strange=5, n=50):
-    """The machine without the effect, and a film of that with it: exactly so many landings moved by more than 3 sigma."""
+    """The machine without the effect, and a film of that with it, that many landings moved by more than 3 sigma."""
     one, thrown, far, same = moved(effect)
     chosen = np.concatenate([draw.choice(far, strange, False), draw.choice(same, n - strange, False)])
     x, side, to, on = (each[chosen] for each in thrown)
