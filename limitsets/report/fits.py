@@ -28,7 +28,7 @@ def lines_of(found: Fit) -> list[str]:
         rows = f" (look at row{'s' if len(test.strange) > 1 else ''} {', '.join(map(str, test.strange))})"
         lines.append(
             f"the model does not fit (p = {test.p:.2g}): the throws do something that it leaves out, like rolling or"
-            f" slipping{rows if test.strange else ''}; do not trust the values"
+            f" slipping, or a number is wrong{rows if test.strange else ''}; do not trust the values"
         )
     else:
         lines.append(f"the model fits: such residuals or larger ones have probability {test.p:.2g}")
