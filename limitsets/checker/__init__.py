@@ -35,6 +35,11 @@ The files follow docs/certificates.md, and each imports only from those before i
     policy       a policy for a sensor of one bit                                 "Policies"
     beliefs      its table                                                        "Tables of a policy"
     claims       the claims of a file, and what each needs
+    speeds       throws whose speed deviates                                      17, 18
+    averages     means over a throw's deviations, in floats                       19, 20
+    chain        one step of a bound                                              21
+    links        the throws of a noisy chain, cell by cell                        17 to 20
+    chances      brackets of probabilities                                        "Probabilities", 21
     report       a file from first to last, and the report about it
     main         the command line
 """

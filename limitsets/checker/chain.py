@@ -139,7 +139,7 @@ class Chain:
             found[nodes] = np.maximum(found[nodes], mean[nodes] + deficit)
         _, most = self.hard.ends(values)
         for nodes in (self.hard.at, self.hard.at + 1):
-            np.maximum.at(found, nodes, most + more)
+            np.maximum.at(found, nodes, most + (more + 2.0**-50 * size))
         return found
 
     def deficits(self, values: Array) -> Array:

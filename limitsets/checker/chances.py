@@ -33,7 +33,7 @@ from .texts import (
 )
 
 ANY, LEFT = "any", "exits"
-MOST_NODES, MOST_STRATA, MOST_BRACKETS, MOST_MEAN = 300_000, 64, 2_000, 5_000
+MOST_NODES, MOST_STRATA, MOST_BRACKETS, MOST_MEAN = 120_000, 64, 2_000, 5_000
 # A mean is bounded from above once no state's bound grows by more than this share of a throw.
 GROWTH = 0.5
 Place = tuple[int, Fraction, Fraction]  # side, from x, to x

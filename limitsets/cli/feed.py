@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -12,6 +13,7 @@ from limitsets.cli.output import Json, Scene, Words, answer, opened, option, pro
 
 if TYPE_CHECKING:
     from limitsets.feeding import Feeding
+    from limitsets.robust import AbsorptionBrackets
 
 __all__ = ["feed"]
 
@@ -42,6 +44,12 @@ def feed(
     cells: Annotated[
         int, option("--cells", "N", "Cells per side, for the probabilities.", min=8, max=100_000)
     ] = 1024,
+    brackets: Annotated[
+        int | None,
+        option(
+            "--brackets", "N", "Prove brackets of the probabilities, on N cells per side.", min=8, max=100_000
+        ),
+    ] = None,
     no_proof: Annotated[bool, typer.Option("--no-proof", help="Probabilities and trials only.")] = False,
     out: Annotated[
         Path | None, option("--out -o", "DIR", "Write feeding.json and feeding.png there.")
@@ -67,6 +75,7 @@ def feed(
             trials=trials,
             seed=seed,
             cells=cells,
+            brackets=brackets,
             progress=tell,
         )
         files = []
@@ -99,6 +108,9 @@ def _text(found: Feeding, files: list[Path]) -> None:
             [WORDS[name], f"{share:.6f}", f"{found.errors[name]:.1e}", met, f"{low:.4f} to {high:.4f}"]
         )
     table(HEADS, rows)
+    if found.brackets is not None:
+        for line in _proved(found.brackets):
+            typer.echo(line)
     most = found.shares.quantile(0.95)
     until = "" if most is None else f", 95 % of the starts after {most}"
     typer.echo(f"throws until a part is fed: {found.shares.mean_throws:.1f} in the mean{until}")
@@ -114,3 +126,19 @@ def _text(found: Feeding, files: list[Path]) -> None:
         typer.echo(found.curve.line())
     if files:
         typer.echo(f"written: {', '.join(map(str, files))}")
+
+
+def _proved(brackets: AbsorptionBrackets) -> list[str]:
+    """Put proved brackets in words, rounded outward."""
+    last = brackets.within["any"].shape[1] - 1
+    found = []
+    for name in ("right", "wrong", "wall"):
+        if name in brackets.within:
+            low, high = (float(end) for end in brackets.within[name][:, -1])
+            lo, hi = math.floor(low * 1e6) / 1e6, math.ceil(high * 1e6) / 1e6
+            found.append(f"PROVED: {WORDS[name]} within {last} throws: {lo:.6f} to {hi:.6f}")
+    first, by = brackets.quantile(0.95)
+    if first is not None and by is not None:
+        count = f"{first}" if first == by else f"{first} to {by}"
+        found.append(f"PROVED: the least number of throws within which 95 % have ended: {count}")
+    return found

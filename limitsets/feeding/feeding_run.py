@@ -8,12 +8,14 @@ from pathlib import Path
 from typing import Any
 
 from limitsets.errors import AnswerError
+from limitsets.feeding.bracketing import fate_brackets
 from limitsets.feeding.falling import ArmEnd, arm_end_of, clear_beyond, time_to_tip
 from limitsets.feeding.fed_shares import Curve, FedShares, FeedingProblem, success_curve
 from limitsets.feeding.proving import proved_feeding
 from limitsets.feeding.trials import Trials, run_trials
 from limitsets.feeding.verdicts import Fed, Safe
 from limitsets.files import as_table, picked
+from limitsets.robust.brackets.result import AbsorptionBrackets
 from limitsets.robust.noise.scattering import Scattering, scattering_of
 from limitsets.robust.sheet.noise_input import still
 from limitsets.scene import Scene, load
@@ -51,6 +53,8 @@ class Feeding:
         The share of right feeds against the level of the noise; None without noise.
     trials : Trials
         Parts thrown.
+    brackets : AbsorptionBrackets or None
+        Proved brackets of right, wrong, wall and exits within n throws; None where they were not asked for.
     """
 
     end: ArmEnd
@@ -63,6 +67,7 @@ class Feeding:
     errors: dict[str, float]
     curve: Curve | None
     trials: Trials
+    brackets: AbsorptionBrackets | None = None
 
     @property
     def tipping(self) -> dict[int, float] | None:
@@ -109,6 +114,7 @@ class Feeding:
             if self.curve is None
             else as_table(**picked(self.curve, *(each.name for each in fields(Curve)))),
             trials=self.trials,
+            brackets=self.brackets,
         )
 
 
@@ -125,6 +131,7 @@ def feed(
     seed: int = 0,
     cells: int = CELLS,
     strata: int = STRATA,
+    brackets: int | None = None,
     progress: Progress | None = None,
 ) -> Feeding:
     """Say what becomes of parts that are thrown along an arm with a cavity at its end.
@@ -152,6 +159,8 @@ def feed(
         Of the trials.
     cells, strata : int
         Cells per side, and pieces into which each law of the noise is cut, for the probabilities.
+    brackets : int, optional
+        Cells per side for proved brackets of the fates, of noise with uniform or normal laws: seconds to minutes.
     progress : callable, optional
         Told (stage, done, all).
 
@@ -201,4 +210,5 @@ def feed(
         errors,
         curve,
         run_trials(end, scatter, trials, seed=seed, progress=progress),
+        None if brackets is None else fate_brackets(end, scatter, brackets, progress=progress),
     )

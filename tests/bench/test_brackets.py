@@ -66,14 +66,16 @@ BOTH = Scattering(speed=Uniform(0.003), landing=Uniform(0.02))
 CASES = [
     pytest.param("paper-designed", 20.5, BOTH, 12_000, (23, 40, 63), 80, id="designed"),
     pytest.param("paper-initial", 20.0, Scattering(landing=Uniform(0.1)), 1000, (23, 63), 200, id="landing"),
-    pytest.param("paper-initial", 20.0, Scattering(speed=Uniform(0.005)), 8000, (23, 63), 150, id="speed"),
+    pytest.param("paper-initial", 20.0, Scattering(speed=Uniform(0.005)), 12_000, (23, 63), 150, id="speed"),
 ]
 
 
 @pytest.mark.parametrize(("name", "x", "scatter", "cells", "counts", "throws"), CASES)
 def test_1e8_throws_meet_the_brackets(name, x, scatter, cells, counts, throws, table):
     scene, begin = ls.load(name), perf_counter()
-    found = absorption_brackets(scene, scatter, right=(x, 2), wrong=x, cells=cells, throws=throws)
+    # Without scatter of the landing a start next to the joint needs throws without bound: there is no mean.
+    mean = scatter.landing is not None
+    found = absorption_brackets(scene, scatter, right=(x, 2), wrong=x, cells=cells, throws=throws, mean=mean)
     table.append(limit(f"brackets of {name}, {cells} cells", perf_counter() - begin, "s", None))
     begin = perf_counter()
     times, right, wrong, made = throw_to_the_end(scene, scatter, x, 2)
@@ -87,8 +89,9 @@ def test_1e8_throws_meet_the_brackets(name, x, scatter, cells, counts, throws, t
     for kind, count in (("right", right), ("wrong", wrong)):
         low, high = found.within[kind][:, -1]
         meet(table, f"{name}: {kind} at last", interval_of(count, parts), (low, high + open_))
-    error = stats.norm.isf(MISS) * times.std(ddof=1) / np.sqrt(parts)
-    meet(table, f"{name}: mean", (times.mean() - error, times.mean() + error), found.mean)
+    if mean:
+        error = stats.norm.isf(MISS) * times.std(ddof=1) / np.sqrt(parts)
+        meet(table, f"{name}: mean", (times.mean() - error, times.mean() + error), found.mean)
     if name == "paper-designed":
         assert found.quantile(0.95) == (63, 63)
 
