@@ -137,9 +137,12 @@ class Chain:
         found = fixed.copy()
         for nodes in (self.live, self.live + 1):
             found[nodes] = np.maximum(found[nodes], mean[nodes] + deficit)
-        _, most = self.hard.ends(values)
+        least, most = self.hard.ends(values)
+        near = np.isfinite(self.hard.much)  # hardly farther than what is thrown from the right node
+        beside = mean[self.hard.at + 1] + INFLATE * np.where(near, self.hard.much, 0.0) * (most - least)
+        bound = np.where(near, np.minimum(most + more, beside), most + more) + 2.0**-50 * size
         for nodes in (self.hard.at, self.hard.at + 1):
-            np.maximum.at(found, nodes, most + (more + 2.0**-50 * size))
+            np.maximum.at(found, nodes, bound)
         return found
 
     def deficits(self, values: Array) -> Array:

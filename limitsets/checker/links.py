@@ -15,6 +15,7 @@ from flint import arb
 from .averages import INFLATE, Mesh, Spread, Table, mean_rows
 from .balls import HALF, Arb, Array, exact, float_above
 from .chain import Bent, Chain, Parts, Reach
+from .model import over_angles
 from .scene import Side
 from .speeds import (
     Hit,
@@ -428,7 +429,24 @@ class Links:
             )
             lo, hi = max(lo, low), min(hi, high)
         one, two = (self.range_of(branch, lo, hi) for branch in (0, 1))
-        self.parts.hard.rows.append((self.start + cell, 0.0, *one, *two))
+        self.parts.hard.rows.append((self.start + cell, self.off_next(cell, first, last), *one, *two))
+
+    def off_next(self, cell: int, first: Arb, last: Hit | None) -> float:
+        """Bound how far the mean from a hard cell is from that at its right node, as a share of what V varies by.
+
+        Infinite where the node is not thrown from, or not surely by one branch as all of the cell.
+        """
+        node = cell + 1
+        if last is None or node not in self.at_cut or self.below[node] != self.above[node]:
+            return math.inf
+        x_lo = self.side.a.lower() if self.side.a > arb(float(self.x[cell])) else arb(float(self.x[cell]))
+        x = x_lo.union(arb(float(self.x[node])))
+        deviations = (-self.most).union(self.most)
+        kappa, phi = kappa_at(self.noisy.kappa, deviations), first.union(last.after)
+        if int(over_angles(self.side, phi, x, kappa)[0]) != self.below[node]:
+            return math.inf
+        slope = slopes_over(self.side, phi, kappa, 1 + deviations).x
+        return upper(abs(slope) * (arb(float(self.x[node])) - x_lo)) / (2.0 * self.e) * INFLATE
 
 
 def chain_of(

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from limitsets.errors import AnswerError
 from limitsets.interval import guard
 from limitsets.proofs.parameters import parameter_box
-from limitsets.robust.brackets.averages import ROUNDING, mean_matrix
+from limitsets.robust.brackets.averages import mean_matrix, rounding_of
 from limitsets.robust.brackets.chain import EXITS, Chain, Place, chain_of
 from limitsets.robust.brackets.nodes import Nodes
 from limitsets.robust.brackets.result import ANY, AbsorptionBrackets
@@ -50,7 +50,7 @@ def _start_row(nodes: Nodes, starts: Sequence[Place]) -> Any:
 
 
 def _mean_above(row: Any, values: Array) -> float:
-    return float((row @ values)[0]) + ROUNDING * float(np.abs(values).max())
+    return float((row @ values)[0]) + rounding_of(row) * float(np.abs(values).max())
 
 
 def _at_most(nodes: Nodes, values: Array, most: float) -> Array:

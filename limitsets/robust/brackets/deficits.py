@@ -12,18 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from limitsets.proofs.intervals import Intervals
-from limitsets.robust.brackets.averages import (
-    Bends,
-    Curvature,
-    Gaps,
-    Kinks,
-    Span,
-    Swings,
-    Windows,
-)
 from limitsets.robust.brackets.densities import Staircase
 from limitsets.robust.brackets.landings import Derivatives, OneSide, landed, slopes
 from limitsets.robust.brackets.nodes import Nodes
+from limitsets.robust.brackets.spans import Bends, Curvature, Gaps, Kinks, Span, Swings, Windows
 
 __all__ = ["Deficits", "Rows"]
 

@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from limitsets.robust.brackets.averages import Average, Bends, Curvature, Span, Swings, mean_matrix
+from limitsets.robust.brackets.averages import Average, mean_matrix
 from limitsets.robust.brackets.densities import Staircase
 from limitsets.robust.brackets.nodes import Nodes
+from limitsets.robust.brackets.spans import Bends, Curvature, Span, Swings
 
 __all__ = ["landing_average"]
 

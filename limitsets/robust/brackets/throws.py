@@ -18,19 +18,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from limitsets.proofs.intervals import Intervals
-from limitsets.robust.brackets.averages import (
-    Average,
-    Gaps,
-    Span,
-    Swings,
-    Windows,
-    mean_matrix,
-)
+from limitsets.robust.brackets.averages import Average, mean_matrix
 from limitsets.robust.brackets.decisions import Decided, decided
 from limitsets.robust.brackets.deficits import Deficits, Rows
 from limitsets.robust.brackets.densities import Staircase
 from limitsets.robust.brackets.landings import Derivatives, OneSide, landed, slopes
 from limitsets.robust.brackets.nodes import Nodes
+from limitsets.robust.brackets.spans import Gaps, Span, Swings, Windows
 
 __all__ = ["throw_average"]
 
@@ -226,7 +220,7 @@ class _Parts(Deficits):
         # Where the speed moves the landing place by less than a cell its derivative says nothing, if it has a sign.
         rate = all_of.delta.absolute()
         spread = float(law.borders[-1] - law.borders[0]) * rate.lo
-        curved = live[((spread > h) & (rate.hi < 2.0 * rate.lo))[live]]
+        curved = live[((spread > h) & (rate.lo > 0.0))[live]]
         if curved.size:
             self.by_borders(rows, found, all_of, curved, lo, hi, density)
 
