@@ -1,8 +1,8 @@
 """Fits of many machines of known truth, over processes: how often intervals hold, and how often a misfit is seen.
 
 Run it as ``python -m tests.bench.fitted_machines [--machines 1000] [--films 1000] [--workers 16] [--seed 0]``; it
-prints a table in JSON.  Every film has a seed of its own, so that the answer is the same with any number of processes, and the
-films with sides recorded wrong are those without, but for these sides.
+prints a table in JSON.  Every film has a seed of its own, so that the answer is the same with any number of processes,
+and the films with sides recorded wrong are those without, but for these sides.
 """
 
 from __future__ import annotations
