@@ -32,6 +32,8 @@ The files follow docs/certificates.md, and each imports only from those before i
     refutations  orbits that refute a goal                                        "Refutations"
     region       one cell of a plane of parameters                                "Regions"
     plane        a plane of parameters in cells, and its regions
+    policy       a policy for a sensor of one bit                                 "Policies"
+    beliefs      its table                                                        "Tables of a policy"
     claims       the claims of a file, and what each needs
     report       a file from first to last, and the report about it
     main         the command line

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from limitsets.cli.arguments import deviations, place
+from limitsets.cli.arguments import HELP_NO_RECHECK, deviations, place
 from limitsets.cli.output import Json, Scene, Words, answer, opened, option, progress, saved, table
 from limitsets.errors import LimitsetsError
 
@@ -41,7 +42,11 @@ def feedback(
     out: Annotated[
         Path | None, option("--out -o", "DIR", "Write feedback.json, policy.csv and policy.png there.")
     ] = None,
+    certificate: Annotated[
+        Path | None, option("--certificate", "FILE", "Write the policy's certificate, NAME.proof.zip.")
+    ] = None,
     json: Json = False,
+    no_recheck: Annotated[bool, typer.Option("--no-recheck", help=HELP_NO_RECHECK)] = False,
 ) -> None:
     """Find a policy for a sensor that answers one question, and throw it.
 
@@ -71,8 +76,13 @@ def feedback(
             at = _places(chosen, sweep)
             tried = list(zip(at, places(chosen, at, error=place(chosen, error), **options), strict=True))
             found = min((each for _, each in tried), key=lambda each: (not each.solved, each.found.throws))
+        written = None
+        if certificate is not None:
+            tell("recheck", 0, 1)
+            found, written = _certified(found, certificate, recheck=not no_recheck)
         thrown = simulate(found, parts) if found.solved else None
         record = found.to_json() | {
+            "certificate": written,
             "simulated": thrown,
             "places": [
                 {"x": x, "verdict": each.found.verdict, "within": each.found.throws} for x, each in tried
@@ -84,8 +94,25 @@ def feedback(
     if csv is not None and policy is not None:
         with saved(csv) as draft:
             draft.write_text(policy.csv(), encoding="utf-8", newline="\n")
-    answer(record, json, lambda: _text(found, tried, thrown, out))
+    answer(record, json, lambda: _text(found, tried, thrown, out, written))
     raise typer.Exit(0 if found.solved else 1)
+
+
+def _certified(found: Synthesis, file: Path, *, recheck: bool) -> tuple[Synthesis, dict[str, Any]]:
+    """Write the certificate; what is left where the checker denies it, and what is said of the file."""
+    from limitsets.proofs.confirm import DeniedError
+
+    if not found.solved:
+        return found, {"file": None, "denied": False, "recheck": None}
+    begin = time.perf_counter()
+    with saved(file) as draft:
+        try:
+            found.save(draft, recheck=recheck, workers=None)
+        except DeniedError as error:
+            kept = str(file.with_name(Path(error.file or "").name))
+            return found.denied(error.claims["policy"]), {"file": kept, "denied": True, "recheck": None}
+    seconds = time.perf_counter() - begin if recheck else None
+    return found, {"file": str(file), "denied": False, "recheck": seconds}
 
 
 def _goal_at(scene: Any, x: float) -> tuple[float, int]:
@@ -152,7 +179,13 @@ def _write(found: Synthesis, record: dict[str, Any], out: Path) -> None:
     laid(out, drawn, lambda _: text)
 
 
-def _text(found: Synthesis, tried: list[tuple[float, Synthesis]], thrown: Any, out: Path | None) -> None:
+def _text(
+    found: Synthesis,
+    tried: list[tuple[float, Synthesis]],
+    thrown: Any,
+    out: Path | None,
+    written: dict[str, Any] | None,
+) -> None:
     unit = found.scene.unit
     x, side = found.goal
     wanted = {"stop": "known to lie", "catch": "to be caught"}[found.mode]
@@ -166,6 +199,8 @@ def _text(found: Synthesis, tried: list[tuple[float, Synthesis]], thrown: Any, o
     typer.echo(f"question: {found.question}")
     typer.echo(_verdict(found))
     policy = found.found.policy
+    if written is not None:
+        typer.echo(_said(written))
     if out is not None:
         typer.echo(
             f"written to {out}: feedback.json" + ("" if policy is None else ", policy.csv, policy.png")
@@ -184,6 +219,16 @@ def _text(found: Synthesis, tried: list[tuple[float, Synthesis]], thrown: Any, o
         typer.echo(
             f"thrown: {thrown.reached} of {thrown.parts} came, in {thrown.mean:.3g} throws on average{more}"
         )
+
+
+def _said(written: dict[str, Any]) -> str:
+    file, seconds = written["file"], written["recheck"]
+    if file is None:
+        return "no certificate is written: there is no policy"
+    if written["denied"]:
+        return f"the checker denies the certificate: it is kept as {file}"
+    done = "not rechecked" if seconds is None else f"rechecked in {seconds:.2g} s"
+    return f"certificate: {file}, {done} (check it: limitsets recheck {file})"
 
 
 def _verdict(found: Synthesis) -> str:
