@@ -61,6 +61,7 @@ class Scene:
     unit: str
     raw: dict[str, Any] = field(default_factory=dict)  # the JSON of the scene
     noise: object = None  # the JSON of the noise
+    end: Fraction | None = None  # where the arm ends in a cavity; landings are followed up to arm.length
     loose: float = 0.0  # the widths of all sides' enclosures together; 0 where `halves` cannot narrow them
     parts: "dict[tuple[str, int], list[Scene]]" = field(default_factory=dict)  # known halves
 
@@ -148,7 +149,9 @@ def over_halves(scene: Scene, check: Callable[..., str], *more: Any) -> str:
 
 def read_scene(raw: object, noise: object) -> Scene:
     """Enclose a_i, d_i, L_i, rho, kappa, h and the arm's length from the decimals of a scene."""
-    scene = table(raw, "scene", "part arm throw model", "name gravity goal cavity world tolerance effects")
+    scene = table(
+        raw, "scene", "part arm throw model", "name gravity goal cavity feedback world tolerance effects"
+    )
     check_spread(scene, noise)
     arm = table(scene["arm"], "arm", "surface_height length")
     reach = quantity(arm["length"], "length", "arm.length")
@@ -171,9 +174,21 @@ def read_scene(raw: object, noise: object) -> Scene:
         sides.append(side)
     require(all(bool(k_lo > side.small_d) for side in sides), "small-angle-2 needs kappa > d")
     whole = Scene(sides, k_lo, k_hi, rho, ends, reach.unit, scene, noise)
+    whole.end = read_end(scene.get("cavity"), unit)
     if whole.cuts():
         whole.loose = sum(float(ball.rad()) for s in sides for ball in (s.a, s.d, s.h, s.shift, whole.rho))
     return whole
+
+
+def read_end(cavity: object, unit: Fraction) -> Fraction | None:
+    """Read where the arm ends, in the unit of arm.length; what the cavity is like beyond is not looked at."""
+    if cavity is None:
+        return None
+    end = quantity(
+        table(cavity, "cavity", "position width depth angle")["position"], "length", "cavity.position"
+    )
+    require(end.lo == end.hi > 0, "cavity.position is not one number above 0")
+    return end.lo / unit
 
 
 def read_model(value: object) -> tuple[str, str]:
@@ -378,7 +393,7 @@ def as_wide_as(dev: Quantity, value: Quantity, lo: Fraction, hi: Fraction, name:
 def same_but_for(names: list[str], raw: list[Any], flat: list[dict[str, object]]) -> bool:
     """Whether all boxes have the same scene, but for the quantities named."""
     rest = [{key: value for key, value in f.items() if key not in names} for f in flat]
-    alike = ("model", "goal", "cavity", "world", "tolerance", "effects")
+    alike = ("model", "goal", "cavity", "feedback", "world", "tolerance", "effects")
     return all(
         r == rest[0] and all(scene.get(key) == raw[0].get(key) for key in alike)
         for r, scene in zip(rest, raw, strict=True)

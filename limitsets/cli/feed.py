@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import time
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from limitsets.cli.arguments import deviations
-from limitsets.cli.output import Json, Scene, Words, answer, opened, option, progress, table
+from limitsets.cli.arguments import HELP_NO_RECHECK, deviations
+from limitsets.cli.output import Json, Scene, Words, answer, opened, option, progress, saved, table
 
 if TYPE_CHECKING:
     from limitsets.feeding import Feeding
@@ -46,7 +47,11 @@ def feed(
     out: Annotated[
         Path | None, option("--out -o", "DIR", "Write feeding.json and feeding.png there.")
     ] = None,
+    certificate: Annotated[
+        Path | None, option("--certificate", "FILE", "Write the proofs' certificate, NAME.proof.zip.")
+    ] = None,
     json: Json = False,
+    no_recheck: Annotated[bool, typer.Option("--no-recheck", help=HELP_NO_RECHECK)] = False,
 ) -> None:
     """Say which side is fed from the end of the arm, from which starts, how surely and how fast.
 
@@ -69,18 +74,36 @@ def feed(
             cells=cells,
             progress=tell,
         )
+        kept = None
+        if certificate is not None and found.written:
+            tell("recheck", 0, 1)
+            found, kept = _certified(found, certificate, recheck=not no_recheck)
+        record = found.to_json() | {"certificate": kept}
         files = []
         if out is not None:
             from limitsets import plot
             from limitsets.files import as_json
             from limitsets.report.writing import laid
 
-            files = laid(out, [("feeding", plot.feeding(found))], lambda _: {"feeding.json": as_json(found)})
-    answer(found, json, lambda: _text(found, files))
+            files = laid(out, [("feeding", plot.feeding(found))], lambda _: {"feeding.json": as_json(record)})
+    answer(record, json, lambda: _text(found, files, certificate, kept))
     raise typer.Exit(0 if no_proof or found.proved else 1)
 
 
-def _text(found: Feeding, files: list[Path]) -> None:
+def _certified(found: Feeding, file: Path, *, recheck: bool) -> tuple[Feeding, dict[str, Any]]:
+    """Write the certificate; what is left where the checker denies it, and what is said of the file."""
+    from limitsets.proofs.confirm import DeniedError
+
+    begin = time.perf_counter()
+    with saved(file) as draft:
+        try:
+            found.save(draft, recheck=recheck, workers=None)
+        except DeniedError as error:
+            return found.denied(error.claims["feeds"]), {"file": None, "recheck": None}
+    return found, {"file": str(file), "recheck": time.perf_counter() - begin if recheck else None}
+
+
+def _text(found: Feeding, files: list[Path], certificate: Path | None, kept: dict[str, Any] | None) -> None:
     from limitsets.feeding.trials import binomial_interval
 
     end, unit = found.end, found.end.scene.unit
@@ -112,5 +135,11 @@ def _text(found: Feeding, files: list[Path]) -> None:
         )
     if found.curve is not None:
         typer.echo(found.curve.line())
+    if kept is not None and kept["file"] is not None:
+        seconds = kept["recheck"]
+        done = "not rechecked" if seconds is None else f"rechecked in {seconds:.2g} s"
+        typer.echo(f"certificate: {certificate}, {done} (check it: limitsets recheck {certificate})")
+    elif certificate is not None:
+        typer.echo("no certificate is written: nothing is proved, or nothing rechecks it")
     if files:
         typer.echo(f"written: {', '.join(map(str, files))}")

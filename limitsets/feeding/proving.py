@@ -20,6 +20,7 @@ from limitsets.feeding.paths import MOST_SIDES, Paths
 from limitsets.feeding.verdicts import Fed, Safe
 from limitsets.goals import OrientedBeyond
 from limitsets.proofs.attraction import Attraction, attraction
+from limitsets.proofs.certify import spelled_deviations
 from limitsets.proofs.cover import cover
 from limitsets.proofs.goals import State
 from limitsets.proofs.goals.kind import above, below
@@ -84,7 +85,7 @@ def proved_feeding(
             "the sides of the part", len(scene.sides), f"up to {MOST_SIDES}", "pass prove=False"
         )
     tell = progress or (lambda stage, done, of: None)
-    every = joined(dict(noise or {}), scattered(scene))
+    every = joined(spelled_deviations(scene, noise), spelled_deviations(scene, scattered(scene)))
     box, cuts = parameter_box(scene, noise=every), (below(end.x), above(end.x))
     wrong = OrientedBeyond(end.x, end.side, from_anywhere=True).wrong()
     shown: tuple[State, ...] = ()

@@ -29,7 +29,7 @@ from limitsets.scene import Scene, load
 from limitsets.scene.quantities import deviation, find
 from limitsets.scene.units import parse
 
-__all__ = ["CLAIMS", "certify", "weakest_of"]
+__all__ = ["CLAIMS", "certify", "spelled_deviations", "weakest_of"]
 
 # Cells per side, tried in turn until everything asked for is proved or refuted.
 LADDER = (2048, 8192, 32768, 131072)
@@ -186,7 +186,7 @@ def _chosen(scene: Scene, claims: Sequence[str] | None) -> tuple[str, ...]:
     return tuple(dict.fromkeys(claims))
 
 
-def _deviations(scene: Scene, given: Mapping[str, str] | None) -> dict[str, str]:
+def spelled_deviations(scene: Scene, given: Mapping[str, str] | None) -> dict[str, str]:
     """Check deviations, and write them as a certificate has them: a decimal number, a space, a unit."""
     found = {}
     for name, text in (given or {}).items():
@@ -251,8 +251,8 @@ def certify(
     """
     loaded = scene if isinstance(scene, Scene) else load(scene)
     wanted = _chosen(loaded, claims)
-    noise = joined(_deviations(loaded, noise), _deviations(loaded, scattered(loaded)))
-    tolerance = _deviations(loaded, tolerance)
+    noise = joined(spelled_deviations(loaded, noise), spelled_deviations(loaded, scattered(loaded)))
+    tolerance = spelled_deviations(loaded, tolerance)
     begin = time.perf_counter()
     if tolerance:
         found, answers = _pieces(loaded, wanted, whole(loaded, tolerance), noise, progress)

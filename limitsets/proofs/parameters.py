@@ -295,9 +295,6 @@ def parameter_box(
     True
     """
     text: Any = copy.deepcopy(dict(scene.text if tree is None else tree))
-    text.pop(
-        "feedback", None
-    )  # other throws: no claim about this one rests on them, and the checker reads none
     reader = _Spans(scene.unit, text, noise)
     for name in noise or {}:
         if name not in VARYING:

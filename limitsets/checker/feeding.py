@@ -1,0 +1,360 @@
+"""Feeding: on which side parts come to rest at X or beyond, where the arm ends, and that they do.
+
+docs/certificates.md, "Feeding", and number 17.
+"""
+
+import math
+from collections.abc import Iterator
+from dataclasses import replace
+from fractions import Fraction
+from typing import Any, NamedTuple
+
+import numpy as np
+from flint import arb
+
+from .balls import Array, UnprovedError, exact, float_above, float_below, prove
+from .cells import Crew, Task, check_structure, extents, first_bad, tasks_of
+from .file import Cells
+from .near_hinge import check_all_jog, check_thrown_out, near_angle, near_landing
+from .orbits import read_orbits
+from .refutations import periodic, read_passing, thrown_again
+from .scene import Scene
+from .starts import MOST_COUNTED
+from .texts import by_side, decimal, hex_float, read_side, require, table
+from .thinning import check_null, check_thinning, not_arriving
+
+FEEDS_KEYS = "safety wrong progress almost never_fed"  # the parts of the claim: a file has some of them
+FAR = 1e300  # beyond all arms
+
+
+def read_feeds(section: dict[str, Any], n_sides: int) -> dict[str, Any]:
+    """Read the section of feeds."""
+    feeds: dict[str, Any] = {"side": read_side(section["side"], n_sides)}
+    require(len(section) > 1, "feeds: nothing is claimed")
+    if "safety" in section:
+        feeds["safety"] = section["safety"]
+        require(feeds["safety"] in ("every", "cells"), "feeds.safety is none of the starts that are known")
+    for name, every, count in (("progress", "every", "throws"), ("almost", "almost-every", "thinning")):
+        if name in section:
+            part = table(section[name], f"feeds.{name}", f"starts {count}")
+            starts, number = part["starts"], part[count]
+            if isinstance(starts, dict):
+                since = by_side(table(starts, "feeds: starts", "from")["from"], "from", n_sides)
+                starts = [hex_float(x, "from") for x in since]
+            require(isinstance(starts, list) or starts == every, f"feeds.{name}: starts that are not known")
+            fits = type(number) is int and 0 <= number < MOST_COUNTED
+            require(fits, f"feeds.{name}.{count} is not a whole number as it should be")
+            feeds[name] = (None if starts == every else starts, number)
+    if "wrong" in section:
+        orbit = table(section["wrong"], "feeds.wrong", "start throws")
+        feeds["wrong"] = read_passing(orbit, "once", n_sides) | {"why": "once"}
+    if "never_fed" in section:
+        cycles = {"cycles": [section["never_fed"]], "complete": False}
+        (feeds["never_fed"],) = read_orbits(cycles, n_sides)["orbits"]
+    return feeds
+
+
+class ArmEnd(NamedTuple):
+    """The cells, with no throws from beyond X; `before`: those with places x < X, `fed`: those with x >= X only.
+
+    A cell without a rank whose target cells come to the last border of a side may leave there: towards the joint the
+    part may also come to rest before the first cell.  `inward` says so by side, `leaving` of all.
+    """
+
+    x: Fraction
+    c: Cells
+    before: Array
+    fed: Array
+    inward: list[Array]
+    leaving: Array
+
+
+def arm_end(c: Cells, scene: Scene) -> ArmEnd:
+    """Find the cells before X and beyond, and those that may leave."""
+    assert scene.end is not None
+    x, n = scene.end, len(c.edges)
+    before = np.array([Fraction(lo) < x for lo in c.lower().tolist()])
+    jog, flip = (np.where(before[:, None], array, -1) for array in (c.jog, c.flip))
+    inward = [np.zeros(len(before), dtype=bool) for _ in range(n)]
+    leaving = np.zeros(len(before), dtype=bool)
+    for array, turned in ((jog, 0), (flip, 1)):
+        begins, ends = at_borders(c, array)
+        for i in range(n):
+            inward[i] |= begins & ((c.side + turned) % n == i)
+        leaving |= begins | ends
+    return ArmEnd(x, replace(c, jog=jog, flip=flip), before, ~before, inward, leaving)
+
+
+def at_borders(c: Cells, array: Array) -> tuple[Array, Array]:
+    """Find the cells without a rank whose targets begin with the first cell of a side, or end with the last."""
+    free = (c.rank < 0) & (array[:, 0] >= 0)
+    return free & np.isin(array[:, 0], c.start[:-1]), free & np.isin(array[:, 1] + 1, c.start[1:])
+
+
+def check_feeds(scene: Scene, c: Cells, box: int, feeds: dict[str, Any], crew: Crew) -> str:
+    """Check all parts of the claim; "" or the reason.  Shares and intervals of starts are kept for the report."""
+    if scene.end is None:
+        return "the scene has no cavity"
+    bad = check_structure(c, scene, -1)
+    for i, edges in enumerate(c.edges):
+        if not (bad or edges[0] < scene.end < edges[-1]):
+            bad = f"side {i}: the cells do not reach from before the end of the arm to beyond"
+    if bad:
+        return bad
+    feeds["x"] = f"{decimal(scene.end)} {scene.unit}"
+    feeds["shares"] = {}
+    end, used = arm_end(c, scene), np.zeros(len(c.side), dtype=bool)
+    for check in (check_safety, check_progress, check_almost):
+        bad, some = check(end, scene, feeds)
+        if bad:
+            return bad
+        used |= some
+    return check_shown(end, scene, feeds) or check_throws(end, scene, box, used, crew)
+
+
+def check_throws(end: ArmEnd, scene: Scene, box: int, used: Array, crew: Crew) -> str:
+    """Check the throws from the cells on which something rests; "" or the reason."""
+    tasks = [freed(end.c, task) for task in tasks_of(end.c, scene, box, np.flatnonzero(used), None)]
+    found = crew.run(tasks)
+    return "" if found is None else f"{end.c.name(found[0])}: {found[1].text}"
+
+
+def freed(c: Cells, task: Task) -> Task:
+    """Let images that may leave the cells be anywhere beyond their borders."""
+    table = task.rows.copy()
+    for column, array in ((4, c.jog), (6, c.flip)):
+        begins, ends = at_borders(c, array)
+        table[begins[task.cells], column] = -FAR
+        table[ends[task.cells], column + 1] = FAR
+    return task._replace(rows=table)
+
+
+# ------------------------------------------------------------------------------ safety
+
+
+def check_safety(end: ArmEnd, scene: Scene, feeds: dict[str, Any]) -> tuple[str, Array]:
+    """Find the starts from which no part comes to rest at X or beyond on another side before it does on the wanted one.
+
+    A part that may come to rest in an unsafe place is unsafe: that is a cell of another side that reaches beyond X, a
+    cell from which one may be thrown into an unsafe place, or before the first cell of a side from where it may be.
+    """
+    none = np.zeros_like(end.before)
+    if "safety" not in feeds:
+        return "", none
+    c, x = end.c, float_below(exact(end.x))
+    bad, count = (c.side != feeds["side"]) & (c.upper() > x), -1
+    ahead = [cells_ahead(end, scene, i) for i in range(len(c.edges))]
+    while count != int(bad.sum()):
+        count = int(bad.sum())
+        gaps = [some is None or bool(bad[some].any()) for some in ahead]
+        bad = bad | thrown_into(end, bad, gaps)
+    safe = end.before & ~thrown_into(end, bad, gaps)
+    if feeds["safety"] == "every":
+        what = f"a part may come to rest beyond the end of the arm on another side than {feeds['side']}"
+        for i, gap in enumerate(gaps):
+            if gap:
+                return f"side {i}, before the first cell: {what}", none
+        bad_one = first_bad(c, [(safe | end.fed, what)])
+        if bad_one:
+            return bad_one, none
+    whole = feeds["safety"] == "every"
+    feeds["shares"]["safety"] = 1.0 if whole else share_of(end, scene, safe, [not gap for gap in gaps])
+    feeds["safe"] = extents(c, safe, inward=True)
+    return "", safe
+
+
+def cells_ahead(end: ArmEnd, scene: Scene, side: int) -> Array | None:
+    """Find the cells to which throws from before the first cell of a side may lead; None if that is not known.
+
+    Such a throw is a jog, and lands before some place or leaves towards the joint.
+    """
+    s, c = scene.sides[side], end.c
+    edge = float(c.edges[side][0])
+    bound = near_angle(s, scene.k_lo, scene.k_hi, edge)
+    if not bound < 1 or check_all_jog(s, scene.k_lo.union(scene.k_hi), arb(edge), bound):
+        return None
+    far = near_landing(s, scene.k_lo, scene.k_hi, edge)
+    found: Array = (c.side == side) & (c.lower() <= (float_above(far) if far.is_finite() else math.inf))
+    return found
+
+
+def thrown_into(end: ArmEnd, places: Array, gaps: list[bool]) -> Array:
+    """Find the cells from which a throw may lead to the places, or before the first cell of the sides in `gaps`."""
+    c, count = end.c, np.concatenate([[0], np.cumsum(places)])
+    hit = np.zeros(len(places), dtype=bool)
+    for array in (c.jog, c.flip):
+        q = np.flatnonzero(array[:, 0] >= 0)
+        hit[q] |= count[array[q, 1] + 1] > count[array[q, 0]]
+    for some, gap in zip(end.inward, gaps, strict=True):
+        hit |= some & gap
+    return hit
+
+
+# ------------------------------------------------------------------------------ progress
+
+
+def late_within(end: ArmEnd, throws: int) -> Array:
+    """Find the cells from which parts are not proved to come to rest at X or beyond within so many throws."""
+    c = end.c
+    late: Array = not_arriving(c, [c.jog, c.flip], ~end.leaving, end.fed, throws) | end.leaving
+    return late
+
+
+def check_progress(end: ArmEnd, scene: Scene, feeds: dict[str, Any]) -> tuple[str, Array]:
+    """Check that every start that is named comes to rest at X or beyond within so many throws."""
+    if "progress" not in feeds:
+        return "", np.zeros_like(end.before)
+    since, throws = feeds["progress"]
+    late = late_within(end, throws)
+    what = f"{throws} throws are not proved to be enough"
+    bad = check_named(end, scene, since, late, what)
+    if not bad:
+        feeds["shares"]["progress"] = share_from(end, scene, since)
+    return bad, end.before & ~late
+
+
+def check_almost(end: ArmEnd, scene: Scene, feeds: dict[str, Any]) -> tuple[str, Array]:
+    """Check that almost every start that is named comes to rest at X or beyond: the others thin out.
+
+    Orbits from cells that cannot lead to one that may leave go on in such cells.  Those from which some number of
+    throws is enough lead to cells of the same kind only; the starts that stay in the others for ever have length zero.
+    """
+    if "almost" not in feeds:
+        return "", np.zeros_like(end.before)
+    since, rounds = feeds["almost"]
+    leaves, count = end.leaving.copy(), -1
+    while count != int(leaves.sum()):
+        count = int(leaves.sum())
+        leaves |= thrown_into(end, leaves, [False] * len(end.inward))
+    bad = check_named(end, scene, since, leaves, "a part may leave the arm")
+    stay = late_within(end, len(leaves)) & ~leaves
+    if not bad and since is None:  # before the first cells
+        bad = check_null(end.c, scene, np.zeros_like(leaves), True)
+    if not bad:
+        bad = check_thinning(end.c, scene, stay, rounds, np.zeros(len(leaves), dtype=np.int32))
+    if not bad:
+        feeds["shares"]["almost"] = share_from(end, scene, since)
+    return bad, end.before & ~leaves
+
+
+def check_named(end: ArmEnd, scene: Scene, since: list[float] | None, late: Array, what: str) -> str:
+    """Check that the starts that are named, beyond some x on each side or all, lie in no bad cell; "" or the reason."""
+    c = end.c
+    for i, edges in enumerate(c.edges):
+        own = slice(int(c.start[i]), int(c.start[i + 1]))
+        needed = end.before[own].copy()
+        if since is None:
+            bad = check_thrown_out(scene, i, float(edges[0]))
+            if bad:
+                return f"side {i}, near the joint, x in (a, {float(edges[0])!r}]: {bad}"
+        else:
+            if not since[i] >= edges[0]:
+                return f"side {i}: starts are claimed that lie before the cells"
+            needed &= edges[1:] > since[i]
+        some = np.flatnonzero(needed & late[own])
+        if some.size:
+            return f"{c.name(int(c.start[i]) + int(some[0]))}: {what}"
+    return ""
+
+
+def share_from(end: ArmEnd, scene: Scene, since: list[float] | None) -> float:
+    """Bound from below the share of the starts x < X that lie beyond some x on each side, or of all."""
+    if since is None:
+        return 1.0
+    some = np.concatenate([edges[:-1] >= x for edges, x in zip(end.c.edges, since, strict=True)])
+    return share_of(end, scene, some, [False] * len(since))
+
+
+def share_of(end: ArmEnd, scene: Scene, some: Array, near: list[bool]) -> float:
+    """Bound from below the share of the starts x < X in some cells, and before the first cells of some sides."""
+    x, claimed, whole = float_below(exact(end.x)), 0.0, 0.0
+    for i, (s, edges) in enumerate(zip(scene.sides, end.c.edges, strict=True)):
+        own = some[end.c.start[i] : end.c.start[i + 1]]
+        widths = np.clip(np.minimum(edges[1:], x) - edges[:-1], 0.0, None)
+        claimed += float(widths[own].sum()) + (
+            max(0.0, float(edges[0]) - float_above(s.a)) if near[i] else 0.0
+        )
+        whole += float_above(exact(end.x)) - float_below(s.a)
+    return claimed / whole * (1 - 2.0**-30)  # against the rounding of these sums
+
+
+# ------------------------------------------------------------------------------ orbits, words
+
+
+def check_shown(end: ArmEnd, scene: Scene, feeds: dict[str, Any]) -> str:
+    """Check the orbit that comes to rest on another side, and the one that never comes to X; "" or the reason."""
+    x = exact(end.x)
+    try:
+        if "wrong" in feeds:
+            *states, (side, lo, hi) = thrown_again(scene, feeds["wrong"])
+            prove(
+                all(each[2] < x for each in states), "it may come to rest beyond the end of the arm earlier"
+            )
+            beyond = side != feeds["side"] and bool(lo > x) and bool(hi <= scene.sides[side].arm)
+            prove(beyond, "it is not proved to come to rest beyond the end of the arm on another side")
+        if "never_fed" in feeds:
+            states = periodic(scene, feeds["never_fed"])
+            prove(all(each[2] < x for each in states), "the periodic orbit may come to the end of the arm")
+    except UnprovedError as error:
+        return f"an orbit: {error}"
+    return ""
+
+
+def verdict_of_feeds(feeds: dict[str, Any], most_open: float) -> tuple[str, str]:
+    """Say what became of a claim that is confirmed: "proved", "refuted" or "proved-on-cells", and what is open."""
+    if "wrong" in feeds or ("never_fed" in feeds and "almost" not in feeds):
+        return "refuted", ""
+    shares, open_parts = feeds["shares"], []
+    progress = max(shares.get("progress", 0.0), shares.get("almost", 0.0))
+    for name, share in (("safety", shares.get("safety", 0.0)), ("progress", progress)):
+        if share < 1 - most_open:
+            of = (
+                f"proved for {100 * math.floor(share * 1e6) / 1e6:.4g} % of the starts"
+                if share
+                else "not claimed"
+            )
+            open_parts.append(f"{name} is {of}")
+    return ("proved-on-cells", "; ".join(open_parts)) if open_parts else ("proved", "")
+
+
+def feeds_statement(feeds: dict[str, Any], noisy: bool) -> str:
+    """Put the claim in words, one line for each of its parts."""
+    return "\n    ".join(
+        ["feeds, from starts x < " + feeds.get("x", "the end of the arm"), *parts_in_words(feeds, noisy)]
+    )
+
+
+def parts_in_words(feeds: dict[str, Any], noisy: bool) -> Iterator[str]:
+    """Put each part in words."""
+    side, x = feeds["side"], feeds.get("x", "the end of the arm")
+    there = f"comes to rest at x >= {x}"
+    if "safety" in feeds:
+        every = f"every start a_i < x < {x} on every side i"
+        some = every if feeds["safety"] == "every" else f"the starts {feeds.get('safe', '')}"
+        yield f"safety: of {some}, none that {there} does so on another side than {side} the first time"
+    if "wrong" in feeds:
+        orbit = feeds["wrong"]
+        number = f"{len(orbit['throws'])} throws" if len(orbit["throws"]) > 1 else "1 throw"
+        start = f"x = {orbit['x']!r} on side {orbit['side']}"
+        yield f"safety is refuted: the start {start} {there} after {number}, on another side than {side}"
+    if "progress" in feeds:
+        since, throws = feeds["progress"]
+        near = "; nearer to the joint x - a_i grows with every throw" if since is None else ""
+        where = " where x is in the cells" if since is None else ""
+        yield f"progress: {named_in_words(since, x)} {there}, within {throws} throws{where}{near}"
+    if "almost" in feeds:
+        others = ", others for other throws" if noisy else ""
+        but = f", but for starts of total length zero{others},"
+        yield f"progress: {named_in_words(feeds['almost'][0], x)}{but} {there}"
+    if "never_fed" in feeds:
+        o = feeds["never_fed"]
+        place = f"x in [{o.lo!r}, {o.hi!r}] on side {o.side}"
+        yield f"progress from every start is refuted: a periodic orbit of {len(o.word)} throws, {place}, stays before"
+    yield "whether a part that rests there falls in clear of the wall is not claimed"
+
+
+def named_in_words(since: list[float] | None, x: str) -> str:
+    """Name the starts."""
+    if since is None:
+        return f"every start a_i < x < {x} on every side i"
+    return "every start with " + ", or ".join(f"{lo!r} < x < {x} on side {i}" for i, lo in enumerate(since))
