@@ -159,7 +159,7 @@ def check_safety(end: ArmEnd, scene: Scene, feeds: dict[str, Any]) -> tuple[str,
             return bad_one, none
     whole = feeds["safety"] == "every"
     feeds["shares"]["safety"] = 1.0 if whole else share_of(end, scene, safe, [not gap for gap in gaps])
-    feeds["safe"] = extents(c, safe, inward=True)
+    feeds["safe"] = extents(c, safe & (c.upper() <= x), inward=True)
     return "", safe
 
 
@@ -319,19 +319,18 @@ def verdict_of_feeds(feeds: dict[str, Any], most_open: float) -> tuple[str, str]
 
 def feeds_statement(feeds: dict[str, Any], noisy: bool) -> str:
     """Put the claim in words, one line for each of its parts."""
-    return "\n    ".join(
-        ["feeds, from starts x < " + feeds.get("x", "the end of the arm"), *parts_in_words(feeds, noisy)]
-    )
+    x = feeds.get("x", "the end of the arm")
+    return "\n    ".join([f"feeds: the arm ends at x = {x}", *parts_in_words(feeds, x, noisy)])
 
 
-def parts_in_words(feeds: dict[str, Any], noisy: bool) -> Iterator[str]:
+def parts_in_words(feeds: dict[str, Any], x: str, noisy: bool) -> Iterator[str]:
     """Put each part in words."""
-    side, x = feeds["side"], feeds.get("x", "the end of the arm")
-    there = f"comes to rest at x >= {x}"
+    side, there = feeds["side"], f"comes to rest at x >= {x}"
     if "safety" in feeds:
-        every = f"every start a_i < x < {x} on every side i"
-        some = every if feeds["safety"] == "every" else f"the starts {feeds.get('safe', '')}"
-        yield f"safety: of {some}, none that {there} does so on another side than {side} the first time"
+        some = (
+            named_in_words(None, x) if feeds["safety"] == "every" else f"the starts {feeds.get('safe', '')}"
+        )
+        yield f"safety: from {some}, the first rest at x >= {x}, if there is one, is on side {side}"
     if "wrong" in feeds:
         orbit = feeds["wrong"]
         number = f"{len(orbit['throws'])} throws" if len(orbit["throws"]) > 1 else "1 throw"
@@ -339,18 +338,19 @@ def parts_in_words(feeds: dict[str, Any], noisy: bool) -> Iterator[str]:
         yield f"safety is refuted: the start {start} {there} after {number}, on another side than {side}"
     if "progress" in feeds:
         since, throws = feeds["progress"]
-        near = "; nearer to the joint x - a_i grows with every throw" if since is None else ""
-        where = " where x is in the cells" if since is None else ""
-        yield f"progress: {named_in_words(since, x)} {there}, within {throws} throws{where}{near}"
+        near = " where x is in the cells; nearer to the joint x - a_i grows with every throw"
+        within = f"within {throws} throws{near if since is None else ''}"
+        yield f"progress: {named_in_words(since, x)} {there}, {within}"
     if "almost" in feeds:
         others = ", others for other throws" if noisy else ""
         but = f", but for starts of total length zero{others},"
         yield f"progress: {named_in_words(feeds['almost'][0], x)}{but} {there}"
     if "never_fed" in feeds:
         o = feeds["never_fed"]
-        place = f"x in [{o.lo!r}, {o.hi!r}] on side {o.side}"
-        yield f"progress from every start is refuted: a periodic orbit of {len(o.word)} throws, {place}, stays before"
-    yield "whether a part that rests there falls in clear of the wall is not claimed"
+        place = f"with a place x in [{o.lo!r}, {o.hi!r}] on side {o.side}"
+        what = f"a periodic orbit, of {len(o.word)} throws, {place}, stays at x < {x}"
+        yield f"progress from every start is refuted: {what}"
+    yield "whether a part that comes to rest there clears the wall of the cavity is not claimed"
 
 
 def named_in_words(since: list[float] | None, x: str) -> str:

@@ -99,8 +99,24 @@ def _certified(found: Feeding, file: Path, *, recheck: bool) -> tuple[Feeding, d
         try:
             found.save(draft, recheck=recheck, workers=None)
         except DeniedError as error:
-            return found.denied(error.claims["feeds"]), {"file": None, "recheck": None}
-    return found, {"file": str(file), "recheck": time.perf_counter() - begin if recheck else None}
+            kept = str(file.with_name(Path(error.file or "").name))
+            return found.denied(error.claims["feeds"]), {"file": None, "denied": kept, "recheck": None}
+    return found, {
+        "file": str(file),
+        "denied": None,
+        "recheck": time.perf_counter() - begin if recheck else None,
+    }
+
+
+def _of_certificate(file: Path, kept: dict[str, Any] | None) -> str:
+    """Say what became of the certificate."""
+    if kept is None:
+        return "no certificate is written: nothing is proved, or nothing rechecks maps with effects"
+    if kept["denied"] is not None:
+        return f"the checker denies the certificate: it is kept as {kept['denied']}"
+    seconds = kept["recheck"]
+    done = "not rechecked" if seconds is None else f"rechecked in {seconds:.2g} s"
+    return f"certificate: {file}, {done} (check it: limitsets recheck {file})"
 
 
 def _text(found: Feeding, files: list[Path], certificate: Path | None, kept: dict[str, Any] | None) -> None:
@@ -135,11 +151,7 @@ def _text(found: Feeding, files: list[Path], certificate: Path | None, kept: dic
         )
     if found.curve is not None:
         typer.echo(found.curve.line())
-    if kept is not None and kept["file"] is not None:
-        seconds = kept["recheck"]
-        done = "not rechecked" if seconds is None else f"rechecked in {seconds:.2g} s"
-        typer.echo(f"certificate: {certificate}, {done} (check it: limitsets recheck {certificate})")
-    elif certificate is not None:
-        typer.echo("no certificate is written: nothing is proved, or nothing rechecks it")
+    if certificate is not None:
+        typer.echo(_of_certificate(certificate, kept))
     if files:
         typer.echo(f"written: {', '.join(map(str, files))}")

@@ -87,6 +87,8 @@ class Paths:
         ways = everywhere(found.cover)
         inward, outward = _leaving(found, ways, unknown)
         marks = np.where(perhaps, np.left_shift(1, side), 0).astype(np.uint8)
+        for each in range(grid.sides):
+            marks[outward[each] & ~fed] |= np.uint8(1 << each)
         near, before = np.zeros(grid.sides, np.uint8), None
         while (
             before is None or (before != near).any()
@@ -101,7 +103,7 @@ class Paths:
         ).tolist():  # a start before X has not landed beyond it
             landings = [spread[ends[cell, 0] : ends[cell, 1] + 1] for ends in ways if ends[cell, 0] >= 0]
             ends_on[cell] = np.bitwise_or.reduce(np.concatenate([*landings, near[inward[:, cell]]]))
-        leaving = (inward.any(axis=0) | outward) & ~fed
+        leaving = (inward | outward).any(axis=0) & ~fed
         stay = (parts.recurrent[parts.label] & ~fed) | leaving
         late = reach(ranges, parts, stay.astype(np.uint8)) > 0
         leaves = reach(ranges, parts, leaving.astype(np.uint8)) > 0
@@ -193,17 +195,17 @@ class Paths:
 
 
 def _leaving(found: Attraction, ways: list[NDArray[np.int32]], unknown: Mask) -> tuple[Mask, Mask]:
-    """By side the cells that may land before its first cell; and those that may land beyond the last ones.
+    """By side the cells that may land before its first cell; and those that may land beyond its last one.
 
     These are the cells without a rank whose images come to the border: of the others they are proved not to.
     """
     grid = found.cover.grid
-    inward, outward = np.tile(unknown, (grid.sides, 1)), unknown.copy()
+    inward, outward = np.tile(unknown, (grid.sides, 1)), np.tile(unknown, (grid.sides, 1))
     for ends in ways:
         free = (found.basin.rank < 0) & (ends[:, 0] >= 0)
         for side in range(grid.sides):
             inward[side] |= free & (ends[:, 0] == grid.offset[side])
-            outward |= free & (ends[:, 1] == grid.offset[side + 1] - 1)
+            outward[side] |= free & (ends[:, 1] == grid.offset[side + 1] - 1)
     return inward, outward
 
 
