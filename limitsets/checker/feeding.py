@@ -5,26 +5,23 @@ docs/certificates.md, "Feeding", and number 17.
 
 import math
 from collections.abc import Iterator
-from dataclasses import replace
-from fractions import Fraction
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
-from flint import arb
 
-from .balls import Array, UnprovedError, exact, float_above, float_below, prove
-from .cells import Crew, Task, check_structure, extents, first_bad, tasks_of
+from .arm_end import ArmEnd, arm_end, freed, late_within, leading_off, share_of, unsafe_starts
+from .balls import Array, UnprovedError, exact, float_below, prove
+from .cells import Crew, check_structure, extents, first_bad, tasks_of
 from .file import Cells
-from .near_hinge import check_all_jog, check_thrown_out, near_angle, near_landing
+from .near_hinge import check_thrown_out
 from .orbits import read_orbits
 from .refutations import periodic, read_passing, thrown_again
 from .scene import Scene
 from .starts import MOST_COUNTED
 from .texts import by_side, decimal, hex_float, read_side, require, table
-from .thinning import check_null, check_thinning, not_arriving
+from .thinning import check_null, check_thinning
 
 FEEDS_KEYS = "safety wrong progress almost never_fed"  # the parts of the claim: a file has some of them
-FAR = 1e300  # beyond all arms
 
 
 def read_feeds(section: dict[str, Any], n_sides: int) -> dict[str, Any]:
@@ -54,50 +51,13 @@ def read_feeds(section: dict[str, Any], n_sides: int) -> dict[str, Any]:
     return feeds
 
 
-class ArmEnd(NamedTuple):
-    """The cells, with no throws from beyond X; `before`: those with places x < X, `fed`: those with x >= X only.
-
-    A cell without a rank whose target cells come to the last border of a side may leave there: towards the joint the
-    part may also come to rest before the first cell.  `inward` says so by side, `leaving` of all.
-    """
-
-    x: Fraction
-    c: Cells
-    before: Array
-    fed: Array
-    inward: list[Array]
-    leaving: Array
-
-
-def arm_end(c: Cells, scene: Scene) -> ArmEnd:
-    """Find the cells before X and beyond, and those that may leave."""
-    assert scene.end is not None
-    x, n = scene.end, len(c.edges)
-    before = np.array([Fraction(lo) < x for lo in c.lower().tolist()])
-    jog, flip = (np.where(before[:, None], array, -1) for array in (c.jog, c.flip))
-    inward = [np.zeros(len(before), dtype=bool) for _ in range(n)]
-    leaving = np.zeros(len(before), dtype=bool)
-    for array, turned in ((jog, 0), (flip, 1)):
-        begins, ends = at_borders(c, array)
-        for i in range(n):
-            inward[i] |= begins & ((c.side + turned) % n == i)
-        leaving |= begins | ends
-    return ArmEnd(x, replace(c, jog=jog, flip=flip), before, ~before, inward, leaving)
-
-
-def at_borders(c: Cells, array: Array) -> tuple[Array, Array]:
-    """Find the cells without a rank whose targets begin with the first cell of a side, or end with the last."""
-    free = (c.rank < 0) & (array[:, 0] >= 0)
-    return free & np.isin(array[:, 0], c.start[:-1]), free & np.isin(array[:, 1] + 1, c.start[1:])
-
-
 def check_feeds(scene: Scene, c: Cells, box: int, feeds: dict[str, Any], crew: Crew) -> str:
     """Check all parts of the claim; "" or the reason.  Shares and intervals of starts are kept for the report."""
     if scene.end is None:
         return "the scene has no cavity"
     bad = check_structure(c, scene, -1)
     for i, edges in enumerate(c.edges):
-        if not (bad or edges[0] < scene.end < edges[-1]):
+        if not (bad or float(edges[0]) < scene.end < float(edges[-1])):
             bad = f"side {i}: the cells do not reach from before the end of the arm to beyond"
     if bad:
         return bad
@@ -109,95 +69,34 @@ def check_feeds(scene: Scene, c: Cells, box: int, feeds: dict[str, Any], crew: C
         if bad:
             return bad
         used |= some
-    return check_shown(end, scene, feeds) or check_throws(end, scene, box, used, crew)
+    return check_shown(end, scene, feeds) or check_images_used(end, scene, box, used, crew)
 
 
-def check_throws(end: ArmEnd, scene: Scene, box: int, used: Array, crew: Crew) -> str:
+def check_images_used(end: ArmEnd, scene: Scene, box: int, used: Array, crew: Crew) -> str:
     """Check the throws from the cells on which something rests; "" or the reason."""
     tasks = [freed(end.c, task) for task in tasks_of(end.c, scene, box, np.flatnonzero(used), None)]
     found = crew.run(tasks)
     return "" if found is None else f"{end.c.name(found[0])}: {found[1].text}"
 
 
-def freed(c: Cells, task: Task) -> Task:
-    """Let images that may leave the cells be anywhere beyond their borders."""
-    table = task.rows.copy()
-    for column, array in ((4, c.jog), (6, c.flip)):
-        begins, ends = at_borders(c, array)
-        table[begins[task.cells], column] = -FAR
-        table[ends[task.cells], column + 1] = FAR
-    return task._replace(rows=table)
-
-
-# ------------------------------------------------------------------------------ safety
-
-
 def check_safety(end: ArmEnd, scene: Scene, feeds: dict[str, Any]) -> tuple[str, Array]:
-    """Find the starts from which no part comes to rest at X or beyond on another side before it does on the wanted one.
-
-    A part that may come to rest in an unsafe place is unsafe: that is a cell of another side that reaches beyond X, a
-    cell from which one may be thrown into an unsafe place, or before the first cell of a side from where it may be.
-    """
+    """Check that from the starts named the first rest at X or beyond is on the wanted side."""
     none = np.zeros_like(end.before)
     if "safety" not in feeds:
         return "", none
-    c, x = end.c, float_below(exact(end.x))
-    bad, count = (c.side != feeds["side"]) & (c.upper() > x), -1
-    ahead = [cells_ahead(end, scene, i) for i in range(len(c.edges))]
-    while count != int(bad.sum()):
-        count = int(bad.sum())
-        gaps = [some is None or bool(bad[some].any()) for some in ahead]
-        bad = bad | thrown_into(end, bad, gaps)
-    safe = end.before & ~thrown_into(end, bad, gaps)
+    bad, gaps = unsafe_starts(end, scene, feeds["side"])
+    safe = end.before & ~bad
     if feeds["safety"] == "every":
         what = f"a part may come to rest beyond the end of the arm on another side than {feeds['side']}"
         for i, gap in enumerate(gaps):
             if gap:
                 return f"side {i}, before the first cell: {what}", none
-        bad_one = first_bad(c, [(safe | end.fed, what)])
-        if bad_one:
-            return bad_one, none
-    whole = feeds["safety"] == "every"
-    feeds["shares"]["safety"] = 1.0 if whole else share_of(end, scene, safe, [not gap for gap in gaps])
-    feeds["safe"] = extents(c, safe & (c.upper() <= x), inward=True)
+        feeds["shares"]["safety"] = 1.0
+        return first_bad(end.c, [(safe | end.fed, what)]), safe
+    feeds["shares"]["safety"] = share_of(end, scene, safe, [not gap for gap in gaps])
+    whole = end.c.upper() <= float_below(exact(end.x))  # not the cell that X lies in
+    feeds["safe"] = extents(end.c, safe & whole, inward=True)
     return "", safe
-
-
-def cells_ahead(end: ArmEnd, scene: Scene, side: int) -> Array | None:
-    """Find the cells to which throws from before the first cell of a side may lead; None if that is not known.
-
-    Such a throw is a jog, and lands before some place or leaves towards the joint.
-    """
-    s, c = scene.sides[side], end.c
-    edge = float(c.edges[side][0])
-    bound = near_angle(s, scene.k_lo, scene.k_hi, edge)
-    if not bound < 1 or check_all_jog(s, scene.k_lo.union(scene.k_hi), arb(edge), bound):
-        return None
-    far = near_landing(s, scene.k_lo, scene.k_hi, edge)
-    found: Array = (c.side == side) & (c.lower() <= (float_above(far) if far.is_finite() else math.inf))
-    return found
-
-
-def thrown_into(end: ArmEnd, places: Array, gaps: list[bool]) -> Array:
-    """Find the cells from which a throw may lead to the places, or before the first cell of the sides in `gaps`."""
-    c, count = end.c, np.concatenate([[0], np.cumsum(places)])
-    hit = np.zeros(len(places), dtype=bool)
-    for array in (c.jog, c.flip):
-        q = np.flatnonzero(array[:, 0] >= 0)
-        hit[q] |= count[array[q, 1] + 1] > count[array[q, 0]]
-    for some, gap in zip(end.inward, gaps, strict=True):
-        hit |= some & gap
-    return hit
-
-
-# ------------------------------------------------------------------------------ progress
-
-
-def late_within(end: ArmEnd, throws: int) -> Array:
-    """Find the cells from which parts are not proved to come to rest at X or beyond within so many throws."""
-    c = end.c
-    late: Array = not_arriving(c, [c.jog, c.flip], ~end.leaving, end.fed, throws) | end.leaving
-    return late
 
 
 def check_progress(end: ArmEnd, scene: Scene, feeds: dict[str, Any]) -> tuple[str, Array]:
@@ -222,10 +121,7 @@ def check_almost(end: ArmEnd, scene: Scene, feeds: dict[str, Any]) -> tuple[str,
     if "almost" not in feeds:
         return "", np.zeros_like(end.before)
     since, rounds = feeds["almost"]
-    leaves, count = end.leaving.copy(), -1
-    while count != int(leaves.sum()):
-        count = int(leaves.sum())
-        leaves |= thrown_into(end, leaves, [False] * len(end.inward))
+    leaves = leading_off(end)
     bad = check_named(end, scene, since, leaves, "a part may leave the arm")
     stay = late_within(end, len(leaves)) & ~leaves
     if not bad and since is None:  # before the first cells
@@ -263,22 +159,6 @@ def share_from(end: ArmEnd, scene: Scene, since: list[float] | None) -> float:
         return 1.0
     some = np.concatenate([edges[:-1] >= x for edges, x in zip(end.c.edges, since, strict=True)])
     return share_of(end, scene, some, [False] * len(since))
-
-
-def share_of(end: ArmEnd, scene: Scene, some: Array, near: list[bool]) -> float:
-    """Bound from below the share of the starts x < X in some cells, and before the first cells of some sides."""
-    x, claimed, whole = float_below(exact(end.x)), 0.0, 0.0
-    for i, (s, edges) in enumerate(zip(scene.sides, end.c.edges, strict=True)):
-        own = some[end.c.start[i] : end.c.start[i + 1]]
-        widths = np.clip(np.minimum(edges[1:], x) - edges[:-1], 0.0, None)
-        claimed += float(widths[own].sum()) + (
-            max(0.0, float(edges[0]) - float_above(s.a)) if near[i] else 0.0
-        )
-        whole += float_above(exact(end.x)) - float_below(s.a)
-    return claimed / whole * (1 - 2.0**-30)  # against the rounding of these sums
-
-
-# ------------------------------------------------------------------------------ orbits, words
 
 
 def check_shown(end: ArmEnd, scene: Scene, feeds: dict[str, Any]) -> str:

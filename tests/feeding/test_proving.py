@@ -188,6 +188,17 @@ def test_with_the_surface_above_the_joint(tmp_path):
     assert proof.fed.share < 1.0
 
 
+def test_landings_beyond_the_length_of_the_arm_are_on_a_side(tmp_path):
+    """Jogs on side 1 from just before the end at 20 in end beyond 20.3 in, where this arm does."""
+    tree = with_cavity("paper-initial").as_dict()
+    tree["arm"]["length"] = "20.3 in"
+    scene = ls.load(tree)
+    assert ls.orbit(ls.load(tree | {"arm": tree["arm"] | {"length": "40 in"}}).map, 19.95, 1, 1).x[1] > 20.3
+    proof, report = certified(scene, tmp_path)
+    assert report.verdict == verdict_of(proof) != "failed"
+    assert any(lo < 19.95 < hi for lo, hi in proof.safe.possible[1][1])
+
+
 def test_a_scene_whose_landings_scatter(tmp_path):
     tables = {"world": {"scatter": {"speed": "0.3 %"}}, "effects": {"spread": "bounded"}}
     proof, report = certified(with_cavity(tables=tables), tmp_path)
