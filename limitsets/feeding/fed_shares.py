@@ -8,9 +8,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from limitsets.cells import Grid, grid
+from limitsets.cells import Grid
 from limitsets.feeding.falling import FATES, ArmEnd
-from limitsets.robust.noise.arrivals import random_starts, with_border
+from limitsets.robust.noise.arrivals import cells_for_noise, random_starts, with_border
 from limitsets.robust.noise.chain_solution import ChainProblem
 from limitsets.robust.noise.scattering import Scattering
 
@@ -92,7 +92,7 @@ class FeedingProblem:
 
     def cover(self) -> Grid:
         """Cells with borders at the end of the arm and where parts begin and cease to clear the wall."""
-        found = grid(self.end.scene.domain, cells=self.chain.cells, grading="uniform")
+        found = cells_for_noise(self.end.scene.domain, self.chain.cells)
         for beyond in {0.0, *(edge for pair in self.end.clear for edge in pair)}:
             found = with_border(found, self.end.x + beyond)
         return found

@@ -9,13 +9,16 @@ Nodes are cells and, last, the exits.  The exits are sinks, and networkx counts 
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterable, Iterator
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from limitsets.errors import AnswerError
 from limitsets.graph.components import descend, reach
+from limitsets.graph.condensation import attracting_of
 from limitsets.graph.graph import TransitionGraph
 
 if TYPE_CHECKING:
@@ -26,6 +29,12 @@ __all__ = ["Backend", "backend"]
 
 def _sinks(graph: TransitionGraph) -> Iterator[set[int]]:
     return ({graph.n_cells + e} for e in range(len(graph.exits)))
+
+
+def _attracting(graph: TransitionGraph) -> list[NDArray[np.int32]]:
+    """Cells of each attracting component; where cells lead, which networkx does not ask for, is not looked at."""
+    sets = graph.recurrent_components()
+    return list(itertools.compress(sets, attracting_of(graph.ranges, graph.components(), sets)))
 
 
 def _check(graph: TransitionGraph, node: Any) -> int:
@@ -63,14 +72,12 @@ class Backend:
     def attracting_components(graph: TransitionGraph) -> Iterator[set[int]]:
         """Yield the components that nothing leaves, the sinks first."""
         yield from _sinks(graph)
-        for cells, ends in zip(graph.recurrent_components(), graph.condensation().attracting, strict=True):
-            if ends:
-                yield set(cells.tolist())
+        yield from (set(cells.tolist()) for cells in _attracting(graph))
 
     @staticmethod
     def number_attracting_components(graph: TransitionGraph) -> int:
         """Count them."""
-        return int(graph.condensation().attracting.sum()) + len(graph.exits)
+        return len(_attracting(graph)) + len(graph.exits)
 
     @staticmethod
     def is_attracting_component(graph: TransitionGraph) -> bool:

@@ -7,13 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from limitsets.cells import Grid
+from limitsets.cells import Domain, Grid, grid
 from limitsets.errors import GridError
 from limitsets.robust.noise.absorbing import Absorption
 from limitsets.robust.noise.boxcars import Array
 from limitsets.robust.noise.ulam import Transfer
 
-__all__ = ["Feeding", "feeding", "random_starts", "with_border"]
+__all__ = ["Feeding", "cells_for_noise", "feeding", "random_starts", "with_border"]
 
 # Share of the starts that is still under way when counting ends.
 UNDER_WAY = 1e-9
@@ -59,6 +59,35 @@ class Feeding:
             return float("nan")
         before = float(total[k - 1]) if k else 0.0
         return k - 1 + (share - before) / (float(total[k]) - before) if k else 0.0
+
+
+def cells_for_noise(domain: Domain, cells: int) -> Grid:
+    """Cut a domain into cells of equal width, for noise takes the part everywhere, and smaller ones next to the joint.
+
+    Jogs are slow there: on equal cells alone 3.0 % of the starts of study 09's robust feeder are lost to the joint,
+    where 2.1 % are.
+
+    Parameters
+    ----------
+    domain : Domain
+        What to cover.
+    cells : int
+        Cells of equal width per side; half as many graded ones are laid over them, so far as they are narrower.
+
+    Returns
+    -------
+    Grid
+        The cells.
+    """
+    plain = grid(domain, cells=cells, grading="uniform")
+    if domain.anchor is None:
+        return plain
+    sides = []
+    graded = grid(domain, cells=max(cells // 2, 1), grading="graded")
+    for (equal,), (towards,) in zip(plain.edges, graded.edges, strict=True):
+        narrower = towards[:-1][np.diff(towards) < equal[1] - equal[0]]
+        sides.append((np.union1d(equal, narrower),))
+    return Grid(domain, tuple(sides))
 
 
 def with_border(grid: Grid, x: float) -> Grid:

@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from limitsets.cells import Grid, grid
+from limitsets.cells import Grid
 from limitsets.errors import AnswerError
 from limitsets.goals import OrientedBeyond, Reaches
 from limitsets.robust.noise.absorbing import Absorption, absorption
-from limitsets.robust.noise.arrivals import Feeding, feeding, random_starts, with_border
+from limitsets.robust.noise.arrivals import Feeding, cells_for_noise, feeding, random_starts, with_border
 from limitsets.robust.noise.cell_images import uses_pieces
 from limitsets.robust.noise.communicating_classes import NoisyClass, classes
 from limitsets.robust.noise.interpolated_pieces import InterpolatedPieces
@@ -117,8 +117,7 @@ class ChainSolution:
 def solve(problem: ChainProblem, scatter: Scattering) -> ChainSolution:
     """Solve at one level of the noise, without errors and derivatives."""
     scene, (x, side) = problem.scene, problem.goal
-    # Uniform: noise makes grading towards the joint needless, and cells are wanted where the part is.
-    cover = with_border(grid(scene.domain, cells=problem.cells, grading="uniform"), x)
+    cover = with_border(cells_for_noise(scene.domain, problem.cells), x)
     chain = problem.chain(cover, scatter)
     beyond = np.concatenate([cover.centres(k) > x for k in range(cover.sides)])
     goal = beyond & (cover.side_of(np.arange(cover.n_cells)) == side)
