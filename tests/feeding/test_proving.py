@@ -122,9 +122,10 @@ def test_a_part_with_too_many_sides_is_told_so():
         proved_feeding(arm_end_of(scene))
 
 
-def test_a_certificate_of_a_scene_with_a_cavity_is_rechecked(tmp_path):
+def test_a_certificate_of_a_scene_with_cavity_and_feedback_is_rechecked(tmp_path):
     """The checker knows the words, and that the claims do not speak of them."""
-    scene = with_cavity(rate="2 Hz")
+    throws = {"sensor": {"side": 2}, "throws": [{"name": "fast", "kappa": "25 in"}]}
+    scene = with_cavity(rate="2 Hz", tables={"feedback": throws})
     file = ls.certify(scene, ["goal"]).save(tmp_path / "fed.proof.zip")
     assert ls.recheck(file).verdict == "proved"
 

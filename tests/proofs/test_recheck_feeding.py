@@ -10,7 +10,7 @@ import pytest
 pytest.importorskip("flint", reason="the checker needs python-flint")
 
 from tests.proofs import forge
-from tests.proofs.test_recheck import COARSE, verdict
+from tests.proofs.test_recheck import COARSE, checker, verdict
 
 CAVITY = {"width": "9.3 in", "depth": "5.8633 in", "angle": "32.23 deg"}
 EVERY = {"side": 2, "safety": "every", "progress": {"starts": "every", "throws": 400}}
@@ -166,6 +166,46 @@ def test_scattered_landings(scattered, tmp_path):
     assert set(on.tolist()) <= {2, -1}
     assert (on[x >= 6.0] == 2).all()
     assert throws[x >= 6.0].max() <= 400
+
+
+def made_up(scattered):
+    """Cells and scene to which a made-up map is given."""
+    f = ending(scattered, {})
+    scene = checker.scene.read_scene(f.header["boxes"][0]["scene"], f.header["noise"])
+    names = ("jog", "flip", "branch", "rank", "component", "phi")
+    edges = [f.arrays[f"0.edges.{i}"] for i in range(3)]
+    return checker.file.Cells(edges, *(f.arrays[f"0.{name}"] for name in names)), scene
+
+
+@pytest.mark.usefixtures("precision")
+def test_what_lands_before_the_first_cell_is_thrown_on(scattered):
+    """All cells are thrown to a place of no harm, one that is near the first border to another side."""
+    c, scene = made_up(scattered)
+    quiet, near, back = 400, 9, int(np.flatnonzero(c.rank >= 0)[0])
+    c.jog[:], c.flip[:] = quiet, -1
+    c.jog[near], c.jog[0], c.rank[0] = int(c.start[1]) - 1, [0, 0], -1
+    bad, gaps = checker.arm_end.unsafe_starts(checker.arm_end.arm_end(c, scene), scene, 2)
+    # parts of side 0 fall from cell 0 to before it, and are thrown from there to cells up to 0.02 in beyond its border
+    assert c.edges[0][near] - c.edges[0][0] < 0.02
+    assert gaps == [True, False, False]
+    assert np.flatnonzero(bad).tolist() == [0, near]
+    c.jog[near] = quiet
+    c.jog[back + 200] = int(c.start[1]) - 1  # too far from the first border
+    bad, gaps = checker.arm_end.unsafe_starts(checker.arm_end.arm_end(c, scene), scene, 2)
+    assert not any(gaps)
+    assert np.flatnonzero(bad).tolist() == [back + 200]
+
+
+@pytest.mark.usefixtures("precision")
+def test_what_may_leave_does_not_arrive(scattered):
+    """All cells are thrown beyond the end but one, which is thrown to the first border, from where all are."""
+    c, scene = made_up(scattered)
+    c.jog[:], c.flip[:], c.rank[:] = int(c.start[3]) - 5, -1, 0
+    c.jog[40], c.rank[40] = [0, 0], -1
+    c.jog[50] = 40
+    end = checker.arm_end.arm_end(c, scene)
+    assert np.flatnonzero(checker.arm_end.late_within(end, 9)).tolist() == [40, 50]
+    assert np.flatnonzero(checker.arm_end.leading_off(end)).tolist() == [40, 50]
 
 
 # ------------------------------------------------------------------------------ what is denied
