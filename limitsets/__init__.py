@@ -23,6 +23,7 @@ if TYPE_CHECKING:  # each from the file that holds it: most rooms have a file of
     from limitsets.auditing import audit
     from limitsets.cells import grid
     from limitsets.feeding import feed
+    from limitsets.fitting import fit
     from limitsets.graph.morse import morse_graph
     from limitsets.graph.transitions import transitions
     from limitsets.inverse import design, robust_design
@@ -60,6 +61,7 @@ _ROOMS = {
     "engine": "engine",
     "feed": "feeding",
     "feedback": "policies",
+    "fit": "fitting",
     "grid": "cells",
     "interval": "interval",
     "limit_set": "sets.limit_set",
@@ -94,6 +96,7 @@ __all__ = [
     "engine",
     "feed",
     "feedback",
+    "fit",
     "grid",
     "interval",
     "limit_set",

@@ -7,7 +7,15 @@ an undecided cell) are values of the answers, never exceptions.
 
 from __future__ import annotations
 
-__all__ = ["AnswerError", "GeometryError", "GridError", "LimitsetsError", "MapError", "SceneError"]
+__all__ = [
+    "AnswerError",
+    "DataError",
+    "GeometryError",
+    "GridError",
+    "LimitsetsError",
+    "MapError",
+    "SceneError",
+]
 
 
 class LimitsetsError(Exception):
@@ -88,3 +96,7 @@ class GridError(LimitsetsError):
 
 class AnswerError(LimitsetsError):
     """A question that the map, grid or graph at hand cannot be asked."""
+
+
+class DataError(LimitsetsError):
+    """A file of measurements that cannot be what it says; the key names row and column."""

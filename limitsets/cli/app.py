@@ -13,6 +13,7 @@ from limitsets.cli.certify import certify
 from limitsets.cli.design import design
 from limitsets.cli.feed import feed
 from limitsets.cli.feedback import feedback
+from limitsets.cli.fit import fit
 from limitsets.cli.margin import margin
 from limitsets.cli.plot import plot
 from limitsets.cli.recheck import recheck
@@ -64,5 +65,6 @@ for command in (
     atlas,
     feed,
     feedback,
+    fit,
 ):
     app.command()(command)

@@ -54,6 +54,7 @@ KERNEL_FREE = {
     "robust",
     "regions",
     "feeding",
+    "fitting",
     "inverse",
     "sweep",
     "plot",

@@ -11,11 +11,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from limitsets.jit import kernel
+from limitsets.jit import kernel, row_of
 from limitsets.maps.contract import require_sides
-from limitsets.maps.kernels import image_on
+from limitsets.maps.kernels import image_on, margin
+from limitsets.maps.stacks import point_of, size_of
 
-__all__ = ["along"]
+__all__ = ["along", "at_points"]
 
 
 @kernel(entry=True)
@@ -67,3 +68,48 @@ def along(
     after, side_after, slope = np.empty(starts.size), np.empty(starts.size, np.int64), np.empty(starts.size)
     _along(params, starts, sides, words, after, side_after, slope)
     return after, side_after, slope
+
+
+@kernel(entry=True)
+def _at_points(stack: Any, x: Any, sides: Any, branches: Any, after: Any, slope: Any, decides: Any) -> None:
+    for k in range(after.shape[0]):
+        params = row_of(stack, k)
+        for j in range(x.size):
+            at, _, factor = image_on(params, x[j], sides[j], branches[j])
+            after[k, j], slope[k, j] = at, factor
+            decides[k, j] = margin(params, x[j], sides[j])
+
+
+def at_points(
+    stack: Any, x: ArrayLike, side: ArrayLike, branch: ArrayLike
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Make one step each on a forced branch at many parameter points.
+
+    Parameters
+    ----------
+    stack : NamedTuple
+        Stacked parameters (`limitsets.maps.stacks`) of a one-dimensional map with `image_on`, m points.
+    x, side, branch : array_like, shape (n,)
+        States and the branch that each takes, the same at all points.
+
+    Returns
+    -------
+    x, slope, margin : ndarray, shape (m, n)
+        Where they end, the derivative with respect to the start, and the number whose sign decides the branch.
+
+    Examples
+    --------
+    >>> from limitsets import maps
+    >>> from limitsets.maps.stacks import stacked
+    >>> from limitsets.maps.forced import at_points
+    >>> at_points(stacked([maps.Doubling(2.0), maps.Doubling(3.0)]), [0.25], [0], [0])[0]
+    array([[0.5 ],
+           [0.75]])
+    """
+    starts = np.ascontiguousarray(x, dtype=np.float64)
+    sides, words = (np.ascontiguousarray(each, dtype=np.int64) for each in (side, branch))
+    if sides.size:
+        require_sides(point_of(stack, 0), int(sides.min()), int(sides.max()))
+    after, slope, decides = (np.empty((size_of(stack), starts.size)) for _ in range(3))
+    _at_points(stack, starts, sides, words, after, slope, decides)
+    return after, slope, decides

@@ -24,6 +24,7 @@ _FILES = {
     "counterexample": "counterexamples",
     "design": "designs",
     "feeding": "fed_parts",
+    "fit_residuals": "residuals",
     "flight": "flights",
     "limit_set": "limit_sets",
     "map": "maps",

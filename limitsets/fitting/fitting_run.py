@@ -1,0 +1,249 @@
+"""`limitsets.fit`: speed, centre of mass, surface height and radius of gyration from filmed throws."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from limitsets.errors import AnswerError, DataError
+from limitsets.fitting.fit_result import Fit, Fitted, Scatter, fitted_scene
+from limitsets.fitting.further import further_throws
+from limitsets.fitting.likelihood import SCATTERS, Likelihood, whitened
+from limitsets.fitting.maximising import Maximum
+from limitsets.fitting.misfit import NAMED, Misfit, misfit
+from limitsets.fitting.predicting import predicted
+from limitsets.fitting.rows import Rows, as_recorded
+from limitsets.fitting.searching import LEVEL, largest, profiles, threshold_of
+from limitsets.fitting.starting import (
+    RADIUS,
+    Start,
+    jacobian,
+    robust_start,
+    spread_of,
+    units_of_change,
+)
+from limitsets.fitting.throws import Throws, length_of, read_throws
+from limitsets.scene import Scene, load
+from limitsets.scene.quantities import base_unit, find
+
+__all__ = ["fit"]
+
+# Differences of readings of one place from which an error of measurement is taken.
+READ_TWICE = 10
+# Of the misfit test: scatters up to so many robust ones, and how many of them are tried.
+WIDEST, SIZES = 1.5, 16
+# A scatter this small beside the end of its interval is none.
+NOTHING = 1e-3
+
+Array = NDArray[np.float64]
+Progress = Callable[[str, int, int], None]
+
+
+def fit(
+    scene: Scene | str | Path,
+    throws: Throws | str | Path,
+    *,
+    error: float | str | None = None,
+    progress: Progress | None = None,
+) -> Fit:
+    """Fit a scene to filmed throws.
+
+    Parameters
+    ----------
+    scene : Scene, str or Path
+        The machine as far as it is known, in the minimal model; the sides of the part stay as they are.
+    throws : str, Path or Throws
+        A CSV file (`limitsets.fitting.read_throws`), or throws that were read.
+    error : str or float, optional
+        Standard deviation of a measured place, "0.5 mm" or in the scene's unit, where the file has no such column.
+        Where neither is given it is taken from places that were read twice (column `run`), and without these it counts
+        as unknown: the scatter is then an upper bound.
+    progress : callable, optional
+        Called with what is done, how much of it, and of how much.
+
+    Returns
+    -------
+    Fit
+        Values with 95 % intervals, scatter, misrecorded sides, whether the model fits, the scene that has it all.
+
+    Raises
+    ------
+    DataError
+        A file that cannot be read, or throws that cannot be; the first thing wrong, with its row and column.
+    AnswerError
+        A scene with effects.
+
+    Examples
+    --------
+    >>> import limitsets as ls
+    >>> import numpy as np
+    >>> from limitsets.fitting import simulated_throws
+    >>> truth = ls.load("paper-designed")
+    >>> film = simulated_throws(truth, np.linspace(8, 23, 48), [0, 1, 2] * 16, error=0.02, speed=0.002, seed=1)
+    >>> found = ls.fit(truth.with_values({"throw.speed": "155 deg/s"}), film)
+    >>> bool(found["throw.speed"].lo < truth.value("throw.speed") < found["throw.speed"].hi)
+    True
+    """
+    begin = time.perf_counter()
+    chosen = scene if isinstance(scene, Scene) else load(scene)
+    if chosen.effects.on():
+        raise AnswerError(
+            "the scene's effects", ", ".join(chosen.effects.on()), "the minimal model", "leave [effects] out"
+        )
+    film = throws if isinstance(throws, Throws) else read_throws(throws, chosen)
+    known, errors = _errors(film, error, chosen)
+
+    def tell(step: str, done: int, of: int) -> None:
+        if progress is not None:
+            progress(step, done, of)
+
+    tell("robust least squares", 0, 3)
+    start = robust_start(chosen, as_recorded(film, errors, known, len(chosen.sides)))
+    tell("maximum likelihood", 1, 3)
+    own, best = largest(chosen, start)
+    tell("profiles", 2, 3)
+    threshold = threshold_of(1, len(film), len(start.names))
+    best, ends = profiles(own, best, threshold, start)
+    return _answer(chosen, own, best, ends, start, threshold, begin)
+
+
+def _errors(film: Throws, error: float | str | None, scene: Scene) -> tuple[bool, Array]:
+    """Return whether the errors of measured places are known, and their standard deviations [length]."""
+    column = bool(np.isfinite(film.error).all())
+    if error is not None:
+        if column:
+            remedy = "leave --error or the column out"
+            raise DataError(
+                "the error", "given twice", "an option or a column", remedy, file=film.file or None
+            )
+        return True, np.full(len(film), length_of(error, scene, "the error"))
+    if column:
+        return True, film.error
+    if film.read_twice.size >= READ_TWICE:
+        return True, np.full(len(film), spread_of(film.read_twice) / math.sqrt(2.0))
+    return False, np.zeros(len(film))
+
+
+def _answer(
+    scene: Scene,
+    own: Likelihood,
+    best: Maximum,
+    ends: list[tuple[float, float]],
+    start: Start,
+    threshold: float,
+    begin: float,
+) -> Fit:
+    values = own.values(best.at)[0]
+    held, quantities = dict(start.held), []
+    for k, name in enumerate(own.names):
+        lo, hi = (float(own.centre[k] + own.scale[k] * end) for end in ends[k])
+        if name == RADIUS and math.isinf(lo) and math.isinf(hi):
+            held[name] = "no decision between jog and flip depends on it closely enough"
+            values[k] = scene.value(name)
+            continue
+        value = float(values[k])
+        if name == RADIUS:  # between a jog and a flip nothing is more likely than the rest
+            value = 0.5 * (lo + hi) if math.isfinite(hi - lo) else min(max(scene.value(name), lo), hi)
+        quantities.append(Fitted(name, value, lo, hi, base_unit(find(name).dimension, scene.unit)))
+    scatters = []
+    for k in range(SCATTERS):
+        j = len(own.names) + k
+        lo, hi = (float(own.scale[j] * end) for end in ends[j])
+        if math.isinf(lo) and values[j] < NOTHING * hi:
+            values[j] = 0.0
+        scatters.append(Scatter(float(values[j]), max(lo, 0.0), hi, not own.rows.known))
+    found = tuple(quantities)
+    speed, landing = scatters
+    new = fitted_scene(scene, found, speed.value, landing.value)
+    told = own.told(values[None])
+    loose = np.sqrt(values[None, -1:] ** 2 + (1e-7 * scene.arm_length) ** 2)
+    misses = own.rows.throws.x_after - told.after[0]
+    sizes = np.sqrt(
+        own.rows.error**2 * (1.0 + told.slope[0] ** 2)
+        + (told.per_log_speed[0] * values[-2]) ** 2
+        + loose[0, 0] ** 2
+    )
+    names = tuple(each.name for each in found)
+    error = own.rows.error
+    if not own.rows.known:  # what the answer may be sharpened to is then told with all scatter as one
+        error = np.full(len(error), landing.value / math.sqrt(2.0))
+    throws = own.rows.throws
+    more = further_throws(
+        new,
+        names,
+        units_of_change(new, names),
+        throws.x_before,
+        own.rows.side,
+        error,
+        (speed.value, landing.value),
+    )
+    return Fit(
+        new,
+        scene,
+        own.rows,
+        found,
+        held,
+        speed,
+        landing,
+        float(np.mean(own.rows.error)) if own.rows.known else None,
+        *_misread(own.rows, len(scene.sides)),
+        _misfit(scene, start),
+        misses,
+        sizes,
+        more,
+        time.perf_counter() - begin,
+        own,
+        best,
+        threshold,
+    )
+
+
+def _misfit(scene: Scene, start: Start) -> Misfit:
+    """Test the model by the robust fit: the most likely machine leans towards throws that no machine makes."""
+    rows = start.rows
+    points = {name: np.array([value]) for name, value in zip(start.names, start.values, strict=True)}
+    told = predicted(scene, points, rows.throws.x_before, rows.side, rows.branch)
+    slopes = jacobian(scene, rows, start.names, start.values, units_of_change(scene, start.names))
+    # of speed and of landings: the scatter that is most likely for the landings that are not far off
+    sizes = start.spread * np.linspace(0.0, WIDEST, SIZES)
+    per_share = max(float(np.median(np.abs(told.per_log_speed))), 1e-12)
+    speed, landing = (each.reshape(-1, 1) for each in np.meshgrid(sizes / per_share, sizes))
+    landing = np.hypot(landing, 1e-7 * scene.arm_length)
+    tried = whitened(rows, told, speed, landing)
+    loss = np.minimum(tried.residual**2, NAMED**2) + tried.log_variance
+    k = [int(np.argmin(loss.sum(axis=1)))]
+
+    def white(miss: Array | None) -> Array:
+        found: Array = whitened(rows, told, speed[k], landing[k], miss).residual[0]
+        return found
+
+    columns = np.stack([white(column[None]) for column in slopes.T], axis=1)
+    throws = rows.throws
+    return misfit(white(None), columns, 2 * rows.side + rows.branch, throws.x_before, throws.row)
+
+
+def _misread(
+    rows: Rows, sides: int
+) -> tuple[tuple[tuple[int, str, int, int], ...], tuple[float, float, float]]:
+    """Name misrecorded sides, and give their share with its exact interval (Clopper and Pearson)."""
+    from scipy.stats import beta
+
+    throws, after = rows.throws, rows.side_after(sides)
+    lines = [
+        (int(throws.row[k]), "side_before", int(throws.side_before[k]), int(rows.side[k]))
+        for k in np.flatnonzero(rows.misread_before())
+    ]
+    lines += [
+        (int(throws.row[k]), "side_after", int(throws.side_after[k]), int(after[k]))
+        for k in np.flatnonzero(rows.misread_after(sides))
+    ]
+    wrong, count = rows.misread(sides)
+    tail = 0.5 * (1.0 - LEVEL)
+    lo = float(beta.ppf(tail, wrong, count - wrong + 1)) if wrong else 0.0
+    hi = float(beta.ppf(1.0 - tail, wrong + 1, count - wrong))
+    return tuple(sorted(lines)), (wrong / count, lo, hi)

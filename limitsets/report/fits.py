@@ -1,0 +1,41 @@
+"""What a fit says in words: what the throws do not tell, rows to look at, whether the model fits, what to film next."""
+
+from __future__ import annotations
+
+from math import isfinite
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from limitsets.fitting import Fit
+
+__all__ = ["lines_of"]
+
+
+def lines_of(found: Fit) -> list[str]:
+    """Write the sentences, one a line."""
+    unit = found.scene.unit
+    lines = [f"{name} is kept as it was: {why}" for name, why in found.held.items()]
+    if found.error is None:
+        lines.append(
+            "no measurement error is given: the scatter is an upper bound (give --error or a column error)"
+        )
+    else:
+        lines.append(f"measurement error: {found.error:.3g} {unit} (standard deviation of a measured place)")
+    for row, column, recorded, fits in found.misread:
+        lines.append(f"row {row}: {column} is recorded as {recorded}, but the part landed as on side {fits}")
+    test = found.misfit
+    if test.lacking:
+        rows = f" (look at row{'s' if len(test.strange) > 1 else ''} {', '.join(map(str, test.strange))})"
+        lines.append(
+            f"the model does not fit (p = {test.p:.2g}): the throws do something that it leaves out, like rolling or"
+            f" slipping, or a number is wrong{rows if test.strange else ''}; do not trust the values"
+        )
+    else:
+        lines.append(f"the model fits: such residuals or larger ones have probability {test.p:.2g}")
+    for each in found.further[:1]:
+        name, factor = max(each.shrinks.items(), key=lambda pair: pair[1])
+        gain = f"ten of them shorten the interval of {name} {factor:.2g} times"
+        if not isfinite(found[name].half):
+            gain = f"they tell most of {name}, whose interval is open"
+        lines.append(f"film next: throws from x = {each.x:.3g} {unit} on side {each.side}; {gain}")
+    return lines

@@ -1,0 +1,232 @@
+"""The fit against machines of known truth, which other formulas throw (`tests.fitting.machines`)."""
+
+import numpy as np
+import pytest
+from scipy.stats import binom
+
+import limitsets as ls
+from limitsets.fitting.searching import threshold_of
+from tests.fitting.machines import ABOVE, ALONG, HEIGHT, KAPPA, RADIUS, described, film, machine, run_film
+from tests.proofs.forge import scene
+
+PLACES = (KAPPA, ALONG, ABOVE, HEIGHT)
+SPEED, LANDING = 0.002, 0.01
+
+
+def aimed_at():
+    """What the builder of all these machines knows."""
+    return ls.load(scene("designed"))
+
+
+def repeated(count, seed, **how):
+    """Machines, films and fits."""
+    draw = np.random.default_rng(seed)
+    for _ in range(count):
+        truth = machine(draw)
+        yield truth, ls.fit(aimed_at(), film(draw, truth, speed=SPEED, landing=LANDING, **how))
+
+
+def held_by(found, truth):
+    """Which intervals hold the truth; those of positions in one region as well."""
+    held = {each.name: each.lo <= truth[each.name] <= each.hi for each in found.quantities}
+    held["speed"] = found.speed.lo <= SPEED <= found.speed.hi
+    held["landing"] = found.landing.lo <= LANDING <= found.landing.hi
+    fitted = [name for name in PLACES if name not in found.held]
+    joint = threshold_of(len(fitted), len(found.rows.throws), len(fitted))
+    held["region"] = found.deviance({name: truth[name] for name in fitted}) <= joint
+    return held
+
+
+def counted(cases):
+    """How often each interval was there, and held."""
+    there, held = {}, {}
+    for truth, found in cases:
+        for name, inside in held_by(found, truth).items():
+            there[name], held[name] = there.get(name, 0) + 1, held.get(name, 0) + inside
+    return there, held
+
+
+def test_intervals_hold_the_truth():
+    there, held = counted(repeated(20, seed=1))
+    for name, count in there.items():
+        # fewer than this many of 95 % intervals would hold once in ten thousand times
+        assert held[name] >= binom.ppf(1e-4, count, 0.95), name
+    assert all(there[name] == 20 for name in (*PLACES, "region"))
+
+
+@pytest.mark.sweep
+@pytest.mark.parametrize("flipped", [0.0, 0.05])
+def test_intervals_of_200_machines_hold_in_179_to_199(flipped):
+    there, held = counted(repeated(200, seed=2, flipped=flipped))
+    for name in (*PLACES, "region"):
+        assert there[name] == 200
+        assert 179 <= held[name] <= 199, (name, held[name])
+    for name in (RADIUS, "speed", "landing"):  # at a bound an interval holds more often
+        assert held[name] >= binom.ppf(1e-4, there[name], 0.95), (name, held[name], there[name])
+
+
+def test_sides_recorded_wrong_are_named_and_move_nothing():
+    draw = np.random.default_rng(3)
+    truth = machine(draw)
+    seed = int(draw.integers(1 << 30))
+    clean, flipped = (
+        ls.fit(aimed_at(), film(np.random.default_rng(seed), truth, flipped=share)) for share in (0.0, 0.1)
+    )
+    right = clean.rows.throws.side_after
+    wrong = flipped.rows.throws.row[flipped.rows.throws.side_after != right]
+    assert wrong.size
+    assert [row for row, *_ in flipped.misread] == wrong.tolist()
+    assert all(column == "side_after" for _, column, *_ in flipped.misread)
+    assert flipped.misread_rate[0] == wrong.size / 100
+    for name in PLACES:
+        assert flipped[name].value == pytest.approx(clean[name].value, abs=1e-3 * clean[name].half)
+    assert clean.misread == ()
+
+
+def test_a_side_before_that_is_recorded_wrong_is_seen_too():
+    draw = np.random.default_rng(4)
+    truth = machine(draw)
+    throws = film(draw, truth)
+    bad = throws.side_before.copy()
+    bad[7] = (bad[7] + 2) % 3
+    spoiled = type(throws)(**{**vars(throws), "side_before": bad})
+    found = ls.fit(aimed_at(), spoiled)
+    assert found.misread == ((9, "side_before", int(bad[7]), int(throws.side_before[7])),)
+
+
+def test_shifts_by_flipped_sides_are_below_a_standard_error():
+    shifts = {name: [] for name in PLACES}
+    for truth, found in repeated(20, seed=5, flipped=0.05):
+        for name in PLACES:
+            # the half of a 95 % interval is about two standard errors
+            shifts[name].append((found[name].value - truth[name]) / (0.5 * found[name].half))
+    for name, each in shifts.items():
+        assert abs(np.median(each)) < 1.0, name
+
+
+def test_throws_that_follow_each_other_share_readings():
+    draw = np.random.default_rng(6)
+    inside = 0
+    for _ in range(8):
+        truth = machine(draw)
+        found = ls.fit(aimed_at(), run_film(draw, truth, 60), error="0.02 in")
+        assert found.rows.throws.shared.sum() == 59
+        inside += sum(
+            found[name].lo <= truth[name] <= found[name].hi for name in PLACES if name not in found.held
+        )
+    assert inside >= binom.ppf(1e-4, 8 * len(PLACES), 0.95) - 3
+
+
+def test_the_error_of_measurement_is_found_from_places_read_twice():
+    draw = np.random.default_rng(7)
+    found = ls.fit(aimed_at(), run_film(draw, machine(draw), 80, twice=True))
+    # 79 differences of two readings: their spread is known to an eighth or so
+    assert found.error == pytest.approx(0.02, rel=0.4)
+    assert not found.landing.at_most
+
+
+def test_without_an_error_the_scatter_is_a_bound():
+    draw = np.random.default_rng(8)
+    truth = machine(draw)
+    found = ls.fit(aimed_at(), film(draw, truth, known=False))
+    assert found.error is None
+    assert found.landing.at_most
+    assert found.landing.hi > LANDING
+    assert all(found[name].lo <= truth[name] <= found[name].hi for name in PLACES)
+
+
+def test_what_the_throws_cannot_tell_is_kept_and_named():
+    draw = np.random.default_rng(9)
+    truth = machine(draw)
+    throws = film(draw, truth, 400)
+    alike = (throws.side_before == 2) & (throws.side_after == 2) & (np.abs(throws.x_before - 10.0) < 2.0)
+    few = type(throws)(
+        **{name: each[alike] if isinstance(each, np.ndarray) else each for name, each in vars(throws).items()}
+    )
+    found = ls.fit(aimed_at(), few)
+    assert found.held
+    for name in found.held:
+        assert found.scene.value(name) == pytest.approx(aimed_at().value(name))
+    assert not {each.name for each in found.quantities} & set(found.held)
+
+
+def test_the_scene_holds_values_uncertainty_and_scatter():
+    draw = np.random.default_rng(10)
+    truth = machine(draw)
+    given = ls.load("paper-designed")
+    found = ls.fit(given, film(draw, truth))
+    again = ls.load(found.scene.as_dict())
+    speed = found["throw.speed"]  # gravity is given: it is the speed that is fitted
+    assert speed.unit == "rad/s"
+    assert speed.lo <= np.sqrt(given.gravity / truth[KAPPA]) <= speed.hi
+    assert again.value("throw.speed") == pytest.approx(speed.value)
+    assert again.tolerance["throw.speed"].of(speed.value) == pytest.approx(speed.half, rel=0.01)
+    assert again.tolerance[HEIGHT].of(1.0) == pytest.approx(found[HEIGHT].half, rel=0.01)
+    assert again.world.scatter.landing.value == pytest.approx(found.landing.value, rel=0.01, abs=1e-9)
+    assert again.goal == given.goal
+    assert again.map.a == pytest.approx(ls.load(described(truth)).map.a, abs=0.1)
+
+
+def test_the_same_film_gives_the_same_fit():
+    draw = np.random.default_rng(11)
+    throws = film(draw, machine(draw))
+    one, two = (ls.fit(aimed_at(), throws) for _ in range(2))
+    assert [each.value for each in one.quantities] == [each.value for each in two.quantities]
+    assert one.misfit == two.misfit
+
+
+def test_from_far_away_the_same_maximum_is_found():
+    draw = np.random.default_rng(12)
+    truth = machine(draw)
+    throws = film(draw, truth)
+    near = ls.fit(aimed_at(), throws)
+    far = ls.fit(aimed_at().with_values({KAPPA: 28.0, ALONG: 4.0, HEIGHT: -0.35, RADIUS: 1.1}), throws)
+    for name in PLACES:
+        assert far[name].value == pytest.approx(near[name].value, abs=0.02 * near[name].half)
+
+
+def test_places_without_any_error_give_the_truth():
+    draw = np.random.default_rng(13)
+    truth = machine(draw)
+    found = ls.fit(aimed_at(), film(draw, truth, error=0.0, speed=0.0, landing=0.0, known=False))
+    for name in PLACES:
+        assert found[name].value == pytest.approx(truth[name], abs=1e-5)
+    assert found[RADIUS].lo <= truth[RADIUS] <= found[RADIUS].hi
+
+
+def test_further_throws_sharpen_as_they_say():
+    """Ten more throws from where it says, against ten more from a place next to it that nobody recommends."""
+    draw = np.random.default_rng(14)
+    truth = machine(draw)
+    throws = film(draw, truth)
+    found = ls.fit(aimed_at(), throws)
+    best = found.further[0]
+    assert best.gain > 0
+    assert sorted(each.side for each in found.further) == [0, 1, 2]
+    name = max((n for n in best.shrinks if n in PLACES), key=lambda n: best.shrinks[n])
+    halves = []
+    for x, side in ((best.x, best.side), (4.0, 0)):
+        more = film_from(draw, truth, np.full(10, x), side)
+        both = {
+            key: np.concatenate([getattr(throws, key), getattr(more, key)]) if key != "file" else ""
+            for key in vars(throws)
+        }
+        halves.append(ls.fit(aimed_at(), type(throws)(**both))[name].half)
+    assert halves[0] < halves[1]
+    assert found[name].half / halves[0] == pytest.approx(best.shrinks[name], rel=0.35)
+
+
+def film_from(draw, truth, x, side):
+    from limitsets.fitting import Throws
+    from tests.fitting.machines import thrown
+    from tests.proofs.forge import Plain
+
+    plain, n = Plain(described(truth)), x.size
+    kappa = truth[KAPPA] / (1.0 + SPEED * draw.standard_normal(n)) ** 2
+    after, ends = thrown(plain, x, np.full(n, side), kappa)
+    noise = 0.02 * draw.standard_normal((2, n))
+    landed = after + LANDING * draw.standard_normal(n)
+    rows = np.arange(100, 100 + n)
+    return Throws(
+        x + noise[0], np.full(n, side), landed + noise[1], ends, np.full(n, 0.02), np.zeros(n, bool), rows
+    )

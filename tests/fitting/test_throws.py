@@ -1,0 +1,156 @@
+"""Films as CSV files: units, and one clear line for whatever is wrong, with its row and column."""
+
+import numpy as np
+import pytest
+
+import limitsets as ls
+from limitsets.errors import DataError
+from limitsets.fitting import read_throws
+
+HEAD = "x_before [mm],side_before,x_after [mm],side_after"
+ROW = "254,2,256.54,2"
+
+
+@pytest.fixture
+def write(tmp_path):
+    def written(text, encoding="utf-8"):
+        path = tmp_path / "throws.csv"
+        path.write_text(text, encoding=encoding, newline="")
+        return path
+
+    return written
+
+
+def read(path):
+    return read_throws(path, ls.load("paper-designed"))
+
+
+def test_places_come_in_the_units_of_the_scene(write):
+    rows = "\n".join(
+        ["254,2,256.54,2,0.508,a"] * 4 + ["254 ,2, 256.54,2,0.508,b"] * 3 + ["127,1,130,1,0.508,"]
+    )
+    throws = read(
+        write(f"\ufeffx_before [mm], side_before ,x_after [ mm ],side_after,error [mm],run\r\n{rows}\r\n\r\n")
+    )
+    assert len(throws) == 8
+    assert throws.x_before[0] == 10.0
+    assert throws.x_after[0] == 10.1
+    assert throws.error[0] == 0.02
+    assert throws.follows.tolist() == [False, True, True, True, False, True, True, False]
+    assert throws.row.tolist() == list(range(2, 10))
+    assert throws.side_before.tolist() == [2] * 7 + [1]
+
+
+def test_columns_may_stand_in_any_order_and_have_units_of_their_own(write):
+    rows = "\n".join(["2,25.4,2,1 "] * 8)
+    throws = read(write(f"side_after,x_before [cm],side_before,x_after [ft]\n{rows}\n"))
+    assert (throws.x_before[0], throws.x_after[0]) == (10.0, 12.0)
+
+
+def test_a_reading_shared_by_two_rows_is_known_by_its_number(write):
+    rows = ["254,2,256.54,2,a", "256.54,2,260,2,a", "260.3,2,262,2,a", "262,2,265,2,b"] * 2
+    throws = read(write("\n".join([f"{HEAD},run", *rows])))
+    assert throws.shared.tolist() == [False, True, False, False] * 2
+    assert throws.read_twice == pytest.approx([0.3 / 25.4] * 2)
+
+
+@pytest.mark.parametrize(
+    ("bad", "place", "said"),
+    [
+        ("254,2,,2", "row 4, column x_after [mm]", "empty"),
+        ("254,3,256,2", "row 4, column side_before", "0 to 2"),
+        ("254,-1,256,2", "row 4, column side_before", "0 to 2"),
+        ("254,2.0,256,2", "row 4, column side_before", "'2.0'"),
+        ("254,2,far,2", "row 4, column x_after [mm]", "'far'"),
+        ("254,2,256 in,2", "row 4, column x_after [mm]", "'256 in'"),
+        ("nan,2,256,2", "row 4, column x_before [mm]", "'nan'"),
+        ("-3,2,256,2", "row 4, column x_before [mm]", "arm's length, 28 in"),
+        ("2540,2,256,2", "row 4, column x_before [mm]", "arm's length, 28 in"),
+        ("254,2,-3,2", "row 4, column x_after [mm]", "leave out a throw off the arm"),
+        ("254,2,2540,2", "row 4, column x_after [mm]", "arm's length, 28 in"),
+        ("254,2,256", "row 4", "4, one for each column"),
+        ("254,3,2,256,5,2", "row 4", "decimals have a point"),
+        ("254,2,256,2,1", "row 4", "4, one for each column"),
+        ('254,2,"256,5",2', "row 4, column x_after [mm]", "'256,5'"),
+    ],
+)
+def test_a_bad_cell_is_one_line_with_file_row_and_column(write, bad, place, said):
+    path = write("\n".join([HEAD, ROW, ROW, bad] + [ROW] * 8))
+    with pytest.raises(DataError) as caught:
+        read(path)
+    text = str(caught.value)
+    assert text.startswith(f"{path}: {place}: ")
+    assert said in text
+    assert "\n" not in text
+
+
+@pytest.mark.parametrize(
+    ("head", "said"),
+    [
+        ("x_before,side_before,x_after [mm],side_after", 'write it like "x_before [mm]"'),
+        ("x_before [mn],side_before,x_after [mm],side_after", "'mn'"),
+        ("x_before [deg],side_before,x_after [mm],side_after", "'deg'"),
+        ("x_before [mm],side_before [mm],x_after [mm],side_after", "none in this column"),
+        ("x_befor [mm],side_before,x_after [mm],side_after", "did you mean 'x_before [mm]'"),
+        ("x_before (mm),side_before,x_after [mm],side_after", "did you mean 'x_before [mm]'"),
+        ("x_before [mm],sid_before,x_after [mm],side_after", "did you mean 'side_before'"),
+        ("x_before [mm],side_before,x_after [mm],x_after [mm]", "each column once"),
+        ("x_before [mm],side_before,x_after [mm],run", "side_after missing"),
+        ("x_before [mm];side_before;x_after [mm];side_after", "commas separate columns"),
+    ],
+)
+def test_a_bad_header_is_one_line(write, head, said):
+    path = write("\n".join([head] + [ROW] * 9))
+    with pytest.raises(DataError) as caught:
+        read(path)
+    assert str(caught.value).startswith(f"{path}: row 1")
+    assert said in str(caught.value)
+
+
+def test_files_that_are_none(write, tmp_path):
+    with pytest.raises(DataError, match="could not be opened"):
+        read(tmp_path / "none.csv")
+    with pytest.raises(DataError, match="could not be opened"):
+        read(tmp_path)
+    with pytest.raises(DataError, match="empty"):
+        read(write(""))
+    with pytest.raises(DataError, match="8 at least"):
+        read(write("\n".join([HEAD] + [ROW] * 7)))
+    with pytest.raises(DataError, match="UTF-8"):
+        read(write(f"{HEAD}\n{ROW}\n\u00e9", encoding="latin-1"))
+    with pytest.raises(DataError, match="separated by commas"):
+        read(write(f'{HEAD}\n{ROW}\n"254,2'))
+
+
+def test_an_error_of_0_is_none(write):
+    with pytest.raises(DataError, match=r"row 2, column error \[mm\]"):
+        read(write("\n".join([f"{HEAD},error [mm]"] + [f"{ROW},0"] * 8)))
+
+
+def test_a_throw_from_where_no_part_flies_names_the_row(write):
+    path = write("\n".join([HEAD, *[ROW] * 8, "40,2,41,2"]))
+    with pytest.raises(
+        DataError, match=r"row 10: the place before is '1.574\S* in'.*beyond the left vertex of side 2"
+    ):
+        ls.fit("paper-designed", path)
+
+
+def test_landings_that_tell_nothing_are_an_error(write):
+    text = "\n".join(
+        [HEAD] + [f"{150 + k * 37 % 400},{k % 3},{100 + k * 91 % 500},{k * 7 % 3}" for k in range(40)]
+    )
+    with pytest.raises(DataError, match="check units and sides"):
+        ls.fit("paper-designed", write(text), error="0.5 mm")
+
+
+def test_one_throw_again_and_again_tells_one_quantity(write):
+    found = ls.fit("paper-designed", write("\n".join([HEAD] + [ROW] * 20)), error="0.5 mm")
+    assert [np.isfinite(each.half) for each in found.quantities] == [True]
+    assert len(found.held) == 4
+    assert not found.misfit.lacking
+
+
+def test_the_error_is_given_once(write):
+    path = write("\n".join([f"{HEAD},error [mm]"] + [f"{ROW},0.5"] * 8))
+    with pytest.raises(DataError, match="given twice"):
+        ls.fit("paper-designed", path, error="0.5 mm")
