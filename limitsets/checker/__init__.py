@@ -34,6 +34,8 @@ The files follow docs/certificates.md, and each imports only from those before i
     feeding      what comes to rest beyond it                                     "Feeding"
     region       one cell of a plane of parameters                                "Regions"
     plane        a plane of parameters in cells, and its regions
+    policy       a policy for a sensor of one bit                                 "Policies"
+    beliefs      its table                                                        "Tables of a policy"
     claims       the claims of a file, and what each needs
     report       a file from first to last, and the report about it
     main         the command line

@@ -33,12 +33,13 @@ def main() -> int:
     parser.add_argument("--json", action="store_true", help="print one JSON object")
     parser.add_argument("--workers", type=int, metavar="N", help="processes (default: all processors)")
     options = parser.parse_args()
-    begun = last = time.monotonic()
+    seen, begun = sys.stderr.isatty(), time.monotonic()
+    last = begun
 
     def bar(done: int, total: int) -> None:
         nonlocal last
         now = time.monotonic()
-        if now - begun > 2 and (now - last > 0.2 or done == total):
+        if seen and now - begun > 2 and (now - last > 0.2 or done == total):
             last = now
             full = 40 * done // max(total, 1)
             text = f"\r[{'#' * full}{'.' * (40 - full)}] {done}/{total} cells"

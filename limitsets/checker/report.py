@@ -14,6 +14,7 @@ from typing import Any
 import flint
 
 from .balls import PRECISION
+from .beliefs import check_policy
 from .cells import Crew, extents
 from .claims import check_box_claims, read_claims, statement_of
 from .feeding import verdict_of_feeds
@@ -32,6 +33,7 @@ from .plane import (
     raster_of,
     read_plane,
 )
+from .policy import Policy, holds_policy, policy_in_words, read_policy
 from .scene import Scene, check_parameters, check_tolerance, over_halves, quantities, read_scene
 from .starts import ATTRACTING, first_version_starts, shares
 from .texts import KINDS, BadFileError, plain, quantity, require, rows, table
@@ -176,6 +178,9 @@ def check_certificate(
     if holds_plane(header):
         recheck_plane(read_plane(header, entries), header, workers, progress, report)
         return
+    if holds_policy(header):
+        recheck_policy(read_policy(header, entries), header, workers, progress, report)
+        return
     file = read_certificate(header, entries)
     gap = describe(report, file)
     own = goal_of_scene(file.raw[0], len(file.scenes[0].sides))
@@ -220,6 +225,30 @@ def recheck_plane(
     report.verdict = "failed" if bad else "proved"
     report.claims = [("region", report.verdict, bad)]
     report.reason = f"region: {bad}" if bad else ""
+
+
+def recheck_policy(
+    policy: Policy,
+    header: dict[str, Any],
+    workers: int,
+    progress: Callable[[int, int], None] | None,
+    report: Report,
+) -> None:
+    """Check a policy, and fill in the report."""
+    model = policy.raw["model"]["flight"], policy.raw["model"]["flip"]
+    require(model == (header["map"]["flight"], header["map"]["flip"]), "map and scene name different models")
+    tell_model(report, model)
+    for name, value in quantities(policy.raw):
+        if not name.startswith("throw."):  # the throws are those to choose from
+            report.parameters[plain(name)] = value_in_words(value, name)
+    noise = "none" if policy.noise is None else deviations_in_words(policy.noise)
+    report.parameters["noise (at every throw)"] = noise
+    report.cells = len(policy.cells[0].side)
+    bad, report.boxes = check_policy(policy, workers, progress)
+    report.statement = policy_in_words(policy)
+    report.verdict = "failed" if bad else "proved"
+    report.claims = [("policy", report.verdict, bad)]
+    report.reason = f"policy: {bad}" if bad else ""
 
 
 def describe(report: Report, file: Certificate) -> str:

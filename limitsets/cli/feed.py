@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from limitsets.cli.arguments import HELP_NO_RECHECK, deviations
-from limitsets.cli.output import Json, Scene, Words, answer, opened, option, progress, saved, table
+from limitsets.cli.certificates import certified, said_of
+from limitsets.cli.output import Json, Scene, Words, answer, opened, option, progress, table
 
 if TYPE_CHECKING:
     from limitsets.feeding import Feeding
@@ -74,11 +74,12 @@ def feed(
             cells=cells,
             progress=tell,
         )
-        kept = None
-        if certificate is not None and found.written:
+        written = None
+        if certificate is not None:
             tell("recheck", 0, 1)
-            found, kept = _certified(found, certificate, recheck=not no_recheck)
-        record = found.to_json() | {"certificate": kept}
+            again = not no_recheck
+            found, written = certified(found, certificate, "feeds", proved=found.written, recheck=again)
+        record = found.to_json() | {"certificate": written}
         files = []
         if out is not None:
             from limitsets import plot
@@ -86,40 +87,11 @@ def feed(
             from limitsets.report.writing import laid
 
             files = laid(out, [("feeding", plot.feeding(found))], lambda _: {"feeding.json": as_json(record)})
-    answer(record, json, lambda: _text(found, files, certificate, kept))
+    answer(record, json, lambda: _text(found, files, written))
     raise typer.Exit(0 if no_proof or found.proved else 1)
 
 
-def _certified(found: Feeding, file: Path, *, recheck: bool) -> tuple[Feeding, dict[str, Any]]:
-    """Write the certificate; what is left where the checker denies it, and what is said of the file."""
-    from limitsets.proofs.confirm import DeniedError
-
-    begin = time.perf_counter()
-    with saved(file) as draft:
-        try:
-            found.save(draft, recheck=recheck, workers=None)
-        except DeniedError as error:
-            kept = str(file.with_name(Path(error.file or "").name))
-            return found.denied(error.claims["feeds"]), {"file": None, "denied": kept, "recheck": None}
-    return found, {
-        "file": str(file),
-        "denied": None,
-        "recheck": time.perf_counter() - begin if recheck else None,
-    }
-
-
-def _of_certificate(file: Path, kept: dict[str, Any] | None) -> str:
-    """Say what became of the certificate."""
-    if kept is None:
-        return "no certificate is written: nothing is proved, or nothing rechecks maps with effects"
-    if kept["denied"] is not None:
-        return f"the checker denies the certificate: it is kept as {kept['denied']}"
-    seconds = kept["recheck"]
-    done = "not rechecked" if seconds is None else f"rechecked in {seconds:.2g} s"
-    return f"certificate: {file}, {done} (check it: limitsets recheck {file})"
-
-
-def _text(found: Feeding, files: list[Path], certificate: Path | None, kept: dict[str, Any] | None) -> None:
+def _text(found: Feeding, files: list[Path], written: dict[str, Any] | None) -> None:
     from limitsets.feeding.trials import binomial_interval
 
     end, unit = found.end, found.end.scene.unit
@@ -151,7 +123,7 @@ def _text(found: Feeding, files: list[Path], certificate: Path | None, kept: dic
         )
     if found.curve is not None:
         typer.echo(found.curve.line())
-    if certificate is not None:
-        typer.echo(_of_certificate(certificate, kept))
+    if written is not None:
+        typer.echo(said_of(written, "nothing is proved, or of a map with effects, which nothing rechecks"))
     if files:
         typer.echo(f"written: {', '.join(map(str, files))}")

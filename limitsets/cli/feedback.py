@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from limitsets.cli.arguments import deviations, place
+from limitsets.cli.arguments import HELP_NO_RECHECK, deviations, place
+from limitsets.cli.certificates import certified, said_of
 from limitsets.cli.output import Json, Scene, Words, answer, opened, option, progress, saved, table
 from limitsets.errors import LimitsetsError
 
@@ -41,7 +42,11 @@ def feedback(
     out: Annotated[
         Path | None, option("--out -o", "DIR", "Write feedback.json, policy.csv and policy.png there.")
     ] = None,
+    certificate: Annotated[
+        Path | None, option("--certificate", "FILE", "Write the policy's certificate, NAME.proof.zip.")
+    ] = None,
     json: Json = False,
+    no_recheck: Annotated[bool, typer.Option("--no-recheck", help=HELP_NO_RECHECK)] = False,
 ) -> None:
     """Find a policy for a sensor that answers one question, and throw it.
 
@@ -71,8 +76,14 @@ def feedback(
             at = _places(chosen, sweep)
             tried = list(zip(at, places(chosen, at, error=place(chosen, error), **options), strict=True))
             found = min((each for _, each in tried), key=lambda each: (not each.solved, each.found.throws))
+        written = None
+        if certificate is not None:
+            tell("recheck", 0, 1)
+            again = not no_recheck
+            found, written = certified(found, certificate, "policy", proved=found.solved, recheck=again)
         thrown = simulate(found, parts) if found.solved else None
         record = found.to_json() | {
+            "certificate": written,
             "simulated": thrown,
             "places": [
                 {"x": x, "verdict": each.found.verdict, "within": each.found.throws} for x, each in tried
@@ -84,7 +95,7 @@ def feedback(
     if csv is not None and policy is not None:
         with saved(csv) as draft:
             draft.write_text(policy.csv(), encoding="utf-8", newline="\n")
-    answer(record, json, lambda: _text(found, tried, thrown, out))
+    answer(record, json, lambda: _text(found, tried, thrown, out, written))
     raise typer.Exit(0 if found.solved else 1)
 
 
@@ -152,7 +163,13 @@ def _write(found: Synthesis, record: dict[str, Any], out: Path) -> None:
     laid(out, drawn, lambda _: text)
 
 
-def _text(found: Synthesis, tried: list[tuple[float, Synthesis]], thrown: Any, out: Path | None) -> None:
+def _text(
+    found: Synthesis,
+    tried: list[tuple[float, Synthesis]],
+    thrown: Any,
+    out: Path | None,
+    written: dict[str, Any] | None,
+) -> None:
     unit = found.scene.unit
     x, side = found.goal
     wanted = {"stop": "known to lie", "catch": "to be caught"}[found.mode]
@@ -166,6 +183,8 @@ def _text(found: Synthesis, tried: list[tuple[float, Synthesis]], thrown: Any, o
     typer.echo(f"question: {found.question}")
     typer.echo(_verdict(found))
     policy = found.found.policy
+    if written is not None:
+        typer.echo(said_of(written, "there is no policy"))
     if out is not None:
         typer.echo(
             f"written to {out}: feedback.json" + ("" if policy is None else ", policy.csv, policy.png")

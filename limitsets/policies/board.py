@@ -12,12 +12,12 @@ from limitsets.cells import CellSet, Domain, Grid, grid
 from limitsets.errors import AnswerError
 from limitsets.goals import OrientedBeyond, Reaches
 from limitsets.graph.condensation import attracting_of
-from limitsets.graph.transitions import transitions
-from limitsets.policies.cell_images import image_of, scattered
-from limitsets.policies.game import Game, Image, Mask, game_of
+from limitsets.policies.cell_images import image_of
+from limitsets.policies.game import Game, Mask, game_of
+from limitsets.proofs.certify import spelled_deviations
+from limitsets.proofs.cover import Cover, cover_on
 from limitsets.proofs.parameters import ParameterBox, parameter_box
-from limitsets.proofs.simulated import joined
-from limitsets.proofs.simulated import scattered as scatter_of
+from limitsets.proofs.simulated import joined, scattered
 from limitsets.scene import Scene
 
 __all__ = ["MODES", "Board", "Progress", "Starts", "board_of"]
@@ -36,8 +36,8 @@ class Board:
     ----------
     scene : Scene
         The scene.
-    throws : dict of str to ParameterBox
-        The parameters of every throw, noise included.
+    covers : dict of str to Cover
+        The cells, and the images proved of them, of every throw, noise included.
     goal : tuple of (float, int)
         The goal region: at x or beyond, on this side.
     mode : str
@@ -54,7 +54,7 @@ class Board:
     """
 
     scene: Scene
-    throws: dict[str, ParameterBox]
+    covers: dict[str, Cover]
     goal: tuple[float, int]
     mode: str
     noise: dict[str, str]
@@ -62,8 +62,13 @@ class Board:
     starts_are: str
     game: Game
 
+    @property
+    def throws(self) -> dict[str, ParameterBox]:
+        """The parameters of every throw, noise included."""
+        return {name: cover.box for name, cover in self.covers.items()}
 
-def _goal_of(scene: Scene, goal: tuple[float, int] | None) -> tuple[float, int]:
+
+def _goal_of(scene: Scene, goal: tuple[float, int] | None, mode: str) -> tuple[float, int]:
     if goal is None:
         if not isinstance(scene.goal, OrientedBeyond | Reaches):
             kind = None if scene.goal is None else scene.goal.kind
@@ -74,6 +79,10 @@ def _goal_of(scene: Scene, goal: tuple[float, int] | None) -> tuple[float, int]:
     if not (0 <= x < scene.arm_length and 0 <= side < len(scene.sides)):
         allowed = f"a place on the arm below {scene.arm_length:.9g} {scene.unit} and a side of the part"
         raise AnswerError("the goal", goal, allowed, "correct it")
+    if mode == "catch" and scene.cavity is not None and x != scene.cavity.position:
+        allowed = f"{scene.cavity.position:.9g} {scene.unit}, where the arm ends and the cavity begins"
+        remedy = "parts are caught there: ask for this x, or move the cavity"
+        raise AnswerError("the x from which parts are caught", x, allowed, remedy)
     return goal
 
 
@@ -93,8 +102,8 @@ def board_of(
     if scene.feedback is None:
         remedy = "add [[feedback.throws]] to the scene, each with name and kappa or speed"
         raise AnswerError("the throws to choose from", "none", "one at least", remedy)
-    x, side = _goal_of(scene, goal)
-    noises = joined(noise or {}, scatter_of(scene))
+    x, side = _goal_of(scene, goal, mode)
+    noises = joined(spelled_deviations(scene, noise), spelled_deviations(scene, scattered(scene)))
     boxes = {
         each.name: parameter_box(scene.with_values({each.quantity: each.text}), noise=noises)
         for each in scene.feedback.throws
@@ -106,12 +115,12 @@ def board_of(
     beyond = np.concatenate([edges[:-1] >= x for (edges,) in cells_of.edges])
     target = np.zeros(cells_of.n_cells, dtype=bool)
     target[cells_of.of_side(side)] = beyond[cells_of.of_side(side)]
-    images = {}
+    covers = {}
     for k, (name, box) in enumerate(boxes.items()):
         if progress is not None:
             progress(f"images of the throw {name}", k, len(boxes))
-        image = image_of(transitions(box.lo, cells_of, "boxes", upper=box.hi))
-        images[name] = scattered(image, cells_of, box.landing) if box.landing else image
+        covers[name] = cover_on(box, cells_of)
+    images = {name: image_of(cover.graph) for name, cover in covers.items()}
     lost = beyond & ~target if mode == "catch" else None
     game = game_of(images, None, target, lost)
     begin, words = _starts(scene, cells_of, starts, noises)
@@ -119,7 +128,7 @@ def board_of(
         begin &= ~beyond
     if not begin.any():
         raise AnswerError("the starts", words, "some that are not caught at once", "name others")
-    return Board(scene, boxes, (x, side), mode, noises, CellSet(cells_of, begin), words, game)
+    return Board(scene, covers, (x, side), mode, noises, CellSet(cells_of, begin), words, game)
 
 
 def _cells(
@@ -144,14 +153,11 @@ def _starts(scene: Scene, cells: Grid, starts: Starts, noise: dict[str, str]) ->
     """Give the cells of the starts, and how they are named."""
     found = np.zeros(cells.n_cells, dtype=bool)
     if starts is None:
-        box = parameter_box(scene, noise=noise)
-        landing = box.landing
-        graph = transitions(box.lo, cells, "boxes", upper=box.hi)
+        graph = cover_on(parameter_box(scene, noise=noise), cells).graph
         sets = graph.recurrent_components()
         good = attracting_of(graph.ranges, graph.components(), sets)
         for each in (part for part, attracts in zip(sets, good, strict=True) if attracts):
             found[each] = True
-        found = _closed(found, scattered(image_of(graph), cells, landing) if landing else image_of(graph))
         if not found.any():
             remedy = "name the starts"
             raise AnswerError("the limit sets of the scene's own throw", "none on these cells", "one", remedy)
@@ -173,14 +179,3 @@ def _starts(scene: Scene, cells: Grid, starts: Starts, noise: dict[str, str]) ->
         inside = (edges[1:] > lo) & (edges[:-1] < hi)
         found[cells.of_side(side)] = inside if lo < hi else (edges[1:] >= lo) & (edges[:-1] <= hi)
     return found, words
-
-
-def _closed(cells: Mask, image: Image) -> Mask:
-    """Add to attracting cells what the scatter of the landings leads to from there; nothing where it may lead off."""
-    while True:
-        more = image(cells)
-        if more is None:
-            return np.zeros_like(cells)
-        if not (more & ~cells).any():
-            return cells
-        cells = cells | more

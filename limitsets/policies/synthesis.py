@@ -3,18 +3,28 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, fields, replace
+from pathlib import Path
+from typing import Any, NamedTuple
 
 from limitsets.cells import CellSet, Grid
 from limitsets.errors import AnswerError
 from limitsets.files import as_table
 from limitsets.policies.board import Board, Progress, Starts, board_of
-from limitsets.policies.search import SOLVED, Found, search
+from limitsets.policies.search import NOT_DECIDED, SOLVED, Found, search
+from limitsets.policies.writing import write
 from limitsets.scene import Scene, load
 from limitsets.scene.sensing import BeyondSensor, Sensor
 
 __all__ = ["Synthesis", "feedback", "places"]
+
+
+class Limits(NamedTuple):
+    """How long a search may go on: throws, seconds, beliefs."""
+
+    throws: int
+    seconds: float
+    beliefs: int
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,11 +35,14 @@ class Synthesis(Board):
     ----------
     sensor : Sensor or None
         What is asked; None: nothing.
+    limits : Limits
+        How long the search could go on.
     found : Found
         How the search ended.
     """
 
     sensor: Sensor | None
+    limits: Limits
     found: Found
 
     @property
@@ -46,6 +59,42 @@ class Synthesis(Board):
     def question(self) -> str:
         """What the sensor is asked, a clause."""
         return "nothing is asked" if self.sensor is None else self.sensor.question(self.scene.unit)
+
+    def asking(self, sensor: Sensor | None) -> Synthesis:
+        """Play with another sensor on the same cells, whose images are not computed again."""
+        return _play(self, sensor, self.limits)
+
+    def save(self, path: str | Path, *, recheck: bool = True, workers: int | None = 1) -> Path:
+        """Write the certificate of a policy that was found; it gets its name once `limitsets.recheck` has confirmed it.
+
+        Parameters
+        ----------
+        path : str or Path
+            The file, replaced whole.
+        recheck : bool
+            Whether to have it checked first.
+        workers : int, optional
+            Processes that check it, as in `limitsets.recheck`.
+
+        Raises
+        ------
+        AnswerError
+            There is no policy, or it is one of throws with effects, which no recheck knows.
+        DeniedError
+            The checker does not confirm it: it is kept as NAME.denied.zip.
+        """
+        if self.found.policy is None:
+            raise AnswerError(
+                "the certificate", self.found.verdict, "of a policy that was found", "see .found"
+            )
+        return write(path, self, self.sensor, self.found.policy, recheck=recheck, workers=workers)
+
+    def denied(self, why: str) -> Synthesis:
+        """Return what is left of it where the checker denies its certificate: nothing is decided."""
+        reason = f"the checker denies it: {why}"
+        return replace(
+            self, found=replace(self.found, verdict=NOT_DECIDED, throws=-1, policy=None, reason=reason)
+        )
 
     def beliefs(self) -> list[dict[int, list[tuple[float, float]]]]:
         """Give per state of the policy where the part may lie: intervals by side [length]."""
@@ -82,12 +131,11 @@ class Synthesis(Board):
         )
 
 
-def _play(
-    board: Board, sensor: Sensor | None, throws: int, seconds: float, beliefs: int, progress: Progress
-) -> Synthesis:
+def _play(board: Board, sensor: Sensor | None, limits: Limits, progress: Progress = None) -> Synthesis:
+    own = {each.name: getattr(board, each.name) for each in fields(Board)}
     game = board.game.asking(None if sensor is None else sensor.answers(board.starts.grid))
-    found = search(game, board.starts.mask, throws, seconds=seconds, beliefs=beliefs, progress=progress)
-    return Synthesis(**{**vars(board), "game": game}, sensor=sensor, found=found)
+    found = search(game, board.starts.mask, **limits._asdict(), progress=progress)
+    return Synthesis(**{**own, "game": game}, sensor=sensor, limits=limits, found=found)
 
 
 def feedback(
@@ -102,6 +150,7 @@ def feedback(
     noise: Mapping[str, str] | None = None,
     seconds: float = 60.0,
     beliefs: int = 400_000,
+    cuts: Sequence[float] = (),
     progress: Progress = None,
 ) -> Synthesis:
     """Look for a policy: which throw on which answer of a sensor of one bit.
@@ -133,6 +182,8 @@ def feedback(
         The most time for the search [s].
     beliefs : int
         The most beliefs to remember.
+    cuts : sequence of float
+        Further borders of cells [length], such as the places of sensors that `Synthesis.asking` will try.
     progress : callable, optional
         Told the step, its number and how many there are.
 
@@ -161,25 +212,13 @@ def feedback(
     """
     chosen = load(scene) if isinstance(scene, str) else scene
     asked = _sensor_of(chosen, sensor)
-    cuts = [] if not isinstance(asked, BeyondSensor) else [asked.x - asked.error, asked.x + asked.error]
-    board = board_of(chosen, mode, goal, starts, cells, noise, cuts, progress)
-    return _play(board, asked, throws, seconds, beliefs, progress)
+    own = asked.cuts if isinstance(asked, BeyondSensor) else ()
+    board = board_of(chosen, mode, goal, starts, cells, noise, (*cuts, *own), progress)
+    return _play(board, asked, Limits(throws, seconds, beliefs), progress)
 
 
 def places(
-    scene: Scene | str,
-    at: Sequence[float],
-    *,
-    error: float = 0.0,
-    mode: str = "stop",
-    goal: tuple[float, int] | None = None,
-    starts: Starts = None,
-    throws: int = 30,
-    cells: int = 1024,
-    noise: Mapping[str, str] | None = None,
-    seconds: float = 60.0,
-    beliefs: int = 400_000,
-    progress: Progress = None,
+    scene: Scene | str, at: Sequence[float], *, error: float = 0.0, progress: Progress = None, **options: Any
 ) -> tuple[Synthesis, ...]:
     """Try the sensor "is the part beyond x?" at several places; the images of the cells are computed once.
 
@@ -189,7 +228,7 @@ def places(
         The places [length].
     error : float
         The sensor's error [length].
-    scene, mode, goal, starts, throws, cells, noise, seconds, beliefs, progress
+    scene, progress, **options
         As in `feedback`; the time is that for each place.
 
     Returns
@@ -197,13 +236,16 @@ def places(
     tuple of Synthesis
         One for each place.
     """
-    chosen = load(scene) if isinstance(scene, str) else scene
-    board = board_of(chosen, mode, goal, starts, cells, noise, at, progress)
-    found = []
-    for k, x in enumerate(at):
+    sensors = [BeyondSensor(x, error) for x in at]
+    found: list[Synthesis] = []
+    for k, sensor in enumerate(sensors):
         if progress is not None:
             progress("places of the sensor", k, len(at))
-        found.append(_play(board, BeyondSensor(x, error), throws, seconds, beliefs, None))
+        if found:
+            found.append(found[0].asking(sensor))
+        else:
+            cuts = [cut for each in sensors for cut in each.cuts]
+            found.append(feedback(scene, sensor, **{**options, "cuts": cuts}))
     return tuple(found)
 
 

@@ -26,7 +26,7 @@ from limitsets.proofs.cover import Cover, targets
 from limitsets.scene.units import spelled_plainly
 from limitsets.thrower import Energy, Exact, Signed, SmallAngle, SmallAngle2
 
-__all__ = ["arrays_of", "pack", "tidy", "write"]
+__all__ = ["arrays_of", "brackets", "pack", "tidy", "write"]
 
 FORMAT, VERSION = "limitsets-proof", 2
 
@@ -47,20 +47,25 @@ FORMULAS = [
 ]
 
 
+def brackets(found: Cover) -> NDArray[np.float64]:
+    """Brackets of the impact angle, shape (n_cells, 2), widened by the slack."""
+    phi = np.concatenate([images.witness for images in found.images], axis=1).T
+    slack = SLACK * np.abs(phi)
+    return np.stack([phi[:, 0] - slack[:, 0], phi[:, 1] + slack[:, 1]], axis=1)
+
+
 def arrays_of(proof: Attraction, prefix: str) -> dict[str, NDArray[Any]]:
     """Arrays of one box of parameters."""
     found = proof.cover
     jog, flip = targets(found, 0), targets(found, 1)
     jogs, flips = jog[:, 0] >= 0, flip[:, 0] >= 0
-    phi = np.concatenate([images.witness for images in found.images], axis=1).T
-    slack = SLACK * np.abs(phi)
     arrays: dict[str, NDArray[Any]] = {
         "jog": jog,
         "flip": flip,
         "branch": np.where(jogs & flips, 2, np.where(flips, 1, 0)).astype(np.int8),
         "rank": proof.basin.rank,
         "component": proof.component,
-        "phi": np.stack([phi[:, 0] - slack[:, 0], phi[:, 1] + slack[:, 1]], axis=1),
+        "phi": brackets(found),
     }
     _say_nothing(arrays, found)
     for side, (edges,) in enumerate(found.grid.edges):

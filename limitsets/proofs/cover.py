@@ -23,7 +23,7 @@ from limitsets.maps import kind_of
 from limitsets.proofs.fixed_point import FixedPoint, fixed_points
 from limitsets.proofs.parameters import ParameterBox
 
-__all__ = ["Cover", "cover", "everywhere", "targets"]
+__all__ = ["Cover", "cover", "cover_on", "everywhere", "targets"]
 
 # Share of a side's extent that is left to the argument near the joint.
 NEAREST = 1e-6
@@ -119,12 +119,18 @@ def cover(
     for side, (edges,) in enumerate(plain.edges):
         wanted = [x for x in (cuts or {}).get(side, ()) if edges[0] < x < edges[-1]]
         sides.append((np.union1d(edges, wanted),))
-    cells_of = Grid(plain.domain, tuple(sides))
+    return cover_on(box, Grid(plain.domain, tuple(sides)), pieces, points)
+
+
+def cover_on(
+    box: ParameterBox, cells: Grid, pieces: int | None = None, points: tuple[FixedPoint, ...] = ()
+) -> Cover:
+    """Enclose the images of cells that are given; `pieces` as in `cover`, `points` where the cells begin there."""
     found = tuple(
         _widened(enclosures(box.lo, box.hi, edges, side, pieces), edges, box.landing)
-        for side, (edges,) in enumerate(sides)
+        for side, (edges,) in enumerate(cells.edges)
     )
-    return Cover(box, cells_of, found, _graph(box, cells_of, found), points)
+    return Cover(box, cells, found, _graph(box, cells, found), points)
 
 
 def _graph(box: ParameterBox, cells: Grid, found: Sequence[Enclosures]) -> TransitionGraph:

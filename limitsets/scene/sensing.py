@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
+from collections.abc import Mapping
 from dataclasses import dataclass
+from decimal import Decimal
+from fractions import Fraction
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,9 +19,28 @@ if TYPE_CHECKING:
     from limitsets.cells import Grid
     from limitsets.scene.schema import FeedbackTable, SensorTable
 
-__all__ = ["BeyondSensor", "ChosenThrow", "Feedback", "Sensor", "SideSensor", "resolve_feedback"]
+__all__ = [
+    "BeyondSensor",
+    "ChosenThrow",
+    "Feedback",
+    "Sensor",
+    "SideSensor",
+    "exact_text",
+    "resolve_feedback",
+]
 
 Mask = NDArray[np.bool_]
+
+
+def exact_text(x: float) -> str:
+    """Write a float in full, so that no digit of it is lost."""
+    return f"{Decimal(x):f}"
+
+
+def _below(x: Fraction) -> float:
+    """Give the largest float that is not above."""
+    nearest = float(x)
+    return nearest if Fraction(nearest) <= x else math.nextafter(nearest, -math.inf)
 
 
 class Sensor(ABC):
@@ -26,6 +49,10 @@ class Sensor(ABC):
     @abstractmethod
     def question(self, unit: str) -> str:
         """Say what is asked, a clause."""
+
+    @abstractmethod
+    def as_text(self, unit: str) -> Mapping[str, str | int]:
+        """Write it as a scene does."""
 
     @abstractmethod
     def answers(self, grid: Grid) -> dict[str, Mask]:
@@ -51,6 +78,16 @@ class BeyondSensor(Sensor):
     x: float
     error: float = 0.0
 
+    @property
+    def cuts(self) -> tuple[float, float]:
+        """The largest floats not above s - error and s + error; between them either answer may come."""
+        place, error = Fraction(self.x), Fraction(repr(self.error))
+        return _below(place - error), _below(place + error)
+
+    def as_text(self, unit: str) -> dict[str, str]:
+        """Write it as a scene does: the place exactly, the error as decimals are read."""
+        return {"beyond": f"{exact_text(self.x)} {unit}", "error": f"{self.error!r} {unit}"}
+
     def question(self, unit: str) -> str:
         """Say what is asked, a clause."""
         more = f" (to {self.error:g} {unit})" if self.error else ""
@@ -58,14 +95,11 @@ class BeyondSensor(Sensor):
 
     def answers(self, grid: Grid) -> dict[str, Mask]:
         """Give the cells in which the answer may be yes, x > s - error, and those in which it may be no."""
-        lowest, highest = self.x - self.error, self.x + self.error
+        lowest, highest = self.cuts
         ends = [(edges[:-1], edges[1:]) for (edges,) in grid.edges]
-        below, above = np.nextafter(lowest, -np.inf), np.nextafter(highest, np.inf)
-        if not self.error:
-            below, above = lowest, highest  # nothing was rounded
         return {
-            "yes": np.concatenate([hi > below for _, hi in ends]),
-            "no": np.concatenate([lo <= above for lo, _ in ends]),
+            "yes": np.concatenate([hi > lowest for _, hi in ends]),
+            "no": np.concatenate([lo <= highest for lo, _ in ends]),
         }
 
     def read(self, x: Any, side: Any, offset: Any) -> Any:
@@ -84,6 +118,10 @@ class SideSensor(Sensor):
     """
 
     side: int
+
+    def as_text(self, unit: str) -> dict[str, int]:
+        """Write it as a scene does."""
+        return {"side": self.side}
 
     def question(self, unit: str) -> str:
         """Say what is asked, a clause."""

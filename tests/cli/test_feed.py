@@ -50,7 +50,7 @@ def test_the_certificate_is_written_and_rechecked(capfd):
     assert "feeds: the arm ends at x = 20.5 in" in out
     assert "feeds: PROVED" in out
     code, out, _ = run(capfd, "feed", file, *quick, "--no-recheck", "--json")
-    assert json.loads(out)["certificate"] == {"file": "fed.proof.zip", "denied": None, "recheck": None}
+    assert json.loads(out)["certificate"] == {"file": "fed.proof.zip", "denied": False, "recheck": None}
 
 
 def test_what_the_checker_denies_is_undecided(capfd, monkeypatch):

@@ -106,6 +106,38 @@ def test_the_files_can_be_run_by_a_controller(capfd):
         assert made <= max(int(row["left"]) for row in rows)
 
 
+def test_a_certificate_is_written_and_confirmed(capfd):
+    pytest.importorskip("flint", reason="the checker needs python-flint")
+    code, out, _ = run(capfd, "feedback", SCENE, *FEW, "--certificate", "one.proof.zip")
+    assert code == 0
+    assert "certificate: one.proof.zip, rechecked in" in out
+    code, out, _ = run(capfd, "recheck", "one.proof.zip")
+    assert code == 0
+    assert "policy: from every start named the part is brought to lie on side 2 at x >= 20 in" in out
+    assert out.splitlines()[-1] == "PROVED"
+    words = ("feedback", SCENE, *FEW, "--certificate", "two.proof.zip", "--no-recheck", "--json")
+    code, out, _ = run(capfd, *words)
+    assert code == 0
+    assert json.loads(out)["certificate"] == {"file": "two.proof.zip", "denied": False, "recheck": None}
+    code, out, _ = run(capfd, *words[:-3], "no.proof.zip", "--throws", "1")
+    assert code == 1
+    assert "no certificate is written: there is no policy" in out
+    assert not Path("no.proof.zip").exists()
+
+
+def test_what_the_checker_denies_is_not_solved(capfd, monkeypatch):
+    pytest.importorskip("flint", reason="the checker needs python-flint")
+    from limitsets.policies import writing
+
+    right = writing.brackets
+    monkeypatch.setattr(writing, "brackets", lambda cover: right(cover) * [0.999, 0.9995])
+    code, out, _ = run(capfd, "feedback", SCENE, *FEW, "--certificate", "one.proof.zip")
+    assert code == 1
+    assert "the checker denies the certificate: it is kept as one.denied.zip" in out
+    assert "not decided: the checker denies it" in out
+    assert sorted(path.name for path in Path().iterdir()) == [SCENE, "one.denied.zip"]
+
+
 def test_no_policy_is_exit_1(capfd):
     code, out, _ = run(
         capfd, "feedback", SCENE, "--cells", "128", "--blind", "--throws", "3", "--csv", "t.csv"

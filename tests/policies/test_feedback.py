@@ -160,7 +160,8 @@ def test_cells_hold_the_images_of_their_points(scene):
 
 def test_a_certificate_of_a_scene_with_feedback_is_about_its_own_throw(scene, tmp_path):
     pytest.importorskip("flint", reason="the checker needs python-flint")
-    proof = ls.certify(scene, ["invariant"])
+    proof = ls.certify(scene, ["invariant", "end-points"])
+    assert proof.proved
     proof.save(tmp_path / "own.proof.zip")
     assert ls.recheck(tmp_path / "own.proof.zip").verdict == "proved"
 

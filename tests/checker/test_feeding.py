@@ -168,19 +168,22 @@ def test_scattered_landings(scattered, tmp_path):
     assert throws[x >= 6.0].max() <= 400
 
 
+@pytest.fixture
 def made_up(scattered):
     """Cells and scene to which a made-up map is given."""
+    import flint
+
     f = ending(scattered, {})
-    scene = checker.scene.read_scene(f.header["boxes"][0]["scene"], f.header["noise"])
     names = ("jog", "flip", "branch", "rank", "component", "phi")
     edges = [f.arrays[f"0.edges.{i}"] for i in range(3)]
-    return checker.file.Cells(edges, *(f.arrays[f"0.{name}"] for name in names)), scene
+    with flint.ctx.workprec(checker.balls.PRECISION):
+        scene = checker.scene.read_scene(f.header["boxes"][0]["scene"], f.header["noise"])
+        yield checker.file.Cells(edges, *(f.arrays[f"0.{name}"] for name in names)), scene
 
 
-@pytest.mark.usefixtures("precision")
-def test_what_lands_before_the_first_cell_is_thrown_on(scattered):
+def test_what_lands_before_the_first_cell_is_thrown_on(made_up):
     """All cells are thrown to a place of no harm, one that is near the first border to another side."""
-    c, scene = made_up(scattered)
+    c, scene = made_up
     quiet, near, back = 400, 9, int(np.flatnonzero(c.rank >= 0)[0])
     c.jog[:], c.flip[:] = quiet, -1
     c.jog[near], c.jog[0], c.rank[0] = int(c.start[1]) - 1, [0, 0], -1
@@ -196,10 +199,9 @@ def test_what_lands_before_the_first_cell_is_thrown_on(scattered):
     assert np.flatnonzero(bad).tolist() == [back + 200]
 
 
-@pytest.mark.usefixtures("precision")
-def test_what_may_leave_does_not_arrive(scattered):
+def test_what_may_leave_does_not_arrive(made_up):
     """All cells are thrown beyond the end but one, which is thrown to the first border, from where all are."""
-    c, scene = made_up(scattered)
+    c, scene = made_up
     c.jog[:], c.flip[:], c.rank[:] = int(c.start[3]) - 5, -1, 0
     c.jog[40], c.rank[40] = [0, 0], -1
     c.jog[50] = 40

@@ -1,0 +1,615 @@
+"""Certificates of policies: confirmed as they are written, and denied where a field says more than is true."""
+
+import io
+import json
+import subprocess
+import sys
+import zipfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+pytest.importorskip("flint", reason="the checker needs python-flint")
+
+import limitsets as ls
+from limitsets.errors import AnswerError
+from limitsets.policies import Policy, broken, places
+from limitsets.policies.enclosed_starts import not_within
+from limitsets.policies.writing import write
+from limitsets.proofs.confirm import DeniedError
+from limitsets.scene.sensing import BeyondSensor, SideSensor
+from tests.proofs.forge import Forged
+
+BUILD = Path(__file__).resolve().parents[2] / "limitsets" / "checker" / "build.py"
+FAST = "27.57073926 in"  # 110 % of the part's own speed: kappa over 1.21
+FEW = {2: (17.0, 18.0)}
+CAVITY = {"position": "20 in", "width": "9.3 in", "depth": "5.8633 in", "angle": "32.23 deg"}
+
+
+def scene_with(name="paper-initial", *, fast=None, **tables):
+    tree = ls.load(name).as_dict() | tables
+    fast = {"kappa": FAST} if fast is None else fast
+    tree["feedback"] = {
+        "sensor": {"beyond": "20 in"},
+        "throws": [{"name": "own", **tree["throw"]}, {"name": "fast", **fast}],
+    }
+    return ls.load(tree)
+
+
+def opened(file):
+    """A certificate that can be spoiled and sealed again."""
+    with zipfile.ZipFile(file) as whole:
+        header = json.loads(whole.read("header.json"))
+        with np.load(io.BytesIO(whole.read("arrays.npz"))) as arrays:
+            return Forged(header, dict(arrays))
+
+
+@pytest.fixture(scope="module")
+def known(tmp_path_factory):
+    """Policies and their certificates: asked "beyond 20 in?", with an error and noise, and in a cavity."""
+    folder, cells = tmp_path_factory.mktemp("policies"), {"starts": FEW, "cells": 256}
+    found = {
+        "stop": ls.feedback(scene_with(), **cells),
+        "noisy": ls.feedback(
+            scene_with(),
+            BeyondSensor(19.0, 0.02),
+            noise={"throw.speed": "0.1 %"},
+            **cells,
+        ),
+        "catch": ls.feedback(
+            scene_with(cavity=CAVITY), SideSensor(2), mode="catch", **cells | {"cells": 512}
+        ),
+    }
+    files = {name: each.save(folder / f"{name}.proof.zip") for name, each in found.items()}
+    return {name: (found[name], opened(file)) for name, file in files.items()}
+
+
+def verdict_of(forged, tmp_path):
+    report = ls.recheck(forged.seal().write(tmp_path / "forged.proof.zip"))
+    return report.verdict, report.reason
+
+
+# ------------------------------------------------------------------------------ as they are written
+
+
+@pytest.mark.parametrize(
+    ("sensor", "options"),
+    [
+        (None, {}),  # the policies of the study on one bit
+        (SideSensor(2), {"mode": "catch"}),
+        (None, {"starts": 16.0}),
+        (SideSensor(2), {"starts": 16.0, "mode": "catch"}),
+        (None, {"noise": {"throw.speed": "0.1 %"}}),
+        (None, {"noise": {"landing.x": "0.005 in"}, "throws": 40}),
+        (BeyondSensor(20.1), {"goal": (20.1, 2), "starts": FEW}),  # 20.1 is no float
+        (BeyondSensor(19.0, 0.1), {"starts": FEW}),
+    ],
+)
+def test_what_is_found_is_confirmed(tmp_path, sensor, options):
+    found = ls.feedback(scene_with(), sensor, **{"cells": 1024} | options)
+    assert found.solved
+    assert broken(found.found.policy, found.game, found.starts.mask) == ""
+    report = ls.recheck(found.save(tmp_path / "x.proof.zip"))
+    assert (report.verdict, report.claims, report.reason) == ("proved", [("policy", "proved", "")], "")
+    assert f"after {found.found.throws} throws at most" in report.statement[0]
+    assert report.cells == found.grid.n_cells
+    assert f"states of the policy: {found.found.policy.states}" in report.statement
+
+
+def test_one_throw_by_hand(tmp_path):
+    """From 19.4 and 19.5 on side 2 the part's own throw jogs beyond 20, as its map says, and not from 18."""
+    scene = scene_with()
+    beyond = [float(ls.orbit(scene.map, x, 2, 1).x[1]) >= 20.0 for x in (18.0, 19.4, 19.5)]
+    assert beyond == [False, True, True]
+    found = ls.feedback(scene, "none", starts={2: (19.4, 19.5)}, cells=128)
+    file = found.save(tmp_path / "hand.proof.zip")
+    report = ls.recheck(file)
+    assert report.statement[0].endswith(
+        "is brought to lie on side 2 at x >= 20 in, and the controller, which stops then, knows it, after 1 throws at"
+        " most (an upper bound)"
+    )
+    assert report.statement[1:] == [
+        "starts: side 2: [19.4000000, 19.5]",
+        "throws to choose from: own: kappa = 33.3605945 in; fast: kappa = 27.57073926 in",
+        "asked before the first throw and after each: nothing",
+        "states of the policy: 2",
+    ]
+    forged = opened(file)
+    begin, end = forged.arrays["edges.2"][0], forged.arrays["edges.2"][-1]
+    assert begin < 18.0 < end
+    forged.header["claims"][0]["section"]["starts"] = [[2, (18.0).hex(), (18.0).hex()]]
+    offset = sum(forged.arrays[f"edges.{side}"].size - 1 for side in (0, 1))
+    cell = offset + int(np.searchsorted(forged.arrays["edges.2"], 18.0, side="right")) - 1
+    forged.arrays["belief"][0, 1:] = cell, cell
+    cover = found.covers["own"]
+    jog = offset + np.searchsorted(forged.arrays["edges.2"], [20.0, 28.0], side="right") - 1
+    forged.arrays["0.jog"][cell] = jog[0], offset + forged.arrays["edges.2"].size - 2
+    forged.arrays["0.phi"][cell] = cover.images[2].witness[:, cell - offset] * [1 - 1e-9, 1 + 1e-9]
+    verdict, reason = verdict_of(forged, tmp_path)
+    assert verdict == "failed"
+    assert "the image of a jog" in reason
+
+
+@pytest.mark.parametrize("name", ["paper-initial-small-angle", "by speed, metric", "scattered"])
+def test_other_scenes(tmp_path, name):
+    """Other formulas; throws given by their speed, in other units; noise that is the scene's own."""
+    if name == "by speed, metric":
+        tree = ls.load("paper-initial").as_dict()
+        speed = {"throw": {"speed": "138 deg/s"}, "gravity": {"acceleration": "193.045 in/s^2"}}
+        scene = scene_with(fast={"speed": "2.65 rad/s"}, **{"arm": tree["arm"]} | speed)
+    elif name == "scattered":
+        spread = {"effects": {"spread": "bounded"}, "world": {"scatter": {"speed": "0.05 %"}}}
+        scene = scene_with(**spread)
+    else:
+        scene = scene_with(name, fast={"kappa": "70 in"})
+    found = ls.feedback(scene, "none", goal=(20.0, 2), starts={2: (19.7, 19.75)}, cells=512, throws=8)
+    assert found.solved
+    report = ls.recheck(found.save(tmp_path / "x.proof.zip"))
+    assert (report.verdict, report.reason) == ("proved", "")
+
+
+def test_the_file_alone_confirms_it(tmp_path, known):
+    file = known["noisy"][1].write(tmp_path / "noisy.proof.zip")
+    subprocess.run([sys.executable, str(BUILD), str(tmp_path / "recheck.pyz")], check=True, cwd=tmp_path)
+    command = [sys.executable, "-I", str(tmp_path / "recheck.pyz"), str(file), "--json"]
+    answer = subprocess.run(command, check=False, capture_output=True, text=True, cwd=tmp_path)
+    report = json.loads(answer.stdout)
+    assert (answer.returncode, report["verdict"], report["claims"]) == (
+        0,
+        "proved",
+        [["policy", "proved", ""]],
+    )
+    assert report["parameters"]["noise (at every throw)"] == "throw.speed within 0.1 %"
+
+
+# ------------------------------------------------------------------------------ what a liar could change
+
+
+def section_of(forged):
+    return forged.header["claims"][0]["section"]
+
+
+def state_that(forged, *, stops=False, first=None):
+    """A state with an answer that may come (by its number), or one that stops."""
+    throw, after = forged.arrays["throw"], forged.arrays["after"]
+    good = throw < 0 if stops else (throw >= 0) & (after[:, first or 0] >= 0)
+    return int(np.flatnonzero(good)[0])
+
+
+def drop_all_cells_of(forged, state):
+    belief = forged.arrays["belief"]
+    forged.arrays["belief"] = np.ascontiguousarray(belief[belief[:, 0] != state])
+
+
+def used_cell(forged, throw=0):
+    return int(np.flatnonzero(forged.arrays[f"{throw}.jog"][:, 0] >= 0)[0])
+
+
+def a_cell_of_the_first_belief_is_dropped(f):
+    f.arrays["belief"][0, 1] += 1
+
+
+def a_belief_is_dropped(f):
+    drop_all_cells_of(f, int(f.arrays["after"][0].max()))
+
+
+def a_belief_is_moved(f):
+    f.arrays["belief"][f.arrays["belief"][:, 0] == f.arrays["after"][0].max(), 1:] += 40
+
+
+def the_sensor_stands_farther_out(f):
+    section_of(f)["scene"]["feedback"]["sensor"]["beyond"] = "20.1 in"
+
+
+def the_sensor_stands_farther_in(f):
+    section_of(f)["scene"]["feedback"]["sensor"]["beyond"] = "19.9 in"
+
+
+def the_sensor_is_worse_than_was_proved(f):
+    section_of(f)["scene"]["feedback"]["sensor"]["error"] = "0.2 in"
+
+
+def the_speed_of_a_throw_is_changed(f):
+    throws = section_of(f)["scene"]["feedback"]["throws"]
+    throws[0]["kappa"] = "33.4 in"
+
+
+def the_throws_change_their_names(f):
+    throws = section_of(f)["scene"]["feedback"]["throws"]
+    throws[0]["kappa"], throws[1]["kappa"] = throws[1]["kappa"], throws[0]["kappa"]
+
+
+def another_throw_is_made(f):
+    state = state_that(f)
+    f.arrays["throw"][state] = 1 - f.arrays["throw"][state]
+
+
+def fewer_throws_are_said_to_be_enough(f):
+    section_of(f)["within"] -= 1
+
+
+def fewer_throws_are_left(f):
+    section_of(f)["within"] -= 1
+    f.arrays["left"][0] -= 1
+
+
+def no_throw_is_left(f):
+    f.arrays["left"][:] = 0
+
+
+def the_states_go_round(f):
+    state = state_that(f, first=1)
+    f.arrays["after"][state, 1] = state
+
+
+def the_states_go_round_with_even_counts(f):
+    a_round = int(f.arrays["after"][0].max())
+    f.arrays["after"][a_round, :] = 0
+    f.arrays["left"][:] = f.arrays["left"][0]
+
+
+def the_starts_reach_farther_down(f):
+    section_of(f)["starts"][0][1] = (16.9).hex()
+
+
+def the_starts_reach_farther_up(f):
+    section_of(f)["starts"][0][2] = (18.1).hex()
+
+
+def the_starts_are_on_another_side(f):
+    section_of(f)["starts"].append([1, (17.0).hex(), (17.0).hex()])
+
+
+def the_starts_leave_the_cells(f):
+    section_of(f)["starts"][0][2] = (40.0).hex()
+
+
+def the_goal_region_begins_farther_out(f):
+    section_of(f)["goal"]["x"] = "20.5 in"
+
+
+def the_goal_region_is_on_another_side(f):
+    section_of(f)["goal"]["side"] = 1
+
+
+def the_mode_is_the_other_one(f):
+    section = section_of(f)
+    section["mode"] = "catch" if section["mode"] == "stop" else "stop"
+
+
+def an_answer_is_dropped(f):
+    f.arrays["after"][state_that(f, first=1), 1] = -1
+
+
+def an_answer_before_the_first_throw_is_dropped(f):
+    first = section_of(f)["first"]
+    first[next(word for word, state in first.items() if state is not None)] = None
+
+
+def answers_are_swapped(f):
+    f.arrays["after"] = np.ascontiguousarray(f.arrays["after"][:, ::-1])
+
+
+def more_noise_than_was_proved(f):
+    f.header["noise"] = {"throw.speed": "0.3 %"}
+
+
+def noise_of_something_else(f):
+    f.header["noise"] = (f.header["noise"] or {}) | {"landing.x": "0.01 in"}
+
+
+def it_stops_at_once(f):
+    f.arrays["throw"][0], f.arrays["after"][0] = -1, -1
+
+
+def an_image_is_narrowed(f):
+    cell = used_cell(f)
+    f.arrays["0.jog"][cell, 1] = f.arrays["0.jog"][cell, 0]
+
+
+def a_branch_is_denied(f):
+    both = (f.arrays["0.jog"][:, 0] >= 0) & (f.arrays["0.flip"][:, 0] >= 0)
+    f.arrays["0.flip"][np.flatnonzero(both)[0]] = -1
+
+
+def an_image_is_left_out(f):
+    f.arrays["0.jog"][used_cell(f)] = -1
+
+
+def an_image_on_no_side(f):
+    f.arrays["0.jog"][used_cell(f)] = 0, 10**6
+
+
+def an_angle_is_moved(f):
+    f.arrays["0.phi"][used_cell(f)] += 0.01
+
+
+def a_border_is_moved(f):
+    edges = f.arrays["edges.2"]
+    cell = int(np.searchsorted(edges, 18.0))
+    edges[cell] += 0.4 * (edges[cell + 1] - edges[cell])
+
+
+def the_part_is_another_one(f):
+    section_of(f)["scene"]["part"]["mass"]["center"]["along"] = "4.1 in"
+
+
+def the_surface_is_higher(f):
+    section_of(f)["scene"]["arm"]["surface_height"] = "-0.19 in"
+
+
+def the_arm_is_shorter(f):
+    section_of(f)["scene"]["arm"]["length"] = "19 in"
+
+
+EVERYWHERE = [
+    a_cell_of_the_first_belief_is_dropped,
+    a_belief_is_dropped,
+    a_belief_is_moved,
+    the_speed_of_a_throw_is_changed,
+    the_throws_change_their_names,
+    another_throw_is_made,
+    fewer_throws_are_said_to_be_enough,
+    fewer_throws_are_left,
+    no_throw_is_left,
+    the_states_go_round,
+    the_states_go_round_with_even_counts,
+    the_starts_reach_farther_down,
+    the_starts_reach_farther_up,
+    the_starts_are_on_another_side,
+    the_starts_leave_the_cells,
+    the_goal_region_is_on_another_side,
+    the_mode_is_the_other_one,
+    an_answer_is_dropped,
+    an_answer_before_the_first_throw_is_dropped,
+    answers_are_swapped,
+    noise_of_something_else,
+    it_stops_at_once,
+    an_image_is_narrowed,
+    a_branch_is_denied,
+    an_image_is_left_out,
+    an_image_on_no_side,
+    an_angle_is_moved,
+    a_border_is_moved,
+    the_part_is_another_one,
+    the_surface_is_higher,
+    the_arm_is_shorter,
+]
+ONLY = [
+    ("stop", the_sensor_stands_farther_out),
+    ("stop", the_sensor_stands_farther_in),
+    ("stop", the_goal_region_begins_farther_out),
+    ("noisy", the_sensor_is_worse_than_was_proved),
+    ("noisy", more_noise_than_was_proved),
+]
+
+
+@pytest.mark.parametrize(
+    ("name", "spoil"),
+    [(name, spoil) for name in ("stop", "noisy", "catch") for spoil in EVERYWHERE] + ONLY,
+    ids=lambda each: each if isinstance(each, str) else each.__name__,
+)
+def test_a_lie_is_denied(tmp_path, known, name, spoil):
+    forged = known[name][1].copy()
+    assert verdict_of(forged, tmp_path) == ("proved", "")
+    spoil(forged)
+    verdict, reason = verdict_of(forged, tmp_path)
+    assert verdict == "failed"
+    assert reason.startswith("policy: ")
+
+
+def test_where_it_is_caught_is_no_matter_of_choice(tmp_path, known):
+    """The place is that of the scene's cavity; without one, a part is not caught at 20 in but at 25 in."""
+    forged = known["catch"][1].copy()
+    section_of(forged)["goal"]["x"] = "25 in"
+    assert verdict_of(forged, tmp_path)[0] == "bad file"
+    del section_of(forged)["scene"]["cavity"]
+    verdict, reason = verdict_of(forged, tmp_path)
+    assert verdict == "failed"
+    assert "does not hold all that may be" in reason
+
+
+def test_a_wrong_side_is_not_caught_on(tmp_path, known):
+    forged = known["catch"][1].copy()
+    section_of(forged)["goal"]["side"] = 1
+    verdict, reason = verdict_of(forged, tmp_path)
+    assert verdict == "failed"
+    assert "down on a wrong side" in reason
+
+
+def test_starts_that_are_caught_at_once_are_none(tmp_path, known):
+    forged = known["catch"][1].copy()
+    section_of(forged)["starts"][0][2] = (20.5).hex()
+    verdict, reason = verdict_of(forged, tmp_path)
+    assert verdict == "failed"
+    assert "caught at once" in reason
+
+
+def test_what_goes_on_for_ever_is_no_policy(tmp_path):
+    """Every image holds: cells that the part's own throw maps into themselves, and a state that comes after itself."""
+    found = ls.feedback(scene_with(), "none", cells=256, throws=1)  # from the limit set of its own throw
+    assert not found.solved
+    forever = Policy(
+        answers=("",),
+        throws=("own", "fast"),
+        first=np.array([0]),
+        belief=found.starts.mask[None],
+        throw=np.array([0]),
+        after=np.array([[0]]),
+        left=np.array([1]),
+    )
+    file = write(tmp_path / "x.proof.zip", found, None, forever, recheck=False, workers=1)
+    report = ls.recheck(file)
+    assert (report.verdict, report.reason) == (
+        "failed",
+        "policy: state 0: the number of throws left does not fall",
+    )
+
+
+def test_what_is_weaker_is_still_true(tmp_path, known):
+    """A better sensor, less noise, a larger count, fewer starts: no lies, and the words are those of the file."""
+    forged = known["noisy"][1].copy()
+    section_of(forged)["scene"]["feedback"]["sensor"]["error"] = "0.01 in"
+    forged.header["noise"] = {"throw.speed": "0.08 %"}
+    section_of(forged)["starts"][0][1] = (17.5).hex()
+    report = ls.recheck(forged.seal().write(tmp_path / "weaker.proof.zip"))
+    assert report.verdict == "proved"
+    assert report.statement[1] == "starts: side 2: [17.5, 18]"
+    assert "0.01 in" in report.statement[3]
+    assert report.parameters["noise (at every throw)"] == "throw.speed within 0.08 %"
+
+
+def put(*path):
+    *way, last = path
+
+    def spoil(f, value):
+        node = f.header
+        for word in way:
+            node = node[word]
+        if value is None:
+            del node[last]
+        else:
+            node[last] = value
+
+    return spoil
+
+
+AT = ("claims", 0, "section")
+FEEDBACK = (*AT, "scene", "feedback")
+
+
+@pytest.mark.parametrize(
+    ("where", "value", "reason"),
+    [
+        (("claims", 0, "verdict"), "proved", "unknown key verdict"),
+        (("claims",), [{"claim": "policy"}, {"claim": "invariant", "section": {}}], "claims of a policy"),
+        (("boxes",), [{}], "no boxes"),
+        (("tolerance",), {"throw.speed": "1 %"}, "no tolerance"),
+        ((*AT, "mode"), "hold", "neither stop nor catch"),
+        ((*AT, "within"), True, "not a number of throws"),
+        ((*AT, "first"), {"yes": 0}, "no missing"),
+        ((*AT, "first", "no"), "0", "no number of a state"),
+        ((*AT, "starts"), [], "not a list of a fitting length"),
+        ((*AT, "starts"), [[2, (18.0).hex(), (17.0).hex()]], "is empty"),
+        ((*AT, "starts"), [[3, (17.0).hex(), (18.0).hex()]], "a side is not a number"),
+        ((*AT, "goal", "x"), ["19 in", "20 in"], "not one number"),
+        ((*AT, "scene", "goal"), {"stays_on_arm": True}, "a goal of its own"),
+        (FEEDBACK, None, "no feedback"),
+        ((*FEEDBACK, "throws"), [], "not a list of a fitting length"),
+        ((*FEEDBACK, "throws", 1, "name"), "own", "two throws have one name"),
+        ((*FEEDBACK, "throws", 1, "kappa"), ["27 in", "28 in"], "not one number"),
+        ((*FEEDBACK, "throws", 1, "speed"), "170 deg/s", "either kappa or speed"),
+        ((*FEEDBACK, "sensor"), None, "any missing"),
+        ((*FEEDBACK, "sensor"), {"beyond": "20 in", "side": 2}, "two questions"),
+        ((*FEEDBACK, "sensor"), {"error": "1 in"}, "asks nothing"),
+        ((*FEEDBACK, "sensor", "error"), "-0.1 in", "negative"),
+        (("map", "flight"), "small-angle", "different models"),
+    ],
+)
+def test_what_cannot_be_read(tmp_path, known, where, value, reason):
+    forged = known["stop"][1].copy()
+    put(*where)(forged, value)
+    verdict, why = verdict_of(forged, tmp_path)
+    assert verdict == "bad file"
+    assert reason in why
+
+
+@pytest.mark.parametrize(
+    ("name", "spoil"),
+    [
+        ("throw", lambda a: a[:-1]),
+        ("left", lambda a: a[:0]),
+        ("after", lambda a: np.ascontiguousarray(a[:, :1])),
+        ("belief", lambda a: a.astype(np.int64)),
+        ("0.phi", lambda a: a[:-1]),
+        ("edges.0", lambda a: a[::-1].copy()),
+        ("more", lambda _: np.zeros(3)),
+    ],
+)
+def test_arrays_that_do_not_fit(tmp_path, known, name, spoil):
+    forged = known["stop"][1].copy()
+    forged.arrays[name] = spoil(forged.arrays.get(name))
+    assert verdict_of(forged, tmp_path)[0] == "bad file"
+
+
+@pytest.mark.parametrize(
+    ("name", "spoil", "reason"),
+    [
+        ("throw", lambda a: np.where(a == 0, 2, a), "none of those to choose from"),
+        ("throw", lambda a: np.where(a == 0, -2, a), "none of those to choose from"),
+        ("after", lambda a: np.where(a == 1, 10**6, a), "a next state is none"),
+        ("left", lambda a: a - 30, "negative"),
+        ("belief", lambda a: a[::-1], "order of the states"),
+        ("belief", lambda a: a + np.array([1000, 0, 0]), "no state"),
+        ("belief", lambda a: a + np.array([0, 0, 10**6]), "cells that are none"),
+        ("belief", lambda a: a * np.array([1, 1, -1]), "cells that are none"),
+    ],
+)
+def test_numbers_of_nothing(tmp_path, known, name, spoil, reason):
+    forged = known["stop"][1].copy()
+    forged.arrays[name] = np.ascontiguousarray(spoil(forged.arrays[name]).astype(np.int32))
+    verdict, why = verdict_of(forged, tmp_path)
+    assert verdict == "failed"
+    assert reason in why
+
+
+# ------------------------------------------------------------------------------ writing
+
+
+def test_nothing_is_written_without_a_policy_or_of_effects(tmp_path):
+    found = ls.feedback(scene_with(), "none", starts=FEW, cells=64, throws=1)
+    with pytest.raises(AnswerError, match="not-solved"):
+        found.save(tmp_path / "x.proof.zip")
+    scene = scene_with(effects={"landing": True}, world={"friction": 0.3, "restitution": 0.1})
+    found = ls.feedback(scene, "none", starts={2: (19.4, 19.5)}, cells=128)
+    assert found.solved
+    with pytest.raises(AnswerError, match="with effects"):
+        found.save(tmp_path / "x.proof.zip")
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_policy_that_is_denied_is_not_decided(tmp_path, monkeypatch):
+    from limitsets.policies import writing
+
+    right = writing.brackets
+    monkeypatch.setattr(writing, "brackets", lambda cover: right(cover) * [0.999, 0.9995])
+    found = ls.feedback(scene_with(), starts=FEW, cells=256)
+    with pytest.raises(DeniedError, match="phi") as denied:
+        found.save(tmp_path / "x.proof.zip")
+    assert [path.name for path in tmp_path.iterdir()] == ["x.denied.zip"]
+    left = found.denied(denied.value.claims["policy"])
+    assert (left.found.verdict, left.found.policy, left.solved) == ("not-decided", None, False)
+    assert "the checker denies it" in left.found.reason
+
+
+def test_a_cavity_is_where_parts_are_caught():
+    scene = scene_with(cavity=CAVITY | {"position": "20.5 in"})
+    with pytest.raises(AnswerError, match=r"caught is 20\.0.*20\.5 in, where the arm ends"):
+        ls.feedback(scene, SideSensor(2), mode="catch", starts=FEW, cells=64)
+    found = ls.feedback(scene, SideSensor(2), mode="catch", goal=(20.5, 2), starts=FEW, cells=64, throws=1)
+    assert found.goal == (20.5, 2)
+    assert ls.feedback(scene, starts=FEW, cells=64, throws=1).goal == (20.0, 2)  # nothing is caught in stop
+
+
+def test_other_sensors_on_the_same_images():
+    """`places` and `asking` find what `feedback` finds with the same borders of cells."""
+    sensors = [BeyondSensor(x, 0.05) for x in (18.0, 20.0)]
+    cuts = [cut for each in sensors for cut in each.cuts]
+    tried = places(scene_with(), [18.0, 20.0], error=0.05, starts=FEW, cells=256)
+    for sensor, each in zip(sensors, tried, strict=True):
+        alone = ls.feedback(scene_with(), sensor, starts=FEW, cells=256, cuts=cuts)
+        assert (each.sensor, each.found.verdict, each.found.throws) == (
+            sensor,
+            alone.found.verdict,
+            alone.found.throws,
+        )
+    assert tried[1].covers is tried[0].covers
+    assert places(scene_with(), []) == ()
+
+
+def test_single_starts_bound_what_the_certificate_claims(known):
+    """No policy of fewer throws than two serves these starts: the count of the certificate is not below it."""
+    found, forged = known["stop"]
+    shown = not_within(found, [(17.0, 2), (17.5, 2), (17.9, 2)], 3)
+    assert 0 <= shown.throws < section_of(forged)["within"]
