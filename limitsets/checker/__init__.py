@@ -30,6 +30,8 @@ The files follow docs/certificates.md, and each imports only from those before i
     end_points   end points of the limit set                                      10 to 12
     orbits       periodic orbits                                                  13
     refutations  orbits that refute a goal                                        "Refutations"
+    arm_end      what can be reached before the end of the arm                    17
+    feeding      what comes to rest beyond it                                     "Feeding"
     region       one cell of a plane of parameters                                "Regions"
     plane        a plane of parameters in cells, and its regions
     policy       a policy for a sensor of one bit                                 "Policies"
