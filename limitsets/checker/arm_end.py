@@ -128,14 +128,12 @@ def leading_off(end: ArmEnd) -> Array:
     return leaves
 
 
-def share_of(end: ArmEnd, scene: Scene, some: Array, near: list[bool]) -> float:
-    """Bound from below the share of the starts x < X in some cells, and before the first cells of some sides."""
+def share_of(end: ArmEnd, scene: Scene, some: Array) -> float:
+    """Bound from below the share of the starts x < X in some cells."""
     x, claimed, whole = float_below(exact(end.x)), 0.0, 0.0
     for i, (s, edges) in enumerate(zip(scene.sides, end.c.edges, strict=True)):
         own = some[end.c.start[i] : end.c.start[i + 1]]
         widths = np.clip(np.minimum(edges[1:], x) - edges[:-1], 0.0, None)
-        claimed += float(widths[own].sum()) + (
-            max(0.0, float(edges[0]) - float_above(s.a)) if near[i] else 0.0
-        )
+        claimed += float(widths[own].sum())
         whole += float_above(exact(end.x)) - float_below(s.a)
     return claimed / whole * (1 - 2.0**-30)  # against the rounding of these sums

@@ -93,7 +93,7 @@ def check_safety(end: ArmEnd, scene: Scene, feeds: dict[str, Any]) -> tuple[str,
                 return f"side {i}, before the first cell: {what}", none
         feeds["shares"]["safety"] = 1.0
         return first_bad(end.c, [(safe | end.fed, what)]), safe
-    feeds["shares"]["safety"] = share_of(end, scene, safe, [not gap for gap in gaps])
+    feeds["shares"]["safety"] = share_of(end, scene, safe)
     whole = end.c.upper() <= float_below(exact(end.x))  # not the cell that X lies in
     feeds["safe"] = extents(end.c, safe & whole, inward=True)
     return "", safe
@@ -158,7 +158,7 @@ def share_from(end: ArmEnd, scene: Scene, since: list[float] | None) -> float:
     if since is None:
         return 1.0
     some = np.concatenate([edges[:-1] >= x for edges, x in zip(end.c.edges, since, strict=True)])
-    return share_of(end, scene, some, [False] * len(since))
+    return share_of(end, scene, some)
 
 
 def check_shown(end: ArmEnd, scene: Scene, feeds: dict[str, Any]) -> str:
