@@ -30,16 +30,18 @@ The files follow docs/certificates.md, and each imports only from those before i
     end_points   end points of the limit set                                      10 to 12
     orbits       periodic orbits                                                  13
     refutations  orbits that refute a goal                                        "Refutations"
+    arm_end      what can be reached before the end of the arm                    17
+    feeding      what comes to rest beyond it                                     "Feeding"
     region       one cell of a plane of parameters                                "Regions"
     plane        a plane of parameters in cells, and its regions
     policy       a policy for a sensor of one bit                                 "Policies"
     beliefs      its table                                                        "Tables of a policy"
     claims       the claims of a file, and what each needs
-    speeds       throws whose speed deviates                                      17, 18
-    averages     means over a throw's deviations, in floats                       19, 20
-    chain        one step of a bound                                              21
-    links        the throws of a noisy chain, cell by cell                        17 to 20
-    chances      brackets of probabilities                                        "Probabilities", 21
+    speeds       throws whose speed deviates                                      18, 19
+    averages     means over a throw's deviations, in floats                       20, 21
+    chain        one step of a bound                                              22
+    links        the throws of a noisy chain, cell by cell                        18 to 21
+    chances      brackets of probabilities                                        "Probabilities", 22
     report       a file from first to last, and the report about it
     main         the command line
 """

@@ -1,6 +1,6 @@
 """The mean of a function after a throw with even noise, bounded for every start: the arithmetic of one step in floats.
 
-docs/certificates.md, "Probabilities", numbers 19 (means at nodes) and 20 (between nodes).  A function V is continuous
+docs/certificates.md, "Probabilities", numbers 20 (means at nodes) and 21 (between nodes).  A function V is continuous
 and affine between nodes.  With e the scatter of the landing, W(y) is the mean of V on [y - e, y + e] and
 W'(y) = (V(y + e) - V(y - e))/(2 e), affine between the places node + e and node - e.
 """

@@ -118,14 +118,14 @@ def check_ranks(c: Cells, scene: Scene, max_rank: int) -> str:
     return first_bad(c, checks)
 
 
-def extents(c: Cells) -> str:
-    """List the attracting cells as intervals, for people."""
+def extents(c: Cells, some: Array, *, inward: bool = False) -> str:
+    """List some cells as intervals, for people, rounded outward or inward."""
     parts = []
     for i, edges in enumerate(c.edges):
-        own = np.concatenate([[False], c.component[c.start[i] : c.start[i + 1]] >= 0, [False]])
+        own = np.concatenate([[False], some[c.start[i] : c.start[i + 1]], [False]])
         ends = np.flatnonzero(np.diff(own.astype(np.int8)))
         spans = [
-            f"[{rounded(edges[a], up=False)}, {rounded(edges[b], up=True)}]"
+            f"[{rounded(edges[a], up=inward)}, {rounded(edges[b], up=not inward)}]"
             for a, b in ends.reshape(-1, 2)[:6]
         ]
         more = " ..." if len(ends) > 12 else ""

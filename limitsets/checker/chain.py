@@ -1,6 +1,6 @@
 """One throw of a bound: what the cells of a noisy chain need, and the step from one function to the next.
 
-docs/certificates.md, "Probabilities", numbers 19 to 21.  The mean of V after a throw is bounded at the nodes; on a cell
+docs/certificates.md, "Probabilities", numbers 20 to 22.  The mean of V after a throw is bounded at the nodes; on a cell
 it lies above the chord by the least of the deficits that are proved there, and by what is not decided.
 """
 

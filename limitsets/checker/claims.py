@@ -10,6 +10,7 @@ import numpy as np
 
 from .cells import Crew, check_components, check_ranks, check_structure, tasks_of
 from .end_points import check_ends, ends_statement, read_ends
+from .feeding import FEEDS_KEYS, check_feeds, feeds_statement, read_feeds
 from .file import Cells
 from .goals import GOALS, check_goal, read_goal_claim, statement_of_goal
 from .near_hinge import check_below_cells, fixed_points_in_words, read_near_hinge
@@ -27,8 +28,9 @@ SECTIONS = {  # the known claims, and the keys of their sections
     "end-points": "images ends pieces",
     "cycles": "cycles complete",
     "refuted": "goal nominal tolerance",
+    "feeds": "side",
 }
-MORE_KEYS = {"refuted": "recurs start throws"}  # further keys that a section may have
+MORE_KEYS = {"refuted": "recurs start throws", "feeds": FEEDS_KEYS}  # further keys that a section may have
 Failed = tuple[list[str], str]  # the claims that fail, and the reason
 
 
@@ -73,6 +75,8 @@ def read_section(name: str, section: dict[str, Any], n_sides: int) -> dict[str, 
         return read_orbits(section, n_sides)
     if name == "refuted":
         return read_refutation(section, n_sides)
+    if name == "feeds":
+        return read_feeds(section, n_sides)
     return {}
 
 
@@ -80,11 +84,14 @@ def check_box_claims(
     scene: Scene, c: Cells, box: int, claims: dict[str, dict[str, Any]], crew: Crew
 ) -> list[Failed]:
     """Check all claims for one box; return those that fail, with the reason."""
-    if "refuted" not in claims:
-        return check_cell_claims(scene, c, box, claims, crew)
-    bad = check_refuted(scene, claims["refuted"])
-    failed = [(["refuted"], bad)] if bad else []
-    others = {name: section for name, section in claims.items() if name != "refuted"}
+    failed: list[Failed] = []
+    if "refuted" in claims:
+        bad = check_refuted(scene, claims["refuted"])
+        failed += [(["refuted"], bad)] if bad else []
+    if "feeds" in claims:
+        bad = check_feeds(scene, c, box, claims["feeds"], crew)
+        failed += [(["feeds"], bad)] if bad else []
+    others = {name: section for name, section in claims.items() if name not in ("refuted", "feeds")}
     return failed + (check_cell_claims(scene, c, box, others, crew) if others else [])
 
 
@@ -181,6 +188,8 @@ def statement_of(name: str, section: dict[str, Any], noisy: bool) -> str:
         return orbits_statement(section)
     if name == "refuted":
         return statement_of_refutation(section)
+    if name == "feeds":
+        return feeds_statement(section, noisy)
     if name == "trapping":
         return "trapping: the attracting cells are mapped into their interior (relative to x <= arm.length)"
     return "invariant: no throw leaves the attracting cells, nor the component it starts in"

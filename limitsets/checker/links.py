@@ -1,6 +1,6 @@
 """The throws of a noisy chain, proved cell by cell in balls: from the laws and the nodes to what a step needs.
 
-docs/certificates.md, "Probabilities", numbers 17 to 20.
+docs/certificates.md, "Probabilities", numbers 18 to 21.
 """
 
 import itertools

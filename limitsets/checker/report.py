@@ -18,6 +18,7 @@ from .beliefs import check_policy
 from .cells import Crew, extents
 from .chances import Chances, chances_in_words, check_chances, holds_chances, read_chances
 from .claims import check_box_claims, read_claims, statement_of
+from .feeding import verdict_of_feeds
 from .file import Cells, open_certificate, read_cells
 from .goals import content_of_goal, goal_of_scene
 from .model import FORMULAS
@@ -64,6 +65,7 @@ class Report:
     share: float | None = None
     explained: float | None = None
     open: float | None = None
+    fed: dict[str, float] | None = None  # of feeds: shares of the arm for whose starts each part is proved
     area: dict[str, float] | None = None  # of a plane: the shares that are proved, refuted and undecided
     statement: list[str] = field(default_factory=list)
     parameters: dict[str, str] = field(default_factory=dict)
@@ -308,6 +310,8 @@ def failed_at_once(file: Certificate, gap: str, own: dict[str, Any] | None) -> d
         failed["cycles"] = "the orbit of the one throw is not that of the other: not with noise"
     if not all(side.landing <= 0 for scene in file.scenes for side in scene.sides) and "end-points" in claims:
         failed["end-points"] = "the landing place moves at every throw: not with noise of it"
+    if "feeds" in claims and (file.tolerance is not None or len(file.scenes) > 1):
+        failed["feeds"] = "it is about one scene: not with a tolerance"
     for name in {"goal", "refuted"} & set(claims):
         goal = claims[name].get("goal", claims[name])
         if own is not None and content_of_goal(goal) != content_of_goal(own):
@@ -317,7 +321,9 @@ def failed_at_once(file: Certificate, gap: str, own: dict[str, Any] | None) -> d
 
 def work_of(file: Certificate) -> int:
     """Count the cells whose throws are checked, for the progress bar."""
-    everywhere = "attracts-all" in file.claims or file.claims.get("goal", {}).get("all", False)
+    everywhere = bool({"attracts-all", "feeds"} & set(file.claims)) or file.claims.get("goal", {}).get(
+        "all", False
+    )
     ranked = "goal" in file.claims and file.version > 1
     return sum(
         len(c.side) if everywhere else int(((c.component >= 0) | (ranked & (c.rank >= 0))).sum())
@@ -349,14 +355,24 @@ def conclude(report: Report, file: Certificate, failed: dict[str, str], own: dic
         if "attracts-all" in failed and not claims["goal"]["all"]:
             claims["goal"].pop("found", None)
         tell_starts(report, claims["goal"], file.scenes, file.cells)
+    if "feeds" in claims and "feeds" not in failed:
+        shares_fed = claims["feeds"]["shares"].items()
+        report.fed = {name: math.floor(share * 1e6) / 1e6 for name, share in shares_fed}
     noisy = file.noise is not None
     report.statement = [statement_of(name, section, noisy) for name, section in claims.items()]
-    if set(claims) - {"refuted"}:  # a refutation does not speak of the cells: they are not checked for it
+    if set(claims) - {
+        "refuted",
+        "feeds",
+    }:  # these do not speak of attracting cells, which are not checked for them
         which = " (first box)" if len(file.cells) > 1 else ""
-        report.statement.append(f"attracting cells: {extents(file.cells[0])}{which}")
+        report.statement.append(
+            f"attracting cells: {extents(file.cells[0], file.cells[0].component >= 0)}{which}"
+        )
     if own is not None and not {"goal", "refuted"} & set(claims):
         report.statement.append("of the scene's own goal nothing is claimed")
-    report.claims = [(name, *state_of(report, name, failed)) for name in claims] + file.unknown
+    report.claims = [
+        (name, *state_of(report, name, section, failed)) for name, section in claims.items()
+    ] + file.unknown
     report.verdict = verdict_of([state for _, state, _ in report.claims])
     report.reason = next((f"{name}: {why}" for name, state, why in report.claims if why), "")
 
@@ -368,12 +384,14 @@ def verdict_of(states: list[str]) -> str:
     return next((word for word in ("refuted", "proved-on-cells") if word in states), "proved")
 
 
-def state_of(report: Report, name: str, failed: dict[str, str]) -> tuple[str, str]:
+def state_of(report: Report, name: str, section: dict[str, Any], failed: dict[str, str]) -> tuple[str, str]:
     """Say what became of a claim, a word of `WORDS`, and why."""
     if failed.get(name):
         return "failed", failed[name]
     if name == "refuted":
         return "refuted", ""
+    if name == "feeds":
+        return verdict_of_feeds(section, MOST_OPEN)
     if name == "goal" and (report.starts == "cells" or (report.open or 0.0) > MOST_OPEN):
         return "proved-on-cells", on_cells_in_words(report)
     return "proved", ""

@@ -61,6 +61,7 @@ class Scene:
     unit: str
     raw: dict[str, Any] = field(default_factory=dict)  # the JSON of the scene
     noise: object = None  # the JSON of the noise
+    end: Fraction | None = None  # where the arm ends in a cavity; landings are followed up to arm.length
     loose: float = 0.0  # the widths of all sides' enclosures together; 0 where `halves` cannot narrow them
     parts: "dict[tuple[str, int], list[Scene]]" = field(default_factory=dict)  # known halves
 
@@ -173,9 +174,21 @@ def read_scene(raw: object, noise: object) -> Scene:
         sides.append(side)
     require(all(bool(k_lo > side.small_d) for side in sides), "small-angle-2 needs kappa > d")
     whole = Scene(sides, k_lo, k_hi, rho, ends, reach.unit, scene, noise)
+    whole.end = read_end(scene.get("cavity"), unit)
     if whole.cuts():
         whole.loose = sum(float(ball.rad()) for s in sides for ball in (s.a, s.d, s.h, s.shift, whole.rho))
     return whole
+
+
+def read_end(cavity: object, unit: Fraction) -> Fraction | None:
+    """Read where the arm ends, in the unit of arm.length; what the cavity is like beyond is not looked at."""
+    if cavity is None:
+        return None
+    end = quantity(
+        table(cavity, "cavity", "position width depth angle")["position"], "length", "cavity.position"
+    )
+    require(end.lo == end.hi > 0, "cavity.position is not one number above 0")
+    return end.lo / unit
 
 
 def read_model(value: object) -> tuple[str, str]:

@@ -1,6 +1,6 @@
 """Throws whose speed deviates: where they land, how that changes with place and speed, and where they flip.
 
-docs/certificates.md, "Probabilities", numbers 17 (landings) and 18 (the border).  The speed w (1 + delta) has kappa =
+docs/certificates.md, "Probabilities", numbers 18 (landings) and 19 (the border).  The speed w (1 + delta) has kappa =
 kappa_0/(1 + delta)^2.  The impact angle p of a start x solves x = P(p), P(p) = kappa p/2 + S(p), and a jog ends at
 T = x + D(p); with kappa > ell there is one solution, which rises with x and with delta.
 """

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from limitsets.cli.arguments import deviations
+from limitsets.cli.arguments import HELP_NO_RECHECK, deviations
+from limitsets.cli.certificates import certified, said_of
 from limitsets.cli.output import Json, Scene, Words, answer, opened, option, progress, table
 
 if TYPE_CHECKING:
@@ -54,7 +55,11 @@ def feed(
     out: Annotated[
         Path | None, option("--out -o", "DIR", "Write feeding.json and feeding.png there.")
     ] = None,
+    certificate: Annotated[
+        Path | None, option("--certificate", "FILE", "Write the proofs' certificate, NAME.proof.zip.")
+    ] = None,
     json: Json = False,
+    no_recheck: Annotated[bool, typer.Option("--no-recheck", help=HELP_NO_RECHECK)] = False,
 ) -> None:
     """Say which side is fed from the end of the arm, from which starts, how surely and how fast.
 
@@ -78,18 +83,24 @@ def feed(
             brackets=brackets,
             progress=tell,
         )
+        written = None
+        if certificate is not None:
+            tell("recheck", 0, 1)
+            again = not no_recheck
+            found, written = certified(found, certificate, "feeds", proved=found.written, recheck=again)
+        record = found.to_json() | {"certificate": written}
         files = []
         if out is not None:
             from limitsets import plot
             from limitsets.files import as_json
             from limitsets.report.writing import laid
 
-            files = laid(out, [("feeding", plot.feeding(found))], lambda _: {"feeding.json": as_json(found)})
-    answer(found, json, lambda: _text(found, files))
+            files = laid(out, [("feeding", plot.feeding(found))], lambda _: {"feeding.json": as_json(record)})
+    answer(record, json, lambda: _text(found, files, written))
     raise typer.Exit(0 if no_proof or found.proved else 1)
 
 
-def _text(found: Feeding, files: list[Path]) -> None:
+def _text(found: Feeding, files: list[Path], written: dict[str, Any] | None) -> None:
     from limitsets.feeding.trials import binomial_interval
 
     end, unit = found.end, found.end.scene.unit
@@ -124,6 +135,8 @@ def _text(found: Feeding, files: list[Path]) -> None:
         )
     if found.curve is not None:
         typer.echo(found.curve.line())
+    if written is not None:
+        typer.echo(said_of(written, "nothing is proved, or of a map with effects, which nothing rechecks"))
     if files:
         typer.echo(f"written: {', '.join(map(str, files))}")
 

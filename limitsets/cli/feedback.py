@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from limitsets.cli.arguments import HELP_NO_RECHECK, deviations, place
+from limitsets.cli.certificates import certified, said_of
 from limitsets.cli.output import Json, Scene, Words, answer, opened, option, progress, saved, table
 from limitsets.errors import LimitsetsError
 
@@ -79,7 +79,8 @@ def feedback(
         written = None
         if certificate is not None:
             tell("recheck", 0, 1)
-            found, written = _certified(found, certificate, recheck=not no_recheck)
+            again = not no_recheck
+            found, written = certified(found, certificate, "policy", proved=found.solved, recheck=again)
         thrown = simulate(found, parts) if found.solved else None
         record = found.to_json() | {
             "certificate": written,
@@ -96,23 +97,6 @@ def feedback(
             draft.write_text(policy.csv(), encoding="utf-8", newline="\n")
     answer(record, json, lambda: _text(found, tried, thrown, out, written))
     raise typer.Exit(0 if found.solved else 1)
-
-
-def _certified(found: Synthesis, file: Path, *, recheck: bool) -> tuple[Synthesis, dict[str, Any]]:
-    """Write the certificate; what is left where the checker denies it, and what is said of the file."""
-    from limitsets.proofs.confirm import DeniedError
-
-    if not found.solved:
-        return found, {"file": None, "denied": False, "recheck": None}
-    begin = time.perf_counter()
-    with saved(file) as draft:
-        try:
-            found.save(draft, recheck=recheck, workers=None)
-        except DeniedError as error:
-            kept = str(file.with_name(Path(error.file or "").name))
-            return found.denied(error.claims["policy"]), {"file": kept, "denied": True, "recheck": None}
-    seconds = time.perf_counter() - begin if recheck else None
-    return found, {"file": str(file), "denied": False, "recheck": seconds}
 
 
 def _goal_at(scene: Any, x: float) -> tuple[float, int]:
@@ -200,7 +184,7 @@ def _text(
     typer.echo(_verdict(found))
     policy = found.found.policy
     if written is not None:
-        typer.echo(_said(written))
+        typer.echo(said_of(written, "there is no policy"))
     if out is not None:
         typer.echo(
             f"written to {out}: feedback.json" + ("" if policy is None else ", policy.csv, policy.png")
@@ -219,16 +203,6 @@ def _text(
         typer.echo(
             f"thrown: {thrown.reached} of {thrown.parts} came, in {thrown.mean:.3g} throws on average{more}"
         )
-
-
-def _said(written: dict[str, Any]) -> str:
-    file, seconds = written["file"], written["recheck"]
-    if file is None:
-        return "no certificate is written: there is no policy"
-    if written["denied"]:
-        return f"the checker denies the certificate: it is kept as {file}"
-    done = "not rechecked" if seconds is None else f"rechecked in {seconds:.2g} s"
-    return f"certificate: {file}, {done} (check it: limitsets recheck {file})"
 
 
 def _verdict(found: Synthesis) -> str:

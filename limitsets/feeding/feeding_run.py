@@ -11,9 +11,10 @@ from limitsets.errors import AnswerError
 from limitsets.feeding.bracketing import fate_brackets
 from limitsets.feeding.falling import ArmEnd, arm_end_of, clear_beyond, time_to_tip
 from limitsets.feeding.fed_shares import Curve, FedShares, FeedingProblem, success_curve
-from limitsets.feeding.proving import proved_feeding
+from limitsets.feeding.proving import FeedingProof, proved_feeding
 from limitsets.feeding.trials import Trials, run_trials
 from limitsets.feeding.verdicts import Fed, Safe
+from limitsets.feeding.writing import holds, write_proof
 from limitsets.files import as_table, picked
 from limitsets.robust.brackets.result import AbsorptionBrackets
 from limitsets.robust.noise.scattering import Scattering, scattering_of
@@ -37,10 +38,9 @@ class Feeding:
         Where the arm ends, the side wanted, and how far beyond the end a part on it clears the wall.
     clear : dict of int to tuple of (float, float)
         The same of every side: intervals of the distance beyond the end [length].
-    safe : Safe or None
-        Which sides can be fed from which starts, proved; None where it was not asked for.
-    fed : Fed or None
-        Whether every start is fed, and after how many throws, proved.
+    proof : FeedingProof or None
+        Which sides can be fed from which starts, whether every start is fed and after how many throws, and the cells;
+        None where it was not asked for.
     noise : dict of str to str
         What differs at every throw in these proofs, and by how much.
     scatter : Scattering
@@ -59,8 +59,7 @@ class Feeding:
 
     end: ArmEnd
     clear: dict[int, tuple[tuple[float, float], ...]]
-    safe: Safe | None
-    fed: Fed | None
+    proof: FeedingProof | None
     noise: dict[str, str]
     scatter: Scattering
     shares: FedShares
@@ -68,6 +67,16 @@ class Feeding:
     curve: Curve | None
     trials: Trials
     brackets: AbsorptionBrackets | None = None
+
+    @property
+    def safe(self) -> Safe | None:
+        """Which sides can be fed from which starts, proved; None where it was not asked for."""
+        return None if self.proof is None else self.proof.safe
+
+    @property
+    def fed(self) -> Fed | None:
+        """Whether every start is fed, and after how many throws, proved; None where it was not asked for."""
+        return None if self.proof is None else self.proof.fed
 
     @property
     def tipping(self) -> dict[int, float] | None:
@@ -86,6 +95,43 @@ class Feeding:
         if self.safe is None or self.fed is None:
             return False
         return self.safe.verdict == "proved" and "proved" in (self.fed.verdict, self.fed.almost_every)
+
+    @property
+    def written(self) -> bool:
+        """Whether a certificate can hold something of the proof: not of a map with effects, that nothing rechecks."""
+        return self.proof is not None and holds(self.proof, self.end)
+
+    def save(self, path: str | Path, *, recheck: bool = True, workers: int | None = 1) -> Path:
+        """Write the certificate of what is proved; it gets its name once `recheck` has confirmed it.
+
+        Parameters
+        ----------
+        path : str or Path
+            The file, replaced whole.
+        recheck : bool
+            Whether to have it checked first.
+        workers : int, optional
+            Processes that check it, as in `limitsets.recheck`.
+
+        Raises
+        ------
+        AnswerError
+            Nothing is proved, or it is proved of a map that no recheck knows.
+        DeniedError
+            The checker does not confirm it: it is kept as NAME.denied.zip, and what it holds is undecided.
+        """
+        if self.proof is None:
+            remedy = "ask for the proof: prove=True"
+            raise AnswerError("the certificate", "without a proof", "safety or progress", remedy)
+        return write_proof(path, self.proof, self.end, recheck=recheck, workers=workers)
+
+    def denied(self, reason: str) -> Feeding:
+        """Return what is left of it where the checker denies the certificate: safety and progress are undecided."""
+        if self.proof is None:
+            return self
+        safe = Safe("undecided", {}, {}, 0.0, self.proof.safe.leaving)
+        fed = Fed("undecided", None, {}, 0.0, reason=f"the checker denies it: {reason}")
+        return replace(self, proof=self.proof._replace(safe=safe, fed=fed))
 
     def to_json(self) -> dict[str, Any]:
         """Give it as JSON takes it: docs/json.md."""
@@ -192,7 +238,7 @@ def feed(
         scatter = Scattering() if read.effects.spread is None else scattering_of(read)
     # normal deviations have no bound, so that nothing holds for every sequence: the proofs are of the still scene then
     proved = end if read.effects.spread != "gaussian" else replace(end, scene=still(read))
-    safe, fed = proved_feeding(proved, noise, progress=progress) if prove else (None, None)
+    proof = proved_feeding(proved, noise, progress=progress) if prove else None
     problem = FeedingProblem.of(end, cells, strata)
     if progress is not None:
         progress("probabilities", 0, 3)
@@ -202,8 +248,7 @@ def feed(
     return Feeding(
         end,
         {number: clear_beyond(read, number) for number in range(len(read.sides))},
-        safe,
-        fed,
+        proof,
         dict(noise or {}),
         scatter,
         shares,

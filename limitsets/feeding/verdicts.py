@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 from limitsets.files import as_table, picked
@@ -81,8 +81,12 @@ class Fed:
         For which starts that is proved: "almost-every", or those beyond some x, ``{"from": {"0": x}}``.
     almost_share : float
         Their share of the starts on the arm.
+    thinning : int
+        Rounds within which the other starts are proved to thin out; 0 where that is not asked or not proved.
     never_fed : tuple of State
         A periodic orbit before the end of the arm, proved; empty where none was found.
+    cycle : mapping
+        The same as a certificate has it; empty where nothing rechecks it.
     reason : str
         What is missing, empty if nothing.
     """
@@ -94,7 +98,9 @@ class Fed:
     almost_every: str | None = None
     almost_from: Any = None
     almost_share: float = 0.0
+    thinning: int = 0
     never_fed: tuple[State, ...] = ()
+    cycle: Mapping[str, Any] = field(default_factory=dict)
     reason: str = ""
 
     def lines(self, unit: str) -> list[str]:

@@ -13,16 +13,14 @@ from numpy.typing import NDArray
 from limitsets.errors import AnswerError, DataError
 from limitsets.fitting.fit_result import Fit, Fitted, Scatter, fitted_scene
 from limitsets.fitting.further import further_throws
-from limitsets.fitting.likelihood import SCATTERS, Likelihood, whitened
+from limitsets.fitting.likelihood import SCATTERS, Likelihood
 from limitsets.fitting.maximising import Maximum
-from limitsets.fitting.misfit import NAMED, Misfit, misfit
-from limitsets.fitting.predicting import predicted
+from limitsets.fitting.misfit import misfit_of
 from limitsets.fitting.rows import Rows, as_recorded
 from limitsets.fitting.searching import LEVEL, largest, profiles, threshold_of
 from limitsets.fitting.starting import (
     RADIUS,
     Start,
-    jacobian,
     robust_start,
     spread_of,
     units_of_change,
@@ -35,8 +33,6 @@ __all__ = ["fit"]
 
 # Differences of readings of one place from which an error of measurement is taken.
 READ_TWICE = 10
-# Of the misfit test: scatters up to so many robust ones, and how many of them are tried.
-WIDEST, SIZES = 1.5, 16
 # A scatter this small beside the end of its interval is none.
 NOTHING = 1e-3
 
@@ -192,7 +188,7 @@ def _answer(
         landing,
         float(np.mean(own.rows.error)) if own.rows.known else None,
         *_misread(own.rows, len(scene.sides)),
-        _misfit(scene, start),
+        misfit_of(scene, start),
         misses,
         sizes,
         more,
@@ -201,30 +197,6 @@ def _answer(
         best,
         threshold,
     )
-
-
-def _misfit(scene: Scene, start: Start) -> Misfit:
-    """Test the model by the robust fit: the most likely machine leans towards throws that no machine makes."""
-    rows = start.rows
-    points = {name: np.array([value]) for name, value in zip(start.names, start.values, strict=True)}
-    told = predicted(scene, points, rows.throws.x_before, rows.side, rows.branch)
-    slopes = jacobian(scene, rows, start.names, start.values, units_of_change(scene, start.names))
-    # of speed and of landings: the scatter that is most likely for the landings that are not far off
-    sizes = start.spread * np.linspace(0.0, WIDEST, SIZES)
-    per_share = max(float(np.median(np.abs(told.per_log_speed))), 1e-12)
-    speed, landing = (each.reshape(-1, 1) for each in np.meshgrid(sizes / per_share, sizes))
-    landing = np.hypot(landing, 1e-7 * scene.arm_length)
-    tried = whitened(rows, told, speed, landing)
-    loss = np.minimum(tried.residual**2, NAMED**2) + tried.log_variance
-    k = [int(np.argmin(loss.sum(axis=1)))]
-
-    def white(miss: Array | None) -> Array:
-        found: Array = whitened(rows, told, speed[k], landing[k], miss).residual[0]
-        return found
-
-    columns = np.stack([white(column[None]) for column in slopes.T], axis=1)
-    throws = rows.throws
-    return misfit(white(None), columns, 2 * rows.side + rows.branch, throws.x_before, throws.row)
 
 
 def _misread(

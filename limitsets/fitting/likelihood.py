@@ -63,7 +63,7 @@ def whitened(
     variance, covariance = _variances(rows, told, speed, landing)
     residual = rows.throws.x_after - told.after if miss is None else miss
     if covariance.any():
-        residual, variance = residual.copy(), variance.copy()
+        residual, variance = (each.copy() for each in np.broadcast_arrays(residual, variance))
         for k in np.flatnonzero(rows.throws.shared):  # LDL^T of a matrix with one band
             share = covariance[:, k] / variance[:, k - 1]
             variance[:, k] -= share * covariance[:, k]

@@ -12,7 +12,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["LEVEL", "NAMED", "Misfit", "misfit"]
+from limitsets.fitting.likelihood import whitened
+from limitsets.fitting.predicting import predicted
+from limitsets.fitting.starting import Start, jacobian, units_of_change
+from limitsets.scene import Scene
+
+__all__ = ["LEVEL", "Misfit", "misfit", "misfit_of"]
 
 LEVEL = 0.05
 DRAWS = 1999
@@ -26,6 +31,8 @@ ROUNDS = 8
 NOTHING = 1e-9
 # Beyond so many robust standard deviations a row is named.
 NAMED = 3.5
+# Scatters up to so many robust ones, and how many of them are tried.
+WIDEST, SIZES = 1.5, 16
 
 Array = NDArray[np.float64]
 
@@ -56,6 +63,30 @@ class Misfit:
     def lacking(self) -> bool:
         """Whether the data hold something that the model lacks."""
         return self.p < LEVEL
+
+
+def misfit_of(scene: Scene, start: Start) -> Misfit:
+    """Test the model by the robust fit: the most likely machine leans towards throws that no machine makes."""
+    rows = start.rows
+    points = {name: np.array([value]) for name, value in zip(start.names, start.values, strict=True)}
+    told = predicted(scene, points, rows.throws.x_before, rows.side, rows.branch)
+    slopes = jacobian(scene, rows, start.names, start.values, units_of_change(scene, start.names))
+    # of speed and of landings: the scatter that is most likely for the landings that are not far off
+    sizes = start.spread * np.linspace(0.0, WIDEST, SIZES)
+    per_share = max(float(np.median(np.abs(told.per_log_speed))), 1e-12)
+    speed, landing = (each.reshape(-1, 1) for each in np.meshgrid(sizes / per_share, sizes))
+    landing = np.hypot(landing, 1e-7 * scene.arm_length)
+    tried = whitened(rows, told, speed, landing)
+    loss = np.minimum(tried.residual**2, NAMED**2) + tried.log_variance
+    k = [int(np.argmin(loss.sum(axis=1)))]
+
+    def white(miss: Array | None) -> Array:
+        found: Array = whitened(rows, told, speed[k], landing[k], miss).residual[0]
+        return found
+
+    columns = np.stack([white(column[None]) for column in slopes.T], axis=1)
+    throws = rows.throws
+    return misfit(white(None), columns, 2 * rows.side + rows.branch, throws.x_before, throws.row)
 
 
 def misfit(

@@ -19,7 +19,7 @@ from limitsets.proofs.goals import State, rechecked
 from limitsets.scene import Scene
 from limitsets.scene.quantities import text_at
 
-__all__ = ["KINDS", "write_refutation"]
+__all__ = ["KINDS", "thrown_orbit", "write_refutation"]
 
 KINDS = ("cycle", "closed", "once")
 """Why an orbit refutes, where a certificate can say it."""
@@ -39,7 +39,7 @@ def _goal(goal: Goal, scene: Scene) -> dict[str, Any]:
     return words
 
 
-def _throws(states: Sequence[State], recurs: Mapping[str, Any], varies: bool) -> dict[str, Any]:
+def thrown_orbit(states: Sequence[State], recurs: Mapping[str, Any], varies: bool) -> dict[str, Any]:
     """Give the start and the throws, of a closed orbit from its exact state on."""
     states = list(states)
     throws = [
@@ -110,7 +110,7 @@ def write_refutation(
         "tolerance": dict(within),
     }
     if kind != "cycle":
-        section |= _throws(states, recurs, box.kappa_varies)
+        section |= thrown_orbit(states, recurs, box.kappa_varies)
     write(
         path,
         [found],

@@ -66,7 +66,7 @@ def resolved(structure: object, file: str | None) -> dict[str, Any]:
         "world": world,
         "effects": resolve_effects(table.effects, world, table.model.flight, resolver),
         "tolerance": _tolerance(tree, table, resolver),
-        "feedback": _feedback(table, len(body.sides), resolver, gravity=gravity is not None),
+        "feedback": _feedback(table, len(body.sides), arm_length, resolver, gravity=gravity is not None),
         "file": file,
         "text": tree,
     }
@@ -93,7 +93,9 @@ def _tolerance(tree: Tree, table: SceneTable, resolver: Resolver) -> dict[str, D
     return scales
 
 
-def _feedback(table: SceneTable, count: int, resolver: Resolver, *, gravity: bool) -> Feedback | None:
+def _feedback(
+    table: SceneTable, count: int, arm_length: float, resolver: Resolver, *, gravity: bool
+) -> Feedback | None:
     if table.feedback is None:
         return None
-    return resolve_feedback(table.feedback, count, resolver, gravity=gravity)
+    return resolve_feedback(table.feedback, count, arm_length, resolver, gravity=gravity)

@@ -91,6 +91,6 @@ def resolve_cavity(
             "the depth of the cavity",
             table.depth,
             allowed,
-            "the ramp is longer than the cavity",
+            "the ramp is longer than the cavity: make it less deep, or wider",
         )
     return Cavity(position, width, depth, angle)

@@ -173,8 +173,10 @@ class Feedback:
     sensor: Sensor | None = None
 
 
-def resolve_feedback(table: FeedbackTable, count: int, resolver: Resolver, *, gravity: bool) -> Feedback:
-    """Resolve ``[feedback]`` for a part with `count` sides."""
+def resolve_feedback(
+    table: FeedbackTable, count: int, arm_length: float, resolver: Resolver, *, gravity: bool
+) -> Feedback:
+    """Resolve ``[feedback]`` for a part with `count` sides on an arm of this length."""
     throws: list[ChosenThrow] = []
     for k, each in enumerate(table.throws):
         key = f"feedback.throws[{k}]"
@@ -193,11 +195,11 @@ def resolve_feedback(table: FeedbackTable, count: int, resolver: Resolver, *, gr
             remedy = "a speed needs it: add [gravity], or give kappa"
             raise resolver.refusal(f"{key}.speed", "the gravity", "missing", "a table [gravity]", remedy)
         throws.append(ChosenThrow(each.name, f"throw.{word}", text))
-    sensor = None if table.sensor is None else _sensor(table.sensor, count, resolver)
+    sensor = None if table.sensor is None else _sensor(table.sensor, count, arm_length, resolver)
     return Feedback(tuple(throws), sensor)
 
 
-def _sensor(table: SensorTable, count: int, resolver: Resolver) -> Sensor:
+def _sensor(table: SensorTable, count: int, arm_length: float, resolver: Resolver) -> Sensor:
     key, named = "feedback.sensor", [word for word in ("beyond", "side") if getattr(table, word) is not None]
     if len(named) != 1:
         found = " and ".join(named) or "none"
@@ -212,8 +214,9 @@ def _sensor(table: SensorTable, count: int, resolver: Resolver) -> Sensor:
         return SideSensor(table.side)
     assert table.beyond is not None
     x = resolver.value(table.beyond, "length", f"{key}.beyond")
-    if x < 0:
-        raise resolver.refusal(f"{key}.beyond", "the sensor's place", table.beyond, "from 0", "correct it")
+    if not 0 <= x <= arm_length:
+        allowed = f"from 0 to the arm's length, {arm_length:.9g} {resolver.unit}"
+        raise resolver.refusal(f"{key}.beyond", "the sensor's place", table.beyond, allowed, "correct it")
     error = 0.0 if table.error is None else resolver.value(table.error, "length", f"{key}.error")
     if error < 0:
         raise resolver.refusal(f"{key}.error", "the sensor's error", table.error, "0 or more", "correct it")

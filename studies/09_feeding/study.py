@@ -53,7 +53,7 @@ class Case(NamedTuple):
         """By side the x from which on almost every start is proved to be fed."""
         if not self.named:
             return None
-        fed = proved_feeding(arm_end_of(self.scene), self.noise)[1]
+        fed = proved_feeding(arm_end_of(self.scene), self.noise).fed
         return {int(side): x for side, x in fed.almost_from["from"].items()}
 
 

@@ -98,7 +98,7 @@ def test_1e8_throws_meet_the_brackets(name, x, scatter, cells, counts, throws, t
 
 def test_the_mean_of_a_normal_law_cut_at_six_sigma_lies_in_its_bracket(table):
     noise = Scattering(speed=Gaussian(0.005), landing=Gaussian(0.02))
-    found = absorption_brackets("paper-designed", noise, right=(20.5, 2), cells=8000, throws=2)
+    found = absorption_brackets("paper-designed", noise, right=(20.5, 2), cells=4000, throws=2)
     solved = noise_statistics("paper-designed", noise, goal=(20.5, 2), sensitivity=False, cells=2048)
     print(f"mean: operator {solved.numbers['mean throws']:.5f}, proved {found.mean}")
     table.append(limit("mean of the normal law, bracket's width", found.mean[1] - found.mean[0], "", None))

@@ -14,7 +14,7 @@ from tests.fitting.test_fit import PLACES
 
 pytestmark = pytest.mark.bench
 
-MACHINES, FILMS = 1000, 200
+MACHINES, FILMS = 1000, 1000
 # 99 % of the counts of 1000 intervals of 95 %; at a bound, and of what decisions alone tell, they hold more often.
 LEAST, MOST = 932, 966
 

@@ -234,6 +234,12 @@ def fewer_throws_are_left(f):
     f.arrays["left"][0] -= 1
 
 
+def every_count_is_one_less(f):
+    """Nothing comes after the throw that catches the part: only its own count says that there is one."""
+    section_of(f)["within"] -= 1
+    f.arrays["left"][f.arrays["throw"] >= 0] -= 1
+
+
 def no_throw_is_left(f):
     f.arrays["left"][:] = 0
 
@@ -352,6 +358,7 @@ EVERYWHERE = [
     another_throw_is_made,
     fewer_throws_are_said_to_be_enough,
     fewer_throws_are_left,
+    every_count_is_one_less,
     no_throw_is_left,
     the_states_go_round,
     the_states_go_round_with_even_counts,

@@ -39,6 +39,40 @@ def test_json_alone_and_noise(capfd):
     assert table["success"]["wanted"] == 0.95
 
 
+def test_the_certificate_is_written_and_rechecked(capfd):
+    file = written("paper-designed", position="20.5 in")
+    quick = ("--trials", "50", "--cells", "32", "--certificate", "fed.proof.zip")
+    code, out, _ = run(capfd, "feed", file, *quick)
+    assert code == 0
+    assert "certificate: fed.proof.zip, rechecked in" in out
+    code, out, _ = run(capfd, "recheck", "fed.proof.zip")
+    assert code == 0
+    assert "feeds: the arm ends at x = 20.5 in" in out
+    assert "feeds: PROVED" in out
+    code, out, _ = run(capfd, "feed", file, *quick, "--no-recheck", "--json")
+    assert json.loads(out)["certificate"] == {"file": "fed.proof.zip", "denied": False, "recheck": None}
+
+
+def test_what_the_checker_denies_is_undecided(capfd, monkeypatch):
+    """It is kept, and the command says so."""
+    from limitsets.feeding import writing
+
+    file, right = written("paper-designed"), writing.section_of
+
+    def too_few(proof, end):
+        section = right(proof, end)
+        return section | {"progress": section["progress"] | {"throws": 5}}
+
+    monkeypatch.setattr(writing, "section_of", too_few)
+    quick = ("--trials", "50", "--cells", "32", "--certificate", "fed.proof.zip")
+    code, out, _ = run(capfd, "feed", file, *quick)
+    assert code == 1
+    assert "progress: UNDECIDED, the checker denies it: side 0, cell" in out
+    assert "the checker denies the certificate: it is kept as fed.denied.zip" in out
+    assert Path("fed.denied.zip").exists()
+    assert not Path("fed.proof.zip").exists()
+
+
 def test_not_proved_is_exit_1(capfd):
     code, out, _ = run(capfd, "feed", written("paper-initial"), "--trials", "50", "--cells", "32")
     assert code == 1

@@ -97,6 +97,15 @@ def test_the_floor_by_hand():
     assert farthest_clear(scene, scene.cavity, 2) == pytest.approx(floor, rel=1e-9)
 
 
+def test_a_corner_that_overhangs_meets_the_floor_by_hand():
+    """The corner at (5, 1) is beyond the side's own right one, at 2: flush on 45 deg it lies (5 - 1) / sqrt(2) deep."""
+    corners = [["0 in", "0 in"], ["2 in", "0 in"], ["5 in", "1 in"]]
+    mass = {"center": {"side": 0, "along": "1.95 in", "above": "0.25 in"}, "radius_of_gyration": "1 in"}
+    part = {"vertices": corners, "mass": mass}
+    scene = with_cavity(tables={"part": part}, width="30 in", depth="2.5 in", angle="45 deg")
+    assert farthest_clear(scene, scene.cavity, 0) == pytest.approx(2.5 * math.sqrt(2.0) + 1.0 - (5.0 - 1.95))
+
+
 def test_what_feeding_needs_is_asked_for():
     with pytest.raises(AnswerError, match=r"without \[cavity\]"):
         ls.feed("paper-designed")

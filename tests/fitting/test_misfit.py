@@ -8,6 +8,9 @@ from scipy.stats import binom
 
 import limitsets as ls
 from limitsets.fitting import Throws
+from limitsets.fitting.misfit import misfit_of
+from limitsets.fitting.rows import as_recorded
+from limitsets.fitting.starting import robust_start
 from limitsets.maps import advance
 from tests.fitting.machines import film, machine
 from tests.proofs.forge import scene
@@ -51,35 +54,50 @@ def spoiled_film(draw, effect, strange=5, n=50):
     return one, Throws(x + noise[0], side, to + noise[1], on, np.full(n, ERROR), np.zeros(n, bool), rows)
 
 
+def lacking(scene, throws):
+    """Ask the test alone, without intervals."""
+    return misfit_of(scene, robust_start(scene, as_recorded(throws, throws.error, True, 3))).lacking
+
+
 def told_apart(effect, count, seed):
     draw = np.random.default_rng(seed)
-    return sum(ls.fit(*spoiled_film(draw, effect)).misfit.lacking for _ in range(count))
+    return sum(lacking(*spoiled_film(draw, effect)) for _ in range(count))
+
+
+def rejected(count, seed, **how):
+    draw, given = np.random.default_rng(seed), ls.load(scene("designed"))
+    return sum(lacking(given, film(draw, machine(draw), **how)) for _ in range(count))
 
 
 @pytest.mark.parametrize("effect", ["roll", "slip"])
 def test_a_machine_with_an_effect_is_told_apart(effect):
     # of a power of 90 % fewer than this come once in a thousand times
-    assert told_apart(effect, 6, seed=21) >= binom.ppf(1e-3, 6, 0.9)
+    assert told_apart(effect, 20, seed=21) >= binom.ppf(1e-3, 20, 0.9)
+
+
+def test_a_machine_without_one_is_left_alone():
+    assert rejected(20, seed=23) <= binom.ppf(0.9999, 20, 0.05)
 
 
 @pytest.mark.sweep
 @pytest.mark.parametrize("effect", ["roll", "slip"])
 def test_the_power_is_90_percent(effect):
-    assert told_apart(effect, 100, seed=22) >= 90
-
-
-def rejected(count, seed):
-    draw, given = np.random.default_rng(seed), ls.load(scene("designed"))
-    return sum(ls.fit(given, film(draw, machine(draw))).misfit.lacking for _ in range(count))
-
-
-def test_a_machine_without_one_is_left_alone():
-    assert rejected(10, seed=23) <= binom.ppf(0.9999, 10, 0.05)
+    assert told_apart(effect, 400, seed=22) >= 360
 
 
 @pytest.mark.sweep
-def test_the_level_is_5_percent():
-    assert rejected(200, seed=24) <= binom.ppf(0.999, 200, 0.05)
+@pytest.mark.parametrize("flipped", [0.0, 0.05])
+def test_the_level_is_5_percent(flipped):
+    assert rejected(400, seed=24, flipped=flipped) <= binom.ppf(0.999, 400, 0.05)
+
+
+@pytest.mark.parametrize("effect", [None, "roll", "slip"])
+def test_the_fit_asks_the_same_test(effect):
+    draw = np.random.default_rng(27)
+    given = ls.load(scene("designed"))
+    one, throws = spoiled_film(draw, effect) if effect else (given, film(draw, machine(draw)))
+    found = ls.fit(one, throws).misfit
+    assert found.lacking == lacking(one, throws) == (effect is not None)
 
 
 def test_rows_that_land_far_off_are_named():

@@ -78,6 +78,11 @@ TABLE: list[tuple[dict[str, Any], str, str]] = [
         "feedback.sensor.beyond",
         "from 0",
     ),
+    (
+        {"feedback": {"throws": [OWN], "sensor": {"beyond": "90 in"}}},
+        "feedback.sensor.beyond",
+        "to the arm's length",
+    ),
     ({"feedback": {"throws": [OWN], "sensor": {"side": 3}}}, "feedback.sensor.side", "0 to 2"),
     (
         {"feedback": {"throws": [OWN], "sensor": {"side": 1, "beyond": "2 in"}}},

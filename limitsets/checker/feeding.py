@@ -1,0 +1,240 @@
+"""Feeding: on which side parts come to rest at X or beyond, where the arm ends, and that they do.
+
+docs/certificates.md, "Feeding", and number 17.
+"""
+
+import math
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from .arm_end import ArmEnd, arm_end, freed, late_within, leading_off, share_of, unsafe_starts
+from .balls import Array, UnprovedError, exact, float_below, prove
+from .cells import Crew, check_structure, extents, first_bad, tasks_of
+from .file import Cells
+from .near_hinge import check_thrown_out
+from .orbits import read_orbits
+from .refutations import periodic, read_passing, thrown_again
+from .scene import Scene
+from .starts import MOST_COUNTED
+from .texts import by_side, decimal, hex_float, read_side, require, table
+from .thinning import check_null, check_thinning
+
+FEEDS_KEYS = "safety wrong progress almost never_fed"  # the parts of the claim: a file has some of them
+
+
+def read_feeds(section: dict[str, Any], n_sides: int) -> dict[str, Any]:
+    """Read the section of feeds."""
+    feeds: dict[str, Any] = {"side": read_side(section["side"], n_sides)}
+    require(len(section) > 1, "feeds: nothing is claimed")
+    if "safety" in section:
+        feeds["safety"] = section["safety"]
+        require(feeds["safety"] in ("every", "cells"), "feeds.safety is none of the starts that are known")
+    for name, every, count in (("progress", "every", "throws"), ("almost", "almost-every", "thinning")):
+        if name in section:
+            part = table(section[name], f"feeds.{name}", f"starts {count}")
+            starts, number = part["starts"], part[count]
+            if isinstance(starts, dict):
+                since = by_side(table(starts, "feeds: starts", "from")["from"], "from", n_sides)
+                starts = [hex_float(x, "from") for x in since]
+            require(isinstance(starts, list) or starts == every, f"feeds.{name}: starts that are not known")
+            fits = type(number) is int and 0 <= number < MOST_COUNTED
+            require(fits, f"feeds.{name}.{count} is not a whole number as it should be")
+            feeds[name] = (None if starts == every else starts, number)
+    if "wrong" in section:
+        orbit = table(section["wrong"], "feeds.wrong", "start throws")
+        feeds["wrong"] = read_passing(orbit, "once", n_sides) | {"why": "once"}
+    if "never_fed" in section:
+        cycles = {"cycles": [section["never_fed"]], "complete": False}
+        (feeds["never_fed"],) = read_orbits(cycles, n_sides)["orbits"]
+    return feeds
+
+
+def check_feeds(scene: Scene, c: Cells, box: int, feeds: dict[str, Any], crew: Crew) -> str:
+    """Check all parts of the claim; "" or the reason.  Shares and intervals of starts are kept for the report."""
+    if scene.end is None:
+        return "the scene has no cavity"
+    bad = check_structure(c, scene, -1)
+    for i, edges in enumerate(c.edges):
+        if not (bad or float(edges[0]) < scene.end < float(edges[-1])):
+            bad = f"side {i}: the cells do not reach from before the end of the arm to beyond"
+    if bad:
+        return bad
+    feeds["x"] = f"{decimal(scene.end)} {scene.unit}"
+    feeds["shares"] = {}
+    end, used = arm_end(c, scene), np.zeros(len(c.side), dtype=bool)
+    for check in (check_safety, check_progress, check_almost):
+        bad, some = check(end, scene, feeds)
+        if bad:
+            return bad
+        used |= some
+    return check_shown(end, scene, feeds) or check_images_used(end, scene, box, used, crew)
+
+
+def check_images_used(end: ArmEnd, scene: Scene, box: int, used: Array, crew: Crew) -> str:
+    """Check the throws from the cells on which something rests; "" or the reason."""
+    tasks = [freed(end.c, task) for task in tasks_of(end.c, scene, box, np.flatnonzero(used), None)]
+    found = crew.run(tasks)
+    return "" if found is None else f"{end.c.name(found[0])}: {found[1].text}"
+
+
+def check_safety(end: ArmEnd, scene: Scene, feeds: dict[str, Any]) -> tuple[str, Array]:
+    """Check that from the starts named the first rest at X or beyond is on the wanted side."""
+    none = np.zeros_like(end.before)
+    if "safety" not in feeds:
+        return "", none
+    bad, gaps = unsafe_starts(end, scene, feeds["side"])
+    safe = end.before & ~bad
+    if feeds["safety"] == "every":
+        what = f"a part may come to rest beyond the end of the arm on another side than {feeds['side']}"
+        for i, gap in enumerate(gaps):
+            if gap:
+                return f"side {i}, before the first cell: {what}", none
+        feeds["shares"]["safety"] = 1.0
+        return first_bad(end.c, [(safe | end.fed, what)]), safe
+    feeds["shares"]["safety"] = share_of(end, scene, safe)
+    whole = end.c.upper() <= float_below(exact(end.x))  # not the cell that X lies in
+    feeds["safe"] = extents(end.c, safe & whole, inward=True)
+    return "", safe
+
+
+def check_progress(end: ArmEnd, scene: Scene, feeds: dict[str, Any]) -> tuple[str, Array]:
+    """Check that every start that is named comes to rest at X or beyond within so many throws."""
+    if "progress" not in feeds:
+        return "", np.zeros_like(end.before)
+    since, throws = feeds["progress"]
+    late = late_within(end, throws)
+    what = f"{throws} throws are not proved to be enough"
+    bad = check_named(end, scene, since, late, what)
+    if not bad:
+        feeds["shares"]["progress"] = share_from(end, scene, since)
+    return bad, end.before & ~late
+
+
+def check_almost(end: ArmEnd, scene: Scene, feeds: dict[str, Any]) -> tuple[str, Array]:
+    """Check that almost every start that is named comes to rest at X or beyond: the others thin out.
+
+    Orbits from cells that cannot lead to one that may leave go on in such cells.  Those from which some number of
+    throws is enough lead to cells of the same kind only; the starts that stay in the others for ever have length zero.
+    """
+    if "almost" not in feeds:
+        return "", np.zeros_like(end.before)
+    since, rounds = feeds["almost"]
+    leaves = leading_off(end)
+    bad = check_named(end, scene, since, leaves, "a part may leave the arm")
+    stay = late_within(end, len(leaves)) & ~leaves
+    if not bad and since is None:  # before the first cells
+        bad = check_null(end.c, scene, np.zeros_like(leaves), True)
+    if not bad:
+        bad = check_thinning(end.c, scene, stay, rounds, np.zeros(len(leaves), dtype=np.int32))
+    if not bad:
+        feeds["shares"]["almost"] = share_from(end, scene, since)
+    return bad, end.before & ~leaves
+
+
+def check_named(end: ArmEnd, scene: Scene, since: list[float] | None, late: Array, what: str) -> str:
+    """Check that the starts that are named, beyond some x on each side or all, lie in no bad cell; "" or the reason."""
+    c = end.c
+    for i, edges in enumerate(c.edges):
+        own = slice(int(c.start[i]), int(c.start[i + 1]))
+        needed = end.before[own].copy()
+        if since is None:
+            bad = check_thrown_out(scene, i, float(edges[0]))
+            if bad:
+                return f"side {i}, near the joint, x in (a, {float(edges[0])!r}]: {bad}"
+        else:
+            if not since[i] >= edges[0]:
+                return f"side {i}: starts are claimed that lie before the cells"
+            needed &= edges[1:] > since[i]
+        some = np.flatnonzero(needed & late[own])
+        if some.size:
+            return f"{c.name(int(c.start[i]) + int(some[0]))}: {what}"
+    return ""
+
+
+def share_from(end: ArmEnd, scene: Scene, since: list[float] | None) -> float:
+    """Bound from below the share of the starts x < X that lie beyond some x on each side, or of all."""
+    if since is None:
+        return 1.0
+    some = np.concatenate([edges[:-1] >= x for edges, x in zip(end.c.edges, since, strict=True)])
+    return share_of(end, scene, some)
+
+
+def check_shown(end: ArmEnd, scene: Scene, feeds: dict[str, Any]) -> str:
+    """Check the orbit that comes to rest on another side, and the one that never comes to X; "" or the reason."""
+    x = exact(end.x)
+    try:
+        if "wrong" in feeds:
+            *states, (side, lo, hi) = thrown_again(scene, feeds["wrong"])
+            prove(
+                all(each[2] < x for each in states), "it may come to rest beyond the end of the arm earlier"
+            )
+            beyond = side != feeds["side"] and bool(lo > x) and bool(hi <= scene.sides[side].arm)
+            prove(beyond, "it is not proved to come to rest beyond the end of the arm on another side")
+        if "never_fed" in feeds:
+            states = periodic(scene, feeds["never_fed"])
+            prove(all(each[2] < x for each in states), "the periodic orbit may come to the end of the arm")
+    except UnprovedError as error:
+        return f"an orbit: {error}"
+    return ""
+
+
+def verdict_of_feeds(feeds: dict[str, Any], most_open: float) -> tuple[str, str]:
+    """Say what became of a claim that is confirmed: "proved", "refuted" or "proved-on-cells", and what is open."""
+    if "wrong" in feeds or ("never_fed" in feeds and "almost" not in feeds):
+        return "refuted", ""
+    shares, open_parts = feeds["shares"], []
+    progress = max(shares.get("progress", 0.0), shares.get("almost", 0.0))
+    for name, share in (("safety", shares.get("safety", 0.0)), ("progress", progress)):
+        if share < 1 - most_open:
+            of = (
+                f"proved for {100 * math.floor(share * 1e6) / 1e6:.4g} % of the starts"
+                if share
+                else "not claimed"
+            )
+            open_parts.append(f"{name} is {of}")
+    return ("proved-on-cells", "; ".join(open_parts)) if open_parts else ("proved", "")
+
+
+def feeds_statement(feeds: dict[str, Any], noisy: bool) -> str:
+    """Put the claim in words, one line for each of its parts."""
+    x = feeds.get("x", "the end of the arm")
+    return "\n    ".join([f"feeds: the arm ends at x = {x}", *parts_in_words(feeds, x, noisy)])
+
+
+def parts_in_words(feeds: dict[str, Any], x: str, noisy: bool) -> Iterator[str]:
+    """Put each part in words."""
+    side, there = feeds["side"], f"comes to rest at x >= {x}"
+    if "safety" in feeds:
+        some = (
+            named_in_words(None, x) if feeds["safety"] == "every" else f"the starts {feeds.get('safe', '')}"
+        )
+        yield f"safety: from {some}, the first rest at x >= {x}, if there is one, is on side {side}"
+    if "wrong" in feeds:
+        orbit = feeds["wrong"]
+        number = f"{len(orbit['throws'])} throws" if len(orbit["throws"]) > 1 else "1 throw"
+        start = f"x = {orbit['x']!r} on side {orbit['side']}"
+        yield f"safety is refuted: the start {start} {there} after {number}, on another side than {side}"
+    if "progress" in feeds:
+        since, throws = feeds["progress"]
+        near = " where x is in the cells; nearer to the joint x - a_i grows with every throw"
+        within = f"within {throws} throws{near if since is None else ''}"
+        yield f"progress: {named_in_words(since, x)} {there}, {within}"
+    if "almost" in feeds:
+        others = ", others for other throws" if noisy else ""
+        but = f", but for starts of total length zero{others},"
+        yield f"progress: {named_in_words(feeds['almost'][0], x)}{but} {there}"
+    if "never_fed" in feeds:
+        o = feeds["never_fed"]
+        place = f"with a place x in [{o.lo!r}, {o.hi!r}] on side {o.side}"
+        what = f"a periodic orbit, of {len(o.word)} throws, {place}, stays at x < {x}"
+        yield f"progress from every start is refuted: {what}"
+    yield "whether a part that comes to rest there clears the wall of the cavity is not claimed"
+
+
+def named_in_words(since: list[float] | None, x: str) -> str:
+    """Name the starts."""
+    if since is None:
+        return f"every start a_i < x < {x} on every side i"
+    return "every start with " + ", or ".join(f"{lo!r} < x < {x} on side {i}" for i, lo in enumerate(since))

@@ -1,0 +1,41 @@
+"""`--certificate FILE`: an answer's certificate, checked before it gets its name."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+from typing import Any
+
+from limitsets.cli.output import saved
+
+__all__ = ["certified", "said_of"]
+
+
+def certified(
+    found: Any, file: Path, claim: str, *, proved: bool, recheck: bool
+) -> tuple[Any, dict[str, Any]]:
+    """Write the certificate; what is left of the answer where the checker denies it, and what is said of the file."""
+    from limitsets.proofs.confirm import DeniedError
+
+    if not proved:
+        return found, {"file": None, "denied": False, "recheck": None}
+    begin = time.perf_counter()
+    with saved(file) as draft:
+        try:
+            found.save(draft, recheck=recheck, workers=None)
+        except DeniedError as error:
+            kept = str(file.with_name(Path(error.file or "").name))
+            return found.denied(error.claims[claim]), {"file": kept, "denied": True, "recheck": None}
+    seconds = time.perf_counter() - begin if recheck else None
+    return found, {"file": str(file), "denied": False, "recheck": seconds}
+
+
+def said_of(written: dict[str, Any], missing: str) -> str:
+    """Say it to people; `missing` is why there is no file."""
+    file, seconds = written["file"], written["recheck"]
+    if file is None:
+        return f"no certificate is written: {missing}"
+    if written["denied"]:
+        return f"the checker denies the certificate: it is kept as {file}"
+    done = "not rechecked" if seconds is None else f"rechecked in {seconds:.2g} s"
+    return f"certificate: {file}, {done} (check it: limitsets recheck {file})"

@@ -1,0 +1,224 @@
+"""What can be reached on enclosed images of the cells before X, where the arm ends.
+
+An orbit goes on from cells before X and ends in a cell beyond.  A cell without a rank (`proofs.basin`) whose image
+comes to the border of the cells may leave: towards the joint it may also come to lie before the first cells, and is
+thrown on from there.  The checker has the same rule (docs/certificates.md, "Feeding").
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from limitsets.cells import CellSet
+from limitsets.feeding.falling import ArmEnd
+from limitsets.feeding.verdicts import Extents, Fed, Safe
+from limitsets.graph.components import ranks, reach, strong_components
+from limitsets.graph.ranges import RUN
+from limitsets.proofs.attraction import Attraction
+from limitsets.proofs.cover import everywhere
+from limitsets.proofs.goals.kind import above, below
+from limitsets.proofs.near_hinge import SCATTERED
+from limitsets.proofs.perron_frobenius import perron_frobenius_bound
+
+__all__ = ["MOST_SIDES", "Paths", "verdict_of_share"]
+
+Mask = NDArray[np.bool_]
+Bits = NDArray[np.uint8]
+
+# What may be open of a claim that is proved.
+LITTLE = 0.01
+MOST_SIDES = 7
+ANY = np.uint8(255)
+
+
+def verdict_of_share(share: float) -> str:
+    """Give the verdict on a claim that is proved for the starts of a share of the arm."""
+    return "proved" if share >= 1.0 - LITTLE else "proved-on-cells" if share > 0.0 else "undecided"
+
+
+@dataclass(frozen=True, eq=False)
+class Paths:
+    """What can be reached.
+
+    Attributes
+    ----------
+    found : Attraction
+        Cells and images.
+    end : ArmEnd
+        Where the arm ends.
+    starts : ndarray of bool, shape (n_cells,)
+        Cells with places before X.
+    ends_on : ndarray of uint8, shape (n_cells,)
+        Bit i: from there a part may come to rest beyond X on side i.
+    near : ndarray of uint8, shape (n_sides,)
+        The same of starts before the first cells of each side.
+    leaves : ndarray of bool, shape (n_cells,)
+        A cell that may leave can be reached.
+    late : ndarray of bool, shape (n_cells,)
+        A recurrent cell, or one that may leave, can be reached.
+    steps : ndarray of int32, shape (n_cells,)
+        Throws until the end, where it is not late.
+    """
+
+    found: Attraction
+    end: ArmEnd
+    starts: Mask
+    ends_on: Bits
+    near: Bits
+    leaves: Mask
+    late: Mask
+    steps: NDArray[np.int32]
+
+    @classmethod
+    def of(cls, found: Attraction, end: ArmEnd) -> Paths:
+        """Find them."""
+        grid, ranges = found.cover.grid, found.cover.graph.ranges
+        lo, hi = (np.concatenate([edges[k : edges.size - 1 + k] for (edges,) in grid.edges]) for k in (0, 1))
+        side = grid.side_of(np.arange(grid.n_cells))
+        fed, perhaps = lo >= above(end.x), hi > below(end.x)
+        owner = np.repeat(np.arange(grid.n_cells), np.diff(ranges.first))
+        ranges = ranges._replace(box=ranges.box.copy())
+        ranges.box[fed[owner], RUN] = 0  # what is fed goes no farther
+        parts = strong_components(ranges)
+        unknown = np.concatenate([images.lost for images in found.cover.images])
+        ways = everywhere(found.cover)
+        inward, outward = _leaving(found, ways, unknown)
+        marks = np.where(perhaps, np.left_shift(1, side), 0).astype(np.uint8)
+        for each in range(grid.sides):
+            marks[outward[each] & ~fed] |= np.uint8(1 << each)
+        near, before = np.zeros(grid.sides, np.uint8), None
+        while (
+            before is None or (before != near).any()
+        ):  # what lands before the first cells goes on from there
+            for each in range(grid.sides):
+                marks[inward[each] & ~fed] |= near[each]
+            spread = reach(ranges, parts, marks)
+            before, near = near, np.array([_ahead(found, spread, each) for each in range(grid.sides)])
+        ends_on = spread.copy()
+        for cell in np.flatnonzero(
+            perhaps & ~fed & ~unknown
+        ).tolist():  # a start before X has not landed beyond it
+            landings = [spread[ends[cell, 0] : ends[cell, 1] + 1] for ends in ways if ends[cell, 0] >= 0]
+            ends_on[cell] = np.bitwise_or.reduce(np.concatenate([*landings, near[inward[:, cell]]]))
+        leaving = (inward | outward).any(axis=0) & ~fed
+        stay = (parts.recurrent[parts.label] & ~fed) | leaving
+        late = reach(ranges, parts, stay.astype(np.uint8)) > 0
+        leaves = reach(ranges, parts, leaving.astype(np.uint8)) > 0
+        steps = ranks(ranges, parts, np.zeros(parts.count, dtype=bool))
+        return cls(found, end, ~fed, ends_on, near, leaves, late, steps)
+
+    def extents(self, some: Mask) -> Extents:
+        """Intervals of the starts in some cells, by side."""
+        return CellSet(self.found.cover.grid, some & self.starts).extents()
+
+    def share(self, some: Mask, near: Mask) -> float:
+        """Share of the arm before X: of the starts in some cells, and before the first cells of some sides."""
+        grid, a = self.found.cover.grid, self.found.cover.box.bare[0].a
+        before = sum(float(edges[0] - a[side]) for side, (edges,) in enumerate(grid.edges) if near[side])
+        inside = float(grid.measure[some & self.starts].sum())
+        return (inside + before) / float((self.end.x - a).sum())
+
+    def near_to(self, bad: Mask) -> Mask:
+        """Of which sides the starts before the first cells come to cells, and to no bad ones."""
+        near = self.found.joint
+        joined = not self.found.cover.points and all(each.proved and not each.rolls for each in near)
+        ahead = [_cells_ahead(self.found, side) for side in range(len(near))]
+        return np.array([joined and not bad[cells].any() for cells in ahead])
+
+    def safe(self) -> Safe:
+        """Say which sides can be fed."""
+        wrong = np.uint8(ANY ^ (1 << self.end.side))
+        bad, near = self.ends_on & wrong > 0, self.near & wrong == 0
+        sides = range(self.found.cover.grid.sides)
+        possible = {side: self.extents(self.ends_on >> side & 1 > 0) for side in sides}
+        whole = not (bad & self.starts).any() and bool(near.all())
+        share = 1.0 if whole else self.share(~bad, near)
+        measure = self.found.cover.grid.measure
+        return Safe(
+            verdict_of_share(share),
+            {side: found for side, found in possible.items() if any(found.values())},
+            self.extents(~bad),
+            share,
+            float(measure[self.leaves & self.starts].sum()) / float(measure[self.starts].sum()),
+        )
+
+    def from_on(self, bad: Mask) -> tuple[dict[int, float], Mask]:
+        """Name by side the x from which on there are no bad cells, and the starts from there on."""
+        grid, bad = self.found.cover.grid, bad & self.starts
+        beyond, good = {}, np.zeros_like(bad)
+        for side, (edges,) in enumerate(grid.edges):
+            last = np.flatnonzero(bad[grid.of_side(side)])
+            first = int(last[-1]) + 1 if last.size else 0
+            beyond[side] = float(edges[first])
+            good[int(grid.offset[side]) + first : int(grid.offset[side]) + edges.size - 1] = True
+        return beyond, good & self.starts
+
+    def fed(self) -> Fed:
+        """Prove of every start that it is fed."""
+        beyond, good = self.from_on(self.late)
+        if not good.any():
+            place = self.found.cover.place(int(np.flatnonzero(self.late & self.starts)[0]))
+            return Fed("undecided", None, {}, 0.0, reason=f"an orbit from {place} may never be fed")
+        near = self.near_to(self.late)
+        whole = bool(near.all()) and not (self.late & self.starts).any()
+        share = 1.0 if whole else self.share(good, near & self._whole_side(good))
+        return Fed(verdict_of_share(share), int(self.steps[good].max()), beyond, share)
+
+    def _whole_side(self, good: Mask) -> Mask:
+        """Of which sides all starts in cells are good."""
+        grid = self.found.cover.grid
+        return np.array(
+            [good[cells][self.starts[cells]].all() for cells in map(grid.of_side, range(grid.sides))]
+        )
+
+    def almost(self, fed: Fed) -> Fed:
+        """Prove of almost every start that it is fed: those that are late thin out, where they cannot leave the arm."""
+        beyond, good = self.from_on(self.leaves)
+        # what cannot leave the arm comes to no cell that can, and what is not late never comes to be
+        left = self.late & self.starts & ~self.leaves
+        thinned = perron_frobenius_bound(self.found.cover, left)
+        if thinned.reason or not good.any():
+            return replace(fed, almost_every="undecided", reason=fed.reason or thinned.reason)
+        # next to the joint a throw rises with the start: it carries no set of positive length into one of length zero
+        near = self.near_to(self.leaves) & all(each.rises for each in self.found.joint)
+        whole = bool(near.all()) and not (self.leaves & self.starts).any()
+        share = 1.0 if whole else self.share(good, near & self._whole_side(good))
+        starts = "almost-every" if whole else {"from": {str(side): x for side, x in beyond.items()}}
+        # a little more, so that other arithmetic can confirm it
+        rounds = thinned.throws + thinned.throws // 8 + 1
+        return replace(
+            fed, almost_every=verdict_of_share(share), almost_from=starts, almost_share=share, thinning=rounds
+        )
+
+
+def _leaving(found: Attraction, ways: list[NDArray[np.int32]], unknown: Mask) -> tuple[Mask, Mask]:
+    """By side the cells that may land before its first cell; and those that may land beyond its last one.
+
+    These are the cells without a rank whose images come to the border: of the others they are proved not to.
+    """
+    grid = found.cover.grid
+    inward, outward = np.tile(unknown, (grid.sides, 1)), np.tile(unknown, (grid.sides, 1))
+    for ends in ways:
+        free = (found.basin.rank < 0) & (ends[:, 0] >= 0)
+        for side in range(grid.sides):
+            inward[side] |= free & (ends[:, 0] == grid.offset[side])
+            outward[side] |= free & (ends[:, 1] == grid.offset[side + 1] - 1)
+    return inward, outward
+
+
+def _cells_ahead(found: Attraction, side: int) -> slice:
+    """Cells to which a throw from before the first cell of a side may lead, besides staying before it."""
+    (edges,), first = found.cover.grid.edges[side], int(found.cover.grid.offset[side])
+    to = found.joint[side].reach + found.cover.box.landing
+    return slice(first, first + int(np.searchsorted(edges[:-1], to, side="right")))
+
+
+def _ahead(found: Attraction, spread: Bits, side: int) -> np.uint8:
+    """Sides on which a start before the first cell of a side may be fed."""
+    near = found.joint[side]
+    if found.cover.points or near.rolls or near.reason not in ("", SCATTERED):
+        return ANY
+    return np.uint8(np.bitwise_or.reduce(spread[_cells_ahead(found, side)]))
