@@ -11,7 +11,7 @@ import numpy as np
 
 from .balls import Array
 
-FAR = 1e4  # beyond its nodes a function is constant up to here
+OUTERMOST = 1e4  # beyond its nodes a function is constant up to here
 PAD = 2.0**-40  # more than the roundings of a place, as a share of the largest place
 NARROW = 2.0**-20  # cells below this share of the largest place are not interpolated in,
 TOLERANCE = 2.0**-26  # and an interpolated value is off by less than this share of the largest value

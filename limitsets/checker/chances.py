@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from flint import arb
 
-from .averages import FAR, INFLATE, Mesh, Rows, Spread, mean_rows
+from .averages import INFLATE, OUTERMOST, Mesh, Rows, Spread, mean_rows
 from .balls import Array, exact
 from .chain import Chain
 from .file import read_array
@@ -190,7 +190,7 @@ def read_mean(value: object) -> tuple[float, float]:
 
 def mesh_of(edges: list[Array]) -> Mesh:
     """Put the nodes of all sides together, with one far out at either end."""
-    whole = [np.concatenate([[-FAR], each, [FAR]]) for each in edges]
+    whole = [np.concatenate([[-OUTERMOST], each, [OUTERMOST]]) for each in edges]
     return Mesh(np.concatenate(whole), np.concatenate([[0], np.cumsum([len(each) for each in whole])]))
 
 
