@@ -418,7 +418,9 @@ class Links:
     def add_hard(self, cell: int) -> None:
         """Collect where throws from a cell may land at all, on both branches."""
         x = (float(self.x[cell]), float(self.x[cell + 1]))
-        last, first = self.hit_of(x[1], self.kappas[-1]), arb(0)
+        known = cell + 1 in self.outer and bool(np.isfinite(self.error[cell + 1]).all())
+        last = self.outer[cell + 1][1] if known else self.hit_of(x[1], self.kappas[-1])
+        first = arb(0)
         if arb(x[0]) > self.side.a:
             before = self.hit_of(x[0], self.kappas[0])
             first = first if before is None else before.before
