@@ -48,7 +48,8 @@ def test_without_noise_there_are_none():
         ls.feed(with_cavity("paper-initial"), prove=False, trials=10, cells=32, brackets=50)
 
 
-def test_the_command_shows_them(capfd):
+def test_the_command_shows_them(capfd, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
     ls.dump(with_cavity("paper-initial"), "fed.toml")
     code, out, _ = run(
         capfd, "feed", "fed.toml", "--no-proof", "--scatter", "landing.x=0.2 in", "--law", "bounded",
