@@ -40,8 +40,10 @@ The files follow docs/certificates.md, and each imports only from those before i
     speeds       throws whose speed deviates                                      18, 19
     averages     means over a throw's deviations, in floats                       20, 21
     chain        one step of a bound                                              22
-    links        the throws of a noisy chain, cell by cell                        18 to 21
-    chances      brackets of probabilities                                        "Probabilities", 22
+    landings     the throws of one side of a noisy chain, and their branches      18, 19
+    links        what a step needs of every cell, and the chain of it             20, 21
+    chances      a claim of probabilities                                         "Probabilities"
+    brackets     its brackets                                                     22
     report       a file from first to last, and the report about it
     main         the command line
 """

@@ -1,100 +1,42 @@
-"""The throws of a noisy chain, proved cell by cell in balls: from the laws and the nodes to what a step needs.
+"""What a step of a noisy chain needs of the throws: collected cell by cell, and put together for all sides.
 
-docs/certificates.md, "Probabilities", numbers 18 to 21.
+docs/certificates.md, "Probabilities", numbers 20 (means at nodes) and 21 (between nodes).
 """
 
 import itertools
 import math
 from collections.abc import Callable
 from fractions import Fraction
-from typing import NamedTuple
 
 import numpy as np
 from flint import arb
 
 from .averages import INFLATE, Mesh, Spread, Table, mean_rows
-from .balls import HALF, Arb, Array, exact, float_above
+from .balls import Arb, Array, exact
 from .chain import Bent, Chain, Parts, Reach
+from .landings import MOST_PLACE, Border, Landings, Noisy, both_ends, upper
 from .model import over_angles
-from .scene import Side
-from .speeds import (
-    Hit,
-    Slopes,
-    advance_over,
-    decides,
-    deciding,
-    deciding_slopes,
-    guess_angle,
-    guess_angles,
-    guess_border,
-    kappa_at,
-    land,
-    slopes_over,
-)
+from .speeds import Hit, Slopes, advance_over, guess_angles, kappa_at, slopes_over
 
 ABSORBED, LIVE, HARD = 0, 1, 2  # what a cell is: all of it absorbs, none of it does, or anything else
-PIECES = 8  # of the speeds, where what decides is not seen to rise or fall with them at once
-MOST_PLACE = 200.0  # no landing is followed farther out
 
 
-class Noisy(NamedTuple):
-    """The scene's sides, kappa of a throw without deviation, and the bounds of the laws, which are uniform."""
+class Links(Landings):
+    """What is collected of one side's throws; `parts` has it for all sides.
 
-    sides: list[Side]
-    kappa: Arb
-    speed: Fraction
-    landing: Fraction
-    strata: int
-
-
-class Border(NamedTuple):
-    """Along a cell: deviations at its two nodes between which, on the chord, the branch changes, and how surely."""
-
-    cut: tuple[float, float]
-    below: int
-    above: int
-    gap: float  # share of the law on which the branch may be the other one
-    phi: Arb
-    places: tuple[Arb, Arb]
-
-
-def upper(ball: Arb) -> float:
-    """Round up; infinite where nothing is known."""
-    return float_above(ball) if ball.is_finite() else math.inf
-
-
-def both_ends(ball: Arb) -> tuple[float, float]:
-    """Round outward; infinite where nothing is known."""
-    return -upper(-ball), upper(ball)
-
-
-class Links:
-    """What is proved of one side's throws; `parts` collects it for all sides.
-
-    Nodes and cells have the numbers that they have in the mesh, `start` being that of the side's first node.
+    In the mesh the side's first node has the number `start`.
     """
 
     def __init__(self, noisy: Noisy, number: int, mesh: Mesh, kinds: Array, parts: Parts):
-        self.noisy, self.number, self.side, self.parts = noisy, number, noisy.sides[number], parts
         self.start = int(mesh.first[number])
-        self.x = mesh.place[self.start : int(mesh.first[number + 1])]
+        super().__init__(noisy, noisy.sides[number], mesh.place[self.start : int(mesh.first[number + 1])])
+        self.number, self.parts = number, parts
         self.kinds = kinds[self.start : int(mesh.first[number + 1])]
         self.after = (number + 1) % len(noisy.sides)
-        self.most, self.e = exact(noisy.speed), float(noisy.landing)
-        self.certain = noisy.speed == 0
+        self.e = float(noisy.landing)
         shift = float(self.side.shift.mid())
         self.shift = (shift, upper(abs(self.side.shift - shift)) + 2.0**-50 * MOST_PLACE)
-        count = 1 if self.certain else noisy.strata + 1
-        shares = [Fraction(2 * j, noisy.strata) - 1 for j in range(count)]
-        deltas = [Fraction(0)] if self.certain else [noisy.speed * share for share in shares]
-        self.deltas = np.array([float(delta) for delta in deltas])
-        self.kappas = [kappa_at(noisy.kappa, exact(delta)) for delta in deltas]
-        n = len(self.x)
-        self.place, self.error = np.full((n, count), np.nan), np.full((n, count), np.inf)
-        self.outer: dict[int, tuple[Hit, Hit]] = {}
-        self.bend = np.zeros(n)  # of T with delta, the largest near each node
-        self.cut, self.below, self.above = np.full(n, self.deltas[-1]), np.zeros(n, int), np.zeros(n, int)
-        self.at_cut: dict[int, tuple[float, float]] = {}
+        self.bend = np.zeros(len(self.x))  # of T with delta, the largest near each node
         self.spread: list[tuple[int, float, int, float, float]] = []
 
     def run(self, told: Callable[[int], None]) -> None:
@@ -117,163 +59,6 @@ class Links:
             self.add_node(node)
         for cell in np.flatnonzero(self.kinds == HARD).tolist():
             self.add_hard(cell)
-
-    # ------------------------------------------------------------------------------------------------- landings
-
-    def hit_all(self, nodes: Array, guess: Array, j: int, kappa: Arb) -> None:
-        """Enclose where throws at one speed land from all nodes."""
-        for node, angle in zip(nodes.tolist(), guess.tolist(), strict=True):
-            x = arb(float(self.x[node]))
-            hit = land(self.side, x, kappa, angle) if x > self.side.a else None
-            if hit is None:
-                continue
-            self.place[node, j] = middle = float(hit.place.mid())
-            self.error[node, j] = upper(abs(hit.place - middle)) + 2.0**-48 * abs(middle)
-            if j in (0, len(self.kappas) - 1):
-                first = self.outer.get(node, (hit, hit))[0]
-                self.outer[node] = (first, hit)
-
-    def known(self, cell: int) -> bool:
-        """Whether all throws from both nodes are enclosed, and none is far out."""
-        two = slice(cell, cell + 2)
-        close = np.abs(self.place[two]).max() < MOST_PLACE
-        return bool(np.isfinite(self.error[two]).all() and close and self.x[cell + 1] > self.x[cell])
-
-    def box(self, cell: int) -> tuple[Arb, Arb]:
-        """Return the angles of all throws from a cell, and their deviations."""
-        phi = self.outer[cell][0].before.union(self.outer[cell + 1][1].after)
-        return phi, (-self.most).union(self.most)
-
-    # ------------------------------------------------------------------------------------------------- decisions
-
-    def branch_of(self, cell: int) -> Border:
-        """Prove the branch of a cell, or where it changes; with no more than the gap 1 where neither is proved."""
-        ends = (float(self.x[cell]), float(self.x[cell + 1]))
-        phi, _ = self.box(cell)
-        hits = (self.outer[cell][0], self.outer[cell + 1][1])
-        found = decides(self.side, ends, self.noisy.kappa, self.most, hits)
-        last = float(self.deltas[-1])
-        none = (hits[0].place, hits[1].place)
-        if found != 2:
-            return Border((last, last), found, found, 0.0, phi, none)
-        border = None if self.certain else self.border_of(cell, ends)
-        return border or Border((last, last), 0, 1, 1.0, phi, none)
-
-    def border_of(self, cell: int, ends: tuple[float, float]) -> Border | None:
-        """Prove how far from a chord the branch changes, where what decides rises or falls with the speed."""
-        s, kappa = self.side, self.noisy.kappa
-        x = arb(ends[0]).union(arb(ends[1]))
-        by_d = self.by_speed(cell, ends, x)
-        rises = bool(by_d > 0)
-        if not (rises or by_d < 0):
-            return None
-        sign, most = (1 if rises else -1), float(self.deltas[-1])
-        cut = guess_border(s, np.array(ends), float(kappa.mid()), most, np.full(2, rises))
-        tried = [self.hit_at(end, g) for end, g in zip(ends, cut.tolist(), strict=True)]
-        tried += [self.hit_at(ends[0], float(cut.min())), self.hit_at(ends[1], float(cut.max()))]
-        known = [hit for hit in tried if hit is not None]
-        if len(known) < len(tried):
-            return None
-        hits, corners = known[:2], known[2:]
-        values = [
-            sign * deciding(s, hit.before.union(hit.after), arb(end), kappa_at(kappa, arb(g)))
-            for hit, end, g in zip(hits, ends, cut.tolist(), strict=True)
-        ]
-        near = corners[0].before.union(corners[1].after)
-        low, high = float(cut.min()), float(cut.max())
-        far = self.distance(near, x, (low, high), (by_d, values), ends, cut)
-        if 0.0 < far < most:  # once more, with the derivative near the chord alone
-            levels = max(low - far, -most), min(high + far, most)
-            first, last = self.hit_at(ends[0], levels[0]), self.hit_at(ends[1], levels[1])
-            if first is not None and last is not None:
-                angles, deviations = first.before.union(last.after), arb(levels[0]).union(arb(levels[1]))
-                _, steep = deciding_slopes(s, angles, x, kappa_at(kappa, deviations), 1 + deviations)
-                far = min(far, self.distance(near, x, (low, high), (steep, values), ends, cut))
-        gap = min(INFLATE * far / (2.0 * most), 1.0)
-        places = (hits[0].place, hits[1].place)
-        return Border((float(cut[0]), float(cut[1])), int(not rises), int(rises), gap, near, places)
-
-    def by_speed(self, cell: int, ends: tuple[float, float], x: Arb) -> Arb:
-        """Enclose how what decides changes with the speed, over all speeds, in pieces where need be."""
-        phi, deviations = self.box(cell)
-        _, whole = deciding_slopes(self.side, phi, x, kappa_at(self.noisy.kappa, deviations), 1 + deviations)
-        if whole > 0 or whole < 0:
-            return whole
-        cuts = np.linspace(-float(self.deltas[-1]), float(self.deltas[-1]), PIECES + 1).tolist()
-        found = []
-        for k, (low, high) in enumerate(itertools.pairwise(cuts)):
-            first, last = self.hit_at(ends[0], low), self.hit_at(ends[1], high)
-            if first is None or last is None:
-                return whole
-            # the ends of the law themselves, which are no floats
-            low_end = -self.most if k == 0 else arb(low)
-            high_end = self.most if k == PIECES - 1 else arb(high)
-            before = self.outer[cell][0].before if k == 0 else first.before
-            after = self.outer[cell + 1][1].after if k == PIECES - 1 else last.after
-            some = low_end.union(high_end)
-            angles = before.union(after)
-            found.append(deciding_slopes(self.side, angles, x, kappa_at(self.noisy.kappa, some), 1 + some)[1])
-        together = found[0]
-        for each in found[1:]:
-            together = together.union(each)
-        return together
-
-    def distance(
-        self,
-        phi: Arb,
-        x: Arb,
-        levels: tuple[float, float],
-        known: tuple[Arb, list[Arb]],
-        ends: tuple[float, float],
-        cut: Array,
-    ) -> float:
-        """Bound how far the branch changes from the chord, on both sides together.
-
-        What decides, turned so that it rises with the speed, has the values known at the two nodes.  Along the chord it
-        rises or falls, or it varies by at most half the cell times its slope.
-        """
-        by_d, values = known
-        between = arb(levels[0]).union(arb(levels[1]))
-        h = arb(ends[1]) - arb(ends[0])
-        slope = (arb(float(cut[1])) - arb(float(cut[0]))) / h
-        along_x, along_d = deciding_slopes(
-            self.side, phi, x, kappa_at(self.noisy.kappa, between), 1 + between
-        )
-        along = along_x + slope * along_d
-        extra = 0.0 if along > 0 or along < 0 else upper(HALF * h * abs(along))
-        over = max(max(upper(v) for v in values) + extra, 0.0)
-        under = max(max(upper(-v) for v in values) + extra, 0.0)
-        steep, most = -upper(-abs(by_d)), float(self.deltas[-1])
-        if not steep > 0.0:
-            return 2.0 * most
-        return min(over / steep, levels[1] + most) + min(under / steep, most - levels[0])
-
-    def hit_at(self, x: float, delta: float) -> Hit | None:
-        """Enclose a throw with a deviation that is a float."""
-        return self.hit_of(x, kappa_at(self.noisy.kappa, arb(delta)))
-
-    def hit_of(self, x: float, kappa: Arb) -> Hit | None:
-        """Enclose a throw with some kappa."""
-        return land(self.side, arb(x), kappa, guess_angle(self.side, x, float(kappa.mid())))
-
-    def assign(self, found: dict[int, Border]) -> None:
-        """Choose how throws from each node are reckoned: as on a cell beside it, best on one with a border."""
-
-        def known(item: tuple[int, Border]) -> int:
-            _, border = item
-            return 1 if border.below == border.above else 2 if border.gap < 1.0 else 0
-
-        for cell, border in sorted(found.items(), key=known):
-            for end, node in enumerate((cell, cell + 1)):
-                self.cut[node], self.below[node], self.above[node] = (
-                    border.cut[end],
-                    border.below,
-                    border.above,
-                )
-                middle = float(border.places[end].mid())
-                self.at_cut[node] = (middle, upper(abs(border.places[end] - middle)))
-
-    # ------------------------------------------------------------------------------------------------- collecting
 
     def range_of(self, flips: int, lo: float, hi: float) -> tuple[int, float, float]:
         """Return where throws end whose jogs would end from lo to hi: the side, and a range a little wider."""

@@ -15,8 +15,9 @@ import flint
 
 from .balls import PRECISION
 from .beliefs import check_policy
+from .brackets import check_chances
 from .cells import Crew, extents
-from .chances import Chances, chances_in_words, check_chances, holds_chances, read_chances
+from .chances import Chances, chances_in_words, holds_chances, read_chances
 from .claims import check_box_claims, read_claims, statement_of
 from .feeding import verdict_of_feeds
 from .file import Cells, open_certificate, read_cells

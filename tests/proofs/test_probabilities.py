@@ -189,8 +189,10 @@ def entries_of(forged, tmp_path):
 def good(tmp_path_factory):
     """The certificate that claims what the checker finds, and no more."""
     with flint.ctx.workprec(checker.balls.PRECISION):
-        module, links = (sys.modules[f"{checker.__name__}.{name}"] for name in ("chances", "links"))
-        claim = module.read_chances(*entries_of(noisy(), tmp_path_factory.mktemp("probabilities")))
+        chances, module, links = (
+            sys.modules[f"{checker.__name__}.{name}"] for name in ("chances", "brackets", "links")
+        )
+        claim = chances.read_chances(*entries_of(noisy(), tmp_path_factory.mktemp("probabilities")))
         whole = module.mesh_of(claim.edges)
         chain = links.chain_of(claim.noisy, whole, *module.kinds_of(claim, whole), lambda more: None)
         row = module.start_row(claim, whole)
