@@ -11,6 +11,7 @@ of it.  Elsewhere the border may be anywhere.
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -22,13 +23,26 @@ from limitsets.proofs.intervals import Intervals
 from limitsets.proofs.mean_value import Jet
 from limitsets.robust.brackets.landings import OneSide, landed, slopes
 
-__all__ = ["Decided", "crossings", "decided", "margin"]
+__all__ = ["Decided", "Piece", "crossings", "decided", "hull", "margin"]
 
 Array = NDArray[np.float64]
 
 BISECTIONS = 48
 # Places at which critical points are looked for.
 SAMPLES = 4096
+
+
+class Piece(NamedTuple):
+    """Deviations of the speed from `first` to `last`, and the impact angles from every cell with these."""
+
+    first: float
+    last: float
+    phi: Intervals
+
+    @property
+    def delta(self) -> Intervals:
+        """The deviations, for every cell."""
+        return Intervals(np.full(self.phi.lo.shape, self.first), np.full(self.phi.lo.shape, self.last))
 
 
 class Decided(NamedTuple):
@@ -97,8 +111,14 @@ def _bisected(side: OneSide, x: Array, lo: Array, hi: Array, rising: NDArray[np.
     return 0.5 * (lo + hi)
 
 
-def decided(side: OneSide, x: Array, phi_lo: Array, phi_hi: Array, bounds: tuple[float, float]) -> Decided:
-    """Decide between jog and flip, on the cells between nodes, for deviations between two bounds.
+def hull(some: Iterable[Intervals]) -> Intervals:
+    """Give the least intervals that hold all of these."""
+    lo, hi = zip(*((each.lo, each.hi) for each in some), strict=True)
+    return Intervals(np.minimum.reduce(lo), np.maximum.reduce(hi))
+
+
+def decided(side: OneSide, x: Array, pieces: Sequence[Piece]) -> Decided:
+    """Decide between jog and flip, on the cells between nodes, for all deviations of a law.
 
     Parameters
     ----------
@@ -106,26 +126,24 @@ def decided(side: OneSide, x: Array, phi_lo: Array, phi_hi: Array, bounds: tuple
         The side.
     x : ndarray, shape (n,)
         Nodes; the decision at them is proved by the cells that they bound.
-    phi_lo, phi_hi : ndarray, shape (n - 1,)
-        Impact angles from a cell, with any deviation.
-    bounds : (float, float)
-        Of the deviations of the speed.
+    pieces : sequence of Piece
+        The deviations of the speed in ascending pieces, and the impact angles from every cell with these.
     """
-    first, last = bounds
+    first, last = bounds = pieces[0].first, pieces[-1].last
     n = x.size
     middle = _at(side, x, np.full(n, 0.5 * (first + last)))
     flips = middle.lo + middle.hi > 0.0
     cut, below, above = np.full(n, last), flips.copy(), flips.copy()
-    whole = Intervals(np.full(n - 1, first), np.full(n - 1, last))
-    box, phi = Intervals(x[:-1], x[1:]), Intervals(phi_lo, phi_hi)
-    found = margin(side, box, phi, whole)[0]
+    box = Intervals(x[:-1], x[1:])
+    found = hull(margin(side, box, each.phi, each.delta)[0] for each in pieces)
     yes, no = found.lo > 0.0, found.hi <= 0.0
     anywhere = last - first if last > first else 1.0
     beta = np.where(yes | no, 0.0, anywhere)
     cell_below, cell_above = yes.copy(), yes.copy()
     open_ = np.flatnonzero(~(yes | no))
     if open_.size:
-        _, by_x, by_delta = margin(side, box[open_], phi[open_], whole[open_], steep=True)
+        steep = [margin(side, box[open_], each.phi[open_], each.delta[open_], steep=True) for each in pieces]
+        by_x, by_delta = (hull(each[k] for each in steep) for k in (1, 2))
         rising, falling = by_delta.lo > 0.0, by_delta.hi < 0.0
         _by_corners(side, x, open_, by_x, rising, falling, bounds, (yes, no, beta, cell_below, cell_above))
         if last > first:

@@ -12,6 +12,8 @@ M' = int p G'(T) T_x + (p g') G at the border, whose oscillation is bounded.
 
 from __future__ import annotations
 
+import math
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -19,7 +21,7 @@ from numpy.typing import NDArray
 
 from limitsets.proofs.intervals import Intervals
 from limitsets.robust.brackets.averages import Average, mean_matrix
-from limitsets.robust.brackets.decisions import Decided, decided
+from limitsets.robust.brackets.decisions import Decided, Piece, decided, hull
 from limitsets.robust.brackets.deficits import Deficits, Rows
 from limitsets.robust.brackets.densities import Staircase
 from limitsets.robust.brackets.landings import Derivatives, OneSide, landed, slopes
@@ -33,6 +35,8 @@ Index = NDArray[np.int64]
 
 # Inflates coefficients against the rounding of the few operations that make them.
 MORE = 1.0 + 2.0**-40
+# Deviations of the speed enclosed at a time: of 6 % at once no derivative keeps its sign.
+PIECE = 0.005
 # A cap that is none.
 NEVER = 1e200
 
@@ -64,6 +68,16 @@ def throw_average(
         side = sides[int(np.searchsorted(source.first, numbers[0], side="right")) - 1]
         parts.add(side, numbers)
     return parts.average()
+
+
+def _columns(borders: Array) -> list[tuple[int, int]]:
+    """Cut the borders of a law into pieces, each narrow enough for enclosures of derivatives to keep their signs."""
+    last = borders.size - 1
+    if not last:
+        return [(0, 0)]
+    count = min(math.ceil(float(borders[-1] - borders[0]) / PIECE), last)
+    cuts = np.unique(np.rint(np.linspace(0, last, count + 1)).astype(int)).tolist()
+    return list(pairwise(cuts))
 
 
 class _Parts(Deficits):
@@ -111,22 +125,23 @@ class _Parts(Deficits):
             table[4].all(axis=1),
         )
         slack = np.maximum(rows.error[:-1], rows.error[1:])
-        phi_lo = np.minimum(rows.phi[:-1, 0], rows.phi[1:, 0]) - slack
-        phi_hi = np.maximum(rows.phi[:-1, -1], rows.phi[1:, -1]) + slack
-        phi_lo[:begin] = 0.0
-        phi_lo = np.maximum(phi_lo, 0.0)
+        pieces = []
+        for first, last in _columns(law.borders):
+            phi_lo = np.minimum(rows.phi[:-1, first], rows.phi[1:, first]) - slack
+            phi_hi = np.maximum(rows.phi[:-1, last], rows.phi[1:, last]) + slack
+            phi_lo[:begin] = 0.0
+            phi = Intervals(np.maximum(phi_lo, 0.0), phi_hi)
+            pieces.append(Piece(float(law.borders[first]), float(law.borders[last]), phi))
         places = x.copy()
         places[:begin] = self.source.place[numbers[:begin]]
-        found = decided(side, places, phi_lo, phi_hi, (float(law.borders[0]), float(law.borders[-1])))
+        found = decided(side, places, pieces)
         at_cut = landed(side, x, np.full(n, law.borders[0]) if law.certain else found.cut)
         rows = rows._replace(
             error=np.maximum(rows.error, np.maximum(at_cut.phi_error, at_cut.error)),
             good=rows.good & at_cut.good,
         )
-        all_of = slopes(
-            side,
-            Intervals(phi_lo, phi_hi),
-            Intervals(np.full(n - 1, law.borders[0]), np.full(n - 1, law.borders[-1])),
+        all_of = Derivatives(
+            *map(hull, zip(*(slopes(side, each.phi, each.delta) for each in pieces), strict=True))
         )
         self._nodes(rows, found, all_of, at_cut.place)
         self._cells(rows, found, all_of, begin)
