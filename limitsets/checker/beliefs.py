@@ -9,6 +9,7 @@ from fractions import Fraction
 from typing import NamedTuple
 
 import numpy as np
+from flint import arb
 
 from .balls import Array
 from .cells import Crew, first_bad, tasks_of
@@ -75,6 +76,9 @@ def check_policy(
 def check_ranges(policy: Policy) -> str:
     """Check that all numbers of states, throws and cells are those of one; "" or the reason."""
     n, states = len(policy.cells[0].side), len(policy.throw)
+    sides = policy.choices[0].scene.sides
+    if not all(arb(float(e[0])) > s.a for e, s in zip(policy.cells[0].edges, sides, strict=True)):
+        return "the cells begin left of a: a part there has left the arm"
     state, first, last = policy.belief.T
     for good, what in (
         (

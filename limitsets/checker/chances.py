@@ -75,6 +75,9 @@ def read_chances(header: dict[str, Any], entries: dict[str, memoryview]) -> Chan
     speed = read_noise(laws, "throw.speed", "share")
     landing = read_noise(laws, "landing.x", "length").lo / LENGTHS[scene.unit]
     require(landing > 0, "landing.x: without scatter of the landing place nothing is rechecked")
+    # far nodes hold where throws land at all, and what is not followed lies off the arm on both branches
+    near = all(bool(abs(side.shift) < MOST_PLACE / 2) for side in scene.sides)
+    require(near and landing < MOST_PLACE, "landings are too far out")
     strata = section["strata"]
     require(type(strata) is int and 1 <= strata <= MOST_STRATA, f"strata is not from 1 to {MOST_STRATA}")
     noisy = Noisy(still.sides, still.k_lo.union(still.k_hi), speed.lo, landing, strata)
@@ -86,6 +89,7 @@ def read_chances(header: dict[str, Any], entries: dict[str, memoryview]) -> Chan
     require(not {ANY, LEFT} & set(places), f"{ANY} and {LEFT} name no places")
     require(not overlapping(places), "two places that absorb overlap")
     starts = read_places(section["starts"], "starts", scene)
+    require(not overlapping({"starts": starts}), "two stretches of starts overlap: they would count twice")
     names = rows(section["names"], "names", 1, 100)
     known = all(isinstance(name, str) and name in (ANY, LEFT, *places) for name in names)
     require(known and len(set(names)) == len(names), "names are not those of places that absorb")

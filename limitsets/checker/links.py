@@ -55,7 +55,10 @@ class Links(Landings):
         self.assign(found)
         for cell in live.tolist():
             self.add_cell(cell, found[cell])
-        for node in sorted({int(k) for cell in live.tolist() for k in (cell, cell + 1)}):
+        # a node between cells that have become hard just now has no bound of how far its throws may be off
+        kept = np.flatnonzero(self.kinds == LIVE).tolist()
+        self.at_cut = {node: self.at_cut[node] for cell in kept for node in (cell, cell + 1)}
+        for node in sorted(self.at_cut):
             self.add_node(node)
         for cell in np.flatnonzero(self.kinds == HARD).tolist():
             self.add_hard(cell)
@@ -96,8 +99,11 @@ class Links(Landings):
             self.bend[node] = max(self.bend[node], upper(abs(over.dd)) * step * step * 0.125)
         two = self.place[cell : cell + 2]
         lo, hi = float(two.min()) - slack, float(two.max()) + slack
-        gap = min(border.gap + max(self.mismatch(cell + k, border, k) for k in (0, 1)), 1.0)
-        places = [self.range_of(branch, lo, hi) for branch in (border.below, border.above)]
+        other = max(self.mismatch(cell + k, border, k) for k in (0, 1))
+        gap = min(border.gap + other, 1.0)
+        # throws that a node reckons by another branch land elsewhere than the cell's
+        branches = (0, 1) if other > 0.0 else (border.below, border.above)
+        places = [self.range_of(branch, lo, hi) for branch in branches]
         self.parts.at_cells.rows.append((at, gap, *places[0], *places[1]))
         if not self.certain and (over.d > 0 or over.d < 0):
             self.add_ends(cell, border, over, h, places)
@@ -247,7 +253,8 @@ def chain_of(
         spread += links.spread
     e = float(noisy.landing)
     table = Table(mesh, e)
-    columns = [np.array(column) for column in zip(*spread, strict=True)]
+    kinds_of_columns = (np.int64, float, np.int64, float, float)
+    columns = [np.array([put[k] for put in spread], dtype=kind) for k, kind in enumerate(kinds_of_columns)]
     rows = mean_rows(len(mesh.place), mesh, Spread(*columns), e)
     live = np.sort(parts.at_cells.array("at", np.int64))
     cells, nodes, hard = (Reach(table, some) for some in (parts.at_cells, parts.at_nodes, parts.hard))

@@ -111,7 +111,10 @@ def read_choice(value: object, raw: dict[str, Any], noise: object) -> Choice:
     ((key, text),) = given.items()
     value = quantity(text, "length" if key == "kappa" else "speed", f"{plain(name)}.{key}")
     require(value.lo == value.hi, "a throw to choose is not one number")
-    return Choice(plain(name), f"{key} = {value}", read_scene({**raw, "throw": given}, noise))
+    # no name reads like another throw of the list in which it is printed
+    return Choice(
+        re.sub("[:;=]", "?", plain(name)), f"{key} = {value}", read_scene({**raw, "throw": given}, noise)
+    )
 
 
 def read_sensor(value: object, n_sides: int) -> Sensor:
