@@ -276,6 +276,11 @@ def shifted(forged):
     )
 
 
+def sides_swapped(forged):
+    places = section_of(forged)["absorbing"]
+    places["right"][0][0], places["wrong"][0][0] = 0, 2
+
+
 def swapped(forged):
     section_of(forged)["names"][:2] = "wrong", "right"
 
@@ -294,7 +299,7 @@ FALSE = {
     "mean raised": changed("mean", [(12.35).hex(), None]),
     "mean bounded": changed("mean", [(12.0).hex(), (12.2).hex()]),
     "X moved": changed(1, "19 in", "absorbing", "right", 0),
-    "side swapped": changed(0, 1, "starts", 2),
+    "side swapped": sides_swapped,
     "names swapped": swapped,
     "n shifted": shifted,
     "kappa changed": changed("kappa", "30 in", "scene", "throw"),
@@ -316,6 +321,7 @@ ODD = {
     "landing.x missing": lambda forged: section_of(forged)["laws"].pop("landing.x"),
     "nothing is rechecked": changed("uniform", "0 in", "laws", "landing.x"),
     "reaches 100": changed("uniform", "120 %", "laws", "throw.speed"),
+    "stretches of starts overlap": changed(0, 1, "starts", 2),
     "overlap": changed("wrong", [[2, "21 in", None]], "absorbing"),
     "name no places": changed("exits", [[2, "10 in", "11 in"]], "absorbing"),
     "names are not": changed("names", ["right", "elsewhere", "any"]),
