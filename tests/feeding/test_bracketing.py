@@ -48,6 +48,7 @@ def test_without_noise_there_are_none():
         ls.feed(with_cavity("paper-initial"), prove=False, trials=10, cells=32, brackets=50)
 
 
+@pytest.mark.sweep  # brackets of 200 throws
 def test_the_command_shows_them(capfd, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     ls.dump(with_cavity("paper-initial"), "fed.toml")

@@ -94,6 +94,7 @@ def test_a_side_before_that_is_recorded_wrong_is_seen_too():
     assert found.misread == ((9, "side_before", int(bad[7]), int(throws.side_before[7])),)
 
 
+@pytest.mark.sweep  # many fits
 def test_shifts_by_flipped_sides_are_below_a_standard_error():
     shifts = {name: [] for name in PLACES}
     for truth, found in repeated(20, seed=5, flipped=0.05):

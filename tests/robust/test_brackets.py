@@ -245,7 +245,7 @@ def test_a_throw_without_noise_is_certain():
             300,
             marks=pytest.mark.sweep,
         ),
-        ("paper-initial", Scattering(landing=Uniform(0.1)), 300),
+        pytest.param("paper-initial", Scattering(landing=Uniform(0.1)), 300, marks=pytest.mark.sweep),
     ],
 )
 def test_brackets_meet_the_shares_of_many_throws(name, scatter, cells):
@@ -293,6 +293,7 @@ def test_right_and_wrong_add_up_and_narrow_with_the_cells():
     assert set(json["within"]) == {"any", "right", "wrong", "exits"}
 
 
+@pytest.mark.sweep  # a bound of the mean, and many throws
 def test_the_mean_and_the_quantiles_hold_for_a_ladder_of_throws():
     scene = ls.load("paper-designed-small-angle")
     a, q = _stretched(scene)

@@ -19,6 +19,7 @@ def study():
     return loaded
 
 
+@pytest.mark.sweep  # fits of many machines
 def test_intervals_hold_and_are_as_wide_as_claimed(study):
     found = study.many(10, seed=3, flipped=0.05)
     for name in study.NAMES[:4]:
@@ -27,6 +28,7 @@ def test_intervals_hold_and_are_as_wide_as_claimed(study):
         assert found[name]["half"] == pytest.approx(EXPECTED["half"][name], rel=0.25)
 
 
+@pytest.mark.sweep  # fits of many machines
 def test_the_table_of_the_page_is_that_of_the_study(study):
     page = (FOLDER / "README.md").read_text(encoding="utf-8")
     for line in study.table(EXPECTED["numbers"]).splitlines():
