@@ -50,7 +50,7 @@ class Parts:
         default_factory=lambda: collected("at", "much", "side", "lo", "hi", "side2", "lo2", "hi2")
     )
     hard: Collected = field(
-        default_factory=lambda: collected("at", "much", "side", "lo", "hi", "side2", "lo2", "hi2")
+        default_factory=lambda: collected("at", "much", "side", "lo", "hi", "side2", "lo2", "hi2", "node")
     )
     ends: Collected = field(default_factory=lambda: collected("at", "least", "most", "side", "lo", "hi"))
     inner: Collected = field(default_factory=lambda: collected("at", "much", "side", "lo", "hi"))
@@ -106,6 +106,7 @@ class Chain:
     cells: Reach
     nodes: Reach
     hard: Reach
+    beside: Array  # by hard cell the node whose mean may serve for it
     ends: Bent
     inner: Bent
     turns: Bent
@@ -138,8 +139,8 @@ class Chain:
         for nodes in (self.live, self.live + 1):
             found[nodes] = np.maximum(found[nodes], mean[nodes] + deficit)
         least, most = self.hard.ends(values)
-        near = np.isfinite(self.hard.much)  # hardly farther than what is thrown from the right node
-        beside = mean[self.hard.at + 1] + INFLATE * np.where(near, self.hard.much, 0.0) * (most - least)
+        near = np.isfinite(self.hard.much)  # hardly farther than what is thrown from that node
+        beside = mean[self.beside] + INFLATE * np.where(near, self.hard.much, 0.0) * (most - least)
         bound = np.where(near, np.minimum(most + more, beside), most + more) + 2.0**-50 * size
         for nodes in (self.hard.at, self.hard.at + 1):
             np.maximum.at(found, nodes, bound)

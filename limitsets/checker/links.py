@@ -207,10 +207,11 @@ class Links(Landings):
         self.spread.append((at, float(weight), side, min(ends), max(ends)))
 
     def add_hard(self, cell: int) -> None:
-        """Collect where throws from a cell may land at all, on both branches."""
-        x = (float(self.x[cell]), float(self.x[cell + 1]))
-        known = cell + 1 in self.outer and bool(np.isfinite(self.error[cell + 1]).all())
-        last = self.outer[cell + 1][1] if known else self.hit_of(x[1], self.kappas[-1])
+        """Collect where throws from a cell may land at all, on both branches; the next node's throws among them."""
+        node = self.next_thrown(cell)
+        x = (float(self.x[cell]), float(self.x[node]))
+        known = node in self.outer and bool(np.isfinite(self.error[node]).all())
+        last = self.outer[node][1] if known else self.hit_of(x[1], self.kappas[-1])
         first = arb(0)
         if arb(x[0]) > self.side.a:
             before = self.hit_of(x[0], self.kappas[0])
@@ -222,14 +223,24 @@ class Links(Landings):
             )
             lo, hi = max(lo, low), min(hi, high)
         one, two = (self.range_of(branch, lo, hi) for branch in (0, 1))
-        self.parts.hard.rows.append((self.start + cell, self.off_next(cell, first, last), *one, *two))
+        much = self.off_next(cell, node, first, last)
+        self.parts.hard.rows.append((self.start + cell, much, *one, *two, self.start + node))
 
-    def off_next(self, cell: int, first: Arb, last: Hit | None) -> float:
-        """Bound how far the mean from a hard cell is from that at its right node, as a share of what V varies by.
+    def next_thrown(self, cell: int) -> int:
+        """Find the node next to a cell on the right, or the first one near it that is thrown from: at the joint.
 
-        Infinite where the node is not thrown from, or not surely by one branch as all of the cell.
+        Cells there are hard and lead to themselves; their throws are hardly others than those from that node.
         """
-        node = cell + 1
+        right = cell + 1
+        near = (k for k in range(right, min(right + 4, len(self.x))) if k in self.at_cut)
+        node = next(near, right)
+        return node if self.x[node] - self.x[cell] < self.e else right
+
+    def off_next(self, cell: int, node: int, first: Arb, last: Hit | None) -> float:
+        """Bound how far the mean from a hard cell is from that at a node, as a share of what V varies by.
+
+        Infinite where the node is not thrown from, or not surely by one branch as all that is between.
+        """
         if last is None or node not in self.at_cut or self.below[node] != self.above[node]:
             return math.inf
         x_lo = self.side.a.lower() if self.side.a > arb(float(self.x[cell])) else arb(float(self.x[cell]))
@@ -260,4 +271,7 @@ def chain_of(
     cells, nodes, hard = (Reach(table, some) for some in (parts.at_cells, parts.at_nodes, parts.hard))
     ends, inner, turns = (Bent(table, some) for some in (parts.ends, parts.inner, parts.turns))
     curved, turned = np.unique(ends.at), np.unique(turns.at)
-    return Chain(mesh, rows, live, absorbed, table, cells, nodes, hard, ends, inner, turns, curved, turned)
+    beside = parts.hard.array("node", np.int64)
+    return Chain(
+        mesh, rows, live, absorbed, table, cells, nodes, hard, beside, ends, inner, turns, curved, turned
+    )
