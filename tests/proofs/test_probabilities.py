@@ -368,7 +368,9 @@ def test_brackets_are_saved_and_rechecked(tmp_path):
         throws=4,
     )
     low, high = found.mean
-    assert low < high < 25  # cells at the joint lead to themselves: only their neighbour's throws bound the mean
+    assert (
+        low < high < 25
+    )  # cells at the joint lead to themselves: only their neighbour's throws bound the mean
     file = found.save(tmp_path / "initial.proof.zip")
     report = ls.recheck(file)
     assert (report.verdict, report.claims) == ("proved", [("probabilities", "proved", "")])
