@@ -2,7 +2,6 @@
 
 import math
 from fractions import Fraction
-from itertools import product
 
 import mpmath
 import numpy as np
@@ -23,6 +22,7 @@ from limitsets.robust.brackets.spans import running
 from limitsets.robust.noise.chain_solution import starts_from
 from limitsets.robust.noise.sampling import throw_many
 from limitsets.robust.noise.scattering import thrown
+from tests.closed_forms import ladder
 
 BOTH = Scattering(speed=Uniform(0.003), landing=Uniform(0.02))
 
@@ -101,17 +101,6 @@ def test_one_throw_is_bounded_at_every_place(name, scatter, count):
 # ------------------------------------------------------------ closed forms
 
 
-def _sum_of_uniforms(widths, t):
-    """P(sum of independent uniform numbers on [0, w_i] <= t), in rationals' place by 50 digits."""
-    with mpmath.workdps(60):
-        n, total = len(widths), mpmath.mpf(0)
-        for signs in product((0, 1), repeat=n):
-            rest = mpmath.mpf(t) - sum(w for s, w in zip(signs, widths, strict=True) if s)
-            if rest > 0:
-                total += (-1) ** sum(signs) * rest**n
-        return float(total / (mpmath.factorial(n) * mpmath.fprod(widths)))
-
-
 def _stretched(scene):
     """a_2, and the factor by which a jog of the small-angle model stretches R - a."""
     return float(scene.sides.a[2]), 1.0 + 2.0 * abs(scene.map.surface_height) / scene.map.kappa
@@ -134,11 +123,9 @@ def test_a_linear_map_with_uniform_noise_has_its_closed_form():
             mean=False,
         )
         low, high = found.within["right"]
-        for n in range(8):
-            widths = [q**n * (hi - lo)] + [2.0 * b * q**k for k in range(n)]
-            least = a + q**n * (lo - a) - b * sum(q**k for k in range(n))
-            exact = 1.0 - _sum_of_uniforms(widths, x_right - least) if x_right > least else 1.0
-            assert low[n] - 1e-12 <= exact <= high[n] + 1e-12
+        exact = ladder((a, q), (lo, hi), b, x_right, 7)
+        assert (low - 1e-12 <= exact).all()
+        assert (exact <= high + 1e-12).all()
         if cells == 1500:
             assert (high - low).max() < 0.01
 
@@ -195,6 +182,7 @@ def test_the_rounding_of_a_mean_grows_with_its_entries():
     assert abs(float((row @ values)[0]) - float(exact)) <= rounding_of(row)
 
 
+@pytest.mark.sweep
 def test_a_linear_map_with_normal_noise_has_its_closed_form():
     scene = ls.load("paper-designed-small-angle")
     a, q = _stretched(scene)
@@ -301,23 +289,15 @@ def test_the_mean_and_the_quantiles_hold_for_a_ladder_of_throws():
     found = absorption_brackets(
         scene, Scattering(landing=Uniform(b)), right=(x_right, 2), starts=[(2, lo, hi)], cells=1500, throws=12
     )
-    # The mean is the sum of P(T > n), each in closed form.
-    mean = sum(1.0 - each for each in _ladder(a, q, lo, hi, b, x_right))
+    exact = ladder((a, q), (lo, hi), b, x_right, 8)
+    mean = (1.0 - exact).sum()  # the sum of P(T > n)
     assert found.mean[0] <= mean + 1e-9
     assert found.mean[1] >= mean - 1e-9
     assert found.mean[1] - found.mean[0] < 0.2
     # The median: the first n with P(T <= n) of at least a half, in closed form.
-    median = next(n for n, each in enumerate(_ladder(a, q, lo, hi, b, x_right)) if each >= 0.5)
+    median = int(np.argmax(exact >= 0.5))
     first, last = found.quantile(0.5, "right")
     assert first <= median <= last <= first + 1
-
-
-def _ladder(a, q, lo, hi, b, x_right):
-    """P(T <= n) in closed form, n from 0 on."""
-    for n in range(9):
-        widths = [q**n * (hi - lo)] + [2.0 * b * q**k for k in range(n)]
-        least = a + q**n * (lo - a) - b * sum(q**k for k in range(n))
-        yield 1.0 - min(_sum_of_uniforms(widths, x_right - least), 1.0) if x_right > least else 1.0
 
 
 # ------------------------------------------------------------ errors
