@@ -235,6 +235,16 @@ class CavityTable(Table):
     angle: Angle
 
 
+class TrayTable(Table):
+    """A plate with equal depressions."""
+
+    depression_width: Length
+    depression_depth: Length
+    pitch: Length
+    agitation: Length
+    wash: Length
+
+
 class EffectsTable(Table):
     """What is simulated beyond the minimal model: effects of those declared."""
 
@@ -253,6 +263,7 @@ class SceneTable(Table):
     model: ModelTable = Field(default_factory=ModelTable)
     goal: GoalTable | None = None
     cavity: CavityTable | None = None
+    tray: TrayTable | None = None
     world: WorldTable = Field(default_factory=WorldTable)
     effects: EffectsTable = Field(default_factory=EffectsTable)
     tolerance: dict[str, Deviation] = Field(default_factory=dict)

@@ -10,9 +10,10 @@ from scipy.stats import beta, binomtest
 import limitsets as ls
 from limitsets.feeding.falling import FATES, arm_end_of
 from limitsets.feeding.fed_shares import FeedingProblem, success_curve
-from limitsets.feeding.trials import binomial_interval, run_trials
+from limitsets.feeding.trials import run_trials
 from limitsets.files import as_json
 from limitsets.robust import Gaussian, Scattering, Uniform
+from limitsets.robust.noise.proportions import binomial_interval
 from tests.feeding.scenes import with_cavity
 
 NOISE = Scattering(speed=Gaussian(0.005), landing=Gaussian(0.02))
