@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -10,7 +9,6 @@ from limitsets.assembly.drawing import Draws
 from limitsets.assembly.pairing import Pair, Start
 from limitsets.engine.crowd import Crowd
 from limitsets.engine.seats import SEATED, off_seat, seat_of
-
 
 if TYPE_CHECKING:
     from limitsets.engine.recording import Recording
