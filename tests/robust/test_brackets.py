@@ -21,8 +21,8 @@ from limitsets.robust.brackets.nodes import Nodes
 from limitsets.robust.brackets.spans import running
 from limitsets.robust.noise.chain_solution import starts_from
 from limitsets.robust.noise.sampling import throw_many
-from limitsets.robust.noise.scattering import thrown
 from tests.closed_forms import ladder
+from tests.one_throw import mean_after
 
 BOTH = Scattering(speed=Uniform(0.003), landing=Uniform(0.02))
 
@@ -55,23 +55,6 @@ def test_normal_strata_have_the_masses_of_the_law():
 # ------------------------------------------------------------ one throw of any function, at any place
 
 
-def _operator(scene, scatter, chain, values, x, side, count):
-    """Mean of a function, affine between the nodes of the chain, after one throw: by midpoints of the laws."""
-    nodes, total = chain.nodes, np.zeros(x.size)
-    share = (np.arange(count) + 0.5) / count
-    speed = [0.0] if scatter.speed is None else scatter.speed.bound * (2.0 * share - 1.0)
-    landing = [0.0] if scatter.landing is None else scatter.landing.bound * (2.0 * share - 1.0)
-    at = thrown(scene.map)
-    for delta in speed:
-        after, turned, code, _ = advance(at(1.0 / (1.0 + delta) ** 2), x, side, 1)
-        assert (code >= 0).all()
-        for k in range(len(scene.sides)):
-            here, row = turned == k, nodes.of_side(k)
-            for off in landing:
-                total[here] += np.interp(after[here] + off, nodes.place[row], values[row])
-    return total / (len(speed) * len(landing))
-
-
 NOISES = [(BOTH, 100), (Scattering(landing=Uniform(0.05)), 1000), (Scattering(speed=Uniform(0.01)), 1000)]
 
 
@@ -83,7 +66,8 @@ def test_one_throw_is_bounded_at_every_place(name, scatter, count):
     random = np.random.default_rng(3)
     x, side = random.uniform(6.0, 22.0, 1000), random.integers(0, 3, 1000)
     waves = np.sin(3.0 * chain.nodes.place + chain.nodes.side()) + (chain.nodes.place > 17.3)
-    found = _operator(scene, scatter, chain, waves, x, side, count)
+    rows = [(chain.nodes.place[row], waves[row]) for row in map(chain.nodes.of_side, range(3))]
+    found = mean_after(scene, scatter, rows, x, side, count)
     none = np.full(chain.free.size, -np.inf)
     above, below = chain.above(waves, none), -chain.above(-waves, none)
     high, low = np.empty(x.size), np.empty(x.size)
