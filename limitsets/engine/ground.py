@@ -64,6 +64,11 @@ class Ground:
         """The polygons without their names."""
         return tuple(piece.corners for piece in self.pieces)
 
+    def is_arm(self, x: float) -> bool:
+        """Whether the arm's surface lies below."""
+        arm = (piece.corners[:, 0] for piece in self.pieces if piece.name == "arm")
+        return any(float(along.min()) <= x <= float(along.max()) for along in arm)
+
     def shapes(self, on: Any) -> dict[str, list[Any]]:
         """Make the engine's shapes on a body of a space, by name; friction and the like are the caller's."""
         from limitsets.engine.stage import pymunk_module
