@@ -263,13 +263,13 @@ def test_refuses(changes: dict[str, Any], key: str, words: str, whole: dict[str,
     assert error.__cause__ is None
 
 
-def test_an_effect_that_no_version_simulates_is_refused_with_those_that_are(whole: dict[str, Any]) -> None:
-    whole["effects"]["contact"] = True
-    with pytest.raises(
-        SceneError, match=f"contact.*this version can simulate: {', '.join(EFFECTS)}"
-    ) as caught:
-        load(whole)
-    assert caught.value.key == "effects.contact"
+def test_contact_is_for_the_engine_alone(whole: dict[str, Any]) -> None:
+    assert not load(whole).effects.contact
+    whole["effects"] = {"contact": True}
+    scene = load(whole)
+    assert scene.effects.contact
+    assert scene.effects.on() == ()
+    assert scene.map is scene.bare_map
 
 
 def test_an_effect_that_is_not_declared_is_an_unknown_key(
