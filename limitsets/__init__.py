@@ -42,6 +42,7 @@ if TYPE_CHECKING:  # each from the file that holds it: most rooms have a file of
     from limitsets.sets.limit_set import limit_set
     from limitsets.sweep.continuation import continuation
     from limitsets.sweep.parameter_atlas import atlas
+    from limitsets.trays.filling import tray
 
 __version__ = "0.1.0"
 
@@ -81,6 +82,7 @@ _ROOMS = {
     "robustness": "robust.sheet.sheet_run",
     "scenes": "scene",
     "transitions": "graph.transitions",
+    "tray": "trays",
 }
 
 __all__ = [
@@ -117,6 +119,7 @@ __all__ = [
     "robustness",
     "scenes",
     "transitions",
+    "tray",
 ]
 
 

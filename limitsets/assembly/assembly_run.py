@@ -31,7 +31,7 @@ Progress = Callable[[str, int, int], None]
 
 OUTCOMES = ("assembled", "ejected", "order", "wrong", "wall", "left", "never", "unfinished")
 """Both in their places; one came out of the cavity again; both on their sides, but the second below the first; one in a
-wrong orientation; one stuck at the wall; one left the arm otherwise; one is still on the arm; one is still in motion."""
+wrong orientation; one stuck at the wall; one left the arm otherwise; one is still on the arm; one still moves."""
 
 PAPER, SURVIVED, OF = 11, 17, 20
 """Of 20 trials of the paper so many assembled; of 20 assembled pairs so many were whole after the next throw."""
@@ -54,7 +54,7 @@ class Series:
     trials: int
 
     def question(self) -> dict[str, Any]:
-        """What is asked, for the file of the trials: everything but how many they are."""
+        """Give what is asked, for the file of the trials: everything but how many they are."""
         words = {
             name: value for name, value in asdict(self).items() if name not in ("scenes", "scatter", "trials")
         }
@@ -249,7 +249,7 @@ def assemble(
     Raises
     ------
     AnswerError
-        Scenes that differ in arm, throw or cavity, or have none; parts that overlap at the start; a file of other trials.
+        Scenes that differ in arm, throw or cavity; parts that overlap at the start; a file of other trials.
 
     Examples
     --------

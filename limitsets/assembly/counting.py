@@ -89,8 +89,8 @@ class Joint:
     error_interval : (float, float)
         Of that, 95 %, to first order: the trials' spread of (both - p1 [2 right] - p2 [1 right]).
     serial : (float, float)
-        Interval of the product, 95 %: the rate of feeding serially, one part after the other, or with two arms, where the
-        order is certain.
+        Interval of the product, 95 %: the rate of feeding serially, one part after the other, or with two arms, where
+        the order is certain.
     """
 
     table: dict[str, dict[str, int]]

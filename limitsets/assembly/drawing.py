@@ -36,7 +36,7 @@ class Draws:
     --------
     >>> import limitsets as ls
     >>> from limitsets.assembly.pairing import pair_of
-    >>> pair = pair_of("paper-assembly-triangle", "paper-quadrilateral")
+    >>> pair = pair_of("paper-triangle", "paper-quadrilateral")
     >>> Draws(pair, 0, 7).starts(apart=True) == Draws(pair, 0, 7).starts(apart=True)
     True
     """
@@ -47,7 +47,7 @@ class Draws:
         self.rows: list[list[float]] = []
 
     def starts(self, *, apart: bool) -> tuple[Start, Start]:
-        """Draw where the parts lie at first, as `limitsets.feed` does, each by itself; `apart`: until they do not overlap."""
+        """Draw where the parts lie at first, each as `limitsets.feed` does; `apart`: until they do not overlap."""
         for _ in range(MOST_DRAWN):
             first, second = (self._start(number) for number in (0, 1))
             if not apart or are_apart(self.pair, (first, second)):

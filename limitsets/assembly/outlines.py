@@ -18,7 +18,7 @@ from limitsets.thrower import impact_angles
 __all__ = ["TOLERANCE", "Way", "meet", "way_of"]
 
 # Parts nearer than this share of the first one's longest side are taken to overlap.
-TOLERANCE = 1e-3
+TOLERANCE = 5e-3
 # Step in which a part turns about the corner that struck [rad], and when turning is given up.
 STEP, PATIENCE = 4e-3, 12.0
 
@@ -41,8 +41,8 @@ class Way:
         The corner that strikes.
     turns : tuple of float
         Angles by which it has turned since, at multiples of `STEP`; the last one is that at rest [rad].
-    speed : float
-        No point of the part is faster [length].
+    in_flight, turning : float
+        No point of the part is faster before and after the impact [length].
     """
 
     scene: Scene
@@ -51,12 +51,19 @@ class Way:
     phi: float
     struck: int
     turns: tuple[float, ...]
-    speed: float
+    in_flight: float
+    turning: float
 
     @property
     def ends(self) -> float:
         """When it lies still."""
         return self.phi + STEP * (len(self.turns) - 1)
+
+    def speed(self, time: float) -> float:
+        """No point of the part is faster from a time on [length]."""
+        if time >= self.ends:
+            return 0.0
+        return self.turning if time >= self.phi else max(self.in_flight, self.turning)
 
     def corners(self, time: float) -> list[tuple[float, float]]:
         """Where its corners are.
@@ -106,7 +113,7 @@ def way_of(scene: Scene, params: Any, start: Start, side: int) -> Way:
     reach = max(math.dist(corner, scene.centre) for corner in scene.vertices.tolist())
     height = scene.surface_height + float(scene.sides.d[before])
     if not math.isfinite(phi):  # outside the model: it stays where it is
-        return Way(scene, start, kappa, 0.0, 0, (0.0,), 0.0)
+        return Way(scene, start, kappa, 0.0, 0, (0.0,), 0.0, 0.0)
     landed = _in_flight(scene, start, kappa, phi)
     # the left corner, unless the scene lets another one land before it
     count = len(landed)
@@ -122,7 +129,7 @@ def way_of(scene: Scene, params: Any, start: Start, side: int) -> Way:
     turned = sum(float(scene.sides.corner[(before + k) % count]) for k in range(sides))
     turns, fastest = _turned(turned - phi, rate, (right, above), inertia, kappa)
     in_flight = math.hypot(height, max(abs(x), abs(x - kappa * phi))) + reach
-    return Way(scene, start, kappa, phi, struck, turns, max(in_flight, 2.0 * reach * fastest))
+    return Way(scene, start, kappa, phi, struck, turns, in_flight, 2.0 * reach * fastest)
 
 
 def _turned(
@@ -152,7 +159,7 @@ def meet(one: Way, two: Way) -> bool:
     As nothing is faster than the ways' speeds, times are left out in which the parts cannot have met: no overlap is
     missed, and parts that come closer than `TOLERANCE` count as overlapping.
     """
-    least, speed = TOLERANCE * float(one.scene.sides.length.max()), one.speed + two.speed
+    least = TOLERANCE * float(one.scene.sides.length.max())
     time, last = 0.0, max(one.ends, two.ends)
     while True:
         apart = -depth_of_overlap(one.corners(time), two.corners(time))
@@ -160,4 +167,5 @@ def meet(one: Way, two: Way) -> bool:
             return True
         if time >= last:
             return False
+        speed = one.speed(time) + two.speed(time)
         time = min(time + apart / speed, last) if speed > 0.0 else last

@@ -62,12 +62,7 @@ class Pair:
     @property
     def contact(self) -> bool:
         """Whether the scenes ask for contact between the parts."""
-        return in_contact(self.scenes[0])
-
-
-def in_contact(scene: Scene) -> bool:
-    """Whether a scene says that parts push each other."""
-    return bool(scene.text.get("effects", {}).get("contact", False))
+        return self.scenes[0].effects.contact
 
 
 def pair_of(
@@ -90,8 +85,8 @@ def pair_of(
                 "two parts on one arm share it, its throw and its cavity: write them alike in both scenes"
             )
             raise AnswerError(f"{name} of the two scenes", values, "the same in both", remedy)
-    if in_contact(one) != in_contact(two):
-        values = in_contact(one), in_contact(two)
+    if one.effects.contact != two.effects.contact:
+        values = one.effects.contact, two.effects.contact
         raise AnswerError(
             "effects.contact of the two scenes", values, "the same in both", "switch it in both"
         )

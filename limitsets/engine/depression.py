@@ -11,6 +11,10 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+import numpy as np
+from numpy.typing import NDArray
+
+from limitsets.engine.ground import ground_of
 from limitsets.engine.settling import IDLE, LEANING
 from limitsets.engine.stage import Stage, pymunk_module, set_up
 
@@ -98,15 +102,12 @@ class Plate:
         """Length of the part's longest side [length]."""
         return float(self.part.sides.length.max())
 
-    def ground(self) -> tuple[tuple[tuple[float, float], ...], ...]:
+    def ground(self) -> tuple[NDArray[np.float64], ...]:
         """Give the polygons of the plate: left and right of the depression, and its floor."""
-        far, half = FAR * self.size, 0.5 * self.width
-        low = -self.depth - self.size  # thicker than any step is long
-        return (
-            ((-far, low), (-half, low), (-half, 0.0), (-far, 0.0)),
-            ((half, low), (far, low), (far, 0.0), (half, 0.0)),
-            ((-half, low), (half, low), (half, -self.depth), (-half, -self.depth)),
-        )
+        far = FAR * self.size
+        level = replace(self.part, surface_height=0.0, arm_length=2.0 * far, cavity=None)
+        hollow = (far - 0.5 * self.width, self.width, self.depth)
+        return tuple(corners - (far, 0.0) for corners in ground_of(level, depressions=[hollow]).polygons)
 
     def lowered(self, x: float, angle: float, height: float) -> Pose:
         """Give the pose of a part over x, turned by an angle, whose lowest point is at a height."""
@@ -154,7 +155,8 @@ class Plate:
         return set_up(replace(self.part, kappa=self.size, surface_height=0.0), 0.0, 0)
 
     def _shapes(self, stage: Stage) -> list[Any]:
-        shapes = [pymunk_module().Poly(stage.space.static_body, corners) for corners in self.ground()]
+        fixed = stage.space.static_body
+        shapes = [pymunk_module().Poly(fixed, corners.tolist()) for corners in self.ground()]
         stage.meet(shapes, self.friction, self.restitution, self.step)
         return shapes
 

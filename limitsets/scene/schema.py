@@ -248,7 +248,7 @@ class TrayTable(Table):
 class EffectsTable(Table):
     """What is simulated beyond the minimal model: effects of those declared."""
 
-    contact: Flag = False  # a word that is kept; no version simulates it
+    contact: Flag = False  # by the engine alone: the map is the same
     auto: Flag = False
 
 

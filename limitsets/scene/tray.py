@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import functools
+import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 
-from limitsets.geometry.polygon import above_side, side_ends
+from limitsets.geometry.polygon import Scalar, Vector, above_side, side_ends
 from limitsets.scene.resolve import Resolver
 
 if TYPE_CHECKING:
@@ -41,14 +44,18 @@ class Tray:
     wash: float
 
 
-def heights_over_sides(vertices: npt.NDArray[np.float64]) -> list[float]:
+def heights_over_sides(
+    vertices: Sequence[Vector],
+    sqrt: Callable[[Scalar], Scalar] = math.sqrt,
+    larger: Callable[[Scalar, Scalar], Scalar] = max,
+) -> list[Scalar]:
     """How high the part stands when it lies on each side [length]."""
-    corners = [(float(x), float(y)) for x, y in vertices]
-    ends = [side_ends(len(corners), side) for side in range(len(corners))]
-    return [
-        max(above_side(corners[left], corners[right], corner)[1] for corner in corners)
+    ends = (side_ends(len(vertices), side) for side in range(len(vertices)))
+    measured = (
+        (above_side(vertices[left], vertices[right], corner, sqrt)[1] for corner in vertices)
         for left, right in ends
-    ]
+    )
+    return [functools.reduce(larger, heights) for heights in measured]
 
 
 def resolve_tray(
@@ -63,7 +70,8 @@ def resolve_tray(
     sizes = Tray(
         **{name: resolver.positive(getattr(table, name), "length", f"tray.{name}") for name in names}
     )
-    heights, wanted = heights_over_sides(vertices), getattr(goal, "side", None)
+    corners = [(float(x), float(y)) for x, y in vertices]
+    heights, wanted = heights_over_sides(corners), getattr(goal, "side", None)
     fit_for = range(len(heights)) if wanted is None else [wanted]
     side = min(fit_for, key=lengths.__getitem__)
     unit, of_side = resolver.unit, f"of side {side}"
