@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from limitsets.feeding.falling import FATES
-from limitsets.feeding.trials import binomial_interval
+from limitsets.robust.noise.proportions import binomial_interval
 
 __all__ = ["Joint", "Overlaps", "Rate", "joint_of", "overlaps_of", "rate_of"]
 
