@@ -269,14 +269,10 @@ def assemble(
     how = (contact or "hinge") if pair.contact else None
     if apart is False and how is not None:
         raise AnswerError("the starts", "overlapping", "parts that do not overlap", "leave apart out")
-    given = None
-    if starts is not None:
-        given = tuple((float(x), int(side)) for x, side in starts)
-        require_apart(pair, given)
-    texts = tuple(json.dumps(each.as_dict()) for each in pair.scenes)
-    series = Series(
-        texts, pair.scatter, how, carried, bool(how if apart is None else apart), given, seed, trials
-    )
+    given = None if starts is None else require_apart(pair, starts)
+    one, two = (json.dumps(each.as_dict()) for each in pair.scenes)
+    side_by_side = bool(how if apart is None else apart)
+    series = Series((one, two), pair.scatter, how, carried, side_by_side, given, seed, trials)
     kept = TrialFile(None if file is None else Path(file), series.question(), trials, CHUNK)
     if len(kept.done) < kept.chunks:
         work = Work(

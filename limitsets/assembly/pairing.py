@@ -138,7 +138,7 @@ def are_apart(pair: Pair, starts: Sequence[Start]) -> bool:
     return depth_of_overlap(one, two) <= 0.0
 
 
-def require_apart(pair: Pair, starts: Sequence[Start]) -> None:
+def require_apart(pair: Pair, starts: Sequence[Start]) -> tuple[Start, Start]:
     """Refuse starts off the arm, and two parts that overlap.
 
     Raises
@@ -155,3 +155,5 @@ def require_apart(pair: Pair, starts: Sequence[Start]) -> None:
         (x1, side1), (x2, side2) = starts
         thing = f"the starts {x1:g} on side {side1} and {x2:g} on side {side2}"
         raise AnswerError(thing, "overlapping", "parts that do not overlap", "move one of them along the arm")
+    (x1, side1), (x2, side2) = starts
+    return (float(x1), int(side1)), (float(x2), int(side2))

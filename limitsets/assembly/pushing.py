@@ -184,7 +184,7 @@ def push(
     watched = _Watched(pair, crowd)
     rests = crowd.rests()
     for throw in range(1, MOST_THROWS + 1):
-        crowd.record = last is not None and throw >= last
+        crowd.film.on = last is not None and throw >= last
         rests = crowd.throw(*draws.throw())
         watched.seen(throw, rests)
         if all(watched.ended) or watched.left or any(rest.where == "unfinished" for rest in rests):

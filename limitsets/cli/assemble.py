@@ -124,9 +124,8 @@ def _text(found: Assembly, files: list[Path]) -> None:
     for name, rate in found.survived.items():
         low, high = rate.interval
         what = "the cavity standing" if name == "standing" else "the cavity thrown too"
-        typer.echo(
-            f"whole after the next throw, {what}: {rate.count} of {rate.of} ({low:.3f} to {high:.3f}); the paper: 17 of 20"
-        )
+        whole = f"{rate.count} of {rate.of} ({low:.3f} to {high:.3f})"
+        typer.echo(f"whole after the next throw, {what}: {whole}; the paper: 17 of 20")
     typer.echo(f"{found.first_series} assembled in the first 20 trials; the paper: 11 of 20")
     if files:
         typer.echo(f"written: {', '.join(map(str, files))}")
