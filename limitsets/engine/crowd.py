@@ -16,6 +16,7 @@ from limitsets.engine.member import FLYING, HINGED, LOOSE, OUT, Member
 from limitsets.engine.overlaps import depth_of_overlap
 from limitsets.engine.recording import Recording
 from limitsets.engine.rests import Rest, lying, on_arm, rest_of
+from limitsets.engine.settling import IDLE
 from limitsets.engine.stage import OVERLAP
 from limitsets.engine.touching import Touching
 from limitsets.errors import AnswerError
@@ -114,6 +115,7 @@ class Crowd:
         self.space = self.contacts.space
         unit = 1.0 if scene.gravity is None else math.sqrt(scene.kappa / scene.gravity)
         self.film, self.count = Film(record, unit, self.members), 0
+        self.awake = max(int(0.5 * IDLE / step), 1)  # steps in which nothing falls asleep
 
     @property
     def overlapped(self) -> set[tuple[int, int]]:
@@ -134,7 +136,8 @@ class Crowd:
             allowed = "a side of the part, and x from a of that side to the arm's length"
             raise AnswerError(f"the place of part {number}", (x, side), allowed, "lay it on the arm")
         self.drop(number, (x, scene.surface_height + float(scene.sides.d[side]), member.flat[side]))
-        member.body.sleep()
+        if x <= self.ground.end:
+            member.body.sleep()
 
     def drop(self, number: int, pose: tuple[float, float, float]) -> None:
         """Put a part anywhere, at rest, with a pose as in `Rest`; `settle` lets it fall.
@@ -286,7 +289,12 @@ class Crowd:
         """Look whether the face of a held part comes down: there it lies, or else tips over the end."""
         wait = member.steps_to_face(self.step)
         if wait > 0:
-            member.due = self.count + (1 if self.contacts.any_of(member.number) else wait)
+            wait = min(wait, self.awake)
+            if self.contacts.any_of(member.number):
+                wait = 1
+            else:
+                member.body.activate()  # it may stand on its corner for long, but not for good
+            member.due = self.count + wait
             return
         if member.lie_down(self.space) != member.side:
             self._mark("roll", member.number)
