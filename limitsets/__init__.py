@@ -41,6 +41,7 @@ if TYPE_CHECKING:  # each from the file that holds it: most rooms have a file of
     from limitsets.sets.limit_set import limit_set
     from limitsets.sweep.continuation import continuation
     from limitsets.sweep.parameter_atlas import atlas
+    from limitsets.trays.filling import tray
 
 __version__ = "0.1.0"
 
@@ -79,6 +80,7 @@ _ROOMS = {
     "robustness": "robust.sheet.sheet_run",
     "scenes": "scene",
     "transitions": "graph.transitions",
+    "tray": "trays",
 }
 
 __all__ = [
@@ -114,6 +116,7 @@ __all__ = [
     "robustness",
     "scenes",
     "transitions",
+    "tray",
 ]
 
 

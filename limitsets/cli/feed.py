@@ -101,7 +101,7 @@ def feed(
 
 
 def _text(found: Feeding, files: list[Path], written: dict[str, Any] | None) -> None:
-    from limitsets.feeding.trials import binomial_interval
+    from limitsets.robust.noise.proportions import binomial_interval
 
     end, unit = found.end, found.end.scene.unit
     typer.echo(f"{end.scene.name}: the arm ends at x = {end.x:g} {unit}, side {end.side} is wanted")
