@@ -42,7 +42,9 @@ class Crowd:
         lies still until another one strikes it.  A corner that comes down beyond the arm's end, a part that was struck
         as it lay, the cavity and other parts meet the engine's own contact.  ``"unilateral"``: that contact for all.
     between : bool
-        Whether parts push each other.  If not, `overlapped` still tells which outlines have met.
+        Whether parts push each other.
+    watch : bool
+        Whether `overlapped` tells which outlines have met where parts do not push each other; slow for very many.
     carried : bool
         Whether the cavity is part of the arm, and all that lies in it is thrown; else only those parts are that touch
         the arm's surface with a corner or have their centre of mass before its end.
@@ -90,6 +92,7 @@ class Crowd:
         *,
         contact: str = "hinge",
         between: bool = True,
+        watch: bool = True,
         carried: bool = False,
         friction: float | None = None,
         sliding: float = 0.2,
@@ -110,7 +113,7 @@ class Crowd:
         self.ground, self.cavity = ground_of(scene, depressions=depressions, wall=wall), scene.cavity
         masses = [area_of(each) for each in scenes] if masses is None else masses
         self.members = [Member(each, k, float(masses[k])) for k, each in enumerate(scenes)]
-        self.contacts = Touching(self.ground, self.members, between, scene.kappa, step)
+        self.contacts = Touching(self.ground, self.members, between, watch, scene.kappa, step)
         self.contacts.rub(mu or 0.0, sliding, e)
         self.space = self.contacts.space
         unit = 1.0 if scene.gravity is None else math.sqrt(scene.kappa / scene.gravity)
@@ -291,6 +294,7 @@ class Crowd:
         if wait > 0:
             wait = min(wait, self.awake)
             if self.contacts.any_of(member.number):
+                member.soften(self.space.collision_bias)
                 wait = 1
             else:
                 member.body.activate()  # it may stand on its corner for long, but not for good

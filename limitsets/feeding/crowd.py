@@ -18,9 +18,9 @@ from numpy.typing import NDArray
 from limitsets.engine import Crowd, Rest
 from limitsets.errors import AnswerError
 from limitsets.feeding.falling import FATES, ArmEnd
-from limitsets.feeding.trials import binomial_interval
 from limitsets.files import as_table
 from limitsets.robust.noise.laws import Gaussian, Law, Uniform
+from limitsets.robust.noise.proportions import binomial_interval
 from limitsets.robust.noise.sampling import uniform_starts
 from limitsets.robust.noise.scattering import Scattering
 
@@ -28,6 +28,8 @@ __all__ = ["BATCHES", "CrowdTrials", "run_crowd"]
 
 BATCHES = 20
 MOST_THROWS = 300
+# A pile that has not come to rest after so long [rad] is thrown as it is.
+PATIENCE = 20.0
 # So often a place on the arm is drawn for a part before it is dropped from above.
 DRAWS = 50
 LAWS = (Gaussian, Uniform, type(None))
@@ -46,17 +48,18 @@ class CrowdTrials:
     contact : str
         How the arm holds a struck corner: "hinge" or "unilateral" (`limitsets.engine.Crowd`).
     fates : ndarray of int64, shape (batches, 5)
-        How many of a batch met each fate of `FATES`; those of the last were on the arm still when throwing ended.
+        How many of those on the arm before the first throw met each fate of `FATES`; those of the last were on the arm
+        still when throwing ended.
     throws : ndarray of int64, shape (batches,)
         Throws made: until all were out, or the most.
-    on_arm : ndarray of int64, shape (batches,)
-        Parts on the arm before the first throw.
+    spilled : ndarray of int64, shape (batches,)
+        Parts that fell off the others before the first throw, into the cavity or off the arm; they are not counted.
     met : ndarray of bool, shape (batches,)
-        Whether the outlines of two parts ever came into contact, from the first throw on.
+        Whether two parts pushed each other, from the first throw on.
     thrown : int
         Parts thrown, each counted at each throw.
     seconds : float
-        Time that all took on this machine.
+        Time that the throws took on this machine.
     seed : int
         Of starts and noise.
     """
@@ -66,7 +69,7 @@ class CrowdTrials:
     contact: str
     fates: NDArray[np.int64]
     throws: NDArray[np.int64]
-    on_arm: NDArray[np.int64]
+    spilled: NDArray[np.int64]
     met: NDArray[np.bool_]
     thrown: int
     seconds: float
@@ -103,7 +106,7 @@ class CrowdTrials:
             counts=self.counts,
             intervals={name: binomial_interval(met, total) for name, met in self.counts.items()},
             mean_throws=float(self.throws.mean()),
-            on_arm=float(self.on_arm.mean()),
+            spilled=float(self.spilled.mean()),
             met=float(self.met.mean()),
             right_per_throw={"value": rate, "error": error},
             thrown=self.thrown,
@@ -162,27 +165,30 @@ def run_crowd(
     if not (isinstance(scatter.speed, LAWS) and isinstance(scatter.landing, LAWS) and scatter.tilt is None):
         allowed = "Gaussian or Uniform of speed and landing"
         raise AnswerError("the noise to throw with", scatter.words(), allowed, "take another law")
-    began, rows, thrown = time.perf_counter(), [], 0
+    rows, thrown, seconds = [], 0, 0.0
     for batch in range(batches):
         if progress is not None:
             progress(f"{parts} parts at once", batch, batches)
         random = np.random.Generator(np.random.Philox(key=[seed, batch]))
-        crowd = Crowd([scene] * parts, between=between, contact=contact, step=step)
+        crowd = Crowd(
+            [scene] * parts, between=between, watch=False, contact=contact, step=step, patience=PATIENCE
+        )
         tried = _Batch(crowd, end, random)
-        on_arm = tried.start()
+        spilled = tried.start()
+        began = time.perf_counter()
         thrown += tried.throw(scatter, throws)
-        rows.append((tried.fates(), tried.throws, on_arm, bool(crowd.overlapped)))
+        seconds += time.perf_counter() - began
+        rows.append((tried.fates(), tried.throws, spilled, bool(crowd.overlapped)))
     if progress is not None:
         progress(f"{parts} parts at once", batches, batches)
-    fates, made, started, met = zip(*rows, strict=True)
-    seconds = time.perf_counter() - began
+    fates, made, spilled_by, met = zip(*rows, strict=True)
     return CrowdTrials(
         parts,
         between,
         contact,
         np.array(fates),
         np.array(made),
-        np.array(started),
+        np.array(spilled_by),
         np.array(met),
         thrown,
         seconds,
@@ -196,16 +202,19 @@ class _Batch:
     def __init__(self, crowd: Crowd, end: ArmEnd, random: np.random.Generator) -> None:
         self.crowd, self.end, self.random = crowd, end, random
         self.fate: dict[int, int] = {}
+        self.spilled: frozenset[int] = frozenset()
         self.throws = 0
 
     def fates(self) -> list[int]:
-        """How many met each fate."""
-        parts = len(self.crowd.members)
-        met = [self.fate.get(number, len(FATES) - 1) for number in range(parts)]
-        return np.bincount(met, minlength=len(FATES)).tolist()
+        """How many met each fate, of those that were thrown."""
+        met = [0] * len(FATES)
+        for number in range(len(self.crowd.members)):
+            if number not in self.spilled:
+                met[self.fate.get(number, -1)] += 1
+        return met
 
     def start(self) -> int:
-        """Lay the parts on free places of the arm, drop those for which none is drawn; how many are on the arm then."""
+        """Lay the parts on free places of the arm, drop those for which none is drawn; how many fall off again."""
         crowd, end, waiting = self.crowd, self.end, []
         row: list[tuple[float, float]] = []  # the ends of the sides that lie on the arm
         d = end.scene.sides.d
@@ -227,7 +236,8 @@ class _Batch:
             crowd.drop(number, (x, height + float(d[side]), crowd.members[number].flat[side]))
             self._take_out(crowd.settle())
         crowd.overlapped.clear()
-        return len(crowd.members) - len(self.fate)
+        self.spilled = frozenset(self.fate)
+        return len(self.spilled)
 
     def _reach(self, x: float, side: int) -> tuple[float, float]:
         """From where to where a part reaches along the arm that lies on this side."""
