@@ -1,6 +1,6 @@
 """Several parts on one arm at once, in the engine: thrown together, in contact with each other and with the ground.
 
-What is assumed stands in docs/crowds.md.
+What is assumed stands in docs/many_parts.md.
 """
 
 from __future__ import annotations
