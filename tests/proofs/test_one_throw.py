@@ -16,6 +16,9 @@ from tests.proofs.test_recheck import checker
 pytestmark = pytest.mark.usefixtures("precision")
 
 X = 20.0
+# places that end within cells of side 1, three next to each other: no more is known of these cells than where their
+# throws may land
+WALLS = [(15.03, 15.08), (15.22, 15.26), (15.4, 15.45)]
 EVEN = [np.linspace(1, 28, 150)] * 3
 
 
@@ -30,7 +33,7 @@ def chain_of(speed, landing, strata, tmp_path):
         "initial",
         laws,
         [[2, "15 in", "16 in"]],
-        {"right": [[2, f"{X} in", None]]},
+        {"right": [[2, f"{X} in", None]], "wall": [[1, *(f"{end} in" for end in wall)] for wall in WALLS]},
         mesh("initial", EVEN, {2: [X]}),
         {"right": np.array([[0.0, 1.0]])},
         strata=strata,
@@ -58,10 +61,16 @@ def test_one_throw_is_bounded_at_every_place(speed, landing, strata, count, wide
     scatter = Scattering(speed=Uniform(speed) if speed else None, landing=Uniform(landing))
     chain, rows = chain_of(speed, landing, strata, tmp_path)
     place = chain.mesh.place
+    assert not np.isfinite(chain.hard.much).all()
     random = np.random.default_rng(5)
     side = random.integers(0, 3, 3000)
     x = random.uniform(scene.sides.a[side] + 1e-3, np.where(side == 2, X, 24.0))
     x[:60] = scene.sides.a[side[:60]] + 10.0 ** random.uniform(-9.0, -3.0, 60)  # cells at the joint
+    x[60:160], side[60:160] = random.uniform(14.9, 15.6, 100), 1
+    some = ~(
+        (side == 1) & np.any([(a <= x) & (x <= b) for a, b in WALLS], axis=0)
+    )  # throws are made from there
+    x, side = x[some], side[some]
     for waves in (
         np.sin(3.0 * place),
         np.cos(1.0 * place),
