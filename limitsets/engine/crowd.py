@@ -190,8 +190,9 @@ class Crowd:
             One per part, in the order of the scenes.
         """
         shifts = landing if isinstance(landing, Mapping) else dict(enumerate(landing))
-        carried = [each for each in self.members if each.mode != OUT and self._is_carried(each)]
-        for member in carried:
+        for member in self.members:
+            if member.mode == OUT or not (self.carried or on_arm(member, self.ground)):
+                continue
             member.let_go(self.space)
             member.level(lying(member))
             member.release(1.0 + deviation, float(shifts.get(member.number, 0.0)), self.step)
@@ -220,9 +221,6 @@ class Crowd:
         """Give what was kept since the crowd was made."""
         return self.film.recording(self.ground)
 
-    def _is_carried(self, member: Member) -> bool:
-        return self.carried or on_arm(member, self.ground)
-
     def _run(self) -> list[Rest]:
         """Step until all are at rest; Python acts only where a part may come down, or a film wants a frame."""
         last, look, frame = math.ceil(self.patience / self.step), 0, 0 if self.film.on else math.inf
@@ -250,10 +248,8 @@ class Crowd:
             self._mark("impact", *contacts.news)
             contacts.news.clear()
         found = self.rests()
-        fed = [rest.number for rest in found if rest.where == "cavity"]
-        lie = [rest.number for rest in found if rest.where in ("arm", "beyond", "leaning")]
-        self._mark("in the cavity", *fed)
-        self._mark("rest", *lie)
+        self._mark("in the cavity", *(rest.number for rest in found if rest.where == "cavity"))
+        self._mark("rest", *(rest.number for rest in found if rest.where in ("arm", "beyond", "leaning")))
         self.film.end(self.count * step)
         self.count = 0
         return found
