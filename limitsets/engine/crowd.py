@@ -248,9 +248,7 @@ class Crowd:
             self._mark("impact", *contacts.news)
             contacts.news.clear()
         found = self.rests()
-        self._mark("in the cavity", *(rest.number for rest in found if rest.where == "cavity"))
-        self._mark("rest", *(rest.number for rest in found if rest.where in ("arm", "beyond", "leaning")))
-        self.film.end(self.count * step)
+        self.film.end(self.count * step, found)
         self.count = 0
         return found
 

@@ -16,7 +16,7 @@ from matplotlib.figure import Figure
 
 import limitsets as ls
 from limitsets.feeding.crowd import CrowdTrials, run_crowd
-from limitsets.feeding.falling import arm_end_of
+from limitsets.feeding.falling import FATES, arm_end_of
 from limitsets.feeding.trials import run_trials
 from limitsets.plot import style
 from limitsets.robust import Gaussian, Scattering
@@ -28,13 +28,14 @@ BATCHES = {1: 200, 2: 100, 3: 60, 5: 40, 10: 20, 20: 12, 50: 6, 100: 4, 200: 3}
 UNILATERAL = (1, 2, 5)
 THROWS = 200
 STEP = 4e-3
+RATE = 2.0  # throws a second
 
 
 def scene() -> Any:
-    """Give paper-designed the cavity of sizes.toml, 2 throws a second, foam on the arm and contact."""
+    """Give paper-designed the cavity of sizes.toml, foam on the arm, and contact."""
     tree = ls.load("paper-designed").as_dict()
-    world = {"throw_rate": "2 Hz", "friction": 0.9}
-    return ls.load({**tree, "cavity": CAVITY, "world": world, "effects": {"contact": True}})
+    tables = {"cavity": CAVITY, "world": {"friction": 0.9}, "effects": {"contact": True}}
+    return ls.load({**tree, **tables})
 
 
 def row(found: CrowdTrials) -> dict[str, Any]:
@@ -49,7 +50,7 @@ def row(found: CrowdTrials) -> dict[str, Any]:
         "throws": float(found.throws.mean()),
         "right per throw": rate,
         "its error": None if math.isnan(error) else error,
-        "right per minute": found.per_minute(2.0),
+        "right per minute": found.per_minute(RATE),
         "met": float(found.met.mean()),
         "seconds per part and throw": found.seconds / found.thrown,
     }
@@ -120,10 +121,18 @@ def draw(numbers: dict[str, Any]) -> Figure:
 
 def table(numbers: dict[str, Any]) -> str:
     """Write the numbers as a Markdown table."""
-    lines = [
-        "| parts | contact | batches | right | wrong | wall | left | never | spilled | throws | right per throw | per minute | ms |",
-        "|---|---|---|---|---|---|---|---|---|---|---|---|---|",
-    ]
+    heads = (
+        "parts",
+        "contact",
+        "batches",
+        *FATES,
+        "spilled",
+        "throws",
+        "right per throw",
+        "per minute",
+        "ms",
+    )
+    lines = [f"| {' | '.join(heads)} |", "|---" * len(heads) + "|"]
     for name, words in {
         "pushing": "hinge, pushing",
         "passing": "hinge, passing through",

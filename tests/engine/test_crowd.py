@@ -267,6 +267,18 @@ def test_a_recording_of_a_throw():
     assert film.poses[5, 1, 0] == pytest.approx(expected, abs=1e-9)
 
 
+def test_what_falls_in_and_comes_out_again_is_marked():
+    """A part in the cavity is laid on the arm again by hand."""
+    crowd = Crowd([FED], friction=1.0, record=True)
+    crowd.place(0, 21.0, 2)
+    crowd.settle()
+    crowd.settle()
+    crowd.place(0, 6.0, 2)
+    crowd.settle()
+    words = [word for _, _, word in crowd.recording().marks if word not in ("impact", "roll")]
+    assert words == ["in the cavity", "ejected", "rest"]
+
+
 def test_a_part_that_falls_off_is_lost_and_one_taken_out_is_out():
     crowd = Crowd([DESIGNED, DESIGNED], friction=1.0)
     crowd.drop(0, (32.0, 3.0, 0.0))
