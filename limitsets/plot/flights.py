@@ -10,9 +10,9 @@ from matplotlib.patches import Patch, Polygon
 from numpy.typing import NDArray
 
 from limitsets.errors import AnswerError
-from limitsets.geometry import side_ends
 from limitsets.maps import codes
 from limitsets.plot import style
+from limitsets.plot.poses import centre_in_flight, outline, turned
 from limitsets.thrower import fly, trace
 
 if TYPE_CHECKING:
@@ -101,30 +101,8 @@ def _canvas(width: float, height: float) -> tuple[Figure, list[Axes]]:
     return style.canvas(9.0, 2 * max(1.6, 8.2 * height / width) + 1.9, 2, 1, sharex=True, sharey=True)
 
 
-def _outline(scene: Scene, side: int) -> Array:
-    """Vertices about the centre of mass with `side` at the bottom, its left end first."""
-    left, right = side_ends(len(scene.vertices), side)
-    about = scene.vertices - np.asarray(scene.centre)
-    along = about[right] - about[left]
-    turned = _turned(about, -math.atan2(float(along[1]), float(along[0])))
-    rolled: Array = np.roll(turned, -left, axis=0)
-    return rolled
-
-
-def _turned(points: Array, angle: float) -> Array:
-    cosine, sine = math.cos(angle), math.sin(angle)
-    turned: Array = points @ np.array([[cosine, sine], [-sine, cosine]])
-    return turned
-
-
-def _centre(scene: Scene, x: float, side: int, phi: float) -> Array:
-    """Centre of mass in flight after the part has turned by phi (docs/model.md, flight)."""
-    h, d, kappa = scene.surface_height, float(scene.sides.d[side]), scene.kappa
-    return np.array([x - (h + d) * phi, h + d + x * phi - 0.5 * kappa * phi * phi])
-
-
 def _in_air(scene: Scene, x: float, side: int, phi: float) -> Array:
-    return _turned(_outline(scene, side), phi) + _centre(scene, x, side, phi)
+    return turned(outline(scene, side), phi) + centre_in_flight(scene, x, side, phi)
 
 
 def _to_rest(
@@ -137,13 +115,13 @@ def _to_rest(
     """
     side, side_after = sides
     at_rest = np.array([after, scene.surface_height + float(scene.sides.d[side_after])])
-    rest = _outline(scene, side_after) + at_rest
+    rest = outline(scene, side_after) + at_rest
     if scene.flight != "exact" or code == codes.ROLL or _struck(scene, landed) != 0:
         return [landed, rest]
     turn = -phi if side_after == side else float(scene.sides.corner[side]) - phi
     pivot = landed[0]
     return [
-        *(_turned(landed - pivot, angle) + pivot for angle in np.linspace(0.0, turn, SHOWN + 1)[:-1]),
+        *(turned(landed - pivot, angle) + pivot for angle in np.linspace(0.0, turn, SHOWN + 1)[:-1]),
         rest,
     ]
 
@@ -179,9 +157,9 @@ def _flight(axes: Axes, scene: Scene, x: float, side: int, phi: float, air: list
         look = {"facecolor": (0.86, 0.92, 0.97, 0.72), "lw": 1.0, "zorder": 3 + 0.1 * k, **FLYING}
         _part(axes, corners, gid="in the air", **look)
     _impact(axes, scene, air[-1], zorder=4)
-    path = np.array([_centre(scene, x, side, angle) for angle in np.linspace(0.0, phi, 80)])
+    path = np.array([centre_in_flight(scene, x, side, angle) for angle in np.linspace(0.0, phi, 80)])
     axes.plot(path[:, 0], path[:, 1], color=style.INK, lw=1.1, ls="-.", zorder=5, gid="path")
-    stops = np.array([_centre(scene, x, side, angle) for angle in np.linspace(0.0, phi, len(air))])
+    stops = np.array([centre_in_flight(scene, x, side, angle) for angle in np.linspace(0.0, phi, len(air))])
     axes.plot(stops[:, 0], stops[:, 1], ls="", zorder=6, gid="centre of mass", **CENTRE)
     text = f"In the air: from x = {x:.2f} {scene.unit} on side {side}, turning by {math.degrees(phi):.1f}°"
     axes.set_title(text, fontsize=style.TEXT, loc="left")

@@ -1,0 +1,180 @@
+"""The legs of one throw: the arm goes down, swings up and stops; the part flies, strikes, turns and rests.
+
+Where the scene simulates no stroke the swing is drawn: from `SWING` below to level, with constant acceleration, so that
+the arm stops with the speed of the throw.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from limitsets.animation.cutting import Leg, Pace
+from limitsets.animation.throwing import Throw, motion, stroke_of
+from limitsets.plot.poses import angle_on_side
+
+if TYPE_CHECKING:
+    from limitsets.scene import Scene
+
+__all__ = ["drawn_of", "legs_of", "rest_leg"]
+
+Array = NDArray[np.float64]
+
+SWING = math.radians(12.0)
+"""By how much the arm swings up where the scene has no stroke."""
+
+RESTS, LOWERS, STAYS = 0.5, 0.5, 1.5
+"""Seconds for which the part is shown at rest, the arm goes down, and the last picture stays."""
+
+
+def drawn_of(scene: Scene) -> str:
+    """Say what is drawn rather than computed."""
+    said = []
+    if not stroke_of(scene):
+        said.append("the swing of the arm and the pauses are drawn, the throw is impulsive")
+    if scene.flight != "exact" or scene.flip != "signed":
+        said.append("the way from the impact to rest is drawn: these formulas have none")
+    on = [name for name in ("slip", "pivot", "bounce") if getattr(scene.effects, name)]
+    if on:
+        said.append(f"the way from the first impact to rest is drawn ({', '.join(on)}); its ends are the map's")
+    return "; ".join(said)
+
+
+def _lying(scene: Scene, x: float, side: int) -> Array:
+    return np.array([x, scene.surface_height + float(scene.sides.d[side]), angle_on_side(scene, side)])
+
+
+def _carried(pose: Array, angle: Array) -> Array:
+    """Poses of a part that lies on the arm while that turns about the joint."""
+    cos, sin = np.cos(angle), np.sin(angle)
+    x, y = cos * pose[0] - sin * pose[1], sin * pose[0] + cos * pose[1]
+    return np.stack([x, y, pose[2] + angle], axis=-1)
+
+
+def _on_lane(x: float, side: float, share: Array) -> Array:
+    return np.tile([x, side], (share.size, 1))
+
+
+def rest_leg(
+    scene: Scene, x: float, side: int, seconds: float, caption: str, note: str = "", stage: int = -1
+) -> Leg:
+    """Let a part lie on the level arm."""
+    lying = _lying(scene, x, side)
+    return Leg(
+        seconds,
+        lambda share: np.tile(lying, (share.size, 1)),
+        lambda share: np.zeros(share.size),
+        lambda share: _on_lane(x, side, share),
+        caption,
+        note,
+        stage,
+    )
+
+
+def legs_of(
+    scene: Scene,
+    throw: Throw,
+    pace: Pace,
+    name: str,
+    *,
+    note: str = "",
+    stage: int = -1,
+    stays: float = RESTS,
+    after: str = "",
+) -> list[Leg]:
+    """Give the legs of one throw, from the arm's way down to the part's rest.
+
+    Parameters
+    ----------
+    scene : Scene
+        The scene.
+    throw : Throw
+        The throw.
+    pace : Pace
+        How fast it runs.
+    name : str
+        What the throw is called, for its captions.
+    note, stage : str, int
+        What is written besides, and known.
+    stays : float
+        Seconds at rest.
+    after : str
+        What is written about the rest, besides where it is.
+    """
+    moves, swing = motion(scene, throw), stroke_of(scene) or SWING
+    unit = pace.unit / pace.rate(scene, throw.kappa)
+    lying, unit_of = _lying(scene, throw.x, throw.side), scene.unit
+    at_rest = f"{throw.word}, x = {throw.after:.2f} {unit_of} on side {throw.side_after}"
+    broken = "; another corner would land first, which the model leaves out" if throw.other_first else ""
+    flown = moves.turning
+    jumps = throw.turned
+
+    def lowered(share: Array) -> Array:
+        return -swing * 0.5 * (1.0 - np.cos(np.pi * share))
+
+    def raised(share: Array) -> Array:
+        return -swing * (1.0 - share * share)
+
+    def turning_lane(share: Array) -> Array:
+        poses = flown.pose(share)
+        end = poses[-1] if share[-1] >= 1.0 else flown.pose(np.ones(1))[0]
+        way = end[2] - moves.impact[2]
+        turned = (poses[:, 2] - moves.impact[2]) / way if abs(way) > 1e-9 else share
+        lane = throw.side + (throw.side_after - throw.side) * (turned if jumps else 0.0 * share)
+        return np.stack([poses[:, 0], np.clip(lane, 0, len(scene.sides) - 1)], axis=-1)
+
+    level = np.zeros_like
+    impact, rolled = moves.struck, [(at, "roll", x, y) for at, x, y in flown.faces]
+    rest = (throw.after, throw.side_after, f"{name}: from x = {throw.x:.4g} {unit_of} on side {throw.side}, {at_rest}")
+    return [
+        Leg(
+            LOWERS,
+            lambda share: _carried(lying, lowered(share)),
+            lowered,
+            lambda share: _on_lane(throw.x, throw.side, share),
+            f"{name}: the arm goes down",
+            note,
+            stage,
+        ),
+        Leg(
+            2.0 * swing * unit,
+            lambda share: _carried(lying, raised(share)),
+            raised,
+            lambda share: _on_lane(throw.x, throw.side, share),
+            f"{name}: the arm swings up and stops",
+            note,
+            stage,
+            marks=((1.0, "thrown", throw.x, float(lying[1])),),
+        ),
+        Leg(
+            throw.phi * unit,
+            moves.flight,
+            level,
+            lambda share: np.stack(
+                [moves.flight(share)[:, 0], np.full(share.size, float(throw.side))], axis=-1
+            ),
+            f"{name}: in flight",
+            note,
+            stage,
+            trail=True,
+            marks=((1.0, "impact", *impact),),
+        ),
+        Leg(
+            flown.time * unit,
+            flown.pose,
+            level,
+            turning_lane,
+            f"{name}: impact, and a {throw.word}" if throw.code >= 0 else f"{name}: impact, and {throw.word}",
+            note,
+            stage,
+            trail=True,
+            marks=(*rolled, (1.0, "rest", throw.after, float(lying[1]))),
+            rest=rest,
+        ),
+        rest_leg(
+            scene, throw.after, throw.side_after, stays, f"{name}: {at_rest}{broken}", after or note, stage
+        ),
+    ]

@@ -1,0 +1,52 @@
+"""A film of a scene: its throws from a start."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from limitsets.animation.cutting import Pace, cut, require_length
+from limitsets.animation.film import Film
+from limitsets.animation.lanes import Progress, good_start, known_of, require_start
+from limitsets.animation.legs import STAYS, drawn_of, legs_of, rest_leg
+from limitsets.animation.throwing import throws_of
+from limitsets.errors import AnswerError
+
+if TYPE_CHECKING:
+    from limitsets.analysis import Analysis
+    from limitsets.scene import Scene
+
+__all__ = ["film_of_analysis", "film_of_scene"]
+
+
+def film_of_scene(
+    scene: Scene, start: tuple[float, int] | None, throws: int, fps: float, slow: float, progress: Progress
+) -> Film:
+    """Show throws of a scene."""
+    if start is not None:
+        require_start(scene, start)
+    require_length(throws)
+    found, _ = known_of(scene, progress)
+    return film_of_analysis(found, start, throws, fps, slow, progress)
+
+
+def film_of_analysis(
+    found: Analysis, start: tuple[float, int] | None, throws: int, fps: float, slow: float, progress: Progress
+) -> Film:
+    """Show throws of a scene that is analysed already."""
+    from limitsets.animation.lanes import lanes_of
+    from limitsets.thrower import trace
+
+    scene, pace = found.scene, Pace.of(found.scene, fps, slow)
+    x, side = good_start(found, throws) if start is None else require_start(scene, start)
+    path = trace(scene.map, x, side, throws)
+    made = throws_of(scene, path)
+    if not made:
+        allowed = "one from which a throw lands on the arm"
+        raise AnswerError("the start", f"x = {x:g} on side {side}: {path.reason}", allowed, "choose another")
+    count = len(made)
+    words = f"Start: x = {x:.2f} {scene.unit} on side {side}"
+    legs = [rest_leg(scene, x, side, 1.0, words)]
+    for number, throw in enumerate(made, start=1):
+        stays = {"stays": STAYS} if number == count else {}
+        legs += legs_of(scene, throw, pace, f"Throw {number} of {count}", **stays)
+    return cut(scene, legs, pace, title=scene.name, about=drawn_of(scene), lanes=lanes_of(scene, found))
