@@ -9,6 +9,7 @@ import numpy as np
 from matplotlib.patches import Polygon
 
 from limitsets.plot import style
+from limitsets.plot.poses import about_centre, turned
 from limitsets.robust.noise.proportions import binomial_interval
 
 if TYPE_CHECKING:
@@ -59,11 +60,10 @@ def _short(state: str) -> str:
     return state.replace("leaning, vertex ", "leaning, P").replace(" lowest", "")
 
 
-def _corners(found: TrayFill, pose: Pose) -> NDArray[np.float64]:
-    about = found.scene.vertices - found.scene.centre
-    cos, sin = math.cos(pose.angle), math.sin(pose.angle)
-    turned: NDArray[np.float64] = about @ np.array([[cos, sin], [-sin, cos]]) + (pose.x, pose.y)
-    return turned
+def _placed(found: TrayFill, pose: Pose, share: float = 1.0) -> NDArray[np.float64]:
+    """Where the vertices are, or points on the way to them."""
+    placed: NDArray[np.float64] = turned(share * about_centre(found.scene), pose.angle) + (pose.x, pose.y)
+    return placed
 
 
 def _poses(axes: Axes, found: TrayFill) -> None:
@@ -86,11 +86,8 @@ def _poses(axes: Axes, found: TrayFill) -> None:
         good = state == counts.right
         look = {"fc": "#9BD1B8", "ec": style.GOAL} if good else {"fc": "none", "ec": style.FLIP}
         pose = counts.poses[state]
-        axes.add_patch(Polygon(_corners(found, pose) + at, closed=True, lw=1.3, **look))
-        corners = found.scene.vertices - found.scene.centre
-        cos, sin = math.cos(pose.angle), math.sin(pose.angle)
-        for k, corner in enumerate(0.72 * corners):
-            x, y = corner @ np.array([[cos, sin], [-sin, cos]]) + (pose.x, pose.y) + at
+        axes.add_patch(Polygon(_placed(found, pose) + at, closed=True, lw=1.3, **look))
+        for k, (x, y) in enumerate(_placed(found, pose, 0.72) + at):
             axes.text(x, y, f"P{k}", fontsize=6.5, ha="center", va="center", color=style.FAINT)
         words = f"{_short(counts.states[state])}{': right' if good else ''}"
         axes.text(at[0] - edge, at[1] - plate.depth - 0.1 * tall, words, fontsize=style.SMALL, va="top")

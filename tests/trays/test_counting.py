@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 import limitsets as ls
+from limitsets.engine.recording import MARKS
 from limitsets.errors import AnswerError, SceneError
 from limitsets.robust.noise.proportions import binomial_interval
-from limitsets.trays import tray_design
+from limitsets.trays import filmed, tray_design
 from limitsets.trays.counting import count
 from limitsets.trays.histories import Histories, histories
 from limitsets.trays.passing import passes_of, random_of
@@ -155,3 +156,19 @@ def test_a_design_confirms_its_best_on_fresh_seeds():
     # one point alone is the same point
     alone = tray_design(with_tray(), [depth], [agitation], passes=20, drops=60, kicks=40, seed=3, step=8e-3)
     assert alone.right[0, 0] == found.right[row, column]
+
+
+def test_a_film_shows_what_the_engine_does():
+    scene = with_tray()
+    kept = filmed(scene, 6, seed=2, step=8e-3)
+    assert np.all(np.diff(kept.times) > 0.0)
+    shown = ~np.isnan(kept.poses[..., 0])
+    assert (shown.sum(axis=1) == 1).all()  # one part at a time
+    assert shown.any(axis=0).all()
+    assert {word for _, _, word in kept.marks} <= set(MARKS)
+    # a part falls freely at first: half of g t^2 in the scene's own seconds, to a step
+    fallen = 0.5 * scene.gravity * kept.times[4:8] ** 2
+    assert kept.poses[0, 0, 1] - kept.poses[4:8, 0, 1] == pytest.approx(fallen, rel=0.06)
+    # each part is lost, or lies in the depression until it is ejected or the film ends
+    ended = [part for _, part, word in kept.marks if word in ("lost", "in the cavity")]
+    assert ended == list(range(kept.poses.shape[1]))
