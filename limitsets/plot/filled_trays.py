@@ -62,8 +62,9 @@ def _short(state: str) -> str:
 
 def _placed(found: TrayFill, pose: Pose, share: float = 1.0) -> NDArray[np.float64]:
     """Where the vertices are, or points on the way to them."""
-    placed: NDArray[np.float64] = turned(share * about_centre(found.scene), pose.angle) + (pose.x, pose.y)
-    return placed
+    corners = turned(share * about_centre(found.scene), pose.angle)
+    corners += pose.x, pose.y
+    return corners
 
 
 def _poses(axes: Axes, found: TrayFill) -> None:
