@@ -20,6 +20,7 @@ from limitsets.cli.recheck import recheck
 from limitsets.cli.robustness import robustness
 from limitsets.cli.scenes import scenes
 from limitsets.cli.throw import throw
+from limitsets.cli.tray import tray
 
 __all__ = ["app"]
 
@@ -66,5 +67,6 @@ for command in (
     feed,
     feedback,
     fit,
+    tray,
 ):
     app.command()(command)
