@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:  # each from the file that holds it: most rooms have a file of the same name
     from limitsets import engine, interval, maps, plot, resilience
     from limitsets.analysis import analyse
+    from limitsets.assembly import assemble
     from limitsets.auditing import audit
     from limitsets.cells import grid
     from limitsets.feeding import feed
@@ -60,6 +61,7 @@ _ROOMS = {
     "design": "inverse",
     "dump": "scene",
     "engine": "engine",
+    "assemble": "assembly",
     "feed": "feeding",
     "feedback": "policies",
     "fit": "fitting",
@@ -85,6 +87,7 @@ _ROOMS = {
 
 __all__ = [
     "analyse",
+    "assemble",
     "atlas",
     "attractors",
     "audit",

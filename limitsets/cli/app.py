@@ -7,6 +7,7 @@ from typing import Annotated
 import typer
 
 from limitsets.cli.analyse import analyse
+from limitsets.cli.assemble import assemble
 from limitsets.cli.atlas import atlas
 from limitsets.cli.audit import audit
 from limitsets.cli.certify import certify
@@ -66,6 +67,7 @@ for command in (
     atlas,
     feed,
     feedback,
+    assemble,
     fit,
     tray,
 ):
