@@ -17,28 +17,32 @@ if TYPE_CHECKING:
 
 __all__ = ["film_of_analysis", "film_of_scene"]
 
+USUAL = 8
+"""Throws that are shown unless others are asked for."""
+
 
 def film_of_scene(
-    scene: Scene, start: tuple[float, int] | None, throws: int, fps: float, slow: float, progress: Progress
+    scene: Scene, start: tuple[float, int] | None, throws: int | None, fps: float, slow: float, progress: Progress
 ) -> Film:
     """Show throws of a scene."""
     if start is not None:
         require_start(scene, start)
-    require_length(throws)
+    require_length(throws or USUAL)
     found, _ = known_of(scene, progress)
     return film_of_analysis(found, start, throws, fps, slow, progress)
 
 
 def film_of_analysis(
-    found: Analysis, start: tuple[float, int] | None, throws: int, fps: float, slow: float, progress: Progress
+    found: Analysis, start: tuple[float, int] | None, throws: int | None, fps: float, slow: float, progress: Progress
 ) -> Film:
     """Show throws of a scene that is analysed already."""
     from limitsets.animation.lanes import lanes_of
     from limitsets.thrower import trace
 
     scene, pace = found.scene, Pace.of(found.scene, fps, slow)
-    x, side = good_start(found, throws) if start is None else require_start(scene, start)
-    path = trace(scene.map, x, side, throws)
+    count = USUAL if throws is None else throws
+    x, side = good_start(found, count) if start is None else require_start(scene, start)
+    path = trace(scene.map, x, side, count)
     made = throws_of(scene, path)
     if not made:
         allowed = "one from which a throw lands on the arm"
