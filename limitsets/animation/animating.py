@@ -13,7 +13,7 @@ from limitsets.files import replaced
 if TYPE_CHECKING:
     from limitsets.animation.film import Film
 
-__all__ = ["KINDS", "SUFFIXES", "animate", "film_of"]
+__all__ = ["KINDS", "SUFFIXES", "animate", "film_of", "require_file"]
 
 Progress = Callable[[str, int, int], None] | None
 
@@ -35,6 +35,21 @@ SUFFIXES = {".gif": "gif:write_gif", ".mp4": "mp4:write_mp4", ".html": "page:wri
 def _found(where: str) -> Any:
     file, name = where.split(":")
     return getattr(import_module(f"limitsets.animation.{file}"), name)
+
+
+def require_file(path: Path) -> Any:
+    """Return what writes such a file.
+
+    Raises
+    ------
+    AnswerError
+        No film has a name like this, or what writes it is not installed.
+    """
+    writer = SUFFIXES.get(path.suffix.lower())
+    if writer is None:
+        allowed = f"a name that ends in {', '.join(SUFFIXES)}"
+        raise AnswerError("the film's file", str(path), allowed, "rename it")
+    return _found(writer)
 
 
 def film_of(
@@ -120,11 +135,12 @@ def animate(
     True
     """
     path = Path(file)
-    writer = SUFFIXES.get(path.suffix.lower())
-    if writer is None:
-        raise AnswerError("the film's file", str(file), f"a name that ends in {', '.join(SUFFIXES)}", "rename it")
-    write = _found(writer)  # before anything is computed: it may ask for a package that is missing
+    write = require_file(path)  # before anything is computed
     made = film_of(scene, start=start, throws=throws, fps=fps, slow=slow, progress=progress)
-    with replaced(path.parent) as draft:
-        write(made, draft / path.name, progress)
+    try:
+        with replaced(path.parent) as draft:
+            write(made, draft / path.name, progress)
+    except OSError as error:
+        remedy = f"it could not be: {error.strerror or error}"
+        raise AnswerError("the film's file", str(file), "a place that can be written", remedy) from None
     return path

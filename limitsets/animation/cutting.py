@@ -111,7 +111,11 @@ class Pace:
     def words(self) -> str:
         """How fast it runs, a clause."""
         if self.clock == "s":
-            return "as fast as the machine" if self.slow == 1.0 else f"{self.slow:g} times slower than the machine"
+            return (
+                "as fast as the machine"
+                if self.slow == 1.0
+                else f"{self.slow:g} times slower than the machine"
+            )
         return f"1/w, the time in which the throw turns by 1 rad, is shown in {self.unit:g} s"
 
 
@@ -153,7 +157,10 @@ def cut(
     require_length(sum(counts) + 1)
     columns: dict[str, list[Any]] = {word: [] for word in ("times", "poses", "arm", "position", "trail")}
     texts: dict[str, list[int]] = {"caption": [], "note": [], "stage": []}
-    captions, notes = list(dict.fromkeys(leg.caption for leg in legs)), list(dict.fromkeys(leg.note for leg in legs))
+    captions, notes = (
+        list(dict.fromkeys(leg.caption for leg in legs)),
+        list(dict.fromkeys(leg.note for leg in legs)),
+    )
     marks: list[tuple[int, str, float, float]] = []
     rests: list[Rest] = []
     frame, trail, clock, before, begins = 0, [0, 0], 0.0, False, [0]
@@ -174,7 +181,7 @@ def cut(
         texts["note"] += [notes.index(leg.note)] * share.size
         texts["stage"] += [leg.stage] * share.size
         last = frame + share.size - 1
-        marks += [(last - round((1.0 - at) * count), *what) for at, *what in leg.marks]
+        marks += [(last - round((1.0 - at) * count), word, x, y) for at, word, x, y in leg.marks]
         if leg.rest is not None:
             rests.append(Rest(begins[-1], last, *leg.rest))
         frame, clock, before = last + 1, clock + leg.seconds / pace.unit, leg.trail

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from limitsets.animation.cutting import Leg, Pace, cut
 from limitsets.animation.film import Film
 from limitsets.animation.lanes import Progress, known_of, require_start
-from limitsets.animation.legs import STAYS, drawn_of, legs_of, rest_leg
+from limitsets.animation.legs import RESTS, STAYS, drawn_of, legs_of, rest_leg
 from limitsets.animation.throwing import Throw, throws_of
 from limitsets.engine.ground import ground_of
 from limitsets.errors import AnswerError
@@ -42,14 +42,24 @@ NEAR = 0.005
 
 
 def film_of_feeding(
-    found: Feeding, start: tuple[float, int] | None, throws: int | None, fps: float, slow: float, progress: Progress
+    found: Feeding,
+    start: tuple[float, int] | None,
+    throws: int | None,
+    fps: float,
+    slow: float,
+    progress: Progress,
 ) -> Film:
     """Show a part until it is fed."""
     return film_of_end(found.end, start, throws, fps, slow, progress)
 
 
 def film_of_end(
-    end: ArmEnd, start: tuple[float, int] | None, throws: int | None, fps: float, slow: float, progress: Progress
+    end: ArmEnd,
+    start: tuple[float, int] | None,
+    throws: int | None,
+    fps: float,
+    slow: float,
+    progress: Progress,
 ) -> Film:
     """Show a part until it is fed."""
     if start is not None and not start[0] < end.x:
@@ -67,8 +77,8 @@ def film_of_end(
     fate = _fate(end, last)
     legs = [rest_leg(scene, x, side, 1.0, f"Start: x = {x:.2f} {scene.unit} on side {side}")]
     for number, throw in enumerate(made, start=1):
-        ends = {"stays": STAYS} if number == len(made) and fate < 0 else {}
-        legs += legs_of(scene, throw, pace, f"Throw {number}", **ends)
+        stays = STAYS if number == len(made) and fate < 0 else RESTS
+        legs += legs_of(scene, throw, pace, f"Throw {number}", stays=stays)
     if fate >= 0:
         legs += _falls(end, scene, last, fate, pace)
     cavity = end.scene.cavity
@@ -77,7 +87,9 @@ def film_of_end(
     pieces = [piece.corners for piece in ground.pieces if piece.name != "arm"]
     foot = (end.x + cavity.width + 1.0, scene.surface_height - cavity.depth - 0.6)
     about = "; ".join(words for words in (drawn_of(scene), "the slide down the ramp is drawn") if words)
-    return cut(scene, legs, pace, title=scene.name, about=about, lanes=lanes, ground=pieces, end=end.x, view=(foot,))
+    return cut(
+        scene, legs, pace, title=scene.name, about=about, lanes=lanes, ground=pieces, end=end.x, view=(foot,)
+    )
 
 
 def _fate(end: ArmEnd, throw: Throw) -> int:
@@ -148,7 +160,10 @@ def _falls(end: ArmEnd, scene: Scene, throw: Throw, fate: int, pace: Pace) -> li
             f"It falls: {words}",
             begins=True,
         )
-        return [falls, leg(STAYS, lambda share: pose(0.0 * share, 0.0 * share, drop + 0.0 * share), words.capitalize())]
+        return [
+            falls,
+            leg(STAYS, lambda share: pose(0.0 * share, 0.0 * share, drop + 0.0 * share), words.capitalize()),
+        ]
     most = _first_contact(cavity, about_end)
     inertia = scene.radius_of_gyration**2 + beyond**2 + d**2
     time, angle_at = _tipping(beyond, d, inertia, gravity, most)
@@ -209,7 +224,9 @@ def _tipping(
 
     down.terminal = True  # type: ignore[attr-defined]  # scipy reads it there
     # an inverted pendulum: from e off the top it takes ln(d/e) of its times, and a few more
-    patience = (40.0 + max(0.0, math.log(height / max(beyond, 1e-300)))) * math.sqrt(inertia / (gravity * height))
+    patience = (40.0 + max(0.0, math.log(height / max(beyond, 1e-300)))) * math.sqrt(
+        inertia / (gravity * height)
+    )
     found = solve_ivp(
         rates, (0.0, patience), [0.0, 0.0], "DOP853", dense_output=True, events=down, rtol=1e-10, atol=1e-14
     )

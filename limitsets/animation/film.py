@@ -39,7 +39,7 @@ class Mark(NamedTuple):
 
 
 class Rest(NamedTuple):
-    """A part has come to rest: the frame in which its throw begins, that of the rest, where [length], and a sentence."""
+    """A part has come to rest: the frame in which its throw begins, and that of the rest; where [length]; in words."""
 
     begin: int
     frame: int
@@ -159,7 +159,8 @@ class Film:
     def polygon(self, frame: int, part: int = 0) -> Array:
         """Corners of a part in a frame, shape (n, 2) [length]."""
         x, y, angle = self.poses[frame, part].tolist()
-        return turned(self.outlines[part], angle) + np.array([x, y])
+        corners: Array = turned(self.outlines[part], angle) + np.array([x, y])
+        return corners
 
     def arm_polygon(self, frame: int, thick: float) -> Array:
         """Corners of the arm in a frame, its surface first, shape (4, 2) [length]."""

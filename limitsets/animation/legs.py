@@ -39,7 +39,9 @@ def drawn_of(scene: Scene) -> str:
         said.append("the way from the impact to rest is drawn: these formulas have none")
     on = [name for name in ("slip", "pivot", "bounce") if getattr(scene.effects, name)]
     if on:
-        said.append(f"the way from the first impact to rest is drawn ({', '.join(on)}); its ends are the map's")
+        said.append(
+            f"the way from the first impact to rest is drawn ({', '.join(on)}); its ends are the map's"
+        )
     return "; ".join(said)
 
 
@@ -177,6 +179,11 @@ def legs_of(
             rest=rest,
         ),
         rest_leg(
-            scene, throw.after, throw.side_after, stays, f"{name}: {at_rest}{broken}", *(after or (note, stage))
+            scene,
+            throw.after,
+            throw.side_after,
+            stays,
+            f"{name}: {at_rest}{broken}",
+            *(after or (note, stage)),
         ),
     ]

@@ -1,4 +1,4 @@
-"""A film as a page that stands alone: the still part as SVG, everything that moves as numbers, a script that draws it."""
+"""A film as a page that stands alone: what is still as SVG, what moves as numbers, and a script that draws it."""
 
 from __future__ import annotations
 
@@ -96,9 +96,9 @@ def _data(picture: Picture) -> dict[str, Any]:
         "rests": [[each.frame, *rounded([each.x]), each.side] for each in film.rests] if lanes else [],
         "position": rounded(film.position) if lanes else None,
         "stage": film.stage.tolist(),
-        "known": [] if lanes is None else [
-            [rounded(shape.points) for shape in picture.bars(each, 10.0, **KNOWN)] for each in lanes.known
-        ],
+        "known": []
+        if lanes is None
+        else [[rounded(shape.points) for shape in picture.bars(each, 10.0, **KNOWN)] for each in lanes.known],
         "look": {
             "parts": PARTS,
             "edges": EDGES,
@@ -116,7 +116,9 @@ def svg_of(shape: Shape) -> str:
     look, places = shape.look, " ".join(f"{x:.2f},{y:.2f}" for x, y in shape.points.tolist())
     x, y = shape.points[0].tolist()
     if shape.kind == "text":
-        how = f'font-size="{look["size"]:g}" text-anchor="{look.get("anchor", "start")}" fill="{look["fill"]}"'
+        how = (
+            f'font-size="{look["size"]:g}" text-anchor="{look.get("anchor", "start")}" fill="{look["fill"]}"'
+        )
         how += f' font-weight="{look.get("weight", "normal")}"'
         return f'<text x="{x:.2f}" y="{y:.2f}" {how}>{escape(look["words"])}</text>'
     paint = f'fill="{look.get("fill", "none")}" stroke="{look.get("stroke", "none")}"'

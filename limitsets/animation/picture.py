@@ -98,9 +98,15 @@ class Picture:
         wide = 2 * math.ceil(0.5 * max(NARROWEST, scale * across + LEFT + RIGHT))
         left = LEFT + 0.5 * (wide - LEFT - RIGHT - scale * across)
         bottom = TOP + scale * up
-        lanes = 0.0 if film.lanes is None else GAP + LANE * len(film.lanes.begin) + AXIS + 12.0 * len(film.lanes.lines)
+        lanes = (
+            0.0
+            if film.lanes is None
+            else GAP + LANE * len(film.lanes.begin) + AXIS + 12.0 * len(film.lanes.lines)
+        )
         tall = 2 * math.ceil(0.5 * (bottom + lanes + FOOT))  # even, as the codecs of mp4 ask
-        return cls(film, scale, (left - scale * float(lo[0]), TOP + scale * float(hi[1])), bottom, (wide, tall))
+        return cls(
+            film, scale, (left - scale * float(lo[0]), TOP + scale * float(hi[1])), bottom, (wide, tall)
+        )
 
     def at(self, points: Any) -> Array:
         """Turn lengths from the joint into pixels."""
@@ -150,7 +156,9 @@ class Picture:
         for side, points in lanes.critical.items():
             for x in points:
                 px, y = self.at((x, 0.0))[0], self.lane(side)
-                found.append(_shape("line", [(px, y - 10), (px, y + 10)], stroke=style.INK, width=2.2, what="critical"))
+                found.append(
+                    _shape("line", [(px, y - 10), (px, y + 10)], stroke=style.INK, width=2.2, what="critical")
+                )
         for number, (x, words) in enumerate(lanes.lines):
             found += self._upright(x, top - 12.0 * (number + 1), foot, style.INK, (6.0, 3.0), words)
         if lanes.goal is not None:
@@ -165,7 +173,13 @@ class Picture:
         assert lanes is not None  # asked before
         end = lanes.end
         step = next(
-            (each * ten for ten in (0.01, 0.1, 1.0, 10.0, 100.0) for each in (1, 2, 5) if each * ten * 8 >= end), end
+            (
+                each * ten
+                for ten in (0.01, 0.1, 1.0, 10.0, 100.0)
+                for each in (1, 2, 5)
+                if each * ten * 8 >= end
+            ),
+            end,
         )
         found = []
         for k in range(int(end / step) + 1):
@@ -194,7 +208,9 @@ class Picture:
             found.append(_shape("polygon", bar, fill=KNOWN["fill"], stroke=KNOWN["stroke"], width=0.8))
             found.append(_text("known to be here", x + 23, y, **small))
             x += 132
-        found.append(_shape("circle", (x + 5, y - 4), radius=5.5, fill=style.FLIP, stroke="#ffffff", width=1.2))
+        found.append(
+            _shape("circle", (x + 5, y - 4), radius=5.5, fill=style.FLIP, stroke="#ffffff", width=1.2)
+        )
         found.append(_text("the part", x + 14, y, **small))
         found.append(_shape("circle", (x + 80, y - 4), radius=3.0, fill=style.INK, opacity=0.55))
         found.append(_text("earlier rests", x + 88, y, **small))
@@ -235,7 +251,9 @@ class Picture:
         if last > first:
             path = self.at(film.poses[first : last + 1, 0, :2])
             ghost = self.at(film.polygon(first))
-            found.append(_shape("line", [*ghost, ghost[0]], stroke="#a9a9a9", width=1.0, dash=(3.0, 3.0), what="left"))
+            found.append(
+                _shape("line", [*ghost, ghost[0]], stroke="#a9a9a9", width=1.0, dash=(3.0, 3.0), what="left")
+            )
             found.append(_shape("line", path, stroke=style.FLIP, width=1.6, dash=(5.0, 3.0), what="trail"))
         for part in range(len(film.outlines)):
             found += self._part(k, part)
@@ -278,7 +296,9 @@ class Picture:
             px, py = self.at((x + cos * label.x - sin * label.y, y + sin * label.x + cos * label.y))
             found.append(_text(label.word, px, py + 4.5, anchor="middle", size=13.0, what="label"))
         if film.labels[part]:
-            found.append(_shape("circle", self.at((x, y)), radius=3.2, fill="#ffffff", stroke=style.INK, width=1.4))
+            found.append(
+                _shape("circle", self.at((x, y)), radius=3.2, fill="#ffffff", stroke=style.INK, width=1.4)
+            )
         return found
 
     def _marks(self, k: int) -> list[Shape]:
@@ -300,11 +320,15 @@ class Picture:
         for rest in film.rests:
             if rest.frame <= k:
                 place = self.at((rest.x, 0.0))[0], self.lane(rest.side)
-                found.append(_shape("circle", place, radius=3.0, fill=style.INK, opacity=0.55, what="visited"))
+                found.append(
+                    _shape("circle", place, radius=3.0, fill=style.INK, opacity=0.55, what="visited")
+                )
         px, y = float(self.at((x, 0.0))[0]), self.lane(side)
         centre = self.at(film.poses[k, 0, :2])
         if abs(float(centre[0]) - px) < LEANS:
-            found.append(_shape("line", [centre, (px, y)], stroke="#7d7d7d", width=0.9, dash=(1.5, 2.5), what="plumb"))
+            found.append(
+                _shape("line", [centre, (px, y)], stroke="#7d7d7d", width=0.9, dash=(1.5, 2.5), what="plumb")
+            )
         look = {"fill": style.FLIP, "stroke": "#ffffff", "width": 1.4}
         return [*found, _shape("circle", (px, y), radius=6.5, what="here", **look)]
 
@@ -325,13 +349,17 @@ def _bounds(film: Film) -> tuple[Array, Array]:
     places = list(film.view)
     if film.surface is not None:
         end = film.surface[1]
-        places += [(0.0, 0.0), (end, 0.0), *((end, end * math.sin(float(k))) for k in (film.arm.min(), film.arm.max()))]
+        places += [
+            (0.0, 0.0),
+            (end, 0.0),
+            *((end, end * math.sin(float(k))) for k in (film.arm.min(), film.arm.max())),
+        ]
     if film.lanes is not None:
         places.append((film.lanes.end, 0.0))
     for place in places:
         lo, hi = np.minimum(lo, place), np.maximum(hi, place)
     margin = 0.06 * reach
-    return lo - (1.5 * margin, 4.0 * margin), hi + (1.5 * margin, margin)
+    return lo - margin * np.array([1.5, 4.0]), hi + margin * np.array([1.5, 1.0])
 
 
 def _pointer(x: float, y: float) -> list[tuple[float, float]]:

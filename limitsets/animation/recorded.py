@@ -97,8 +97,12 @@ def _words(
     return (f"Throw {count}" if count else "Before the first throw"), note
 
 
-def _view(ground: tuple[NDArray[np.float64], ...], poses: NDArray[np.float64]) -> tuple[tuple[float, float], ...]:
+def _view(
+    ground: tuple[NDArray[np.float64], ...], poses: NDArray[np.float64]
+) -> tuple[tuple[float, float], ...]:
     """Keep the surfaces in sight on which parts come to lie: those that begin where parts are."""
     reach = float(np.nanmax(poses[:, :, 0])), float(np.nanmin(poses[:, :, 0]))
     tops = [(float(each[:, 0].max()), float(each[:, 1].max())) for each in ground]
-    return tuple((min(x, reach[0]), y) for x, y in tops if x > reach[1] and y <= float(np.nanmax(poses[:, :, 1])))
+    return tuple(
+        (min(x, reach[0]), y) for x, y in tops if x > reach[1] and y <= float(np.nanmax(poses[:, :, 1]))
+    )

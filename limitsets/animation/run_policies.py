@@ -28,7 +28,12 @@ class _Step(NamedTuple):
 
 
 def film_of_policy(
-    found: Synthesis, start: tuple[float, int] | None, throws: int | None, fps: float, slow: float, progress: Progress
+    found: Synthesis,
+    start: tuple[float, int] | None,
+    throws: int | None,
+    fps: float,
+    slow: float,
+    progress: Progress,
 ) -> Film:
     """Show what a policy does from a start, without noise."""
     policy = found.found.policy
@@ -42,12 +47,18 @@ def film_of_policy(
         x, side = require_start(scene, start)
         inside = found.starts.extents().get(side, [])
         if not any(lo <= x <= hi for lo, hi in inside):
-            raise AnswerError("the start", f"x = {x:g} on side {side}", "one of the policy's starts", "choose another")
+            raise AnswerError(
+                "the start", f"x = {x:g} on side {side}", "one of the policy's starts", "choose another"
+            )
     steps = _run(found, policy, x, side)
     known = tuple(found.beliefs())
     texts = [_words(found, each) for each in steps]
     question = found.question
-    legs = [rest_leg(scene, x, side, 1.5, f"Start: x = {x:.2f} {scene.unit} on side {side}", texts[0], steps[0].state)]
+    legs = [
+        rest_leg(
+            scene, x, side, 1.5, f"Start: x = {x:.2f} {scene.unit} on side {side}", texts[0], steps[0].state
+        )
+    ]
     made = [(each, each.throw) for each in steps if each.throw is not None][:throws]
     for number, (each, throw) in enumerate(made):
         last = number + 1 == len(made)
@@ -93,9 +104,10 @@ def _run(found: Synthesis, policy: Policy, x: float, side: int) -> list[_Step]:
         name = policy.throws[int(policy.throw[state])]
         box = found.throws[name]
         path = trace(box.at_kappa(box.middle_kappa), x, side, 1)
-        (throw,) = throws_of(found.scene, path, box.middle_kappa) or [None]
-        if throw is None:
+        made = throws_of(found.scene, path, box.middle_kappa)
+        if not made:
             break
+        throw = made[0]
         steps.append(_Step(state, heard, name, throw))
         x, side, table = throw.after, throw.side_after, policy.after[state]
         if throw.code < 0 or (found.mode == "catch" and x >= found.goal[0]):

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 
 from limitsets.animation.cutting import Pace, cut, require_length
 from limitsets.animation.film import Film
-from limitsets.animation.lanes import Progress, good_start, known_of, require_start
-from limitsets.animation.legs import STAYS, drawn_of, legs_of, rest_leg
+from limitsets.animation.lanes import Progress, good_start, known_of, lanes_of, require_start
+from limitsets.animation.legs import RESTS, STAYS, drawn_of, legs_of, rest_leg
 from limitsets.animation.throwing import throws_of
 from limitsets.errors import AnswerError
 
@@ -22,7 +22,12 @@ USUAL = 8
 
 
 def film_of_scene(
-    scene: Scene, start: tuple[float, int] | None, throws: int | None, fps: float, slow: float, progress: Progress
+    scene: Scene,
+    start: tuple[float, int] | None,
+    throws: int | None,
+    fps: float,
+    slow: float,
+    progress: Progress,
 ) -> Film:
     """Show throws of a scene."""
     if start is not None:
@@ -33,10 +38,14 @@ def film_of_scene(
 
 
 def film_of_analysis(
-    found: Analysis, start: tuple[float, int] | None, throws: int | None, fps: float, slow: float, progress: Progress
+    found: Analysis,
+    start: tuple[float, int] | None,
+    throws: int | None,
+    fps: float,
+    slow: float,
+    progress: Progress,
 ) -> Film:
     """Show throws of a scene that is analysed already."""
-    from limitsets.animation.lanes import lanes_of
     from limitsets.thrower import trace
 
     scene, pace = found.scene, Pace.of(found.scene, fps, slow)
@@ -51,6 +60,6 @@ def film_of_analysis(
     words = f"Start: x = {x:.2f} {scene.unit} on side {side}"
     legs = [rest_leg(scene, x, side, 1.0, words)]
     for number, throw in enumerate(made, start=1):
-        stays = {"stays": STAYS} if number == count else {}
-        legs += legs_of(scene, throw, pace, f"Throw {number} of {count}", **stays)
+        stays = STAYS if number == count else RESTS
+        legs += legs_of(scene, throw, pace, f"Throw {number} of {count}", stays=stays)
     return cut(scene, legs, pace, title=scene.name, about=drawn_of(scene), lanes=lanes_of(scene, found))

@@ -7,6 +7,7 @@ from typing import Annotated
 import typer
 
 from limitsets.cli.analyse import analyse
+from limitsets.cli.animate import animate
 from limitsets.cli.atlas import atlas
 from limitsets.cli.audit import audit
 from limitsets.cli.certify import certify
@@ -56,6 +57,7 @@ for command in (
     analyse,
     throw,
     plot,
+    animate,
     certify,
     recheck,
     audit,
