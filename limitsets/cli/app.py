@@ -7,6 +7,7 @@ from typing import Annotated
 import typer
 
 from limitsets.cli.analyse import analyse
+from limitsets.cli.animate import animate
 from limitsets.cli.assemble import assemble
 from limitsets.cli.atlas import atlas
 from limitsets.cli.audit import audit
@@ -58,6 +59,7 @@ for command in (
     analyse,
     throw,
     plot,
+    animate,
     certify,
     recheck,
     audit,
