@@ -12,9 +12,11 @@ import tomllib
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from matplotlib.figure import Figure
 
 import limitsets as ls
+from limitsets.engine import Crowd
 from limitsets.feeding.crowd import CrowdTrials, run_crowd
 from limitsets.feeding.falling import FATES, arm_end_of
 from limitsets.feeding.trials import run_trials
@@ -28,6 +30,7 @@ BATCHES = {1: 200, 2: 100, 3: 60, 5: 40, 10: 20, 20: 12, 50: 6, 100: 4, 200: 3}
 UNILATERAL = (1, 2, 5)
 THROWS = 200
 STEP = 4e-3
+STEPS = (8e-3, 4e-3, 2e-3, 1e-3, 5e-4)
 RATE = 2.0  # throws a second
 
 
@@ -73,9 +76,49 @@ def main(seed: int = 0, out: Path = HERE, share: float = 1.0) -> dict[str, Any]:
         "passing": {str(parts): run(parts, between=False) for parts in BATCHES},
         "unilateral": {str(parts): run(parts, contact="unilateral") for parts in UNILATERAL},
         "half the step": {str(parts): run(parts, step=0.5 * STEP) for parts in UNILATERAL},
+        "errors of places": errors_of_places(seed),
     }
     draw(numbers).savefig(out / "many_parts.png", dpi=130)
     return numbers
+
+
+def errors_of_places(seed: int) -> dict[str, Any]:
+    """Throw pairs of which one flips towards the other: how far places are from those of the finest step."""
+    part, random, starts = scene(), np.random.default_rng(seed), []
+    for _ in range(60):
+        x = random.uniform(5.0, 9.0)
+        starts.append((x, x + random.uniform(5.0, 8.0), 0.005 * random.standard_normal()))
+    rests: dict[float, list[Any]] = {}
+    for step in STEPS:
+        rests[step] = []
+        for inner, outer, deviation in starts:
+            crowd = Crowd([part, part], step=step)
+            crowd.place(0, inner, 2)
+            crowd.place(1, outer, 0)
+            rests[step].append((crowd.throw(deviation), bool(crowd.overlapped)))
+    found: dict[str, Any] = {}
+    finest = rests[STEPS[-1]]
+    for step in STEPS[:-1]:
+        off, differ, alone = [], 0, 0.0
+        for (coarse, _), (fine, met) in zip(rests[step], finest, strict=True):
+            if any(
+                (one.where, one.side) != (two.where, two.side) for one, two in zip(coarse, fine, strict=True)
+            ):
+                differ += 1
+                continue
+            error = max(abs(one.x - two.x) for one, two in zip(coarse, fine, strict=True))
+            if met:
+                off.append(error)
+            else:
+                alone = max(alone, error)
+        found[str(step)] = {
+            "met": len(off),
+            "differ": differ,
+            "median": float(np.median(off)),
+            "worst": max(off),
+            "worst of pairs that do not meet": alone,
+        }
+    return found
 
 
 def draw(numbers: dict[str, Any]) -> Figure:
