@@ -27,6 +27,8 @@ WIDEST, NARROWEST = 900.0, 640.0
 LEFT, RIGHT, TOP, FOOT = 62.0, 22.0, 62.0, 62.0
 LANE, GAP, AXIS = 34.0, 22.0, 22.0
 TALLEST = 500.0
+# The line from a part to its place in the lanes is left out where they are farther apart than this.
+LEANS = 16.0
 THICK = 0.45
 """Of the arm [length, for one 28 long]."""
 
@@ -96,9 +98,15 @@ class Picture:
         wide = 2 * math.ceil(0.5 * max(NARROWEST, scale * across + LEFT + RIGHT))
         left = LEFT + 0.5 * (wide - LEFT - RIGHT - scale * across)
         bottom = TOP + scale * up
-        lanes = 0.0 if film.lanes is None else GAP + LANE * len(film.lanes.begin) + AXIS
+        lanes = (
+            0.0
+            if film.lanes is None
+            else GAP + LANE * len(film.lanes.begin) + AXIS + 12.0 * len(film.lanes.lines)
+        )
         tall = 2 * math.ceil(0.5 * (bottom + lanes + FOOT))  # even, as the codecs of mp4 ask
-        return cls(film, scale, (left - scale * float(lo[0]), TOP + scale * float(hi[1])), bottom, (wide, tall))
+        return cls(
+            film, scale, (left - scale * float(lo[0]), TOP + scale * float(hi[1])), bottom, (wide, tall)
+        )
 
     def at(self, points: Any) -> Array:
         """Turn lengths from the joint into pixels."""
@@ -107,7 +115,8 @@ class Picture:
 
     def lane(self, side: float) -> float:
         """Height of a lane, also between two [pixels]."""
-        return self.bottom + GAP + LANE * (side + 0.35)
+        lines = 0 if self.film.lanes is None else len(self.film.lanes.lines)
+        return self.bottom + GAP + 12.0 * lines + LANE * (side + 0.35)
 
     # ---------------------------------------------------------------- what does not move
 
@@ -147,8 +156,11 @@ class Picture:
         for side, points in lanes.critical.items():
             for x in points:
                 px, y = self.at((x, 0.0))[0], self.lane(side)
-                found.append(_shape("line", [(px, y - 10), (px, y + 10)], stroke=style.INK, width=2.2, what="critical"))
-        found += self._upright(lanes.sensor, top, foot, style.INK, (6.0, 3.0), "sensor")
+                found.append(
+                    _shape("line", [(px, y - 10), (px, y + 10)], stroke=style.INK, width=2.2, what="critical")
+                )
+        for number, (x, words) in enumerate(lanes.lines):
+            found += self._upright(x, top - 12.0 * (number + 1), foot, style.INK, (6.0, 3.0), words)
         if lanes.goal is not None:
             x, side = lanes.goal
             words = f"goal: side {side} from {x:g} {film.unit} on"
@@ -157,9 +169,17 @@ class Picture:
 
     def _axis(self, y: float) -> list[Shape]:
         """Draw ticks of x under the lanes."""
-        end, unit = self.film.surface[1], self.film.unit
+        lanes, unit = self.film.lanes, self.film.unit
+        assert lanes is not None  # asked before
+        end = lanes.end
         step = next(
-            (each * ten for ten in (0.01, 0.1, 1.0, 10.0, 100.0) for each in (1, 2, 5) if each * ten * 8 >= end), end
+            (
+                each * ten
+                for ten in (0.01, 0.1, 1.0, 10.0, 100.0)
+                for each in (1, 2, 5)
+                if each * ten * 8 >= end
+            ),
+            end,
         )
         found = []
         for k in range(int(end / step) + 1):
@@ -188,7 +208,9 @@ class Picture:
             found.append(_shape("polygon", bar, fill=KNOWN["fill"], stroke=KNOWN["stroke"], width=0.8))
             found.append(_text("known to be here", x + 23, y, **small))
             x += 132
-        found.append(_shape("circle", (x + 5, y - 4), radius=5.5, fill=style.FLIP, stroke="#ffffff", width=1.2))
+        found.append(
+            _shape("circle", (x + 5, y - 4), radius=5.5, fill=style.FLIP, stroke="#ffffff", width=1.2)
+        )
         found.append(_text("the part", x + 14, y, **small))
         found.append(_shape("circle", (x + 80, y - 4), radius=3.0, fill=style.INK, opacity=0.55))
         found.append(_text("earlier rests", x + 88, y, **small))
@@ -196,10 +218,8 @@ class Picture:
         return [*found, _text("impact", x + 188, y, **small)]
 
     def _upright(
-        self, x: float | None, top: float, foot: float, colour: str, dash: tuple[float, ...], words: str
+        self, x: float, top: float, foot: float, colour: str, dash: tuple[float, ...], words: str
     ) -> list[Shape]:
-        if x is None:
-            return []
         px = float(self.at((x, 0.0))[0])
         near_right = px > self.size[0] - 190.0
         look = {"anchor": "end" if near_right else "start", "size": 11.5, "fill": colour}
@@ -231,7 +251,9 @@ class Picture:
         if last > first:
             path = self.at(film.poses[first : last + 1, 0, :2])
             ghost = self.at(film.polygon(first))
-            found.append(_shape("line", [*ghost, ghost[0]], stroke="#a9a9a9", width=1.0, dash=(3.0, 3.0), what="left"))
+            found.append(
+                _shape("line", [*ghost, ghost[0]], stroke="#a9a9a9", width=1.0, dash=(3.0, 3.0), what="left")
+            )
             found.append(_shape("line", path, stroke=style.FLIP, width=1.6, dash=(5.0, 3.0), what="trail"))
         for part in range(len(film.outlines)):
             found += self._part(k, part)
@@ -252,18 +274,15 @@ class Picture:
         return self.bars(lanes.known[stage], 10.0, what="known", **KNOWN)
 
     def _arm(self, k: int) -> list[Shape]:
-        corners = self.at(self.film.arm_polygon(k, self.thick))
+        if self.film.surface is None:
+            return []
+        corners = self.at(self.film.arm_polygon(k, THICK * self.film.surface[1] / 28.0))
         joint = np.array(self.origin)
         return [
             _shape("polygon", corners, fill=ARM, what="arm"),
             _shape("line", corners[:2], stroke=style.INK, width=2.2),
             _shape("circle", joint, radius=5.5, fill="#ffffff", stroke=style.INK, width=1.6, what="joint"),
         ]
-
-    @property
-    def thick(self) -> float:
-        """Of the arm, in proportion to its length [length]."""
-        return THICK * max(self.film.surface[1], 1e-9) / 28.0
 
     def _part(self, k: int, part: int) -> list[Shape]:
         film = self.film
@@ -277,7 +296,9 @@ class Picture:
             px, py = self.at((x + cos * label.x - sin * label.y, y + sin * label.x + cos * label.y))
             found.append(_text(label.word, px, py + 4.5, anchor="middle", size=13.0, what="label"))
         if film.labels[part]:
-            found.append(_shape("circle", self.at((x, y)), radius=3.2, fill="#ffffff", stroke=style.INK, width=1.4))
+            found.append(
+                _shape("circle", self.at((x, y)), radius=3.2, fill="#ffffff", stroke=style.INK, width=1.4)
+            )
         return found
 
     def _marks(self, k: int) -> list[Shape]:
@@ -299,18 +320,23 @@ class Picture:
         for rest in film.rests:
             if rest.frame <= k:
                 place = self.at((rest.x, 0.0))[0], self.lane(rest.side)
-                found.append(_shape("circle", place, radius=3.0, fill=style.INK, opacity=0.55, what="visited"))
+                found.append(
+                    _shape("circle", place, radius=3.0, fill=style.INK, opacity=0.55, what="visited")
+                )
         px, y = float(self.at((x, 0.0))[0]), self.lane(side)
         centre = self.at(film.poses[k, 0, :2])
-        found.append(_shape("line", [centre, (px, y)], stroke="#7d7d7d", width=0.9, dash=(1.5, 2.5), what="plumb"))
+        if abs(float(centre[0]) - px) < LEANS:
+            found.append(
+                _shape("line", [centre, (px, y)], stroke="#7d7d7d", width=0.9, dash=(1.5, 2.5), what="plumb")
+            )
         look = {"fill": style.FLIP, "stroke": "#ffffff", "width": 1.4}
         return [*found, _shape("circle", (px, y), radius=6.5, what="here", **look)]
 
 
 def _bounds(film: Film) -> tuple[Array, Array]:
     """Find the least and the largest x and y of what is shown."""
-    reach = [float(np.hypot(*outline.T).max()) for outline in film.outlines]
-    lo, hi = np.array([0.0, np.inf]), np.array([film.surface[1], -np.inf])
+    reach = max(float(np.hypot(*outline.T).max()) for outline in film.outlines)
+    lo, hi = np.array([np.inf, np.inf]), np.array([-np.inf, -np.inf])
     for part, outline in enumerate(film.outlines):
         pose = film.poses[:, part]
         pose = pose[np.isfinite(pose[:, 0])]
@@ -320,12 +346,20 @@ def _bounds(film: Film) -> tuple[Array, Array]:
         for u, v in outline.tolist():
             x, y = pose[:, 0] + cos * u - sin * v, pose[:, 1] + sin * u + cos * v
             lo, hi = np.minimum(lo, (x.min(), y.min())), np.maximum(hi, (x.max(), y.max()))
-    tips = film.surface[1] * np.sin(film.arm)
-    lo[1], hi[1] = min(lo[1], float(tips.min())), max(hi[1], float(tips.max()))
+    places = list(film.view)
+    if film.surface is not None:
+        end = film.surface[1]
+        places += [
+            (0.0, 0.0),
+            (end, 0.0),
+            *((end, end * math.sin(float(k))) for k in (film.arm.min(), film.arm.max())),
+        ]
     if film.lanes is not None:
-        hi[0] = max(hi[0], min(film.lanes.end, film.surface[1] * 1.5))
-    margin = 0.06 * max(reach)
-    return lo - (1.5 * margin, 4.0 * margin), hi + (1.5 * margin, margin)
+        places.append((film.lanes.end, 0.0))
+    for place in places:
+        lo, hi = np.minimum(lo, place), np.maximum(hi, place)
+    margin = 0.06 * reach
+    return lo - margin * np.array([1.5, 4.0]), hi + margin * np.array([1.5, 1.0])
 
 
 def _pointer(x: float, y: float) -> list[tuple[float, float]]:

@@ -7,6 +7,8 @@ from typing import Annotated
 import typer
 
 from limitsets.cli.analyse import analyse
+from limitsets.cli.animate import animate
+from limitsets.cli.assemble import assemble
 from limitsets.cli.atlas import atlas
 from limitsets.cli.audit import audit
 from limitsets.cli.certify import certify
@@ -57,6 +59,7 @@ for command in (
     analyse,
     throw,
     plot,
+    animate,
     certify,
     recheck,
     audit,
@@ -66,6 +69,7 @@ for command in (
     atlas,
     feed,
     feedback,
+    assemble,
     fit,
     tray,
 ):

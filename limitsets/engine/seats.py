@@ -93,7 +93,7 @@ def _ahead(point: Points, outline: Points, way: Points) -> float:
     for one, two in pairwise([*outline, outline[0]]):
         side, to = two - one, one - point
         across = way[0] * side[1] - way[1] * side[0]
-        if across == 0.0:
+        if abs(across) <= 1e-9 * math.hypot(side[0], side[1]):  # along it: its ends are met on other sides
             continue
         time = (to[0] * side[1] - to[1] * side[0]) / across
         share = (to[0] * way[1] - to[1] * way[0]) / across

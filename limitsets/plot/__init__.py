@@ -16,6 +16,7 @@ from importlib import import_module
 from typing import Any
 
 _FILES = {
+    "assembly": "assemblies",
     "atlas": "atlas_maps",
     "atlas_surface": "atlas_surfaces",
     "audit": "audit_strips",
