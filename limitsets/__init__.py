@@ -21,6 +21,7 @@ if TYPE_CHECKING:  # each from the file that holds it: most rooms have a file of
     from limitsets import engine, interval, maps, plot, resilience
     from limitsets.analysis import analyse
     from limitsets.animation import animate
+    from limitsets.assembly import assemble
     from limitsets.auditing import audit
     from limitsets.cells import grid
     from limitsets.feeding import feed
@@ -42,6 +43,7 @@ if TYPE_CHECKING:  # each from the file that holds it: most rooms have a file of
     from limitsets.sets.limit_set import limit_set
     from limitsets.sweep.continuation import continuation
     from limitsets.sweep.parameter_atlas import atlas
+    from limitsets.trays.filling import tray
 
 __version__ = "0.1.0"
 
@@ -61,6 +63,7 @@ _ROOMS = {
     "design": "inverse",
     "dump": "scene",
     "engine": "engine",
+    "assemble": "assembly",
     "feed": "feeding",
     "feedback": "policies",
     "fit": "fitting",
@@ -81,11 +84,13 @@ _ROOMS = {
     "robustness": "robust.sheet.sheet_run",
     "scenes": "scene",
     "transitions": "graph.transitions",
+    "tray": "trays",
 }
 
 __all__ = [
     "analyse",
     "animate",
+    "assemble",
     "atlas",
     "attractors",
     "audit",
@@ -117,6 +122,7 @@ __all__ = [
     "robustness",
     "scenes",
     "transitions",
+    "tray",
 ]
 
 

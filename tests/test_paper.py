@@ -119,7 +119,7 @@ def beyond_it(extents, side):
 
 
 def test_the_four_scenes():
-    assert sorted(ls.scenes()) == sorted(TABLE)
+    assert [name for name in ls.scenes() if ls.load(name).cavity is None] == sorted(TABLE)
 
 
 def test_resting_sides(paper):

@@ -150,7 +150,7 @@ def over_halves(scene: Scene, check: Callable[..., str], *more: Any) -> str:
 def read_scene(raw: object, noise: object) -> Scene:
     """Enclose a_i, d_i, L_i, rho, kappa, h and the arm's length from the decimals of a scene."""
     scene = table(
-        raw, "scene", "part arm throw model", "name gravity goal cavity feedback world tolerance effects"
+        raw, "scene", "part arm throw model", "name gravity goal cavity tray feedback world tolerance effects"
     )
     check_spread(scene, noise)
     arm = table(scene["arm"], "arm", "surface_height length")
@@ -393,7 +393,7 @@ def as_wide_as(dev: Quantity, value: Quantity, lo: Fraction, hi: Fraction, name:
 def same_but_for(names: list[str], raw: list[Any], flat: list[dict[str, object]]) -> bool:
     """Whether all boxes have the same scene, but for the quantities named."""
     rest = [{key: value for key, value in f.items() if key not in names} for f in flat]
-    alike = ("model", "goal", "cavity", "feedback", "world", "tolerance", "effects")
+    alike = ("model", "goal", "cavity", "tray", "feedback", "world", "tolerance", "effects")
     return all(
         r == rest[0] and all(scene.get(key) == raw[0].get(key) for key in alike)
         for r, scene in zip(rest, raw, strict=True)

@@ -8,6 +8,7 @@ import typer
 
 from limitsets.cli.analyse import analyse
 from limitsets.cli.animate import animate
+from limitsets.cli.assemble import assemble
 from limitsets.cli.atlas import atlas
 from limitsets.cli.audit import audit
 from limitsets.cli.certify import certify
@@ -21,6 +22,7 @@ from limitsets.cli.recheck import recheck
 from limitsets.cli.robustness import robustness
 from limitsets.cli.scenes import scenes
 from limitsets.cli.throw import throw
+from limitsets.cli.tray import tray
 
 __all__ = ["app"]
 
@@ -67,6 +69,8 @@ for command in (
     atlas,
     feed,
     feedback,
+    assemble,
     fit,
+    tray,
 ):
     app.command()(command)

@@ -1,23 +1,24 @@
 """Several parts on one arm at once, in the engine: thrown together, in contact with each other and with the ground.
 
-What is assumed stands in docs/crowds.md.
+What is assumed stands in docs/many_parts.md.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-import numpy as np
-
+from limitsets.engine.asking import area_of, check_asked
+from limitsets.engine.filming import Film
 from limitsets.engine.ground import ground_of
 from limitsets.engine.member import FLYING, HINGED, LOOSE, OUT, Member
 from limitsets.engine.overlaps import depth_of_overlap
-from limitsets.engine.recording import Mark, Recording
+from limitsets.engine.recording import Recording
 from limitsets.engine.rests import Rest, lying, on_arm, rest_of
 from limitsets.engine.settling import IDLE
-from limitsets.engine.stage import ITERATIONS, OVERLAP, TAKEN_BACK, pymunk_module
+from limitsets.engine.stage import OVERLAP
+from limitsets.engine.touching import Touching
 from limitsets.errors import AnswerError
 
 if TYPE_CHECKING:
@@ -25,13 +26,8 @@ if TYPE_CHECKING:
 
 __all__ = ["Crowd"]
 
-# A part slower than this share of the speed of a fall by its own size is idle.
-SLOW = 1e-3
 # Time [rad] between two looks at who is asleep or lost, and between two frames of a film.
 LOOK, FRAME = 0.1, 0.04
-# Collision types: parts; pieces of the ground have those beyond.
-PART = 1
-ARM, OTHERS = 1, 2  # categories of shapes
 
 
 class Crowd:
@@ -46,7 +42,9 @@ class Crowd:
         lies still until another one strikes it.  A corner that comes down beyond the arm's end, a part that was struck
         as it lay, the cavity and other parts meet the engine's own contact.  ``"unilateral"``: that contact for all.
     between : bool
-        Whether parts push each other.  If not, `overlapped` still tells which outlines have met.
+        Whether parts push each other.
+    watch : bool
+        Whether `overlapped` tells which outlines have met where parts do not push each other; slow for very many.
     carried : bool
         Whether the cavity is part of the arm, and all that lies in it is thrown; else only those parts are that touch
         the arm's surface with a corner or have their centre of mass before its end.
@@ -69,8 +67,6 @@ class Crowd:
 
     Attributes
     ----------
-    overlapped : set of (int, int)
-        Parts whose outlines have come into contact so far, the lower number first.
     ground : Ground
         What stands still.
 
@@ -96,6 +92,7 @@ class Crowd:
         *,
         contact: str = "hinge",
         between: bool = True,
+        watch: bool = True,
         carried: bool = False,
         friction: float | None = None,
         sliding: float = 0.2,
@@ -107,51 +104,26 @@ class Crowd:
         wall: float | None = None,
         depressions: Sequence[tuple[float, float, float]] = (),
     ) -> None:
-        pymunk, scene = pymunk_module(), scenes[0]
+        scene = scenes[0]
         mu = scene.world.friction if friction is None else friction
         e = (scene.world.restitution or 0.0) if restitution is None else restitution
-        _check(scenes, contact, mu, sliding, e, step)
-        self.contact, self.between, self.carried = contact, between, carried
-        self.step, self.patience, self.record = step, patience, record
+        check_asked(scenes, contact, mu, sliding, e, step)
+        self.hinged, self.between, self.carried = contact == "hinge", between, carried
+        self.step, self.patience = step, patience
         self.ground, self.cavity = ground_of(scene, depressions=depressions, wall=wall), scene.cavity
-        masses = [_area(each) for each in scenes] if masses is None else masses
+        masses = [area_of(each) for each in scenes] if masses is None else masses
         self.members = [Member(each, k, float(masses[k])) for k, each in enumerate(scenes)]
-        self.unit = 1.0 if scene.gravity is None else math.sqrt(scene.kappa / scene.gravity)
+        self.contacts = Touching(self.ground, self.members, between, watch, scene.kappa, step)
+        self.contacts.rub(mu or 0.0, sliding, e)
+        self.space = self.contacts.space
+        unit = 1.0 if scene.gravity is None else math.sqrt(scene.kappa / scene.gravity)
+        self.film, self.count = Film(record, unit, self.members), 0
+        self.awake = max(int(0.5 * IDLE / step), 1)  # steps in which nothing falls asleep
 
-        size = min(member.size for member in self.members)
-        self.space = space = pymunk.Space()
-        space.gravity = (0.0, -scene.kappa)
-        space.iterations = ITERATIONS
-        space.collision_slop = OVERLAP * size
-        space.collision_bias = (1.0 - TAKEN_BACK) ** (1.0 / step)
-        space.sleep_time_threshold = IDLE
-        space.idle_speed_threshold = SLOW * math.sqrt(scene.kappa * size)
-        # the engine takes the products of the numbers of two shapes
-        own, bounce = max(math.sqrt(sliding), 1e-6), math.sqrt(e)
-        self.names: dict[int, str] = {}
-        for kind, (name, shapes) in enumerate(self.ground.shapes(space.static_body).items(), PART + 1):
-            self.names[kind] = name
-            for shape in shapes:
-                shape.friction, shape.elasticity = ((mu or 0.0) if name == "arm" else sliding) / own, bounce
-                shape.collision_type = kind
-                shape.filter = pymunk.ShapeFilter(categories=ARM if name == "arm" else OTHERS)
-            space.add(*shapes)
-            space.on_collision(PART, kind, begin=self._strikes, separate=self._leaves)
-        space.on_collision(PART, PART, begin=self._strikes, separate=self._leaves)
-        self.on_all = pymunk.ShapeFilter(categories=OTHERS)
-        self.off_arm = pymunk.ShapeFilter(categories=OTHERS, mask=self.on_all.mask ^ ARM)
-        self.by_shape: dict[Any, Member] = {}
-        for member in self.members:
-            member.shape.friction, member.shape.elasticity = own, bounce
-            member.shape.collision_type = PART
-            self.by_shape[member.shape] = member
-
-        self.count, self.elapsed = 0, 0.0
-        self.touching: set[tuple[int, int]] = set()
-        self.overlapped: set[tuple[int, int]] = set()
-        self.struck: set[int] = set()
-        self.frames: list[tuple[float, list[tuple[float, float, float]]]] = []
-        self.marks: list[Mark] = []
+    @property
+    def overlapped(self) -> set[tuple[int, int]]:
+        """Parts whose outlines have come into contact so far, the lower number first."""
+        return self.contacts.overlapped
 
     def place(self, number: int, x: float, side: int) -> None:
         """Lay a part on the arm; it comes into play if it was out.
@@ -167,7 +139,8 @@ class Crowd:
             allowed = "a side of the part, and x from a of that side to the arm's length"
             raise AnswerError(f"the place of part {number}", (x, side), allowed, "lay it on the arm")
         self.drop(number, (x, scene.surface_height + float(scene.sides.d[side]), member.flat[side]))
-        member.body.sleep()
+        if x <= self.ground.end:
+            member.body.sleep()
 
     def drop(self, number: int, pose: tuple[float, float, float]) -> None:
         """Put a part anywhere, at rest, with a pose as in `Rest`; `settle` lets it fall.
@@ -188,7 +161,7 @@ class Crowd:
                     remedy = "move one of them: the engine would throw them apart"
                     raise AnswerError(thing, "overlapping", "outlines that do not overlap", remedy)
         self.space.add(member.body, member.shape)
-        member.mode, member.shape.filter = LOOSE, self.on_all
+        member.mode, member.shape.filter = LOOSE, self.contacts.on_all
 
     def take(self, number: int) -> None:
         """Take a part out of play."""
@@ -197,7 +170,7 @@ class Crowd:
             member.let_go(self.space)
             self.space.remove(member.body, member.shape)
             member.mode = OUT
-            self.touching = {pair for pair in self.touching if number not in pair}
+            self.contacts.forget(number)
 
     def throw(
         self, deviation: float = 0.0, landing: Mapping[int, float] | Sequence[float] = ()
@@ -217,15 +190,15 @@ class Crowd:
             One per part, in the order of the scenes.
         """
         shifts = landing if isinstance(landing, Mapping) else dict(enumerate(landing))
-        carried = [each for each in self.members if each.mode != OUT and self._is_carried(each)]
-        for member in carried:
+        for member in self.members:
+            if member.mode == OUT or not (self.carried or on_arm(member, self.ground)):
+                continue
             member.let_go(self.space)
             member.level(lying(member))
             member.release(1.0 + deviation, float(shifts.get(member.number, 0.0)), self.step)
-            hinged = self.contact == "hinge"
-            member.mode, member.due = (FLYING, 1) if hinged else (LOOSE, 0)
-            member.shape.filter = self.off_arm if hinged else self.on_all
-            self._mark(member, "thrown")
+            member.mode, member.due = (FLYING, 1) if self.hinged else (LOOSE, 0)
+            member.shape.filter = self.contacts.off_arm if self.hinged else self.contacts.on_all
+            self._mark("thrown", member.number)
         return self._run()
 
     def settle(self) -> list[Rest]:
@@ -245,23 +218,14 @@ class Crowd:
         return found
 
     def recording(self) -> Recording:
-        """What was kept since the crowd was made."""
-        times = np.array([time for time, _ in self.frames])
-        poses = np.array([pose for _, pose in self.frames]).reshape(times.size, len(self.members), 3)
-        outlines = tuple(np.array(each.corners) for each in self.members)
-        return Recording(
-            times, poses, outlines, self.ground.polygons, np.zeros(times.size), tuple(self.marks)
-        )
-
-    def _is_carried(self, member: Member) -> bool:
-        return self.carried or on_arm(member, self.ground)
+        """Give what was kept since the crowd was made."""
+        return self.film.recording(self.ground)
 
     def _run(self) -> list[Rest]:
         """Step until all are at rest; Python acts only where a part may come down, or a film wants a frame."""
-        last, look, frame = math.ceil(self.patience / self.step), 0, 0
+        last, look, frame = math.ceil(self.patience / self.step), 0, 0 if self.film.on else math.inf
         looks, frames = (max(round(time / self.step), 1) for time in (LOOK, FRAME))
-        step, forward = self.step, self.space.step
-        self.count = 0
+        step, forward, contacts = self.step, self.space.step, self.contacts
         for each in self.members:
             each.met, each.lost = {}, each.lost and each.mode == OUT
         while self.count < last:
@@ -270,25 +234,26 @@ class Crowd:
                 look = self.count + looks
                 if not self._moving():
                     break
-            if self.record and self.count >= frame:
+            if self.count >= frame:
                 frame = self.count + frames
-                self._film()
-            until = min(last, look, *(each.due for each in held), frame if self.record else last)
-            self.struck.clear()
-            while self.count < until and not self.struck:
+                self.film.frame(self.count * step)
+            until = min(last, look, frame, *(each.due for each in held))
+            contacts.struck.clear()
+            while self.count < until and not contacts.struck:
                 forward(step)
                 self.count += 1
             for each in held:
-                if self.count >= each.due or each.number in self.struck:
+                if self.count >= each.due or each.number in contacts.struck:
                     (self._fly if each.mode == FLYING else self._turn)(each)
+            self._mark("impact", *contacts.news)
+            contacts.news.clear()
         found = self.rests()
-        for rest in found:
-            if rest.where not in ("out", "lost", "unfinished"):
-                self._mark(self.members[rest.number], "in the cavity" if rest.where == "cavity" else "rest")
-        self._film()
-        self.elapsed += self.count * step * self.unit
+        self.film.end(self.count * step, found)
         self.count = 0
         return found
+
+    def _mark(self, word: str, *numbers: int) -> None:
+        self.film.mark(self.count * self.step, numbers, word)
 
     def _moving(self) -> bool:
         """Whether any part is in motion; those that have fallen off are taken out."""
@@ -297,7 +262,7 @@ class Crowd:
             if each.mode != OUT and not each.body.is_sleeping:
                 moves = True
                 if each.body.position.y < self.ground.bottom:
-                    self._mark(each, "lost")
+                    self._mark("lost", each.number)
                     self.take(each.number)
                     each.lost = True
         return moves
@@ -306,95 +271,32 @@ class Crowd:
         """Look whether a part in flight has come down; on the arm its corner is held from then on."""
         found = member.struck(self.step)
         if found is None:
-            member.due = self.count + (1 if self._touched(member) else member.steps_to_arm(self.step))
+            member.due = self.count + (
+                1 if self.contacts.any_of(member.number) else member.steps_to_arm(self.step)
+            )
         elif self.ground.is_arm(member.corner_at(*found, self.step)):
             member.catch(self.space, *found, self.step)
             member.met["arm"] = None
-            self._mark(member, "impact")
+            self._mark("impact", member.number)
             self._turn(member)
         else:
-            member.mode, member.shape.filter = LOOSE, self.on_all
+            member.mode, member.shape.filter = LOOSE, self.contacts.on_all
 
     def _turn(self, member: Member) -> None:
         """Look whether the face of a held part comes down: there it lies, or else tips over the end."""
         wait = member.steps_to_face(self.step)
         if wait > 0:
-            member.due = self.count + (1 if self._touched(member) else wait)
+            wait = min(wait, self.awake)
+            if self.contacts.any_of(member.number):
+                member.soften(self.space.collision_bias)
+                wait = 1
+            else:
+                member.body.activate()  # it may stand on its corner for long, but not for good
+            member.due = self.count + wait
             return
         if member.lie_down(self.space) != member.side:
-            self._mark(member, "roll")
-        member.mode, member.shape.filter = LOOSE, self.on_all
+            self._mark("roll", member.number)
+        member.mode, member.shape.filter = LOOSE, self.contacts.on_all
         # the engine's memory breaks where a body is put to sleep that is in contact with one awake
-        if member.body.position.x <= self.ground.end and not self._touched(member):
+        if member.body.position.x <= self.ground.end and not self.contacts.any_of(member.number):
             member.body.sleep()
-
-    def _touched(self, member: Member) -> bool:
-        return any(member.number in pair for pair in self.touching)
-
-    def _pair(self, arbiter: Any) -> tuple[int, int, str, str]:
-        """Numbers of what meets, lower first, and names; pieces of the ground have negative numbers."""
-        found = []
-        for shape in arbiter.shapes:
-            member = self.by_shape.get(shape)
-            kind = shape.collision_type
-            found.append(
-                (-kind, self.names[kind]) if member is None else (member.number, f"part {member.number}")
-            )
-        (one, first), (two, second) = sorted(found)
-        return one, two, first, second
-
-    def _strikes(self, arbiter: Any, _space: Any, _data: Any) -> None:
-        """Two shapes come into contact."""
-        one, two, first, second = self._pair(arbiter)
-        if one >= 0:
-            self.overlapped.add((one, two))
-            if not self.between:
-                arbiter.process_collision = False
-                return
-        self.touching.add((one, two))
-        for number, name in ((one, second), (two, first)):
-            if number >= 0:
-                member = self.members[number]
-                if name not in member.met:
-                    member.met[name] = None
-                    self._mark(member, "impact")
-                if member.mode in (FLYING, HINGED):
-                    self.struck.add(number)
-
-    def _leaves(self, arbiter: Any, _space: Any, _data: Any) -> None:
-        one, two, *_ = self._pair(arbiter)
-        self.touching.discard((one, two))
-
-    def _mark(self, member: Member, word: str) -> None:
-        if self.record:
-            self.marks.append((self.elapsed + self.count * self.step * self.unit, member.number, word))
-
-    def _film(self) -> None:
-        if self.record:
-            poses = [(math.nan,) * 3 if each.mode == OUT else each.pose() for each in self.members]
-            self.frames.append((self.elapsed + self.count * self.step * self.unit, poses))
-
-
-def _area(scene: Scene) -> float:
-    x, y = scene.vertices.T
-    return 0.5 * float(np.dot(x, np.roll(y, -1)) - np.dot(y, np.roll(x, -1)))
-
-
-def _check(
-    scenes: Sequence[Scene], contact: str, mu: float | None, sliding: float, e: float, step: float
-) -> None:
-    """Refuse parts that are not on one arm, and contacts that cannot be."""
-    for name in ("unit", "kappa", "surface_height", "arm_length", "cavity"):
-        values = {repr(getattr(scene, name)) for scene in scenes}
-        if len(values) > 1:
-            remedy = "parts on one arm share it, its throw and its cavity"
-            raise AnswerError(f"{name} of the scenes", ", ".join(sorted(values)), "one value", remedy)
-    if contact not in ("hinge", "unilateral"):
-        raise AnswerError("the contact", contact, "'hinge' or 'unilateral'", "choose one")
-    if mu is None or not (0.0 <= mu < math.inf and 0.0 <= sliding < math.inf):
-        remedy = "pass friction=0.5, or give world.friction in the scene"
-        raise AnswerError("the friction", (mu, sliding), "numbers from 0", remedy)
-    if not 0.0 <= e <= 1.0:
-        raise AnswerError("the restitution", e, "0 to 1", "pass restitution=0 for a plastic contact")
-    if not 0.0 < step <= 0.05:
-        raise AnswerError("the engine's step", step, "above 0 and at most 0.05 rad", "pass step=4e-3")

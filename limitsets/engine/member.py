@@ -25,7 +25,7 @@ ROUNDS = 30  # of Newton's method, which ends long before
 
 
 def whole_steps(gap: float, speed: float, gain: float, step: float) -> int:
-    """Steps, one at least, in which nothing covers a gap that starts at a speed and gains so much per time."""
+    """Count the steps, one at least, in which nothing covers a gap that begins at a speed and gains so much."""
     time = (math.sqrt(speed * speed + 2.0 * gain * gap) - speed) / gain if gap > 0.0 else 0.0
     return max(int(time / step), 1)
 
@@ -83,7 +83,7 @@ class Member:
         body.position = (x + shift, y)
 
     def steps_to_arm(self, step: float) -> int:
-        """Steps in which no corner can come down to the arm."""
+        """Count the steps in which no corner can come down to the arm."""
         body = self.body
         gap = min(y for _, y in self.world()) - self.scene.surface_height
         speed = abs(body.angular_velocity) * self.reach - body.velocity.y
@@ -154,7 +154,7 @@ class Member:
         self.high = self.low + (left - right) % math.tau
 
     def steps_to_face(self, step: float) -> int:
-        """Steps in which no face can come down; 0 where one does in the next."""
+        """Count the steps in which no face can come down; 0 where one does in the next."""
         body = self.body
         angle, rate = body.angle, body.angular_velocity
         if not self.low < angle + rate * step < self.high:
@@ -173,6 +173,11 @@ class Member:
         self.let_go(space)
         self.stand((x, self.scene.surface_height + float(self.scene.sides.d[side]), angle))
         return side
+
+    def soften(self, bias: float) -> None:
+        """Let the joint take back its drift as slowly as contacts their overlap, or they would never rest."""
+        if self.joint.error_bias != bias:  # to set it wakes the part
+            self.joint.error_bias = bias
 
     def let_go(self, space: Any) -> None:
         """Take the joint away, if there is one."""

@@ -42,6 +42,6 @@ def _along_sides(one: Corners, two: Iterable[tuple[float, float]]) -> float:
     for (x0, y0), (x1, y1) in zip(one, [*one[1:], one[0]], strict=True):
         along, up = x1 - x0, y1 - y0
         length = math.hypot(along, up)
-        depth = max(((y0 - y) * along - (x0 - x) * up) for x, y in others) / length
+        depth = max((y - y0) * along - (x - x0) * up for x, y in others) / length
         least = min(least, depth)
     return least

@@ -79,7 +79,7 @@ def lying(member: Member) -> int:
 
 
 def _nearest(angle: float, flat: Sequence[float]) -> tuple[int, float]:
-    """The side that is nearest to lie on, and by which angle it is off."""
+    """Find the side that is nearest to lie on, and by which angle it is off."""
     off = [abs(math.remainder(angle - each, math.tau)) for each in flat]
     return off.index(min(off)), min(off)
 

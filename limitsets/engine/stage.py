@@ -10,6 +10,7 @@ order). With the velocity at the middle of the step, as in `Stage.drift`, it is 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from types import ModuleType
 from typing import TYPE_CHECKING, Any, TypeAlias
@@ -18,7 +19,7 @@ from limitsets.errors import AnswerError
 from limitsets.geometry import side_ends
 
 if TYPE_CHECKING:
-    from pymunk import Body, Poly, Segment, Space
+    from pymunk import Body, Poly, Segment, Shape, Space
 
     from limitsets.scene import Scene
 
@@ -116,12 +117,17 @@ class Stage:
         """
         low = self.height - self.size
         arm: Segment = pymunk_module().Segment(on, (-far, low), (far, low), self.size)
-        arm.friction = arm.elasticity = 1.0  # the engine takes products
+        self.meet([arm], friction, restitution, step)
+        return arm
+
+    def meet(self, ground: Sequence[Shape], friction: float, restitution: float, step: float) -> None:
+        """Let shapes of the ground meet the part with this friction and restitution, in steps of this length."""
+        for shape in ground:
+            shape.friction = shape.elasticity = 1.0  # the engine takes products
         self.part.friction, self.part.elasticity = friction, restitution
         self.space.iterations = ITERATIONS
         self.space.collision_slop = OVERLAP * self.size
         self.space.collision_bias = (1.0 - TAKEN_BACK) ** (1.0 / step)
-        return arm
 
     def state(self) -> State:
         """Remember where the part is in flight; its rate of turning does not change."""

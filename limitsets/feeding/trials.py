@@ -12,10 +12,11 @@ from numpy.typing import NDArray
 
 from limitsets.feeding.falling import FATES, ArmEnd
 from limitsets.files import as_table
+from limitsets.robust.noise.proportions import binomial_interval
 from limitsets.robust.noise.sampling import ManyParts, scattering_map, uniform_starts
 from limitsets.robust.noise.scattering import Scattering
 
-__all__ = ["PAPER", "SERIES", "Trials", "binomial_interval", "run_trials"]
+__all__ = ["PAPER", "SERIES", "Trials", "run_trials"]
 
 SERIES = 20
 """Trials of the paper, each from a random start."""
@@ -24,23 +25,6 @@ PAPER = 19
 """So many of them succeeded."""
 
 MOST_THROWS = 20_000
-
-
-def binomial_interval(successes: int, trials: int, confidence: float = 0.95) -> tuple[float, float]:
-    """Give the interval of Clopper and Pearson for the probability of success.
-
-    Source: Clopper and Pearson, Biometrika 26, 1934.
-
-    Examples
-    --------
-    >>> low, high = binomial_interval(19, 20)
-    >>> round(low, 3), round(high, 4)
-    (0.751, 0.9987)
-    """
-    from scipy.stats import binomtest
-
-    found = binomtest(successes, trials).proportion_ci(confidence, method="exact")
-    return float(found.low), float(found.high)
 
 
 @dataclass(frozen=True, eq=False)

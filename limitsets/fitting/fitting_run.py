@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from limitsets.errors import AnswerError, DataError
 from limitsets.fitting.fit_result import Fit, Fitted, Scatter, fitted_scene
-from limitsets.fitting.further import further_throws
+from limitsets.fitting.further import Question, further_throws
 from limitsets.fitting.likelihood import SCATTERS, Likelihood
 from limitsets.fitting.maximising import Maximum
 from limitsets.fitting.misfit import misfit_of
@@ -169,15 +169,8 @@ def _answer(
     if not own.rows.known:  # what the answer may be sharpened to is then told with all scatter as one
         error = np.full(len(error), landing.value / math.sqrt(2.0))
     throws = own.rows.throws
-    more = further_throws(
-        new,
-        names,
-        units_of_change(new, names),
-        throws.x_before,
-        own.rows.side,
-        error,
-        (speed.value, landing.value),
-    )
+    asked = Question(new, names, units_of_change(new, names), (speed.value, landing.value))
+    more = further_throws(asked, throws.x_before, own.rows.side, error)
     return Fit(
         new,
         scene,

@@ -7,6 +7,7 @@ and about the radius of gyration it alone tells anything.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +16,7 @@ from limitsets.fitting.likelihood import SHARPEST
 from limitsets.fitting.predicting import predicted
 from limitsets.scene import Scene
 
-__all__ = ["Further", "further_throws", "information"]
+__all__ = ["Further", "Question", "further_throws", "information"]
 
 PLACES = 200
 STEP = 1e-4
@@ -47,18 +48,20 @@ class Further:
     shrinks: dict[str, float]
 
 
-def information(
-    scene: Scene,
-    names: tuple[str, ...],
-    units: Array,
-    x: Array,
-    side: NDArray[np.int64],
-    error: Array,
-    scatter: tuple[float, float],
-) -> Array:
+class Question(NamedTuple):
+    """Quantities of a scene that are to be known, the units of their change, and the scatter of speed and place."""
+
+    scene: Scene
+    names: tuple[str, ...]
+    units: Array
+    scatter: tuple[float, float]
+
+
+def information(asked: Question, x: Array, side: NDArray[np.int64], error: Array) -> Array:
     """Return the information of single throws about quantities in their units of change; shape (n, p, p)."""
     from scipy.stats import norm
 
+    scene, names, units, scatter = asked
     centre = np.array([scene.value(name) for name in names])
     moves = np.concatenate([np.zeros((1, len(names))), np.diag(units), -np.diag(units)]) * STEP
     points = dict(zip(names, (centre + moves).T, strict=True))
@@ -79,24 +82,17 @@ def information(
     return np.where(np.isfinite(total), total, 0.0)
 
 
-def further_throws(
-    scene: Scene,
-    names: tuple[str, ...],
-    units: Array,
-    x: Array,
-    side: NDArray[np.int64],
-    error: Array,
-    scatter: tuple[float, float],
-) -> tuple[Further, ...]:
+def further_throws(asked: Question, x: Array, side: NDArray[np.int64], error: Array) -> tuple[Further, ...]:
     """Find the start on each side from which a throw tells most beside those filmed; the most telling first."""
-    known = information(scene, names, units, x, side, error, scatter).sum(axis=0)
+    scene, names = asked.scene, asked.names
+    known = information(asked, x, side, error).sum(axis=0)
     known += np.eye(len(names)) / BEFORE**2
     found = []
-    size = float(np.mean(error)) if np.mean(error) > 0 else scatter[1]
+    size = float(np.mean(error)) if np.mean(error) > 0 else asked.scatter[1]
     for own in range(len(scene.sides)):
         least = scene.sides.a[own] + 0.02 * (scene.arm_length - scene.sides.a[own])
         places = np.linspace(least, scene.arm_length, PLACES)
-        there = information(scene, names, units, places, np.full(PLACES, own), np.full(PLACES, size), scatter)
+        there = information(asked, places, np.full(PLACES, own), np.full(PLACES, size))
         gains = np.linalg.slogdet(known + there)[1] - np.linalg.slogdet(known)[1]
         best = int(np.argmax(gains))
         ratio = np.diag(np.linalg.inv(known)) / np.diag(np.linalg.inv(known + MORE * there[best]))

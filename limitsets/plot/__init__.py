@@ -16,6 +16,7 @@ from importlib import import_module
 from typing import Any
 
 _FILES = {
+    "assembly": "assemblies",
     "atlas": "atlas_maps",
     "atlas_surface": "atlas_surfaces",
     "audit": "audit_strips",
@@ -37,6 +38,8 @@ _FILES = {
     "robust_design": "fronts",
     "tolerance_box": "margins",
     "tornado": "margins",
+    "tray": "filled_trays",
+    "tray_design": "filled_trays",
 }
 
 __all__ = [*_FILES]

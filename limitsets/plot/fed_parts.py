@@ -9,9 +9,10 @@ import numpy as np
 from matplotlib.patches import Polygon
 
 from limitsets.feeding.falling import FATES, time_to_tip
-from limitsets.feeding.trials import PAPER, SERIES, binomial_interval
+from limitsets.feeding.trials import PAPER, SERIES
 from limitsets.geometry.polygon import above_side, side_ends
 from limitsets.plot import style
+from limitsets.robust.noise.proportions import binomial_interval
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

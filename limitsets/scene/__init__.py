@@ -11,6 +11,7 @@ from limitsets.scene.facts import Deviation, Effects, Scatter, World
 from limitsets.scene.quantities import NAMES, deviation
 from limitsets.scene.reading import load, scenes
 from limitsets.scene.scene import Scene
+from limitsets.scene.tray import Tray
 from limitsets.scene.writing import dump
 
 __all__ = [
@@ -20,6 +21,7 @@ __all__ = [
     "Effects",
     "Scatter",
     "Scene",
+    "Tray",
     "World",
     "deviation",
     "dump",

@@ -6,6 +6,7 @@ single scene refuses with a reason is here a flag: no triangle, a part that cann
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -22,6 +23,7 @@ from limitsets.scene.numbers import Numbers
 from limitsets.scene.quantities import base_unit, in_units, replaced, text_at
 from limitsets.scene.resolve import LEAST
 from limitsets.scene.scene import Scene, resting_places
+from limitsets.scene.tray import Tray, heights_over_sides
 from limitsets.scene.units import convert, fits, parse
 
 if TYPE_CHECKING:
@@ -92,7 +94,7 @@ def throw_stack(scene: Scene, values: Mapping[str, npt.ArrayLike]) -> ThrowStack
     count = max(each.size for each in arrays.values()) if arrays else 1
     with np.errstate(all="ignore"):  # where there is no such scene; those points are flagged
         reader = _Arrays(tree, scene.unit, arrays, count)
-        numbers = reader.numbers(scene.goal, scene.cavity)
+        numbers = reader.numbers(scene.goal, scene.cavity, scene.tray)
     possible = reader.possible
 
     def kept(found: Array, present: Any) -> Array:
@@ -198,7 +200,7 @@ class _Arrays(Numbers):
         for height in heights:
             self.require(height >= -slack)
 
-    def numbers(self, goal: Any, cavity: Cavity | None) -> dict[str, Array]:
+    def numbers(self, goal: Any, cavity: Cavity | None, tray: Tray | None) -> dict[str, Array]:
         """Return the fields of the throw map as arrays; the flags are complete then."""
         arm_length = self.number("arm.length")
         a, d, length, right, corner = (
@@ -214,9 +216,13 @@ class _Arrays(Numbers):
             self.require((kappa >= LEAST) & (kappa <= 1 / LEAST))
         if hasattr(goal, "x"):  # a goal beyond the arm is refused
             self.require(goal.x < arm_length)
+        wanted = getattr(goal, "side", None)
+        fitted = length.min(axis=-1) if wanted is None else length[:, wanted]
+        if tray is not None:  # so are depressions that the part does not fit in, or that are deeper than it
+            heights = heights_over_sides(self.shape.vertices, np.sqrt, np.maximum)
+            highest = functools.reduce(np.maximum, heights) if wanted is None else heights[wanted]
+            self.require((tray.depression_width >= fitted) & (tray.depression_depth < highest))
         if cavity is not None:  # so is one that the arm overlaps, or that the part does not fit in
-            wanted = getattr(goal, "side", None)
-            fitted = length.min(axis=-1) if wanted is None else length[:, wanted]
             self.require((cavity.position <= arm_length) & (cavity.position > a.max(axis=-1)))
             self.require(cavity.width >= fitted)
         found = {

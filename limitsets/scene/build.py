@@ -11,6 +11,7 @@ from limitsets.scene.purpose import resolve_effects, resolve_goal, resolve_world
 from limitsets.scene.quantities import deviation, require
 from limitsets.scene.resolve import Resolver
 from limitsets.scene.sensing import Feedback, resolve_feedback
+from limitsets.scene.tray import resolve_tray
 from limitsets.scene.units import parse
 from limitsets.scene.validation import Tree, plain, validate
 
@@ -51,6 +52,9 @@ def resolved(structure: object, file: str | None) -> dict[str, Any]:
     if table.cavity is not None:
         feet, lengths = body.sides.a.tolist(), body.sides.length.tolist()
         cavity = resolve_cavity(table.cavity, feet, lengths, arm_length, goal, resolver)
+    tray = None
+    if table.tray is not None:
+        tray = resolve_tray(table.tray, body.vertices, body.sides.length, goal, resolver)
     return {
         "name": table.name,
         "unit": unit,
@@ -63,6 +67,7 @@ def resolved(structure: object, file: str | None) -> dict[str, Any]:
         "flip": table.model.flip,
         "goal": goal,
         "cavity": cavity,
+        "tray": tray,
         "world": world,
         "effects": resolve_effects(table.effects, world, table.model.flight, resolver),
         "tolerance": _tolerance(tree, table, resolver),

@@ -130,10 +130,14 @@ class Effects:
         What the scene writes after the name of each effect that is on, in the order in which a throw meets them.
     auto : bool
         Let the analysis switch on what the scene calls for.
+    contact : bool
+        Parts meet each other and the walls of cavities and depressions, in the rigid-body engine; the map of one part
+        on the arm is the same with it and without.
     """
 
     words: Mapping[str, bool | str] = field(default_factory=dict)
     auto: bool = False
+    contact: bool = False
 
     def __getattr__(self, name: str) -> Any:
         """Give what the scene writes after the name of an effect."""

@@ -81,17 +81,14 @@ def _noise(text: str | None, name: str, key: str, resolver: Resolver) -> Deviati
 
 
 def resolve_effects(table: EffectsTable, world: World, flight: str, resolver: Resolver) -> Effects:
-    """Resolve ``[effects]``: refuse what this version cannot simulate, then what lacks its facts."""
-    given = {name: how for name, how in table.model_dump().items() if how and name != "auto"}
+    """Resolve ``[effects]``: refuse what excludes each other, and what lacks its facts."""
+    given = {name: how for name, how in table.model_dump().items() if how and name not in ("auto", "contact")}
     if not given:
-        return Effects(auto=table.auto)
+        return Effects(auto=table.auto, contact=table.contact)
     from limitsets.thrower.effects import EFFECTS  # lazily: its room loads numba
 
     for effect in given:
         key = f"effects.{effect}"
-        if effect not in EFFECTS:
-            allowed = f"the effects that this version can simulate: {', '.join(EFFECTS)}"
-            raise resolver.refusal(key, "the effect", effect, allowed, f"leave {key} out")
         if flight != "exact":
             allowed = 'flight = "exact" in [model]'
             raise resolver.refusal(
@@ -116,4 +113,4 @@ def resolve_effects(table: EffectsTable, world: World, flight: str, resolver: Re
                     f"{fact} in [world]",
                     f"{effect} needs it: add world.{fact}, or leave {key} out",
                 )
-    return Effects({name: given[name] for name in EFFECTS if name in given}, table.auto)
+    return Effects({name: given[name] for name in EFFECTS if name in given}, table.auto, table.contact)

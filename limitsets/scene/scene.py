@@ -18,6 +18,7 @@ from limitsets.goals import Goal
 from limitsets.scene.cavity import Cavity
 from limitsets.scene.facts import Deviation, Effects, World
 from limitsets.scene.sensing import Feedback
+from limitsets.scene.tray import Tray
 
 if TYPE_CHECKING:
     from limitsets.cells import Domain
@@ -68,6 +69,8 @@ class Scene:
         What is asked.
     cavity : Cavity or None
         Where the arm ends, and what lies beyond its end; only `limitsets.feed` asks for it.
+    tray : Tray or None
+        A plate with depressions; only `limitsets.tray` asks for it.
     world : World
         Facts, whether or not an effect uses them.
     effects : Effects
@@ -96,6 +99,7 @@ class Scene:
     flip: str
     goal: Goal | None
     cavity: Cavity | None
+    tray: Tray | None
     world: World
     effects: Effects
     tolerance: Mapping[str, Deviation]

@@ -235,10 +235,20 @@ class CavityTable(Table):
     angle: Angle
 
 
+class TrayTable(Table):
+    """A plate with equal depressions."""
+
+    depression_width: Length
+    depression_depth: Length
+    pitch: Length
+    agitation: Length
+    wash: Length
+
+
 class EffectsTable(Table):
     """What is simulated beyond the minimal model: effects of those declared."""
 
-    contact: Flag = False  # a word that is kept; no version simulates it
+    contact: Flag = False  # by the engine alone: the map is the same
     auto: Flag = False
 
 
@@ -253,6 +263,7 @@ class SceneTable(Table):
     model: ModelTable = Field(default_factory=ModelTable)
     goal: GoalTable | None = None
     cavity: CavityTable | None = None
+    tray: TrayTable | None = None
     world: WorldTable = Field(default_factory=WorldTable)
     effects: EffectsTable = Field(default_factory=EffectsTable)
     tolerance: dict[str, Deviation] = Field(default_factory=dict)

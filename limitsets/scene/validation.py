@@ -18,7 +18,6 @@ Tree: TypeAlias = dict[str, Any]
 """A scene as TOML holds it: tables, lists, text, switches and numbers."""
 
 _DEEPEST = 8
-_LATER = ("tray",)
 _TABLES = {"model_type": "a table", "dict_type": "a table", "list_type": "a list", "missing": "a value"}
 
 
@@ -80,12 +79,6 @@ def validate(tree: Tree, file: str | None) -> SceneTable:
 
     from limitsets.scene.schema import scene_table
 
-    for word in _LATER:
-        if word in tree:
-            raise SceneError(
-                "this table", f"[{word}]", "the other tables of a scene", "leave it out: this version does not "
-                "have it yet", key=word, file=file,
-            )  # fmt: skip
     on = tree.get("effects")
     table = scene_table(with_effects=isinstance(on, dict) and bool(on.keys() - {"auto", "contact"}))
     try:

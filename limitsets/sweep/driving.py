@@ -2,22 +2,19 @@
 
 from __future__ import annotations
 
-import math
 import time
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Future, wait
-from typing import TYPE_CHECKING, TypeAlias
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Protocol, TypeAlias
 
 from limitsets.errors import LimitsetsError
-from limitsets.sweep.plan import Plan
-from limitsets.sweep.work import Answer, answer
 
 if TYPE_CHECKING:
     from limitsets.sweep.executors import Given
-    from limitsets.sweep.store import Store
 
-__all__ = ["Progress", "drive"]
+__all__ = ["Kept", "Progress", "Work", "drive"]
 
 Progress: TypeAlias = Callable[[str, int, int], None]
 
@@ -26,11 +23,54 @@ _MOST_DEATHS = 3
 _SECONDS = 0.5
 
 
+@dataclass(frozen=True)
+class Work:
+    """What is to be computed, in numbered chunks.
+
+    Attributes
+    ----------
+    chunks : int
+        How many there are.
+    function : callable
+        Importable by workers: called with `given` and the number of a chunk.
+    given : tuple
+        What it is given before the number.
+    size : callable
+        Points in the chunk of a number.
+    place : callable
+        The same in words, for errors.
+    task, name, points : str
+        What answers, what is said to be done, and what its points are, in words.
+    """
+
+    chunks: int
+    function: Callable[..., Any]
+    given: tuple[Any, ...]
+    size: Callable[[int], int]
+    place: Callable[[int], str]
+    task: str
+    name: str
+    points: str
+
+
+class Kept(Protocol):
+    """Where answers are kept, so that a run that was cut off goes on with the rest."""
+
+    @property
+    def done(self) -> Collection[int]:
+        """Numbers of the chunks that are kept."""
+        ...
+
+    def write(self, found: Any) -> None:
+        """Keep the answer of a chunk."""
+        ...
+
+
 class _Told:
     """What is said while chunks are computed: how many points a second, and how long it will take."""
 
-    def __init__(self, plan: Plan, store: Store, progress: Progress | None) -> None:
-        self.plan, self.store, self.progress = plan, store, progress
+    def __init__(self, work: Work, store: Kept, progress: Progress | None) -> None:
+        self.work, self.store, self.progress = work, store, progress
         self.began, self.before = time.monotonic(), len(store.done)
         self.points = 0
 
@@ -38,14 +78,15 @@ class _Told:
         """Say it."""
         if self.progress is None:
             return
-        done, of = len(self.store.done), math.prod(self.plan.chunks)
+        done, of = len(self.store.done), self.work.chunks
         if done == of:
             return
-        words, seconds = "atlas (a first run compiles: up to two minutes)", time.monotonic() - self.began
+        seconds = time.monotonic() - self.began
+        words = f"{self.work.name} (a first run compiles: up to two minutes)"
         if self.points and seconds > 0:
             rate = self.points / seconds
             left = (of - done) * seconds / (done - self.before)
-            words = f"atlas, {rate:,.0f} points a second, {_in_words(left)} left"
+            words = f"{self.work.name}, {rate:,.0f} {self.work.points} a second, {_in_words(left)} left"
         self.progress(words, done, of)
 
 
@@ -55,17 +96,17 @@ def _in_words(seconds: float) -> str:
     return f"{seconds / 60:.0f} min" if seconds < 6000 else f"{seconds / 3600:.1f} h"
 
 
-def drive(plan: Plan, store: Store, pool: Given, progress: Progress | None = None) -> None:
-    """Compute the chunks of a plan that its store does not hold yet.
+def drive(work: Work, store: Kept, pool: Given, progress: Progress | None = None) -> None:
+    """Compute the chunks that a store does not hold yet.
 
     Raises
     ------
     LimitsetsError
         The task failed, a chunk kills its worker again and again, or the store cannot be written.
     """
-    todo = deque(k for k in range(math.prod(plan.chunks)) if k not in store.done)
-    flight: dict[Future[Answer], int] = {}
-    told = _Told(plan, store, progress)
+    todo = deque(k for k in range(work.chunks) if k not in store.done)
+    flight: dict[Future[Any], int] = {}
+    told = _Told(work, store, progress)
     try:
         while todo or flight:
             lost: list[int] = []
@@ -73,21 +114,21 @@ def drive(plan: Plan, store: Store, pool: Given, progress: Progress | None = Non
             while todo and len(flight) < pool.window and not lost:
                 k = todo.popleft()
                 try:
-                    flight[pool.submit(answer, plan, k)] = k
+                    flight[pool.submit(work.function, *work.given, k)] = k
                 except BrokenExecutor:
                     lost.append(k)
             done, _ = wait(flight, timeout=_SECONDS, return_when=FIRST_COMPLETED)
             for future in done:
                 k = flight.pop(future)
-                if not _kept(plan, store, future, k, told):
+                if not _kept(work, store, future, k, told):
                     lost.append(k)
             if lost:
                 for future, k in flight.items():
-                    if not _kept(plan, store, future, k, told):
+                    if not _kept(work, store, future, k, told):
                         lost.append(k)
                 flight.clear()
                 pool.restart()
-                _one_by_one(plan, store, pool, sorted(lost), told)
+                _one_by_one(work, store, pool, sorted(lost), told)
     except BaseException:
         for future in flight:
             future.cancel()
@@ -96,7 +137,7 @@ def drive(plan: Plan, store: Store, pool: Given, progress: Progress | None = Non
     pool.end()
 
 
-def _kept(plan: Plan, store: Store, future: Future[Answer], number: int, told: _Told) -> bool:
+def _kept(work: Work, store: Kept, future: Future[Any], number: int, told: _Told) -> bool:
     """Write the answers of a chunk; False where the worker died."""
     try:
         found = future.result()
@@ -106,29 +147,29 @@ def _kept(plan: Plan, store: Store, future: Future[Answer], number: int, told: _
         raise
     except Exception as error:
         raise LimitsetsError(
-            f"the task {plan.task}", f"{type(error).__name__}: {error}", "a task that answers",
-            f"it failed in the chunk at {plan.words(plan.region(number))}",
+            work.task, f"{type(error).__name__}: {error}", "a task that answers",
+            f"it failed in the chunk at {work.place(number)}",
         ) from error  # fmt: skip
     store.write(found)
-    told.points += math.prod(part.stop - part.start for part in plan.region(number))
+    told.points += work.size(number)
     return True
 
 
-def _one_by_one(plan: Plan, store: Store, pool: Given, lost: list[int], told: _Told) -> None:
+def _one_by_one(work: Work, store: Kept, pool: Given, lost: list[int], told: _Told) -> None:
     """Compute alone each chunk that may have killed its worker, so that the one that does is known."""
     for number in lost:
         told.tell()
         for _ in range(_MOST_DEATHS):
             try:
-                future = pool.submit(answer, plan, number)
+                future = pool.submit(work.function, *work.given, number)
             except BrokenExecutor:
                 pool.restart()
                 continue
-            if _kept(plan, store, future, number, told):
+            if _kept(work, store, future, number, told):
                 break
             pool.restart()
         else:
             raise LimitsetsError(
                 "a worker", f"killed {_MOST_DEATHS} times by one chunk", "a chunk that a worker survives",
-                f"it is the one at {plan.words(plan.region(number))}; look at its memory and at the task there",
+                f"it is the one at {work.place(number)}; look at its memory and at the task there",
             )  # fmt: skip

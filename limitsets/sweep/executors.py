@@ -17,7 +17,7 @@ from typing import Any
 from limitsets.errors import LimitsetsError
 from limitsets.sweep.store import imported
 
-__all__ = ["Given", "Here", "Processes", "on_cluster", "present_cores"]
+__all__ = ["Given", "Here", "Processes", "chosen_pool", "on_cluster", "present_cores"]
 
 # Chunks that wait beside those that are computed: enough that no worker ever waits for the driver.
 _WAITING = 2
@@ -152,3 +152,29 @@ def on_cluster(address: str) -> Iterator[Given]:
     with client:
         threads = sum(client.nthreads().values())
         yield Given(client.get_executor(pure=False), _WAITING * max(threads, 1))
+
+
+@contextmanager
+def chosen_pool(
+    chunks: int, executor: Executor | None, cluster: str | None, workers: int | None
+) -> Iterator[Given]:
+    """Choose where so many chunks are computed.
+
+    Raises
+    ------
+    LimitsetsError
+        More than one place is named, or no workers are asked for.
+    """
+    if (executor is not None) + (cluster is not None) + (workers is not None) > 1:
+        raise LimitsetsError("the workers", "given twice", "executor, cluster or workers", "give one of them")
+    if workers is not None and workers < 1:
+        raise LimitsetsError("the number of workers", workers, "1 or more", "correct it")
+    if executor is not None:
+        yield Given(executor)
+    elif cluster is not None:
+        with on_cluster(cluster) as pool:
+            yield pool
+    elif chunks == 1:  # to start a process takes longer than most single chunks
+        yield Given(Here(), 1)
+    else:
+        yield Processes(min(workers or present_cores(), chunks))

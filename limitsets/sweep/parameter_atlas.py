@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
-from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -17,12 +16,13 @@ from limitsets.maps import coerce, kind_of
 from limitsets.scene import Scene, load
 from limitsets.sweep.axes import Axis, axis_of
 from limitsets.sweep.boundaries import STEP
-from limitsets.sweep.driving import Progress, drive
-from limitsets.sweep.executors import Given, Here, Processes, on_cluster, present_cores
+from limitsets.sweep.driving import Progress, Work, drive
+from limitsets.sweep.executors import chosen_pool
 from limitsets.sweep.plan import Plan, chunk_shape, code_of
 from limitsets.sweep.store import CHECKSUM, Store, imported
 from limitsets.sweep.subjects import MapSubject, SceneSubject, Subject
 from limitsets.sweep.tasks import named, resolved
+from limitsets.sweep.work import answer
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -259,8 +259,10 @@ def atlas(
     held = Store(plan, path)
     kept, of = len(held.done), math.prod(plan.chunks)
     if kept < of:
-        with _pool(plan, of - kept, executor, cluster, workers) as pool:
-            drive(plan, held, pool, progress)
+        if executor is None and cluster is None and of - kept > 1:
+            _require_importable(plan)
+        with chosen_pool(of - kept, executor, cluster, workers) as pool:
+            drive(_work(plan), held, pool, progress)
     return Atlas(opened(held.group.store), path, of - kept, kept)
 
 
@@ -316,25 +318,17 @@ def _subject(subject: Any, domain: Any) -> Subject:
     return MapSubject(coerce(subject), None if domain is None else as_domain(domain))
 
 
-@contextmanager
-def _pool(
-    plan: Plan, chunks: int, executor: Executor | None, cluster: str | None, workers: int | None
-) -> Iterator[Given]:
-    """Choose where the chunks are computed."""
-    if (executor is not None) + (cluster is not None) + (workers is not None) > 1:
-        raise LimitsetsError("the workers", "given twice", "executor, cluster or workers", "give one of them")
-    if workers is not None and workers < 1:
-        raise LimitsetsError("the number of workers", workers, "1 or more", "correct it")
-    if executor is not None:
-        yield Given(executor)
-    elif cluster is not None:
-        with on_cluster(cluster) as pool:
-            yield pool
-    elif chunks == 1:  # to start a process takes longer than most single chunks
-        yield Given(Here(), 1)
-    else:
-        _require_importable(plan)
-        yield Processes(min(workers or present_cores(), chunks))
+def _work(plan: Plan) -> Work:
+    """Give the chunks of a plan to be computed."""
+
+    def size(number: int) -> int:
+        return math.prod(part.stop - part.start for part in plan.region(number))
+
+    def place(number: int) -> str:
+        return plan.words(plan.region(number))
+
+    chunks = math.prod(plan.chunks)
+    return Work(chunks, answer, (plan,), size, place, f"the task {plan.task}", "atlas", "points")
 
 
 def _require_importable(plan: Plan) -> None:

@@ -15,8 +15,9 @@ import limitsets as ls
 from limitsets.feeding import Feeding
 from limitsets.feeding.falling import arm_end_of
 from limitsets.feeding.proving import proved_feeding
-from limitsets.feeding.trials import PAPER, SERIES, binomial_interval
+from limitsets.feeding.trials import PAPER, SERIES
 from limitsets.robust import Gaussian, Scattering, Uniform
+from limitsets.robust.noise.proportions import binomial_interval
 
 HERE = Path(__file__).resolve().parent
 CAVITY = tomllib.loads((HERE.parent / "sizes.toml").read_text(encoding="utf-8"))["cavity"]

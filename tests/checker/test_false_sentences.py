@@ -60,27 +60,35 @@ def test_starts_that_overlap_are_refused(tmp_path):
     assert verdict(touching, tmp_path).verdict == "proved"
 
 
-def test_a_wide_stratum_on_cells_without_bounds_proves_nothing(tmp_path):
+# strata, and what is said that is false; cells under a single stratum have no bounds, and one that is a third as wide
+# is bounded at its nodes only by how far its places bend
+WIDE = [(1, [0.53, 0.58]), (3, [0.002, 0.012])]
+
+
+@pytest.mark.parametrize(("strata", "said"), WIDE)
+def test_wide_strata_prove_nothing_narrow(strata, said, tmp_path):
     """Places that bend with the speed by far more than their scatter, taken as even between two speeds.
 
     T = x + 2 H (x - a) (1 + delta)^2 / kappa, H = 50 in, kappa = 200 in, delta within 0.3: the share beyond 20.5 in
-    is 0.48; if T were even between its ends it would be 0.55.
+    is 0.48; if T were even between its ends it would be 0.55, between thirds of the speeds larger by 0.006.
     """
     x = np.linspace(15.0, 15.1, 2001)
     least = np.sqrt((20.5 - x) / (2 * 50.0 * (x - FOOT) / 200.0)) - 1.0
     true = float(np.mean((0.3 - least) / 0.6))
     assert 0.47 < true < 0.49
-    for said, expected in (([0.53, 0.58], "failed"), ([0.0, 1.0], "proved")):
-        rows = np.array([[0.0, 1e-6], said])
+    false = np.array(said) + (true if strata > 1 else 0.0)
+    for pair, expected in ((false, "failed"), ([0.0, 1.0], "proved")):
+        rows = np.array([[0.0, 1e-6], pair])
         laws = {"landing.x": "0.05 in", "throw.speed": "30 %"}
         forged = chances([[2, "15 in", "15.1 in"]], 20.5, {"right": rows}, laws)
-        section_of(forged)["strata"] = 1
+        section_of(forged)["strata"] = strata
         section_of(forged)["scene"]["throw"]["kappa"] = "200 in"
         section_of(forged)["scene"]["arm"]["surface_height"] = "-50 in"
         nodes = forged.arrays["edges.2"]
         nodes = np.concatenate([nodes[(nodes < 14.9) | (nodes > 15.2)], np.linspace(14.9, 15.2, 601)])
         forged.arrays["edges.2"] = np.unique(nodes)
-        assert verdict(forged.seal(), tmp_path).verdict == expected
+        report = verdict(forged.seal(), tmp_path)
+        assert report.verdict == expected
 
 
 def test_where_all_places_absorb_no_throw_is_made(tmp_path):

@@ -125,6 +125,7 @@ def never_fed(good):
     raise AssertionError
 
 
+@pytest.mark.sweep
 def test_almost_every_start_is_fed_though_an_orbit_never_is(good, never_fed, tmp_path):
     cycle, _ = never_fed
     report = verdict(ending(good, ALMOST | {"never_fed": cycle}, "20.5 in"), tmp_path)

@@ -19,6 +19,7 @@ def found():
     return ls.feed(scene, NOISE, prove=False, level=False, trials=4000, cells=512, brackets=500)
 
 
+@pytest.mark.sweep
 def test_the_operator_and_the_trials_lie_in_the_brackets(found):
     assert set(found.brackets.within) == {"any", "right", "wrong", "wall", "exits"}
     parts = found.trials.fate.size
@@ -36,6 +37,7 @@ def test_the_operator_and_the_trials_lie_in_the_brackets(found):
     assert first - 1 <= found.shares.quantile(0.95) <= by + 1
 
 
+@pytest.mark.sweep
 def test_the_json_has_them(found):
     table = json.loads(json.dumps(found.to_json()))["brackets"]
     assert table["how"] == "proved"

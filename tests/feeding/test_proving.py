@@ -166,7 +166,7 @@ def test_the_certificate_where_two_sides_can_be_fed(tmp_path):
     ("name", "noise"),
     [
         ("paper-designed", {"throw.speed": "0.3%"}),
-        ("paper-designed", {"landing.x": "0.02 in"}),
+        pytest.param("paper-designed", {"landing.x": "0.02 in"}, marks=pytest.mark.sweep),
         ("paper-initial", {"throw.speed": "0.3 %"}),
         ("paper-initial", {"landing.x": "0.02 in"}),
     ],

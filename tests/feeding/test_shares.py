@@ -10,9 +10,10 @@ from scipy.stats import beta, binomtest
 import limitsets as ls
 from limitsets.feeding.falling import FATES, arm_end_of
 from limitsets.feeding.fed_shares import FeedingProblem, success_curve
-from limitsets.feeding.trials import binomial_interval, run_trials
+from limitsets.feeding.trials import run_trials
 from limitsets.files import as_json
 from limitsets.robust import Gaussian, Scattering, Uniform
+from limitsets.robust.noise.proportions import binomial_interval
 from tests.feeding.scenes import with_cavity
 
 NOISE = Scattering(speed=Gaussian(0.005), landing=Gaussian(0.02))
@@ -86,6 +87,7 @@ def test_without_noise_all_are_fed_on_side_2():
     assert not trials.beyond.any()
 
 
+@pytest.mark.sweep
 def test_close_to_the_end_at_a_high_rate_parts_meet_the_wall():
     """The share within the distance that does not clear, by the density of first rests beyond the end."""
     slow, fast = (arm_end_of(with_cavity(rate=rate)) for rate in ("2 Hz", "4 Hz"))
@@ -123,6 +125,7 @@ KEYS = {
 }  # fmt: skip
 
 
+@pytest.mark.sweep
 def test_json_and_figure():
     found = ls.feed(with_cavity(rate="2 Hz"), NOISE, trials=400, cells=128, strata=8, level=False)
     table = json.loads(as_json(found))

@@ -46,6 +46,7 @@ def counted(cases):
     return there, held
 
 
+@pytest.mark.sweep
 def test_intervals_hold_the_truth():
     there, held = counted(repeated(20, seed=1))
     for name, count in there.items():
@@ -105,6 +106,7 @@ def test_shifts_by_flipped_sides_are_below_a_standard_error():
         assert abs(np.median(each)) < 1.0, name
 
 
+@pytest.mark.sweep
 def test_throws_that_follow_each_other_share_readings():
     draw = np.random.default_rng(6)
     inside = 0

@@ -91,7 +91,7 @@ def test_the_level_is_5_percent(flipped):
     assert rejected(400, seed=24, flipped=flipped) <= binom.ppf(0.999, 400, 0.05)
 
 
-@pytest.mark.parametrize("effect", [None, "roll", "slip"])
+@pytest.mark.parametrize("effect", [None, "roll", pytest.param("slip", marks=pytest.mark.sweep)])
 def test_the_fit_asks_the_same_test(effect):
     draw = np.random.default_rng(27)
     given = ls.load(scene("designed"))

@@ -61,7 +61,7 @@ def test_first_critical_points_of_the_papers_parts(name, flight, flip, first):
             assert (found[side][0].before, found[side][0].kind) == (0, "jog->flip")
 
 
-@pytest.mark.parametrize("name", ls.scenes())
+@pytest.mark.parametrize("name", [name for name in ls.scenes() if ls.load(name).cavity is None])
 def test_own_critical_points_are_round(name):
     scene = ls.load(name)
     targets = [20.0, 20.0, 20.0] if "initial" in name else [10.0, 10.0, 20.0]

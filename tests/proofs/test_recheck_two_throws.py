@@ -284,6 +284,7 @@ def test_no_box_with_two_throws_that_go_beyond_is_proved(model, landing):
     assert proved == looked
 
 
+@pytest.mark.sweep
 def test_the_kinds_hold_all_that_two_throws_of_an_orbit_do(good):
     """Angles and branches of the plain throw of `forge.py`, of a scene within the tolerance."""
     f = good["one"]

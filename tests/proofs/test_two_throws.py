@@ -160,7 +160,7 @@ def test_random_boxes_are_never_proved_below_an_orbit(seed):
     random = np.random.default_rng(seed)
     names = random.choice(list(DESIGNED), int(random.integers(1, 6)), replace=False).tolist()
     widths = {name: Fraction(int(random.integers(1, 40)), 10_000) for name in names}
-    name = str(random.choice(ls.scenes()))
+    name = str(random.choice([name for name in ls.scenes() if ls.load(name).cavity is None]))
     # another model in which the designed scenes keep parts on the arm
     model = ("exact", "energy") if "designed" in name and seed % 2 else None
     box = Attacked(name, widths, model=model, cells=512)

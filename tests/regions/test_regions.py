@@ -111,6 +111,7 @@ def test_orbits_of_parameters_drawn_in_a_cell_do_what_its_record_says(plane):
         assert block.flip_order == (0, 1, 2)
 
 
+@pytest.mark.sweep
 def test_every_parameter_has_the_periodic_orbit_that_refutes(plane):
     """The orbit of a parameter is found by going backward along the chain, which contracts."""
     rng = np.random.default_rng(4)

@@ -76,6 +76,7 @@ def test_recurrent_cells_beside_a_fixed_point_are_proved_to_be_passed_through():
     assert (found.attractors[0].lo, found.undecided) == (1.0, 0.0)
 
 
+@pytest.mark.sweep
 def test_what_is_passed_through_is_so_for_every_parameter():
     """For slopes from 0.5 to 1.2 no orbit need leave the cells beside 0, for the lower corner alone all do."""
     lower, upper = Contraction(0.5, 0.0), Contraction(1.2, 0.0)

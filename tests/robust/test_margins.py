@@ -134,6 +134,7 @@ def test_a_tolerance_in_turns_or_milligrams_says_the_unit_of_the_margin():
     assert (one.unit, one.least) == ("mg", 6)
 
 
+@pytest.mark.sweep
 def test_the_landing_place_agrees_with_the_throw_at_50_digits():
     nominal = reference.paper("designed")
     sharp = float(

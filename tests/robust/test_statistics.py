@@ -51,6 +51,7 @@ NUMBERS = (
 )
 
 
+@pytest.mark.sweep
 def test_gaussian_noise_against_throws(gaussian):
     scene = ls.load("paper-designed")
     thrown = throw_many(
@@ -141,6 +142,7 @@ def test_slopes_are_those_of_secants(gaussian):
     assert gaussian.sensitivity["speed"]["wrong beyond"].slope > 5 * gaussian.numbers["wrong beyond"]
 
 
+@pytest.mark.sweep
 def test_levels_begin_without_noise(gaussian):
     levels = noise_levels("paper-designed", gaussian.scatter, factors=(0.0, 1.0), goal=GOAL, cells=512)
     still = noise_statistics("paper-designed", Scattering(), goal=GOAL, cells=512, sensitivity=False)

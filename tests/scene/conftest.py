@@ -20,6 +20,13 @@ _WHOLE = {
     "gravity": {"tilt": "30 deg"},
     "model": {"flight": "exact", "flip": "signed"},
     "goal": {"oriented_beyond": {"x": "20 in", "side": 2}},
+    "tray": {
+        "depression_width": "7.02 in",
+        "depression_depth": "1.53 in",
+        "pitch": "14.04 in",
+        "agitation": "0.4 in",
+        "wash": "1 in",
+    },
     "cavity": {"position": "20 in", "width": "9.3 in", "depth": "5.8633 in", "angle": "32.23 deg"},
     "world": {
         "throw_rate": "2 Hz",

@@ -21,6 +21,7 @@ TABLES = (
     "model",
     "goal",
     "cavity",
+    "tray",
     "world",
     "effects",
     "feedback",

@@ -23,7 +23,7 @@ PAPER = {
 
 
 def test_lists_the_built_in_scenes() -> None:
-    assert scenes() == sorted(PAPER)
+    assert scenes() == sorted([*PAPER, "paper-quadrilateral", "paper-triangle"])
 
 
 @pytest.mark.parametrize("name", PAPER)

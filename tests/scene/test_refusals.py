@@ -13,6 +13,13 @@ from limitsets.scene import dump, load
 from limitsets.thrower.effects import EFFECTS
 
 GONE = object()
+TRAY = {
+    "depression_width": "7.02 in",
+    "depression_depth": "1.53 in",
+    "pitch": "14.04 in",
+    "agitation": "0.4 in",
+    "wash": "1 in",
+}
 CAVITY = {"position": "20 in", "width": "9.3 in", "depth": "5.8633 in", "angle": "32.23 deg"}
 BOTH = {"sides": ["3 in", "4 in", "5 in"], "vertices": [["0 in", "0 in"], ["1 in", "0 in"], ["0 in", "1 in"]]}
 
@@ -50,7 +57,18 @@ TABLE: list[tuple[dict[str, Any], str, str]] = [
     ({"throw": GONE}, "throw", "required"),
     ({"part/mass": GONE}, "part.mass", "required"),
     ({"part/mass/center/side": GONE}, "part.mass.center.side", "required"),
-    ({"tray": {"rows": 1}}, "tray", "this version does not have it"),
+    # tray
+    ({"tray": {}}, "tray.depression_width", "required"),
+    ({"tray": TRAY | {"rows": 1}}, "tray.rows", "agitation, depression_depth, depression_width, pitch, wash"),
+    (
+        {"tray": TRAY | {"depression_width": "6.7 in"}},
+        "tray.depression_width",
+        "at least 6.75 in, the length of side 2",
+    ),
+    ({"tray": TRAY | {"depression_depth": "3.07 in"}}, "tray.depression_depth", "deeper than the part"),
+    ({"tray": TRAY | {"pitch": "7.02 in"}}, "tray.pitch", "above the width of a depression, 7.02 in"),
+    ({"tray": TRAY | {"agitation": "0 in"}}, "tray.agitation", "above 0"),
+    ({"tray": TRAY | {"wash": "1 s"}}, "tray.wash", "length"),
     # feedback
     ({"feedback": {}}, "feedback.throws", "required"),
     ({"feedback": {"throws": []}}, "feedback.throws", "at least 1"),
@@ -245,13 +263,13 @@ def test_refuses(changes: dict[str, Any], key: str, words: str, whole: dict[str,
     assert error.__cause__ is None
 
 
-def test_an_effect_that_no_version_simulates_is_refused_with_those_that_are(whole: dict[str, Any]) -> None:
-    whole["effects"]["contact"] = True
-    with pytest.raises(
-        SceneError, match=f"contact.*this version can simulate: {', '.join(EFFECTS)}"
-    ) as caught:
-        load(whole)
-    assert caught.value.key == "effects.contact"
+def test_contact_is_for_the_engine_alone(whole: dict[str, Any]) -> None:
+    assert not load(whole).effects.contact
+    whole["effects"] = {"contact": True}
+    scene = load(whole)
+    assert scene.effects.contact
+    assert scene.effects.on() == ()
+    assert scene.map is scene.bare_map
 
 
 def test_an_effect_that_is_not_declared_is_an_unknown_key(

@@ -40,12 +40,14 @@ def expected():
     return json.loads((FOLDER / "expected.json").read_text(encoding="utf-8"))
 
 
+@pytest.mark.sweep
 def test_reference_has_the_known_ends(answer):
     numbers, _ = answer
     for side, parts in expected()["reference"].items():
         assert numbers["reference"][side] == [pytest.approx(pair, abs=2e-12) for pair in parts]
 
 
+@pytest.mark.sweep
 @pytest.mark.parametrize("what", ["throw", "critical_points"])
 def test_errors_of_one_throw(answer, what):
     numbers, _ = answer
@@ -55,6 +57,7 @@ def test_errors_of_one_throw(answer, what):
         assert low <= numbers[what][name] <= high, name
 
 
+@pytest.mark.sweep
 def test_newton_doubles_its_digits(answer):
     points = answer[0]["points"]["throw"]
     errors = [point["error"] for point in points if point["method"] == "exact, libm and Newton, compiled"]
@@ -63,11 +66,13 @@ def test_newton_doubles_its_digits(answer):
     assert errors[3] < 1e-13
 
 
+@pytest.mark.sweep
 def test_small_angles_over_random_parts(answer):
     for key, (value, tolerance) in expected()["small_over_exact"].items():
         assert answer[0]["small_over_exact"][key] == pytest.approx(value, abs=tolerance)
 
 
+@pytest.mark.sweep
 def test_exponents_of_the_limit_set(answer):
     found = answer[0]["limit_set"]
     for name, (value, tolerance) in expected()["limit_set"]["exponents"].items():
@@ -78,12 +83,14 @@ def test_exponents_of_the_limit_set(answer):
     assert found["least"]["cells, centres"] > 20 * found["least"]["cells, end points of cells"]
 
 
+@pytest.mark.sweep
 def test_refining_borders_alone_is_geometric(answer):
     points = answer[0]["points"]["limit set"]
     errors = [point["error"] for point in points if point["method"] == "border cells refined"]
     assert all(after < before / 20 for before, after in pairwise(errors))
 
 
+@pytest.mark.sweep
 def test_exponents_of_long_runs(answer):
     for title, wanted in expected()["long_run"].items():
         for name, (value, tolerance) in wanted.items():
@@ -92,6 +99,7 @@ def test_exponents_of_long_runs(answer):
         assert answer[0]["lyapunov"][key] == pytest.approx(value, abs=tolerance)
 
 
+@pytest.mark.sweep
 def test_figures_and_the_table(answer, modules):
     numbers, out = answer
     for name in ("one-throw.png", "limit-set.png", "long-run.png"):
@@ -129,6 +137,7 @@ def test_costs_of_effects_take_any_table_of_maps(modules, tmp_path):
     assert figure.axes[0].get_xscale() == "log"
 
 
+@pytest.mark.sweep
 def test_what_leaving_effects_out_is_worth(answer):
     """docs/model.md: landing is never called for on these limit sets, roll in 8.3 % of the jogs of initial alone."""
     effects = answer[0]["effects"]

@@ -8,6 +8,8 @@ import nbformat
 import pytest
 
 NOTEBOOKS = sorted((Path(__file__).resolve().parents[2] / "notebooks").glob("*.ipynb"))
+LONG = {"02_atlas.ipynb"}  # a sweep over parameters
+TO_RUN = [pytest.param(n, marks=pytest.mark.sweep) if n.name in LONG else n for n in NOTEBOOKS]
 
 
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.name)
@@ -19,7 +21,7 @@ def test_stored_without_outputs(path):
     assert all(cell.outputs == [] and cell.execution_count is None for cell in code)
 
 
-@pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.name)
+@pytest.mark.parametrize("path", TO_RUN, ids=lambda path: path.name)
 def test_runs(path, tmp_path):
     with warnings.catch_warnings():  # of jupyter's own making
         warnings.simplefilter("ignore")

@@ -84,6 +84,7 @@ def physics_engine(tmp_path_factory):
     return study, study.main(seed=3, out=out, throws=150), out
 
 
+@pytest.mark.sweep
 def test_the_engine_agrees_with_the_map(physics_engine):
     study, numbers, out = physics_engine
     expected = json.loads((STUDIES / "02_physics_engine" / "expected.json").read_text(encoding="utf-8"))
@@ -101,6 +102,7 @@ def test_the_engine_agrees_with_the_map(physics_engine):
         assert study.order(errors["step"], errors[kind]) == pytest.approx(expected["order"], abs=0.15)
 
 
+@pytest.mark.sweep
 def test_unilateral_contact_in_the_engine(physics_engine):
     study, numbers, _ = physics_engine
     expected = json.loads((STUDIES / "02_physics_engine" / "expected.json").read_text(encoding="utf-8"))
@@ -123,6 +125,7 @@ def effects_in_engine(tmp_path_factory):
     return study, study.main(seed=3, out=out, throws=60), out
 
 
+@pytest.mark.sweep
 def test_the_engine_agrees_with_the_effects(effects_in_engine):
     study, numbers, out = effects_in_engine
     assert (out / "effects.png").stat().st_size > 20_000
@@ -142,6 +145,7 @@ def test_the_engine_agrees_with_the_effects(effects_in_engine):
         assert found["error"]["worst"] < most.get(kind, most["hinge"]), name
 
 
+@pytest.mark.sweep
 def test_the_engine_nears_the_effects_as_its_order_says(effects_in_engine):
     _, numbers, _ = effects_in_engine
     expected = json.loads((STUDIES / "02_physics_engine" / "expected.json").read_text(encoding="utf-8"))

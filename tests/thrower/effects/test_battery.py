@@ -165,6 +165,7 @@ def ledger(params: Any, x: float, side: int, book: Any) -> int:
 ALL = ("landing", "roll", "slip", "pivot", "bounce")
 
 
+@pytest.mark.sweep
 def test_the_energy_of_a_throw_is_accounted_for() -> None:
     kinds = {IMPACT: 0, TURN: 0, FLIGHT: 0}
     rubbing = 0

@@ -129,6 +129,7 @@ def test_an_impulse_in_the_cone_does_not_stick_where_the_path_slides_back() -> N
     assert after.slide == pytest.approx(-2 * 0.4375 / 1.3, rel=1e-12)
 
 
+@pytest.mark.sweep
 @pytest.mark.parametrize("restitution", [0.0, 0.6, 1.0])
 def test_impacts_are_those_of_the_integrated_law(restitution: float) -> None:
     back, gained = 0, []

@@ -1,0 +1,291 @@
+"""Trials of assembly, run anywhere and counted: `limitsets.assemble`."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import Executor
+from dataclasses import asdict, dataclass
+from functools import lru_cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from limitsets import __version__
+from limitsets.assembly.counting import Joint, Overlaps, Rate, joint_of, overlaps_of, rate_of
+from limitsets.assembly.pairing import Pair, Start, pair_of, require_apart
+from limitsets.assembly.passing import pass_through
+from limitsets.assembly.trial_file import Row, TrialFile
+from limitsets.errors import AnswerError
+from limitsets.files import as_table
+from limitsets.robust.noise.scattering import Scattering
+from limitsets.scene import Scene
+from limitsets.sweep.driving import Work, drive
+from limitsets.sweep.executors import chosen_pool
+
+if TYPE_CHECKING:
+    from limitsets.engine.recording import Recording
+
+__all__ = ["OUTCOMES", "PAPER", "SURVIVED", "Assembly", "assemble"]
+
+Progress = Callable[[str, int, int], None]
+
+OUTCOMES = ("assembled", "ejected", "order", "wrong", "wall", "left", "never", "unfinished")
+"""Both in their places; one came out of the cavity again; both on their sides, but the second below the first; one in a
+wrong orientation; one stuck at the wall; one left the arm otherwise; one is still on the arm; one still moves."""
+
+PAPER, SURVIVED, OF = 11, 17, 20
+"""Of 20 trials of the paper so many assembled; of 20 assembled pairs so many were whole after the next throw."""
+
+TRIALS, CHUNK = 2000, 10
+SERIES = 20
+
+
+@dataclass(frozen=True)
+class Series:
+    """Trials to be made, as workers are sent them: the scenes as JSON, the noise, how parts meet, and the seed."""
+
+    scenes: tuple[str, str]
+    scatter: Scattering
+    contact: str | None
+    carried: bool
+    apart: bool
+    starts: tuple[Start, Start] | None
+    seed: int
+    trials: int
+
+    def question(self) -> dict[str, Any]:
+        """Give what is asked, for the file of the trials: everything but how many they are."""
+        words = {
+            name: value for name, value in asdict(self).items() if name not in ("scenes", "scatter", "trials")
+        }
+        scenes = [json.loads(text) for text in self.scenes]
+        return {"limitsets": __version__, "scenes": scenes, "scatter": self.scatter.words(), **words}
+
+    def film(self, number: int, last: int) -> Recording:
+        """Make a trial in contact again, and keep poses from throw `last` on."""
+        from limitsets.assembly.pushing import push
+
+        return push(_pair(self), self.seed, number, self._how(), starts=self.starts, last=last)[1]
+
+    def row(self, number: int) -> Row:
+        """Make a trial."""
+        pair = _pair(self)
+        if self.contact is None:
+            passed = pass_through(pair, self.seed, number, apart=self.apart, starts=self.starts)
+            return {"outcome": passed.outcome, **asdict(passed)}
+        from limitsets.assembly.pushing import push
+
+        return asdict(push(pair, self.seed, number, self._how(), starts=self.starts)[0])
+
+    def _how(self) -> Any:
+        from limitsets.assembly.pushing import Question
+
+        return Question(self.contact or "hinge", self.carried)
+
+
+@lru_cache(maxsize=4)
+def _read(scenes: tuple[str, str], scatter: Scattering) -> Pair:
+    return pair_of(json.loads(scenes[0]), json.loads(scenes[1]), scatter)
+
+
+def _pair(series: Series) -> Pair:
+    return _read(series.scenes, series.scatter)
+
+
+def made(series: Series, chunk: int, number: int) -> list[tuple[int, Row]]:
+    """Make the trials of a chunk: what a worker does."""
+    numbers = range(number * chunk, min((number + 1) * chunk, series.trials))
+    return [(k, series.row(k)) for k in numbers]
+
+
+@dataclass(frozen=True, eq=False)
+class Assembly:
+    """What became of pairs of parts.
+
+    Attributes
+    ----------
+    pair : Pair
+        Both parts, the end of the arm, and the noise.
+    series : Series
+        What was asked.
+    rows : tuple of mapping
+        The trials by number: `limitsets.assembly.passing.Passed`, or `limitsets.assembly.pushing.Pushed` with contact.
+    """
+
+    pair: Pair
+    series: Series
+    rows: tuple[Row, ...]
+
+    @property
+    def contact(self) -> str:
+        """How the parts meet: "none", "hinge" or "unilateral"."""
+        return self.series.contact or "none"
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """How many trials ended in each way."""
+        words = [row["outcome"] for row in self.rows]
+        return {name: words.count(name) for name in OUTCOMES}
+
+    @property
+    def assembled(self) -> Rate:
+        """The rate of assembly, with its interval."""
+        return rate_of(self.counts["assembled"], len(self.rows))
+
+    @property
+    def first_series(self) -> int:
+        """Pairs assembled in the first 20 trials."""
+        return sum(row["outcome"] == "assembled" for row in self.rows[:SERIES])
+
+    @property
+    def overlaps(self) -> Overlaps | None:
+        """Shares of the trials in which the outlines overlap; None with contact."""
+        return overlaps_of(self.rows) if self.series.contact is None else None
+
+    @property
+    def joint(self) -> Joint | None:
+        """The joint law of both fates, and the error that multiplying makes; None with contact."""
+        return joint_of(self.rows) if self.series.contact is None else None
+
+    @property
+    def survived(self) -> dict[str, Rate]:
+        """Assembled pairs that are whole after one more throw: with a standing cavity, and with one that is thrown."""
+        found = {}
+        for name in ("standing", "carried"):
+            known = [row[f"survives_{name}"] for row in self.rows if row.get(f"survives_{name}") is not None]
+            if known:
+                found[name] = rate_of(sum(known), len(known))
+        return found
+
+    def example(self, outcome: str) -> int | None:
+        """Give the number of the first trial that ended so."""
+        return next((k for k, row in enumerate(self.rows) if row["outcome"] == outcome), None)
+
+    def film(self, number: int, throws: int = 1) -> Recording:
+        """Make a trial with contact again, and keep the poses of its last throws.
+
+        Raises
+        ------
+        AnswerError
+            Parts that pass through each other are not in the engine.
+        """
+        if self.series.contact is None:
+            remedy = "switch contact on in both scenes: [effects] contact = true"
+            raise AnswerError("the film", "of parts without contact", "trials in the engine", remedy)
+        return self.series.film(number, max(max(self.rows[number]["throws"]) - throws + 1, 1))
+
+    def to_json(self) -> dict[str, Any]:
+        """Give it as JSON takes it: docs/json.md."""
+        one, two = self.pair.scenes
+        return as_table(
+            scenes=[one.name, two.name],
+            unit=one.unit,
+            contact=self.contact,
+            carried=self.series.carried,
+            overlaps=self.overlaps,
+            trials=len(self.rows),
+            seed=self.series.seed,
+            scatter=self.pair.scatter.words() or None,
+            counts=self.counts,
+            assembled=self.assembled,
+            first_series={"of": SERIES, "assembled": self.first_series},
+            joint=self.joint,
+            survived=self.survived or None,
+            paper={"assembled": rate_of(PAPER, OF), "survived": rate_of(SURVIVED, OF)},
+        )
+
+
+def assemble(
+    scene: Scene | str | Path | Mapping[str, Any],
+    scene2: Scene | str | Path | Mapping[str, Any],
+    scatter: Scattering | None = None,
+    *,
+    contact: str | None = None,
+    carried: bool = False,
+    apart: bool | None = None,
+    starts: Sequence[Start] | None = None,
+    trials: int = TRIALS,
+    seed: int = 0,
+    file: str | Path | None = None,
+    executor: Executor | None = None,
+    cluster: str | None = None,
+    workers: int | None = None,
+    progress: Progress | None = None,
+) -> Assembly:
+    """Throw pairs of parts along an arm with a cavity at its end, and count what becomes of them.
+
+    Parameters
+    ----------
+    scene, scene2 : Scene, str, Path or mapping
+        The part that is to lie below, and the one on top of it; arm, throw and cavity are the same in both.
+    scatter : Scattering, optional
+        Random noise of every throw; default the scenes'.  The speed's is common, each landing has its own.
+    contact : str, optional
+        How a struck corner meets the arm where the scenes have ``contact = true``: ``"hinge"`` (default) or
+        ``"unilateral"``.  Without contact in the scenes the parts pass through each other, and the map alone throws.
+    carried : bool
+        With contact: whether the cavity is part of the arm, and thrown with what lies in it.
+    apart : bool, optional
+        Whether random starts are those of parts that do not overlap; default with contact, where they have to be.
+    starts : pair of (float, int), optional
+        x and side of each part, instead of random ones.
+    trials, seed : int
+        Trial number k of a seed draws the same whatever the workers.
+    file : str or Path, optional
+        Finished trials are kept there; the same call goes on with what is left.
+    executor : concurrent.futures.Executor, optional
+        It makes the trials.
+    cluster : str, optional
+        Instead: the address of a Dask scheduler.
+    workers : int, optional
+        Instead: so many processes on this machine.  By default all happens in this one.
+    progress : callable, optional
+        Told (stage, done, all).
+
+    Returns
+    -------
+    Assembly
+
+    Raises
+    ------
+    AnswerError
+        Scenes that differ in arm, throw or cavity; parts that overlap at the start; a file of other trials.
+
+    Examples
+    --------
+    >>> import limitsets as ls
+    >>> found = ls.assemble("paper-triangle", "paper-quadrilateral", trials=20)
+    >>> found.contact, len(found.rows), found.joint.rates[0].share
+    ('none', 20, 1.0)
+    """
+    pair = pair_of(scene, scene2, scatter)
+    if trials < 1:
+        raise AnswerError("the trials", trials, "1 or more", "throw some parts")
+    if not pair.contact and (contact is not None or carried):
+        remedy = "switch it on in both scenes: [effects] contact = true"
+        raise AnswerError("effects.contact", False, "true, for trials in the engine", remedy)
+    if contact not in (None, "hinge", "unilateral"):
+        raise AnswerError("the contact", contact, "'hinge' or 'unilateral'", "choose one")
+    how = (contact or "hinge") if pair.contact else None
+    if apart is False and how is not None:
+        raise AnswerError("the starts", "overlapping", "parts that do not overlap", "leave apart out")
+    given = None if starts is None else require_apart(pair, starts)
+    one, two = (json.dumps(each.as_dict()) for each in pair.scenes)
+    side_by_side = bool(how if apart is None else apart)
+    series = Series((one, two), pair.scatter, how, carried, side_by_side, given, seed, trials)
+    kept = TrialFile(None if file is None else Path(file), series.question(), trials, CHUNK)
+    if len(kept.done) < kept.chunks:
+        work = Work(
+            kept.chunks,
+            made,
+            (series, CHUNK),
+            lambda chunk: len(kept.numbers(chunk)),
+            lambda chunk: f"trials {kept.numbers(chunk).start} to {kept.numbers(chunk).stop - 1}",
+            "the trials",
+            "assembly",
+            "trials",
+        )
+        here = executor is None and cluster is None and workers is None
+        with chosen_pool(1 if here else kept.chunks, executor, cluster, workers) as pool:
+            drive(work, kept, pool, progress)
+    return Assembly(pair, series, tuple(kept))

@@ -1,0 +1,210 @@
+"""A trial of two parts in contact with each other and with the cavity, in the engine."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from limitsets.assembly.drawing import Draws
+from limitsets.assembly.pairing import Pair, Start
+from limitsets.engine.crowd import Crowd
+from limitsets.engine.seats import SEATED, off_seat, seat_of
+
+if TYPE_CHECKING:
+    from limitsets.engine.recording import Recording
+    from limitsets.engine.rests import Rest
+
+__all__ = ["FRICTION", "MOST_THROWS", "Pushed", "Question", "push"]
+
+MOST_THROWS = 500
+FRICTION = 0.5
+"""On the arm, of scenes that give none: unilateral contact, and parts that are struck where they lie, need one."""
+
+
+@dataclass(frozen=True)
+class Question:
+    """How parts meet: as `Crowd` has it.
+
+    Attributes
+    ----------
+    contact : str
+        "hinge" or "unilateral".
+    carried : bool
+        Whether the cavity is thrown with what lies in it.
+    step : float
+        The engine's [rad].
+    """
+
+    contact: str = "hinge"
+    carried: bool = False
+    step: float = 4e-3
+
+
+@dataclass(frozen=True)
+class Pushed:
+    """What became of both parts.
+
+    Attributes
+    ----------
+    outcome : str
+        A word of `limitsets.assembly.assembly_run.OUTCOMES`.
+    throws : tuple of int
+        Throws after which each part came to lie in the cavity, or left; those made where it did neither.
+    entered : tuple of (int or None)
+        The side on which each came to lie in the cavity, -1 for none; None where it did not.
+    wall : tuple of bool
+        Whether each met the far wall on its way in.
+    touched : bool
+        Whether the parts touched each other on the way.
+    survives_standing, survives_carried : bool or None
+        Whether an assembled pair is still assembled after one more throw: with a cavity that stands in the room, and
+        with one that is part of the arm.
+    """
+
+    outcome: str
+    throws: tuple[int, int]
+    entered: tuple[int | None, int | None]
+    wall: tuple[bool, bool]
+    touched: bool
+    survives_standing: bool | None = None
+    survives_carried: bool | None = None
+
+
+class _Watched:
+    """A trial under way: what has happened to the parts so far."""
+
+    def __init__(self, pair: Pair, crowd: Crowd) -> None:
+        self.pair, self.crowd = pair, crowd
+        first, second = pair.ends
+        below = seat_of(first.scene, first.side)
+        self.seats = below, seat_of(second.scene, second.side, [below])
+        cavity = first.scene.cavity
+        assert cavity is not None  # `pair_of` refuses scenes without one
+        self.near = SEATED * cavity.width
+        self.throws = [0, 0]
+        self.entered: list[int | None] = [None, None]
+        self.wall = [False, False]
+        self.ended = [False, False]
+        self.ejected = self.left = self.touched = False
+
+    def seen(self, throw: int, rests: list[Rest]) -> None:
+        """Take note of where the parts are after a throw."""
+        for k, rest in enumerate(rests):
+            inside = rest.where == "cavity"
+            if self.entered[k] is not None and not inside:
+                self.ejected = True
+                self.entered[k] = None
+            if not self.ended[k]:
+                self.throws[k] = throw
+            if inside and self.entered[k] is None:
+                self.entered[k] = rest.side
+                self.wall[k] = "wall" in rest.met
+            lost = rest.where == "lost" or (rest.where == "arm" and rest.x <= self._least(k, rest.side))
+            self.left |= lost
+            self.ended[k] = inside or lost
+            self.touched |= any(name.startswith("part") for name in rest.met)
+
+    def _least(self, k: int, side: int) -> float:
+        return float(self.pair.scenes[k].sides.a[side]) if side >= 0 else 0.0
+
+    def assembled(self) -> bool:
+        """Whether both parts lie in their seats."""
+        members = self.crowd.members
+        return all(off_seat(members[k].world(), self.seats[k]) <= self.near for k in (0, 1))
+
+    def outcome(self, rests: list[Rest]) -> str:
+        """Say what became of them, for the first reason that holds."""
+        if all(rest.where == "cavity" for rest in rests) and self.assembled():
+            return "assembled"
+        if self.ejected:
+            return "ejected"
+        if self.left:
+            return "left"
+        if any(rest.where == "unfinished" for rest in rests):
+            return "unfinished"
+        inside = [k for k, rest in enumerate(rests) if rest.where == "cavity"]
+        if not inside:
+            return "never"
+        sides = [end.side for end in self.pair.ends]
+        if any(rests[k].side not in (sides[k], -1) for k in inside):
+            return "wrong"
+        if (
+            len(inside) == 2
+            and all(rests[k].side == sides[k] for k in (0, 1))
+            and self.throws[1] <= self.throws[0]
+        ):
+            return "order"
+        if any(self.wall[k] and rests[k].side == -1 for k in inside):
+            return "wall"
+        return "wrong" if len(inside) == 2 else "never"
+
+
+def crowd_of(pair: Pair, how: Question, *, record: bool = False) -> Crowd:
+    """Make the engine's crowd of both parts."""
+    friction = pair.scenes[0].world.friction
+    return Crowd(
+        pair.scenes,
+        contact=how.contact,
+        carried=how.carried,
+        friction=FRICTION if friction is None else friction,
+        step=how.step,
+        record=record,
+    )
+
+
+def push(
+    pair: Pair,
+    seed: int,
+    number: int,
+    how: Question = Question(),
+    *,
+    starts: tuple[Start, Start] | None = None,
+    last: int | None = None,
+) -> tuple[Pushed, Recording]:
+    """Make one trial; its film has frames from throw `last` on, and none where that is not given.
+
+    Parameters
+    ----------
+    pair : Pair
+        The parts and the noise.
+    seed, number : int
+        Of the draws: starts that do not overlap, speeds, landing places.
+    how : Question
+        How parts meet.
+    starts : pair of (float, int), optional
+        Instead of random ones.
+    last : int, optional
+        The throw from which poses are kept.
+    """
+    draws = Draws(pair, seed, number)
+    drawn = draws.starts(apart=True)
+    crowd = crowd_of(pair, how)
+    for k, start in enumerate(starts or drawn):
+        crowd.place(k, *start)
+    watched = _Watched(pair, crowd)
+    rests = crowd.rests()
+    for throw in range(1, MOST_THROWS + 1):
+        crowd.film.on = last is not None and throw >= last
+        rests = crowd.throw(*draws.throw())
+        watched.seen(throw, rests)
+        if all(watched.ended) or watched.left or any(rest.where == "unfinished" for rest in rests):
+            break
+    outcome = watched.outcome(rests)
+    standing = carried = None
+    if outcome == "assembled":
+        if not how.carried:
+            crowd.throw(*draws.throw())
+            standing = watched.assembled()
+        crowd.carried = True
+        crowd.throw(*draws.throw())
+        carried = watched.assembled()
+    made = Pushed(
+        outcome,
+        (watched.throws[0], watched.throws[1]),
+        (watched.entered[0], watched.entered[1]),
+        (watched.wall[0], watched.wall[1]),
+        watched.touched,
+        standing,
+        carried,
+    )
+    return made, crowd.recording()

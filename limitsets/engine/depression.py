@@ -1,0 +1,181 @@
+"""One part and one depression of a plate: it falls, hits the edges, rolls over or lies down in it, until it rests.
+
+The depression's middle is at x = 0, the plate's surface at y = 0.  Lengths are those of the scene; gravity is one size
+(the part's longest side) per unit of time squared, so that nothing depends on a throw.  Mass 1.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from limitsets.engine.ground import ground_of
+from limitsets.engine.settling import IDLE, LEANING
+from limitsets.engine.stage import Stage, pymunk_module, set_up
+
+if TYPE_CHECKING:
+    from limitsets.scene import Scene
+
+__all__ = ["EMPTY", "UNFINISHED", "Motion", "Plate", "Pose", "Rest", "fall_speed"]
+
+EMPTY, UNFINISHED = 0, -1
+"""States in which no part rests in the depression: none of it is below the plate's surface; it did not come to rest."""
+
+# A part that is less far below the surface than this share of its size is not in the depression.
+IN_IT = 1e-3
+# The plate goes on to either side for so many sizes.
+FAR = 60.0
+
+
+class Pose(NamedTuple):
+    """Where a part is: its centre of mass [length], and the angle by which it is turned [rad]."""
+
+    x: float
+    y: float
+    angle: float
+
+
+class Motion(NamedTuple):
+    """How it moves: along the plate and up [length per unit of time], turning [rad per unit of time]."""
+
+    along: float
+    up: float
+    turning: float
+
+
+class Rest(NamedTuple):
+    """How a motion ended.
+
+    `state`: `EMPTY`, `UNFINISHED`, 1 + i for a part that lies flush on side i on the floor of the depression, or
+    1 + n + k for one that leans in it, vertex k lowest, of a part with n sides.  `side`: on which side a part that is
+    not in the depression lies on the plate, else -1.  `time`: until it rested.
+    """
+
+    pose: Pose
+    state: int
+    side: int
+    time: float
+
+
+def fall_speed(size: float, height: float) -> float:
+    """Give the speed at the end of a fall from a height [length per unit of time].
+
+    Examples
+    --------
+    >>> fall_speed(2.0, 1.0)
+    2.0
+    """
+    return math.sqrt(2.0 * size * height)
+
+
+@dataclass(frozen=True)
+class Plate:
+    """A plate with one depression, and the part that falls into it.
+
+    Attributes
+    ----------
+    part : Scene
+        The part; of its arm and throw nothing is used.
+    width, depth : float
+        Of the depression [length].
+    friction, restitution : float
+        Of the engine's contact: Coulomb's law, and Newton's restitution.
+    step, patience : float
+        The engine's step, and when to give up [units of time].
+    """
+
+    part: Scene
+    width: float
+    depth: float
+    friction: float
+    restitution: float
+    step: float = 4e-3
+    patience: float = 60.0
+
+    @property
+    def size(self) -> float:
+        """Length of the part's longest side [length]."""
+        return float(self.part.sides.length.max())
+
+    def ground(self) -> tuple[NDArray[np.float64], ...]:
+        """Give the polygons of the plate: left and right of the depression, and its floor."""
+        far = FAR * self.size
+        level = replace(self.part, surface_height=0.0, arm_length=2.0 * far, cavity=None)
+        hollow = (far - 0.5 * self.width, self.width, self.depth)
+        return tuple(corners - (far, 0.0) for corners in ground_of(level, depressions=[hollow]).polygons)
+
+    def lowered(self, x: float, angle: float, height: float) -> Pose:
+        """Give the pose of a part over x, turned by an angle, whose lowest point is at a height."""
+        about = self.part.vertices - self.part.centre
+        low = float((about[:, 0] * math.sin(angle) + about[:, 1] * math.cos(angle)).min())
+        return Pose(x, height - low, angle)
+
+    def seated(self, side: int, x: float = 0.0) -> Pose:
+        """Give the pose of a part on a side on the floor of the depression, the middle of its side at x."""
+        stage = self._stage()
+        offset = float(self.part.sides.a[side]) - 0.5 * float(self.part.sides.length[side])
+        return self.lowered(x + offset, stage.flat[side], -self.depth)
+
+    def settle(
+        self, pose: Pose, motion: Motion, watch: Callable[[float, Pose, Motion], None] | None = None
+    ) -> Rest:
+        """Let a part move from here until it rests.
+
+        Parameters
+        ----------
+        pose, motion : Pose, Motion
+            Where it begins; it may not overlap the plate.
+        watch : callable, optional
+            Told time, pose and motion at the start and after each step.
+
+        Returns
+        -------
+        Rest
+        """
+        stage = self._stage()
+        space, body = stage.space, stage.body
+        space.add(*self._shapes(stage))
+        body.position, body.angle = (pose.x, pose.y), pose.angle
+        body.velocity, body.angular_velocity = (motion.along, motion.up), motion.turning
+        space.sleep_time_threshold = IDLE
+        time = 0.0
+        while time <= self.patience and not body.is_sleeping:
+            if watch is not None:
+                watch(time, *_seen(body))
+            space.step(self.step)
+            time += self.step
+        return self._rest(stage, time)
+
+    def _stage(self) -> Stage:
+        return set_up(replace(self.part, kappa=self.size, surface_height=0.0), 0.0, 0)
+
+    def _shapes(self, stage: Stage) -> list[Any]:
+        fixed = stage.space.static_body
+        shapes = [pymunk_module().Poly(fixed, corners.tolist()) for corners in self.ground()]
+        stage.meet(shapes, self.friction, self.restitution, self.step)
+        return shapes
+
+    def _rest(self, stage: Stage, time: float) -> Rest:
+        body, sides = stage.body, len(stage.flat)
+        pose = _seen(body)[0]
+        if not body.is_sleeping:
+            return Rest(pose, UNFINISHED, -1, time)
+        off = [abs(math.remainder(body.angle - flat, math.tau)) for flat in stage.flat]
+        nearest = off.index(min(off))
+        flush, low = off[nearest] < LEANING, stage.lowest()
+        depth = -float(body.local_to_world(stage.corners[low]).y)
+        if depth < IN_IT * self.size:
+            return Rest(pose, EMPTY, nearest if flush else -1, time)
+        if flush and depth > self.depth - IN_IT * self.size:
+            return Rest(pose, 1 + nearest, -1, time)
+        return Rest(pose, 1 + sides + low, -1, time)
+
+
+def _seen(body: Any) -> tuple[Pose, Motion]:
+    pose = Pose(float(body.position.x), float(body.position.y), float(body.angle))
+    return pose, Motion(float(body.velocity.x), float(body.velocity.y), float(body.angular_velocity))

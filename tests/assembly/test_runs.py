@@ -1,0 +1,126 @@
+"""Trials by any executor, in any order, cut off and gone on with; what cannot be; JSON and the command."""
+
+import json
+from concurrent.futures import Executor, Future, ThreadPoolExecutor
+
+import pytest
+
+import limitsets as ls
+from limitsets.errors import AnswerError
+from tests.assembly.pairs import NAMES, NOISE, pair
+from tests.cli.command import run
+from tests.sweep.stores import Shuffled
+
+COUNT = 45  # the last chunk is not full
+
+
+@pytest.fixture(scope="module")
+def whole():
+    return ls.assemble(*NAMES, NOISE, trials=COUNT, seed=8).rows
+
+
+class Killed(Executor):
+    """Ends the run, as Ctrl-C does, after some chunks."""
+
+    def __init__(self, chunks):
+        self.left = chunks
+
+    def submit(self, function, /, *arguments):
+        if self.left == 0:
+            raise KeyboardInterrupt
+        self.left -= 1
+        future = Future()
+        future.set_result(function(*arguments))
+        return future
+
+
+def test_the_same_by_threads_in_any_order_and_by_processes(whole):
+    with ThreadPoolExecutor(3) as pool:
+        assert ls.assemble(*NAMES, NOISE, trials=COUNT, seed=8, executor=pool).rows == plain(whole)
+    assert ls.assemble(*NAMES, NOISE, trials=COUNT, seed=8, executor=Shuffled(4)).rows == plain(whole)
+    assert ls.assemble(*NAMES, NOISE, trials=COUNT, seed=8, workers=2).rows == plain(whole)
+
+
+def plain(rows):
+    return tuple(json.loads(json.dumps(row)) for row in rows)
+
+
+def test_a_killed_run_goes_on(whole, tmp_path):
+    file = tmp_path / "trials.json"
+    # the driver hands out its window before it writes: the chunks of a file come from a run that was let finish
+    ls.assemble(*NAMES, NOISE, trials=20, seed=8, file=file)
+    with pytest.raises(KeyboardInterrupt):
+        ls.assemble(*NAMES, NOISE, trials=COUNT, seed=8, file=file, executor=Killed(1))
+    assert len(json.loads(file.read_text())["trials"]) == 20
+    made = []
+    found = ls.assemble(
+        *NAMES, NOISE, trials=COUNT, seed=8, file=file, progress=lambda stage, done, of: made.append(done)
+    )
+    assert min(made) >= 2  # two of the five chunks were there
+    assert found.rows == plain(whole)
+    assert ls.assemble(*NAMES, NOISE, trials=7, seed=8, file=file).rows == plain(whole)[:7]
+
+
+def test_a_file_of_other_trials_is_refused(tmp_path):
+    file = tmp_path / "trials.json"
+    ls.assemble(*NAMES, NOISE, trials=1, seed=8, file=file)
+    with pytest.raises(AnswerError, match="seed differs"):
+        ls.assemble(*NAMES, NOISE, trials=1, seed=9, file=file)
+    file.write_text("[]")
+    with pytest.raises(AnswerError, match="a file of trials that this call wrote"):
+        ls.assemble(*NAMES, NOISE, trials=1, seed=8, file=file)
+
+
+def test_what_cannot_be():
+    two = ls.load(NAMES[1])
+    with pytest.raises(AnswerError, match="overlapping"):
+        ls.assemble(*NAMES, starts=[(10.0, 2), (10.5, 1)], trials=1)
+    with pytest.raises(AnswerError, match="the start of paper-quadrilateral"):
+        ls.assemble(*NAMES, starts=[(6.0, 2), (20.5, 1)], trials=1)
+    with pytest.raises(AnswerError, match="kappa of the two scenes"):
+        ls.assemble(NAMES[0], two.with_values({"throw.kappa": 24.0}), trials=1)
+    with pytest.raises(AnswerError, match="surface_height of the two scenes"):
+        ls.assemble(NAMES[0], two.with_values({"arm.surface_height": -0.4}), trials=1)
+    trees = [ls.load(name).as_dict() for name in NAMES]
+    for tree in trees:
+        del tree["cavity"]
+    with pytest.raises(AnswerError, match="cavity"):
+        ls.assemble(*trees, trials=1)
+    with pytest.raises(AnswerError, match="effects.contact"):
+        ls.assemble(*NAMES, contact="hinge", trials=1)
+    with pytest.raises(AnswerError, match="effects.contact of the two scenes"):
+        ls.assemble(pair(contact=True)[0], NAMES[1], trials=1)
+    with pytest.raises(AnswerError, match="the contact"):
+        ls.assemble(*pair(contact=True), contact="glue", trials=1)
+    with pytest.raises(AnswerError, match="the trials"):
+        ls.assemble(*NAMES, trials=0)
+
+
+KEYS = {
+    "scenes", "unit", "contact", "carried", "overlaps", "trials", "seed", "scatter", "counts", "assembled",
+    "first_series", "joint", "survived", "paper",
+}  # fmt: skip
+
+
+def test_json_and_the_command(capfd, tmp_path):
+    options = ("--trials", "12", "--seed", "2", "--scatter", "throw.speed=0.5 %")
+    code, out, _ = run(capfd, "assemble", *NAMES, *options, "--json", "-o", str(tmp_path))
+    found = json.loads(out)
+    assert code == 0
+    assert set(found) == KEYS
+    assert found["contact"] == "none"
+    assert set(found["overlaps"]) == {"ever", "at_start", "at_rest", "in_flight"}
+    assert set(found["assembled"]) == {"count", "of", "share", "interval"}
+    assert set(found["joint"]) == {
+        "table", "rates", "both", "product", "error", "error_interval", "serial"
+    }  # fmt: skip
+    assert found["paper"]["assembled"]["count"] == 11
+    assert json.loads((tmp_path / "assembly.json").read_text()) == found
+    assert (tmp_path / "assembly.png").stat().st_size > 10_000
+    code, out, _ = run(capfd, "assemble", *NAMES, *options)
+    assert code == 0
+    assert "the outlines overlap in" in out.splitlines()[1]  # reported first
+    assert "one part after the other, or two arms" in out
+    code, _, err = run(capfd, "assemble", NAMES[0], "paper-designed")
+    assert code == 2
+    assert err.count("\n") == 1
