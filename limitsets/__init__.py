@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:  # each from the file that holds it: most rooms have a file of the same name
     from limitsets import engine, interval, maps, plot, resilience
     from limitsets.analysis import analyse
+    from limitsets.animation import animate
     from limitsets.assembly import assemble
     from limitsets.auditing import audit
     from limitsets.cells import grid
@@ -50,6 +51,7 @@ __version__ = "0.1.0"
 # the function.  A namespace is its own room.
 _ROOMS = {
     "analyse": "analysis",
+    "animate": "animation",
     "atlas": "sweep.parameter_atlas",
     "attractors": "sets.attractors",
     "audit": "auditing",
@@ -87,6 +89,7 @@ _ROOMS = {
 
 __all__ = [
     "analyse",
+    "animate",
     "assemble",
     "atlas",
     "attractors",

@@ -51,6 +51,8 @@ class Leg(NamedTuple):
         Share of the leg, word, and place.
     rest : tuple of (float, int, str) or None
         x, side and sentence where the part comes to rest at its end.
+    begins : bool
+        Whether a throw begins: what was drawn of the last one is taken away.
     """
 
     seconds: float
@@ -63,6 +65,7 @@ class Leg(NamedTuple):
     trail: bool = False
     marks: tuple[tuple[float, str, float, float], ...] = ()
     rest: tuple[float, int, str] | None = None
+    begins: bool = False
 
 
 @dataclass(frozen=True)
@@ -108,7 +111,11 @@ class Pace:
     def words(self) -> str:
         """How fast it runs, a clause."""
         if self.clock == "s":
-            return "as fast as the machine" if self.slow == 1.0 else f"{self.slow:g} times slower than the machine"
+            return (
+                "as fast as the machine"
+                if self.slow == 1.0
+                else f"{self.slow:g} times slower than the machine"
+            )
         return f"1/w, the time in which the throw turns by 1 rad, is shown in {self.unit:g} s"
 
 
@@ -143,22 +150,28 @@ def cut(
     lanes: Lanes | None,
     ground: Sequence[Array] = (),
     end: float | None = None,
+    view: Sequence[tuple[float, float]] = (),
 ) -> Film:
     """Cut legs of one part's motion into frames: each ends in a frame, and the first begins in one."""
     counts = [max(1, round(leg.seconds * pace.fps)) for leg in legs]
     require_length(sum(counts) + 1)
     columns: dict[str, list[Any]] = {word: [] for word in ("times", "poses", "arm", "position", "trail")}
     texts: dict[str, list[int]] = {"caption": [], "note": [], "stage": []}
-    captions, notes = list(dict.fromkeys(leg.caption for leg in legs)), list(dict.fromkeys(leg.note for leg in legs))
+    captions, notes = (
+        list(dict.fromkeys(leg.caption for leg in legs)),
+        list(dict.fromkeys(leg.note for leg in legs)),
+    )
     marks: list[tuple[int, str, float, float]] = []
     rests: list[Rest] = []
-    frame, trail, clock, before = 0, [0, 0], 0.0, False
+    frame, trail, clock, before, begins = 0, [0, 0], 0.0, False, [0]
     for number, (leg, count) in enumerate(zip(legs, counts, strict=True)):
         share = np.arange(0 if number == 0 else 1, count + 1) / count
         columns["times"].append(clock + share * leg.seconds / pace.unit)
         columns["poses"].append(leg.pose(share))
         columns["arm"].append(leg.arm(share))
         columns["position"].append(leg.lane(share))
+        if leg.begins:
+            begins, trail = [*begins, frame], [frame, frame]
         if leg.trail and not before:
             trail = [max(frame - 1, 0), frame]
         for k in range(share.size):
@@ -168,14 +181,13 @@ def cut(
         texts["note"] += [notes.index(leg.note)] * share.size
         texts["stage"] += [leg.stage] * share.size
         last = frame + share.size - 1
-        marks += [(last - round((1.0 - at) * count), *what) for at, *what in leg.marks]
+        marks += [(last - round((1.0 - at) * count), word, x, y) for at, word, x, y in leg.marks]
         if leg.rest is not None:
-            rests.append(Rest(last, *leg.rest))
+            rests.append(Rest(begins[-1], last, *leg.rest))
         frame, clock, before = last + 1, clock + leg.seconds / pace.unit, leg.trail
-    ends = [at for at, word, _, _ in marks if word == "thrown"][1:]
     shown = []
     for at, word, x, y in marks:
-        until = next((k for k in ends if k > at), frame)
+        until = next((k for k in begins if k > at), frame)
         shown.append(Mark(at, until, 0, word, x, y))
     return Film(
         title,
@@ -200,4 +212,5 @@ def cut(
         lanes,
         np.concatenate(columns["position"]),
         np.array(texts["stage"]),
+        tuple(view),
     )

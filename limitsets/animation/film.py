@@ -39,8 +39,9 @@ class Mark(NamedTuple):
 
 
 class Rest(NamedTuple):
-    """A part has come to rest: in which frame, where, on which side [length], and a sentence about the throw."""
+    """A part has come to rest: the frame in which its throw begins, and that of the rest; where [length]; in words."""
 
+    begin: int
     frame: int
     x: float
     side: int
@@ -63,8 +64,8 @@ class Lanes:
         Critical points by side.
     goal : tuple of (float, int) or None
         The goal's x and side.
-    sensor : float or None
-        Where a sensor stands.
+    lines : tuple of (float, str)
+        Other places, such as a sensor's, and what they are.
     known : tuple of dict
         Where a controller knows the part to be, one for each state it comes to.
     """
@@ -74,7 +75,7 @@ class Lanes:
     sets: tuple[Extents, ...] = ()
     critical: dict[int, tuple[float, ...]] = field(default_factory=dict)
     goal: tuple[float, int] | None = None
-    sensor: float | None = None
+    lines: tuple[tuple[float, str], ...] = ()
     known: tuple[Extents, ...] = ()
 
 
@@ -102,8 +103,8 @@ class Film:
         Words on each part.
     arm : ndarray, shape (frames,)
         Angle of the arm, 0 when level [rad].
-    surface : tuple of (float, float)
-        Height of the arm's surface over the joint, and where the arm ends [length].
+    surface : tuple of (float, float) or None
+        Height of the arm's surface over the joint, and where the arm ends [length]; None where the arm is ground.
     ground : tuple of ndarray, shape (m, 2)
         What does not move [length].
     captions, notes : tuple of str
@@ -122,6 +123,8 @@ class Film:
         Where the first part is in the lanes: x [length], and the side, between two sides while it turns.
     stage : ndarray of int, shape (frames,)
         Number in ``lanes.known``, -1 for none.
+    view : tuple of (float, float)
+        Places that have to be in sight, besides what moves [length].
     """
 
     title: str
@@ -134,7 +137,7 @@ class Film:
     outlines: tuple[Array, ...]
     labels: tuple[tuple[Label, ...], ...]
     arm: Array
-    surface: tuple[float, float]
+    surface: tuple[float, float] | None
     ground: tuple[Array, ...]
     captions: tuple[str, ...]
     notes: tuple[str, ...]
@@ -146,6 +149,7 @@ class Film:
     lanes: Lanes | None
     position: Array
     stage: NDArray[np.int64]
+    view: tuple[tuple[float, float], ...] = ()
 
     @property
     def frames(self) -> int:
@@ -155,10 +159,12 @@ class Film:
     def polygon(self, frame: int, part: int = 0) -> Array:
         """Corners of a part in a frame, shape (n, 2) [length]."""
         x, y, angle = self.poses[frame, part].tolist()
-        return turned(self.outlines[part], angle) + np.array([x, y])
+        corners: Array = turned(self.outlines[part], angle) + np.array([x, y])
+        return corners
 
     def arm_polygon(self, frame: int, thick: float) -> Array:
         """Corners of the arm in a frame, its surface first, shape (4, 2) [length]."""
+        assert self.surface is not None  # asked where there is one
         height, end = self.surface
         corners = np.array([[0.0, height], [end, height], [end, height - thick], [0.0, height - thick]])
         return turned(corners, float(self.arm[frame]))

@@ -28,5 +28,12 @@ def write_gif(film: Film, file: Path, progress: Progress = None) -> None:
         pictures.append(image.quantize(palette=palette, dither=Image.Dither.NONE))
     delay = 10 * round(100.0 / film.fps)
     pictures[0].save(
-        file, "GIF", save_all=True, append_images=pictures[1:], duration=delay, loop=0, optimize=False, disposal=1
+        file,
+        "GIF",
+        save_all=True,
+        append_images=pictures[1:],
+        duration=delay,
+        loop=0,
+        optimize=False,
+        disposal=1,
     )

@@ -7,14 +7,14 @@ from typing import TYPE_CHECKING, Any
 
 from limitsets.animation.film import Lanes
 from limitsets.errors import AnswerError
-from limitsets.goals import OrientedBeyond, Reaches
+from limitsets.goals import Goal, OrientedBeyond, Reaches
 from limitsets.plot.style import stretch
 
 if TYPE_CHECKING:
     from limitsets.analysis import Analysis
     from limitsets.scene import Scene
 
-__all__ = ["Progress", "good_start", "known_of", "require_start"]
+__all__ = ["Progress", "good_start", "known_of", "lanes_of", "require_start"]
 
 Progress = Any
 
@@ -30,14 +30,18 @@ def known_of(scene: Scene, progress: Progress = None, **more: Any) -> tuple[Anal
     return found, lanes_of(found.scene, found, **more)
 
 
-def lanes_of(scene: Scene, found: Analysis | None = None, **more: Any) -> Lanes:
-    """Lay the lanes out; without an analysis they show no sets."""
-    goal = scene.goal
+def lanes_of(scene: Scene, found: Analysis | None = None, goal: Goal | None = None, **more: Any) -> Lanes:
+    """Lay the lanes out; without an analysis they show no sets.  The goal is the scene's, or another."""
+    goal = scene.goal if goal is None else goal
     return Lanes(
         tuple(scene.sides.a.tolist()),
         scene.arm_length,
-        () if found is None else tuple({side: list(parts) for side, parts in each.items()} for each in found.extents),
-        {} if found is None else {s: tuple(p.x for p in points) for s, points in found.critical_points.items()},
+        ()
+        if found is None
+        else tuple({side: list(parts) for side, parts in each.items()} for each in found.extents),
+        {}
+        if found is None
+        else {s: tuple(p.x for p in points) for s, points in found.critical_points.items()},
         (goal.x, goal.side) if isinstance(goal, OrientedBeyond | Reaches) else None,
         **more,
     )

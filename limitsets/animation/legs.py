@@ -39,7 +39,9 @@ def drawn_of(scene: Scene) -> str:
         said.append("the way from the impact to rest is drawn: these formulas have none")
     on = [name for name in ("slip", "pivot", "bounce") if getattr(scene.effects, name)]
     if on:
-        said.append(f"the way from the first impact to rest is drawn ({', '.join(on)}); its ends are the map's")
+        said.append(
+            f"the way from the first impact to rest is drawn ({', '.join(on)}); its ends are the map's"
+        )
     return "; ".join(said)
 
 
@@ -83,7 +85,7 @@ def legs_of(
     note: str = "",
     stage: int = -1,
     stays: float = RESTS,
-    after: str = "",
+    after: tuple[str, int] | None = None,
 ) -> list[Leg]:
     """Give the legs of one throw, from the arm's way down to the part's rest.
 
@@ -101,8 +103,8 @@ def legs_of(
         What is written besides, and known.
     stays : float
         Seconds at rest.
-    after : str
-        What is written about the rest, besides where it is.
+    after : tuple of (str, int), optional
+        Note and stage once it rests.
     """
     moves, swing = motion(scene, throw), stroke_of(scene) or SWING
     unit = pace.unit / pace.rate(scene, throw.kappa)
@@ -128,7 +130,8 @@ def legs_of(
 
     level = np.zeros_like
     impact, rolled = moves.struck, [(at, "roll", x, y) for at, x, y in flown.faces]
-    rest = (throw.after, throw.side_after, f"{name}: from x = {throw.x:.4g} {unit_of} on side {throw.side}, {at_rest}")
+    sentence = f"{name}: {throw.word} from {throw.x:.2f} {unit_of}, side {throw.side}, to {throw.after:.2f}"
+    rest = (throw.after, throw.side_after, f"{sentence}, side {throw.side_after}")
     return [
         Leg(
             LOWERS,
@@ -138,6 +141,7 @@ def legs_of(
             f"{name}: the arm goes down",
             note,
             stage,
+            begins=True,
         ),
         Leg(
             2.0 * swing * unit,
@@ -175,6 +179,11 @@ def legs_of(
             rest=rest,
         ),
         rest_leg(
-            scene, throw.after, throw.side_after, stays, f"{name}: {at_rest}{broken}", after or note, stage
+            scene,
+            throw.after,
+            throw.side_after,
+            stays,
+            f"{name}: {at_rest}{broken}",
+            *(after or (note, stage)),
         ),
     ]

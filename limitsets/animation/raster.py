@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from limitsets.animation.picture import Picture, Shape
+from limitsets.animation.picture import Picture
+from limitsets.animation.shapes import Shape
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -33,7 +34,7 @@ def frames(picture: Picture, zoom: float = 1.0, progress: Progress = None) -> It
     width, height = picture.size
     wide, tall = 2 * round(0.5 * zoom * width), 2 * round(0.5 * zoom * height)
     figure = Figure(figsize=(wide / zoom / DPI, tall / zoom / DPI), dpi=DPI * zoom)
-    canvas = FigureCanvasAgg(figure)
+    canvas: Any = FigureCanvasAgg(figure)  # matplotlib types none of its methods
     axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
     axes.set_xlim(0.0, width)
     axes.set_ylim(height, 0.0)
@@ -41,11 +42,11 @@ def frames(picture: Picture, zoom: float = 1.0, progress: Progress = None) -> It
     for shape in picture.still():
         axes.add_artist(_artist(shape))
     canvas.draw()
-    background = canvas.copy_from_bbox(figure.bbox)  # type: ignore[attr-defined]  # of the Agg canvas
+    background = canvas.copy_from_bbox(figure.bbox)
     for k in range(picture.film.frames):
         if progress is not None:
             progress("frames", k, picture.film.frames)
-        canvas.restore_region(background)  # type: ignore[attr-defined]  # likewise
+        canvas.restore_region(background)
         _draw(axes, picture.moving(k))
         yield np.array(np.asarray(canvas.buffer_rgba())[:, :, :3])
 
@@ -65,7 +66,9 @@ def _artist(shape: Shape) -> Any:
     look, (x, y) = shape.look, shape.points[0].tolist()
     if shape.kind == "text":
         how = {"ha": ANCHORS[look.get("anchor", "start")], "va": "baseline", "color": look["fill"]}
-        return Text(x, y, look["words"], fontsize=look["size"] * POINTS, weight=look.get("weight", "normal"), **how)
+        return Text(
+            x, y, look["words"], fontsize=look["size"] * POINTS, weight=look.get("weight", "normal"), **how
+        )
     width = look.get("width", 0.0) * POINTS
     if shape.kind == "line":
         # matplotlib takes dashes in multiples of the width

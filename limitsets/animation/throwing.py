@@ -46,6 +46,8 @@ class Throw(NamedTuple):
         Of this throw [length].
     other_first : bool
         Whether another corner would have landed first, which the model leaves out.
+    scatters : bool
+        Whether the landing place deviates from that of the formulas.
     """
 
     x: float
@@ -57,6 +59,7 @@ class Throw(NamedTuple):
     phi: float
     kappa: float
     other_first: bool
+    scatters: bool = False
 
     @property
     def word(self) -> str:
@@ -93,19 +96,20 @@ def throws_of(scene: Scene, path: Trace, kappa: float | None = None) -> list[Thr
     for k in range(path.code.size):
         if path.code[k] == codes.OUTSIDE_MODEL or not math.isfinite(float(path.phi[k])):
             break
-        found.append(
-            Throw(
-                float(path.x[k]),
-                int(path.side[k]),
-                float(path.x[k + 1]),
-                int(path.side[k + 1]),
-                int(path.code[k]),
-                int(path.turned[k]),
-                float(path.phi[k]),
-                scene.kappa if kappa is None else kappa,
-                bool(path.other_vertex_first[k]),
-            )
+        throw = Throw(
+            float(path.x[k]),
+            int(path.side[k]),
+            float(path.x[k + 1]),
+            int(path.side[k + 1]),
+            int(path.code[k]),
+            int(path.turned[k]),
+            float(path.phi[k]),
+            scene.kappa if kappa is None else kappa,
+            bool(path.other_vertex_first[k]),
         )
+        if scene.effects.spread is not None:
+            throw = throw._replace(kappa=kappa_of(scene, throw), scatters=True)
+        found.append(throw)
     return found
 
 
@@ -133,9 +137,7 @@ def kappa_of(scene: Scene, throw: Throw) -> float:
 
 def motion(scene: Scene, throw: Throw) -> Motion:
     """Say how the part moves in one throw, of a throw at rate 1."""
-    spread = scene.effects.spread is not None
-    kappa = kappa_of(scene, throw) if spread else throw.kappa
-    lean = stroke_of(scene)
+    kappa, lean = throw.kappa, stroke_of(scene)
     gravity = -kappa * math.sin(lean), -kappa * math.cos(lean)
     exact = scene.flight == "exact"
     by_contact = [name for name in CONTACTS if getattr(scene.effects, name)]
@@ -159,7 +161,7 @@ def motion(scene: Scene, throw: Throw) -> Motion:
         gravity,
         pendulum=exact and scene.flip == "signed" and not by_contact,
         rolls=bool(scene.effects.roll),
-        scatters=spread,
+        scatters=throw.scatters,
     )
     shift = turning.shift
 

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 
 from limitsets.animation.cutting import Pace, cut, require_length
 from limitsets.animation.film import Film
-from limitsets.animation.lanes import Progress, good_start, known_of, require_start
-from limitsets.animation.legs import STAYS, drawn_of, legs_of, rest_leg
+from limitsets.animation.lanes import Progress, good_start, known_of, lanes_of, require_start
+from limitsets.animation.legs import RESTS, STAYS, drawn_of, legs_of, rest_leg
 from limitsets.animation.throwing import throws_of
 from limitsets.errors import AnswerError
 
@@ -17,28 +17,41 @@ if TYPE_CHECKING:
 
 __all__ = ["film_of_analysis", "film_of_scene"]
 
+USUAL = 8
+"""Throws that are shown unless others are asked for."""
+
 
 def film_of_scene(
-    scene: Scene, start: tuple[float, int] | None, throws: int, fps: float, slow: float, progress: Progress
+    scene: Scene,
+    start: tuple[float, int] | None,
+    throws: int | None,
+    fps: float,
+    slow: float,
+    progress: Progress,
 ) -> Film:
     """Show throws of a scene."""
     if start is not None:
         require_start(scene, start)
-    require_length(throws)
+    require_length(throws or USUAL)
     found, _ = known_of(scene, progress)
     return film_of_analysis(found, start, throws, fps, slow, progress)
 
 
 def film_of_analysis(
-    found: Analysis, start: tuple[float, int] | None, throws: int, fps: float, slow: float, progress: Progress
+    found: Analysis,
+    start: tuple[float, int] | None,
+    throws: int | None,
+    fps: float,
+    slow: float,
+    progress: Progress,
 ) -> Film:
     """Show throws of a scene that is analysed already."""
-    from limitsets.animation.lanes import lanes_of
     from limitsets.thrower import trace
 
     scene, pace = found.scene, Pace.of(found.scene, fps, slow)
-    x, side = good_start(found, throws) if start is None else require_start(scene, start)
-    path = trace(scene.map, x, side, throws)
+    count = USUAL if throws is None else throws
+    x, side = good_start(found, count) if start is None else require_start(scene, start)
+    path = trace(scene.map, x, side, count)
     made = throws_of(scene, path)
     if not made:
         allowed = "one from which a throw lands on the arm"
@@ -47,6 +60,6 @@ def film_of_analysis(
     words = f"Start: x = {x:.2f} {scene.unit} on side {side}"
     legs = [rest_leg(scene, x, side, 1.0, words)]
     for number, throw in enumerate(made, start=1):
-        stays = {"stays": STAYS} if number == count else {}
-        legs += legs_of(scene, throw, pace, f"Throw {number} of {count}", **stays)
+        stays = STAYS if number == count else RESTS
+        legs += legs_of(scene, throw, pace, f"Throw {number} of {count}", stays=stays)
     return cut(scene, legs, pace, title=scene.name, about=drawn_of(scene), lanes=lanes_of(scene, found))

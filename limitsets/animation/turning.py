@@ -130,7 +130,14 @@ def _pendulum(
     for event, way in ((low, -1.0), (high, 1.0)):
         event.terminal, event.direction = True, way  # type: ignore[attr-defined]  # scipy reads them there
     found = solve_ivp(
-        rates, (0.0, LONGEST), [0.0, rate], "DOP853", dense_output=True, events=(low, high), rtol=1e-10, atol=1e-12
+        rates,
+        (0.0, LONGEST),
+        [0.0, rate],
+        "DOP853",
+        dense_output=True,
+        events=(low, high),
+        rtol=1e-10,
+        atol=1e-12,
     )
     if found.status != 1:
         return None
@@ -243,7 +250,8 @@ def _joined(pieces: list[_Piece], rest: tuple[Array, float], shift: float) -> Tu
 
     later = pieces[1:]
     faces = tuple(
-        (piece.begin / time if time else 1.0, float(piece.vertex[0]), float(piece.vertex[1])) for piece in later
+        (piece.begin / time if time else 1.0, float(piece.vertex[0]), float(piece.vertex[1]))
+        for piece in later
     )
     return Turning(time, pose, faces, shift, drawn=False)
 

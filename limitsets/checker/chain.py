@@ -133,7 +133,8 @@ class Chain:
         size = float(np.abs(values).max())
         mean = self.rows.times(values) + (self.rows.off * size + more)
         low, high = self.nodes.ends(values)
-        mean[self.nodes.at] += INFLATE * self.nodes.much * (high - low)
+        at = self.nodes.at
+        mean[at] = np.minimum(mean[at] + INFLATE * self.nodes.much * (high - low), high + more)
         deficit = INFLATE * self.deficits(values)[self.live] + 2.0**-50 * size
         found = fixed.copy()
         for nodes in (self.live, self.live + 1):
@@ -156,9 +157,10 @@ class Chain:
         lo, hi = self.turns.products(low, high)
         turned = np.bincount(self.turns.at, hi - lo, n)
         least, most = self.cells.ends(values)
-        best, gap = np.zeros(n), np.zeros(n)
-        best[self.cells.at] = most - least
+        span, gap = np.zeros(n), np.zeros(n)
+        span[self.cells.at] = most - least
         gap[self.cells.at] = self.cells.much * (most - least)
+        best = span.copy()
         best[self.curved] = np.minimum(best[self.curved], np.maximum(bent[self.curved], 0.0))
         best[self.turned] = np.minimum(best[self.turned], turned[self.turned])
-        return best + gap
+        return np.minimum(best + gap, span)

@@ -7,6 +7,7 @@ from typing import Annotated
 import typer
 
 from limitsets.cli.analyse import analyse
+from limitsets.cli.animate import animate
 from limitsets.cli.assemble import assemble
 from limitsets.cli.atlas import atlas
 from limitsets.cli.audit import audit
@@ -21,6 +22,7 @@ from limitsets.cli.recheck import recheck
 from limitsets.cli.robustness import robustness
 from limitsets.cli.scenes import scenes
 from limitsets.cli.throw import throw
+from limitsets.cli.tray import tray
 
 __all__ = ["app"]
 
@@ -57,6 +59,7 @@ for command in (
     analyse,
     throw,
     plot,
+    animate,
     certify,
     recheck,
     audit,
@@ -68,5 +71,6 @@ for command in (
     feedback,
     assemble,
     fit,
+    tray,
 ):
     app.command()(command)

@@ -11,7 +11,7 @@ from limitsets.errors import LimitsetsError
 if TYPE_CHECKING:
     from limitsets.scene import Scene
 
-__all__ = ["HELP_NO_RECHECK", "Ends", "deviations", "ends_of", "number", "place", "position"]
+__all__ = ["HELP_NO_RECHECK", "Ends", "deviations", "ends_of", "number", "place", "places_of", "position"]
 
 HELP_NO_RECHECK = "Write certificates without checking them first."
 
@@ -32,6 +32,15 @@ def place(scene: Scene, text: str) -> float:
 
     word = number(text)
     return word if isinstance(word, float) else convert(parse(text, "length", key="--x"), scene.unit)
+
+
+def places_of(scene: Scene, text: str, option: str) -> list[float]:
+    """Read LO:HI:N, N lengths from LO to HI."""
+    words = text.split(":")
+    if len(words) != 3 or not words[2].strip().isdigit() or not 1 <= int(words[2]) <= 1000:
+        raise LimitsetsError("the places", text, "LO:HI:N, N from 1 to 1000", "correct it", key=option)
+    lo, hi, count = place(scene, words[0]), place(scene, words[1]), int(words[2])
+    return [lo + (hi - lo) * k / max(count - 1, 1) for k in range(count)]
 
 
 def position(scene: Scene, text: str) -> float:

@@ -51,6 +51,13 @@ def feed(
             "--brackets", "N", "Prove brackets of the probabilities, on N cells per side.", min=8, max=100_000
         ),
     ] = None,
+    parts: Annotated[
+        int | None,
+        option(
+            "--parts", "N", "Throw N parts at once, in the engine, that push each other.", min=1, max=1000
+        ),
+    ] = None,
+    batches: Annotated[int, option("--batches", "N", "How often --parts are thrown.", min=1)] = 20,
     no_proof: Annotated[bool, typer.Option("--no-proof", help="Probabilities and trials only.")] = False,
     out: Annotated[
         Path | None, option("--out -o", "DIR", "Write feeding.json and feeding.png there.")
@@ -81,6 +88,8 @@ def feed(
             seed=seed,
             cells=cells,
             brackets=brackets,
+            parts=parts,
+            batches=batches,
             progress=tell,
         )
         written = None
@@ -135,6 +144,14 @@ def _text(found: Feeding, files: list[Path], written: dict[str, Any] | None) -> 
         )
     if found.curve is not None:
         typer.echo(found.curve.line())
+    for crowd in found.crowds:
+        how = "push" if crowd.between else "pass through"
+        each = ", ".join(f"{name} {met}" for name, met in crowd.counts.items() if met)
+        once, error = crowd.right_per_throw
+        typer.echo(
+            f"{crowd.parts} parts at once that {how} each other (arm: {crowd.contact}): {each};"
+            f" {once:.4f} +- {error:.4f} right per throw"
+        )
     if written is not None:
         typer.echo(said_of(written, "nothing is proved, or of a map with effects, which nothing rechecks"))
     if files:

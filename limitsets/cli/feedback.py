@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from limitsets.cli.arguments import HELP_NO_RECHECK, deviations, place
+from limitsets.cli.arguments import HELP_NO_RECHECK, deviations, place, places_of
 from limitsets.cli.certificates import certified, said_of
 from limitsets.cli.output import Json, Scene, Words, answer, opened, option, progress, saved, table
 from limitsets.errors import LimitsetsError
@@ -73,7 +73,7 @@ def feedback(
         if sweep is None:
             found = run(chosen, _sensor(chosen, beyond, error, side, blind=blind), **options)
         else:
-            at = _places(chosen, sweep)
+            at = places_of(chosen, sweep, "--sweep")
             tried = list(zip(at, places(chosen, at, error=place(chosen, error), **options), strict=True))
             found = min((each for _, each in tried), key=lambda each: (not each.solved, each.found.throws))
         written = None
@@ -137,14 +137,6 @@ def _starts(scene: Any, words: list[str] | None, begin: str | None) -> Any:
             raise LimitsetsError("the starts", word, "SIDE=LO:HI", remedy, key="--starts")
         found[int(side)] = (place(scene, lo), place(scene, hi))
     return found or None
-
-
-def _places(scene: Any, text: str) -> list[float]:
-    words = text.split(":")
-    if len(words) != 3 or not words[2].strip().isdigit() or not 1 <= int(words[2]) <= 1000:
-        raise LimitsetsError("the places", text, "LO:HI:N, N from 1 to 1000", "correct it", key="--sweep")
-    lo, hi, count = place(scene, words[0]), place(scene, words[1]), int(words[2])
-    return [lo + (hi - lo) * k / max(count - 1, 1) for k in range(count)]
 
 
 def _write(found: Synthesis, record: dict[str, Any], out: Path) -> None:

@@ -1,6 +1,6 @@
 """Several parts on one arm at once, in the engine: thrown together, in contact with each other and with the ground.
 
-What is assumed stands in docs/crowds.md.
+What is assumed stands in docs/many_parts.md.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from limitsets.engine.member import FLYING, HINGED, LOOSE, OUT, Member
 from limitsets.engine.overlaps import depth_of_overlap
 from limitsets.engine.recording import Recording
 from limitsets.engine.rests import Rest, lying, on_arm, rest_of
+from limitsets.engine.settling import IDLE
 from limitsets.engine.stage import OVERLAP
 from limitsets.engine.touching import Touching
 from limitsets.errors import AnswerError
@@ -41,7 +42,9 @@ class Crowd:
         lies still until another one strikes it.  A corner that comes down beyond the arm's end, a part that was struck
         as it lay, the cavity and other parts meet the engine's own contact.  ``"unilateral"``: that contact for all.
     between : bool
-        Whether parts push each other.  If not, `overlapped` still tells which outlines have met.
+        Whether parts push each other.
+    watch : bool
+        Whether `overlapped` tells which outlines have met where parts do not push each other; slow for very many.
     carried : bool
         Whether the cavity is part of the arm, and all that lies in it is thrown; else only those parts are that touch
         the arm's surface with a corner or have their centre of mass before its end.
@@ -89,6 +92,7 @@ class Crowd:
         *,
         contact: str = "hinge",
         between: bool = True,
+        watch: bool = True,
         carried: bool = False,
         friction: float | None = None,
         sliding: float = 0.2,
@@ -109,11 +113,12 @@ class Crowd:
         self.ground, self.cavity = ground_of(scene, depressions=depressions, wall=wall), scene.cavity
         masses = [area_of(each) for each in scenes] if masses is None else masses
         self.members = [Member(each, k, float(masses[k])) for k, each in enumerate(scenes)]
-        self.contacts = Touching(self.ground, self.members, between, scene.kappa, step)
+        self.contacts = Touching(self.ground, self.members, between, watch, scene.kappa, step)
         self.contacts.rub(mu or 0.0, sliding, e)
         self.space = self.contacts.space
         unit = 1.0 if scene.gravity is None else math.sqrt(scene.kappa / scene.gravity)
         self.film, self.count = Film(record, unit, self.members), 0
+        self.awake = max(int(0.5 * IDLE / step), 1)  # steps in which nothing falls asleep
 
     @property
     def overlapped(self) -> set[tuple[int, int]]:
@@ -134,7 +139,8 @@ class Crowd:
             allowed = "a side of the part, and x from a of that side to the arm's length"
             raise AnswerError(f"the place of part {number}", (x, side), allowed, "lay it on the arm")
         self.drop(number, (x, scene.surface_height + float(scene.sides.d[side]), member.flat[side]))
-        member.body.sleep()
+        if x <= self.ground.end:
+            member.body.sleep()
 
     def drop(self, number: int, pose: tuple[float, float, float]) -> None:
         """Put a part anywhere, at rest, with a pose as in `Rest`; `settle` lets it fall.
@@ -184,8 +190,9 @@ class Crowd:
             One per part, in the order of the scenes.
         """
         shifts = landing if isinstance(landing, Mapping) else dict(enumerate(landing))
-        carried = [each for each in self.members if each.mode != OUT and self._is_carried(each)]
-        for member in carried:
+        for member in self.members:
+            if member.mode == OUT or not (self.carried or on_arm(member, self.ground)):
+                continue
             member.let_go(self.space)
             member.level(lying(member))
             member.release(1.0 + deviation, float(shifts.get(member.number, 0.0)), self.step)
@@ -214,9 +221,6 @@ class Crowd:
         """Give what was kept since the crowd was made."""
         return self.film.recording(self.ground)
 
-    def _is_carried(self, member: Member) -> bool:
-        return self.carried or on_arm(member, self.ground)
-
     def _run(self) -> list[Rest]:
         """Step until all are at rest; Python acts only where a part may come down, or a film wants a frame."""
         last, look, frame = math.ceil(self.patience / self.step), 0, 0 if self.film.on else math.inf
@@ -244,11 +248,7 @@ class Crowd:
             self._mark("impact", *contacts.news)
             contacts.news.clear()
         found = self.rests()
-        fed = [rest.number for rest in found if rest.where == "cavity"]
-        lie = [rest.number for rest in found if rest.where in ("arm", "beyond", "leaning")]
-        self._mark("in the cavity", *fed)
-        self._mark("rest", *lie)
-        self.film.end(self.count * step)
+        self.film.end(self.count * step, found)
         self.count = 0
         return found
 
@@ -286,7 +286,13 @@ class Crowd:
         """Look whether the face of a held part comes down: there it lies, or else tips over the end."""
         wait = member.steps_to_face(self.step)
         if wait > 0:
-            member.due = self.count + (1 if self.contacts.any_of(member.number) else wait)
+            wait = min(wait, self.awake)
+            if self.contacts.any_of(member.number):
+                member.soften(self.space.collision_bias)
+                wait = 1
+            else:
+                member.body.activate()  # it may stand on its corner for long, but not for good
+            member.due = self.count + wait
             return
         if member.lie_down(self.space) != member.side:
             self._mark("roll", member.number)

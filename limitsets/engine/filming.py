@@ -10,6 +10,7 @@ import numpy as np
 from limitsets.engine.ground import Ground
 from limitsets.engine.member import OUT, Member
 from limitsets.engine.recording import Mark, Recording
+from limitsets.engine.rests import Rest
 
 __all__ = ["Film"]
 
@@ -31,6 +32,7 @@ class Film:
         self.on, self.unit, self.start, self.members = on, unit, 0.0, members
         self.frames: list[tuple[float, list[tuple[float, float, float]]]] = []
         self.marks: list[Mark] = []
+        self.inside: set[int] = set()  # the parts in the cavity
 
     def mark(self, time: float, numbers: Iterable[int], word: str) -> None:
         """Keep what happens to parts, so long after the throw began [rad]."""
@@ -43,9 +45,19 @@ class Film:
             poses = [(math.nan,) * 3 if each.mode == OUT else each.pose() for each in self.members]
             self.frames.append((self.start + time * self.unit, poses))
 
-    def end(self, time: float) -> None:
-        """Let the next throw begin where this one ended."""
+    def end(self, time: float, rests: Iterable[Rest]) -> None:
+        """Keep where all have come to rest; the next throw begins there."""
         self.frame(time)
+        inside = set()
+        for rest in rests:
+            if rest.where == "cavity":
+                inside.add(rest.number)
+            elif rest.number in self.inside and rest.where != "out":
+                self.mark(time, [rest.number], "ejected")
+            if rest.where in ("arm", "beyond", "leaning"):
+                self.mark(time, [rest.number], "rest")
+        self.mark(time, sorted(inside - self.inside), "in the cavity")
+        self.inside = inside
         self.start += time * self.unit
 
     def recording(self, ground: Ground) -> Recording:

@@ -174,6 +174,11 @@ class Member:
         self.stand((x, self.scene.surface_height + float(self.scene.sides.d[side]), angle))
         return side
 
+    def soften(self, bias: float) -> None:
+        """Let the joint take back its drift as slowly as contacts their overlap, or they would never rest."""
+        if self.joint.error_bias != bias:  # to set it wakes the part
+            self.joint.error_bias = bias
+
     def let_go(self, space: Any) -> None:
         """Take the joint away, if there is one."""
         if self.joint is not None:

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 __all__ = ["Touching"]
 
 # A part slower than this share of the speed of a fall by its own size is idle.
-SLOW = 1e-3
+SLOW = 3e-3
 # Collision type of parts; pieces of the ground have those beyond.
 PART = 1
 ARM, OTHERS = 1, 2  # categories of shapes
@@ -38,7 +38,7 @@ class Touching:
     """
 
     def __init__(
-        self, ground: Ground, members: Sequence[Member], between: bool, kappa: float, step: float
+        self, ground: Ground, members: Sequence[Member], between: bool, watch: bool, kappa: float, step: float
     ) -> None:
         pymunk = pymunk_module()
         size = min(member.size for member in members)
@@ -50,8 +50,9 @@ class Touching:
         space.collision_bias = (1.0 - TAKEN_BACK) ** (1.0 / step)
         space.sleep_time_threshold = IDLE
         space.idle_speed_threshold = SLOW * math.sqrt(kappa * size)
-        self.on_all = pymunk.ShapeFilter(categories=OTHERS)
-        self.off_arm = pymunk.ShapeFilter(categories=OTHERS, mask=self.on_all.mask ^ ARM)
+        group = 0 if between or watch else 1  # of shapes that do not see each other
+        self.on_all = pymunk.ShapeFilter(group, OTHERS)
+        self.off_arm = pymunk.ShapeFilter(group, OTHERS, self.on_all.mask ^ ARM)
         self.names: dict[int, str] = {}
         self.pieces: list[Any] = []
         for kind, (name, shapes) in enumerate(ground.shapes(space.static_body).items(), PART + 1):

@@ -9,6 +9,7 @@ from typing import Any
 
 from limitsets.errors import AnswerError
 from limitsets.feeding.bracketing import fate_brackets
+from limitsets.feeding.crowd import BATCHES, CrowdTrials, run_crowd
 from limitsets.feeding.falling import ArmEnd, arm_end_of, clear_beyond, time_to_tip
 from limitsets.feeding.fed_shares import Curve, FedShares, FeedingProblem, success_curve
 from limitsets.feeding.proving import FeedingProof, proved_feeding
@@ -55,6 +56,9 @@ class Feeding:
         Parts thrown.
     brackets : AbsorptionBrackets or None
         Proved brackets of right, wrong, wall and exits within n throws; None where they were not asked for.
+    crowds : tuple of CrowdTrials
+        Many parts at once in the engine: that push each other, and that pass through each other, from the same seeds;
+        empty where they were not asked for.
     """
 
     end: ArmEnd
@@ -67,6 +71,7 @@ class Feeding:
     curve: Curve | None
     trials: Trials
     brackets: AbsorptionBrackets | None = None
+    crowds: tuple[CrowdTrials, ...] = ()
 
     @property
     def safe(self) -> Safe | None:
@@ -161,6 +166,7 @@ class Feeding:
             else as_table(**picked(self.curve, *(each.name for each in fields(Curve)))),
             trials=self.trials,
             brackets=self.brackets,
+            crowds=[crowd.to_json() | {"right_per_minute": crowd.per_minute(rate)} for crowd in self.crowds],
         )
 
 
@@ -178,6 +184,8 @@ def feed(
     cells: int = CELLS,
     strata: int = STRATA,
     brackets: int | None = None,
+    parts: int | None = None,
+    batches: int = BATCHES,
     progress: Progress | None = None,
 ) -> Feeding:
     """Say what becomes of parts that are thrown along an arm with a cavity at its end.
@@ -207,6 +215,10 @@ def feed(
         Cells per side, and pieces into which each law of the noise is cut, for the probabilities.
     brackets : int, optional
         Cells per side for proved brackets of the fates, of noise with uniform or normal laws: seconds to minutes.
+    parts : int, optional
+        Throw so many parts at once, in the engine: for a scene with ``effects.contact = true`` and `world.friction`.
+    batches : int
+        How often that is tried.
     progress : callable, optional
         Told (stage, done, all).
 
@@ -217,7 +229,8 @@ def feed(
     Raises
     ------
     AnswerError
-        For a scene without a cavity or a wanted side, no trials, or noise of which nothing can be proved.
+        For a scene without a cavity or a wanted side, no trials, or noise of which nothing can be proved; parts at once
+        in a scene without contact, or without pymunk.
 
     Examples
     --------
@@ -236,6 +249,10 @@ def feed(
         raise AnswerError("the trials", trials, "1 or more", "throw some parts")
     if scatter is None:
         scatter = Scattering() if read.effects.spread is None else scattering_of(read)
+    # first, as they may be refused: with contact between the parts and without
+    how: dict[str, Any] = {"batches": batches, "seed": seed, "progress": progress}
+    both = () if parts is None else (True, False)
+    crowds = tuple(run_crowd(end, scatter, parts or 0, between=between, **how) for between in both)
     # normal deviations have no bound, so that nothing holds for every sequence: the proofs are of the still scene then
     proved = end if read.effects.spread != "gaussian" else replace(end, scene=still(read))
     proof = proved_feeding(proved, noise, progress=progress) if prove else None
@@ -256,4 +273,5 @@ def feed(
         curve,
         run_trials(end, scatter, trials, seed=seed, progress=progress),
         None if brackets is None else fate_brackets(end, scatter, brackets, progress=progress),
+        crowds,
     )

@@ -58,6 +58,7 @@ KERNEL_FREE = {
     "inverse",
     "sweep",
     "plot",
+    "animation",
     "report",
     "cli",
 }

@@ -38,6 +38,8 @@ _FILES = {
     "robust_design": "fronts",
     "tolerance_box": "margins",
     "tornado": "margins",
+    "tray": "filled_trays",
+    "tray_design": "filled_trays",
 }
 
 __all__ = [*_FILES]

@@ -23,7 +23,8 @@ Array = NDArray[np.float64]
 
 def about_centre(scene: Scene) -> Array:
     """Vertices about the centre of mass, in the frame in which the scene gives them; shape (n, 2)."""
-    return scene.vertices - np.asarray(scene.centre)
+    about: Array = scene.vertices - np.asarray(scene.centre)
+    return about
 
 
 def angle_on_side(scene: Scene, side: int) -> float:

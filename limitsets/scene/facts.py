@@ -131,8 +131,8 @@ class Effects:
     auto : bool
         Let the analysis switch on what the scene calls for.
     contact : bool
-        Parts meet each other and the walls of cavities and depressions, in the rigid-body engine; the map of one part on
-        the arm is the same with it and without.
+        Parts meet each other and the walls of cavities and depressions, in the rigid-body engine; the map of one part
+        on the arm is the same with it and without.
     """
 
     words: Mapping[str, bool | str] = field(default_factory=dict)

@@ -7,6 +7,7 @@ others as they are.  The chain has no memory but its state: `histories` asks whe
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -22,6 +23,8 @@ Array = NDArray[np.float64]
 
 # Passes after which nothing changes any more: 2 to this power.
 ENDLESS = 40
+# A wrong part that no kick moved leaves by so little, that there is one answer.
+LEAVES = 1.0 - 1e-12
 # Draws of the counted probabilities, and the confidence of the intervals.
 DRAWS, CONFIDENCE = 2000, 0.95
 
@@ -70,11 +73,18 @@ class Chain:
         return np.asarray(power[..., 0, :])
 
     @property
-    def by_formula(self) -> Array:
-        """The rest p_release/(p_capture + p_release): of "empty" and "right" alone, from one to the other in a pass."""
+    def capture_and_release(self) -> tuple[Array, Array]:
+        """Give p_capture and p_release: of the chain watched only while it is empty or right.
+
+        From each of the two, the probability that the other one is the next of them, whatever wrong parts lay there
+        between; so p_release/(p_capture + p_release) is exactly the share of "empty" in both, after endless passes.
+        """
         step = self.passed
-        release, capture = step[..., self.right, 0], step[..., 0, self.right]
-        return np.asarray(release / (capture + release))
+        ends, others = [0, self.right], [k for k in range(1, step.shape[-1]) if k != self.right]
+        among, out = step[..., others, :][..., others], step[..., others, :][..., ends]
+        between = np.linalg.solve(np.eye(len(others)) - LEAVES * among, out)
+        watched = step[..., ends, :][..., ends] + step[..., ends, :][..., others] @ between
+        return np.asarray(watched[..., 0, 1]), np.asarray(watched[..., 1, 0])
 
 
 def chain_of(counts: Counts) -> Chain:
@@ -127,8 +137,10 @@ class Filled:
         Mean number of passes that a depression stays as it is; infinite where no kick changed it.
     number : int
         Of the state wanted, in `states`.
+    capture, release : float
+        Between empty and right (`Chain.capture_and_release`).
     rest, rest_interval : float; tuple of float
-        p_release/(p_capture + p_release): what were empty if there were no wrong parts.
+        release/(capture + release): the share that is empty of the depressions without a wrong part.
     """
 
     right: Array
@@ -138,6 +150,8 @@ class Filled:
     last_interval: Array
     stays: Array
     number: int
+    capture: float
+    release: float
     rest: float
     rest_interval: tuple[float, float]
 
@@ -162,7 +176,12 @@ class Filled:
             last_interval=dict(zip(names, self.last_interval.tolist(), strict=True)),
             stays=dict(zip(names, self.stays.tolist(), strict=True)),
             unfilled=self.unfilled,
-            rest={"value": self.rest, "interval": self.rest_interval},
+            rest={
+                "p_capture": self.capture,
+                "p_release": self.release,
+                "value": self.rest,
+                "interval": self.rest_interval,
+            },
             passes_to_95=self.passes_to(0.95),
         )
 
@@ -177,7 +196,9 @@ def filled(counts: Counts, passes: int, random: np.random.Generator) -> Filled:
 
     with np.errstate(divide="ignore"):
         stays = 1.0 / (1.0 - np.diagonal(chain.passed))
-    low, high = interval(drawn.by_formula).tolist()
+    capture, release = chain.capture_and_release
+    captures, releases = drawn.capture_and_release
+    low, high = interval(releases / (captures + releases)).tolist()
     return Filled(
         chain.occupied(passes)[:, chain.right],
         interval(drawn.occupied(passes)[..., chain.right]),
@@ -186,6 +207,8 @@ def filled(counts: Counts, passes: int, random: np.random.Generator) -> Filled:
         interval(drawn.at_last()),
         stays,
         chain.right,
-        float(chain.by_formula),
+        float(capture),
+        float(release),
+        float(release) / float(capture + release) if capture + release else math.nan,
         (low, high),
     )

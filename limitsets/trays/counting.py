@@ -41,6 +41,8 @@ class Counts:
         By the state before, the states in which one kick left it; rows of states that never came about are 0.
     unfinished : int
         Parts that had not come to rest when patience ended; they are in none of the counts.
+    poses : dict of int to Pose
+        Where the first part in each state lay.
     """
 
     states: tuple[str, ...]
@@ -48,6 +50,7 @@ class Counts:
     captured: NDArray[np.int64]
     kicked: NDArray[np.int64]
     unfinished: int
+    poses: dict[int, Pose]
 
     @property
     def met(self) -> list[int]:
@@ -125,8 +128,8 @@ def count(
 ) -> Counts:
     """Count captures of `drops` parts that come by, and what `kicks` kicks do in each state that comes about.
 
-    A state's kicks begin from the poses, in turn, in which parts came to lie in it: from those that came by or, where none
-    did, from those kicked into it.
+    A state's kicks begin from the poses, in turn, in which parts came to lie in it: from those that came by or, where
+    none did, from those kicked into it.
 
     Raises
     ------
@@ -163,4 +166,5 @@ def count(
         poses |= fresh
         waiting += sorted(fresh)
     unfinished = sum(rest.state == UNFINISHED for rest in every)
-    return Counts(passes.states, passes.right, captured, kicked, unfinished)
+    first = {state: found[0] for state, found in sorted(poses.items()) if state > EMPTY}
+    return Counts(passes.states, passes.right, captured, kicked, unfinished, first)

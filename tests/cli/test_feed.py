@@ -1,7 +1,10 @@
 """`limitsets feed`: words, JSON, files, exit codes."""
 
 import json
+import re
 from pathlib import Path
+
+import pytest
 
 import limitsets as ls
 from tests.cli.command import run
@@ -83,3 +86,29 @@ def test_a_scene_without_a_cavity_is_told_so(capfd):
     code, _, err = run(capfd, "feed", "paper-designed")
     assert code == 2
     assert "add [cavity]" in err
+
+
+def test_many_parts_at_once(capfd):
+    """The keys are those of docs/json.md; without contact nothing is thrown at once."""
+    pytest.importorskip("pymunk")
+    tables = {"world": {"friction": 0.9, "throw_rate": "2 Hz"}, "effects": {"contact": True}}
+    ls.dump(with_cavity("paper-designed", tables=tables), "many.toml")
+    quick = ("--no-proof", "--trials", "20", "--cells", "32", "--parts", "2", "--batches", "2")
+    code, out, _ = run(capfd, "feed", "many.toml", *quick, "--json")
+    assert code == 0
+    crowds = json.loads(out)["crowds"]
+    page = (Path(__file__).resolve().parents[2] / "docs" / "json.md").read_text(encoding="utf-8")
+    line = next(line for line in page.splitlines() if line.startswith("| `crowds`"))
+    named = re.search(r"`\{(.*?)\}`", line).group(1).split(", ")
+    for crowd, between in zip(crowds, (True, False), strict=True):
+        assert list(crowd) == named
+        assert (crowd["parts"], crowd["batches"], crowd["between"]) == (2, 2, between)
+        rate = crowd["right_per_throw"]["value"]
+        assert crowd["right_per_minute"] == pytest.approx(120.0 * rate)
+    code, out, _ = run(capfd, "feed", "many.toml", *quick)
+    assert code == 0
+    assert "2 parts at once that push each other (arm: hinge):" in out
+    assert "right per throw" in out
+    code, _, err = run(capfd, "feed", written("paper-designed"), *quick)
+    assert code == 2
+    assert "effects.contact" in err

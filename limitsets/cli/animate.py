@@ -1,0 +1,127 @@
+"""`limitsets animate`: a film of throws, of feeding, of feedback, or of an orbit that violates the goal."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from limitsets.cli.arguments import position
+from limitsets.cli.output import Json, Scene, answer, option, progress
+from limitsets.errors import LimitsetsError
+
+__all__ = ["animate"]
+
+# Pairs that are thrown to find one that is assembled, and drops of a tray of which only the passes are shown.
+PAIRS, FEW = 40, 20
+HELP_START = "x and side of the start: 15,2 or '38 cm,2'; default a good one, on the limit set."
+
+
+def animate(
+    scene: Scene,
+    out: Annotated[
+        Path | None,
+        option("--out -o", "FILE", "A name that ends in .html, .gif or .mp4; ./NAME.html by default."),
+    ] = None,
+    start: Annotated[str | None, option("--start", "X,SIDE", HELP_START)] = None,
+    throws: Annotated[
+        int | None,
+        option(
+            "--throws", "N", "How many throws at most; default 8, and all of --feed and --feedback.", min=1
+        ),
+    ] = None,
+    feed: Annotated[
+        bool, typer.Option("--feed", help="Throw until the part falls into the scene's [cavity].")
+    ] = False,
+    feedback: Annotated[
+        bool, typer.Option("--feedback", help="Find a policy for the scene's [feedback], and throw by it.")
+    ] = False,
+    margin: Annotated[
+        str | None,
+        option("--margin", "QUANTITY", "Show the orbit that violates the goal, at its margin of QUANTITY."),
+    ] = None,
+    assemble: Annotated[
+        str | None,
+        option("--assemble", "SCENE2", "Throw the part together with another; both scenes in contact."),
+    ] = None,
+    tray: Annotated[bool, typer.Option("--tray", help="Show a depression of the scene's [tray].")] = False,
+    reading: Annotated[str | None, option("--reading", "R", "Of the margin: fixed or per-throw.")] = None,
+    fps: Annotated[float, option("--fps", "N", "Frames per second.")] = 20.0,
+    slow: Annotated[float, option("--slow", "N", "How many times slower than the machine.")] = 3.0,
+    json: Json = False,
+) -> None:
+    """Write a film: the arm swings up and stops, the part flies and lands, and where that is on the limit set."""
+    if feed + feedback + tray + (margin is not None) + (assemble is not None) > 1:
+        value = "more than one of --feed, --feedback, --margin, --assemble, --tray"
+        raise LimitsetsError("what to show", value, "one of them", "make a film of each")
+    if reading is not None and margin is None:
+        raise LimitsetsError("the reading", reading, "with --margin", "name the quantity", key="--reading")
+    with progress() as tell:
+        from limitsets.animation import animate as write
+        from limitsets.animation import require_file
+        from limitsets.scene import load
+
+        chosen = load(scene)
+        file = Path(f"{chosen.name}.html") if out is None else out
+        require_file(file)  # before anything is searched or proved
+        begin = None if start is None else _start(chosen, start)
+        if begin is not None and (tray or margin is not None or assemble is not None):
+            allowed = "none with --margin, --assemble and --tray, which have their own"
+            raise LimitsetsError("the start", start, allowed, "leave it out")
+        asked: dict[str, Any] = {
+            "feed": feed,
+            "feedback": feedback,
+            "tray": tray,
+            "margin": margin,
+            "assemble": assemble,
+        }
+        shown = _shown(chosen, tell, reading=reading, **asked)
+        write(shown, file, start=begin, throws=throws, fps=fps, slow=slow, progress=tell)
+    size = file.stat().st_size
+    answer(
+        {"film": str(file), "bytes": size}, json, lambda: typer.echo(f"film: {file} ({size / 1e6:.2g} MB)")
+    )
+
+
+def _start(scene: Any, text: str) -> tuple[float, int]:
+    x, comma, side = text.rpartition(",")
+    if not comma or not side.strip().isdigit():
+        raise LimitsetsError("the start", text, "X,SIDE, as in 15,2", "name both", key="--start")
+    return position(scene, x), int(side)
+
+
+def _shown(
+    scene: Any,
+    tell: Any,
+    *,
+    feed: bool,
+    feedback: bool,
+    tray: bool,
+    margin: str | None,
+    assemble: str | None,
+    reading: str | None,
+) -> Any:
+    """Compute what is asked, as far as a film needs it."""
+    if feed:
+        from limitsets.feeding.falling import arm_end_of
+
+        return arm_end_of(scene)
+    if feedback:
+        from limitsets.policies import feedback as find
+
+        return find(scene, progress=tell)
+    if tray:
+        from limitsets.trays import tray as fill
+
+        return fill(scene, passes=1, drops=FEW, kicks=FEW, progress=tell)
+    if assemble is not None:
+        from limitsets.assembly import assemble as pairs
+
+        return pairs(scene, assemble, trials=PAIRS, progress=tell)
+    if margin is not None:
+        from limitsets.robust import margin as bracket
+
+        (found,) = bracket(scene, margin, reading=reading, progress=tell)
+        return found
+    return scene

@@ -1,0 +1,171 @@
+"""Files: what a page holds, frames and delays of a GIF, frames of an MP4; the page needs nothing from elsewhere."""
+
+import json
+import re
+import sys
+from html.parser import HTMLParser
+
+import numpy as np
+import pytest
+
+import limitsets as ls
+from limitsets.animation import animating, film_of
+from limitsets.animation.picture import Picture
+from limitsets.animation.raster import frames
+from limitsets.errors import AnswerError
+from tests.test_architecture import LATE, run_python
+
+SHORT = {"start": (21.0, 2), "throws": 1, "slow": 1.0, "fps": 20.0}
+
+
+class Page(HTMLParser):
+    """Read tags, their attributes and texts; every tag that is opened is closed."""
+
+    EMPTY = ("meta", "input", "circle", "polygon", "polyline")
+
+    def __init__(self, text):
+        super().__init__()
+        self.tags, self.open, self.texts = [], [], {}
+        self.feed(text)
+        self.close()
+        assert not self.open
+
+    def handle_starttag(self, tag, attrs):
+        self.tags.append((tag, dict(attrs)))
+        if tag not in self.EMPTY:
+            self.open.append((tag, dict(attrs).get("id")))
+
+    def handle_startendtag(self, tag, attrs):
+        self.tags.append((tag, dict(attrs)))
+
+    def handle_endtag(self, tag):
+        assert self.open.pop()[0] == tag
+
+    def handle_data(self, data):
+        if self.open:
+            self.texts[self.open[-1]] = self.texts.get(self.open[-1], "") + data
+
+
+def test_a_page_holds_the_poses_and_nothing_from_elsewhere(tmp_path):
+    file = ls.animate("paper-designed", tmp_path / "run.html", **SHORT)
+    text, film = file.read_text(encoding="utf-8"), film_of("paper-designed", **SHORT)
+    page = Page(text)
+    assert not re.search(r"https?:|//[a-z]|@import|url\(", text)
+    assert not [attrs for _, attrs in page.tags if {"src", "href", "xlink:href"} & attrs.keys()]
+    data = json.loads(page.texts["script", "film"])
+    assert np.array(data["poses"]) == pytest.approx(film.poses, abs=1e-5)
+    assert np.array(data["arm"]) == pytest.approx(film.arm, abs=1e-6)
+    assert data["captions"] == list(film.captions)
+    assert len(data["times"]) == film.frames
+    assert file.stat().st_size < 100_000
+
+
+def test_a_page_speaks_to_those_who_do_not_see_it(tmp_path):
+    page = Page(ls.animate("paper-designed", tmp_path / "run.html", **SHORT).read_text(encoding="utf-8"))
+    attributes = {attrs["id"]: attrs for _, attrs in page.tags if "id" in attrs}
+    (picture,) = [attrs for tag, attrs in page.tags if tag == "svg"]
+    assert picture["role"] == "img"
+    assert all(name in attributes for name in picture["aria-labelledby"].split())
+    assert attributes["frame"]["aria-label"] == "Frame"
+    assert attributes["said"]["aria-live"] == "polite"
+    said = [text for (tag, _), text in page.texts.items() if tag == "button"]
+    assert any("flip from 21.00 in, side 2, to 16.55, side 0" in text for text in said)
+
+
+def test_the_still_part_and_the_first_frame_are_there_without_a_script(tmp_path):
+    text = ls.animate("paper-designed", tmp_path / "run.html", **SHORT).read_text(encoding="utf-8")
+    film = film_of("paper-designed", **SHORT)
+    corners = Picture.of(film).at(film.polygon(0))
+    drawn = " ".join(f"{x:.2f},{y:.2f}" for x, y in corners)
+    assert f'points="{drawn}"' in text
+
+
+def test_a_gif_has_the_frames_and_their_delays(tmp_path):
+    from PIL import Image
+
+    film = film_of("paper-designed", **SHORT)
+    with Image.open(ls.animate("paper-designed", tmp_path / "run.gif", **SHORT)) as image:
+        assert image.info["loop"] == 0
+        delays = []
+        for k in range(image.n_frames):
+            image.seek(k)
+            delays.append(image.info["duration"])
+        assert image.size == tuple(2 * round(0.45 * each) for each in Picture.of(film).size)
+    # frames that are alike are stored as one, shown as long
+    assert sum(delays) == 50 * film.frames
+    assert film.frames - 5 <= len(delays) <= film.frames
+
+
+def test_an_mp4_has_the_frames(tmp_path):
+    import imageio_ffmpeg
+
+    film = film_of("paper-designed", **SHORT)
+    file = ls.animate("paper-designed", tmp_path / "run.mp4", **SHORT)
+    count, seconds = imageio_ffmpeg.count_frames_and_secs(str(file))
+    assert count == film.frames
+    assert seconds == pytest.approx(film.frames / 20.0, abs=0.06)
+    reader = imageio_ffmpeg.read_frames(str(file))
+    about = next(reader)
+    reader.close()
+    assert about["size"] == tuple(2 * round(0.75 * each) for each in Picture.of(film).size)
+    assert about["codec"] == "h264"
+
+
+def test_pixels_show_the_part_where_it_is():
+    """The colour of the part's face is at its centre of mass, aside from the sign there, and nowhere under the arm."""
+    film = film_of("paper-designed", **SHORT)
+    picture, face = Picture.of(film), np.array([0xCF, 0xE3, 0xF2])
+    for k, pixels in enumerate(frames(picture)):
+        if k % 9 == 0:
+            centre, corners = picture.at(film.poses[k, 0, :2]), picture.at(film.polygon(k))
+            beside = centre + 0.25 * (corners.mean(axis=0) - centre) + (0.0, -9.0)
+            x, y = np.round(beside).astype(int)
+            above = pixels[: int(picture.bottom)].astype(int)
+            found = np.argwhere((np.abs(above - face) < 6).all(axis=2))
+            assert (np.abs(found - (y, x)).sum(axis=1) <= 12).any()
+            assert found[:, 1].min() >= corners[:, 0].min() - 3
+            assert found[:, 1].max() <= corners[:, 0].max() + 3
+            assert found[:, 0].max() <= corners[:, 1].max() + 3
+
+
+def test_without_imageio_ffmpeg_one_line_says_what_to_install(tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
+    monkeypatch.delitem(sys.modules, "limitsets.animation.mp4", raising=False)
+    with pytest.raises(AnswerError, match=r"pip install 'limitsets\[animate\]'"):
+        ls.animate("paper-designed", tmp_path / "run.mp4", **SHORT)
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_film_that_is_not_finished_leaves_the_old_file(tmp_path):
+    file = tmp_path / "run.gif"
+    file.write_bytes(b"old")
+
+    def stop(stage, done, _):
+        if stage == "frames" and done > 3:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        ls.animate("paper-designed", file, progress=stop, **SHORT)
+    assert file.read_bytes() == b"old"
+    assert [each.name for each in tmp_path.iterdir()] == ["run.gif"]
+
+
+def test_a_place_that_cannot_be_written_is_named(tmp_path):
+    (tmp_path / "taken").write_text("")
+    with pytest.raises(AnswerError, match="the film's file"):
+        ls.animate("paper-designed", tmp_path / "taken" / "run.html", **SHORT)
+
+
+def test_importing_limitsets_loads_none_of_it():
+    loaded = run_python("import sys, limitsets; print(*sys.modules)").split()
+    assert not [name for name in loaded if name.startswith(("limitsets.animation", "PIL", "imageio"))]
+    loaded = run_python("import sys, limitsets as ls; ls.animate; print(*sys.modules)").split()
+    assert not {*LATE, "PIL", "imageio_ffmpeg"} & set(loaded) - {"numba", "scipy", "networkx"}
+
+
+def test_every_kind_and_writer_of_the_tables_is_there():
+    for where in (
+        *animating.KINDS.values(),
+        *(each for each in animating.SUFFIXES.values() if "mp4" not in each),
+    ):
+        assert callable(animating._found(where))

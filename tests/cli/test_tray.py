@@ -1,0 +1,93 @@
+"""`limitsets tray`: words, JSON as docs/json.md has it, files, errors."""
+
+import csv
+import json
+import re
+from pathlib import Path
+
+import pytest
+
+import limitsets as ls
+from tests.cli.command import run
+from tests.trays.scenes import with_tray
+
+pytest.importorskip("pymunk")
+
+PAGE = (Path(__file__).resolve().parents[2] / "docs" / "json.md").read_text(encoding="utf-8")
+FEW = ("--drops", "80", "--kicks", "20", "--passes", "12")
+
+
+@pytest.fixture(autouse=True)
+def _scene(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    ls.dump(with_tray(), "tray.toml")
+
+
+def documented(section):
+    """Keys in the first column of a section's table."""
+    text = PAGE.split(f"## {section}", 1)[1].split("\n## ", 1)[0]
+    cells = re.findall(r"^\| (`[^|]*`) \|", text, re.M)
+    return {name for cell in cells for name in re.findall(r"`(\w+)`", cell)}
+
+
+def test_words_files_and_table(capfd):
+    code, out, _ = run(
+        capfd, "tray", "tray.toml", *FEW, "--histories", "2", "-o", "out", "--csv", "filled.csv"
+    )
+    assert code == 0
+    assert "depressions 7.02 in wide and 1.53 in deep, side 2 is right" in out
+    assert "side 2: right" in out
+    assert "filled rightly after 12 passes" in out
+    assert "p_release/(p_capture + p_release)" in out
+    assert "2 histories with parts that return" in out
+    assert {path.name for path in Path("out").iterdir()} == {"tray.json", "tray.png"}
+    rows = list(csv.reader(Path("filled.csv").read_text().splitlines()))
+    assert rows[0] == ["passes", "right", "low", "high"]
+    assert [int(row[0]) for row in rows[1:]] == list(range(13))
+    record = json.loads(Path("out/tray.json").read_text())
+    assert [float(row[1]) for row in rows[1:]] == pytest.approx(record["filled"]["right"], abs=1e-9)
+
+
+def test_json_has_the_keys_of_the_page(capfd):
+    code, out, _ = run(capfd, "tray", "tray.toml", *FEW, "--json", "--histories", "1", "--seed", "3")
+    assert code == 0
+    record = json.loads(out)
+    assert set(record) == documented("tray\n")
+    assert record["seed"] == 3
+    assert record["arrivals"]["of"] + record["unfinished"] >= 80
+    assert set(record["filled"]["last"]) == set(record["arrivals"]["counts"])
+    assert sum(record["filled"]["last"].values()) == pytest.approx(1.0)
+    assert [each["returning"] for each in record["histories"]] == [False, True]
+
+
+def test_depths_and_agitations(capfd):
+    words = ("--depths", "0.8:1.6:2", "--agitations", "0.4:0.8 in:2")
+    code, out, _ = run(capfd, "tray", "tray.toml", *FEW, *words, "-o", "out", "--csv", "grid.csv", "--json")
+    assert code == 0
+    record = json.loads(out)
+    assert set(record) == documented("tray: depths and agitations")
+    assert (record["depths"], record["agitations"]) == ([0.8, 1.6], [0.4, 0.8])
+    assert {path.name for path in Path("out").iterdir()} == {"design.json", "design.png"}
+    rows = list(csv.DictReader(Path("grid.csv").read_text().splitlines()))
+    assert [float(row["right"]) for row in rows] == pytest.approx(
+        [share for shares in record["right"] for share in shares], abs=1e-9
+    )
+    code, out, _ = run(capfd, "tray", "tray.toml", *FEW, "--depths", "1:2:2")
+    assert code == 0
+    assert "on fresh seeds" in out
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("paper-designed",), "add [tray]"),
+        (("tray.toml", "--side", "7"), "side wanted"),
+        (("tray.toml", "--depths", "1:2"), "LO:HI:N"),
+        (("tray.toml", "--depths", "3.2:3.3:2"), "deeper than the part"),
+    ],
+)
+def test_one_clear_error(capfd, words, said):
+    code, _, err = run(capfd, "tray", *words, *FEW)
+    assert code == 2
+    assert said in err
+    assert "Traceback" not in err

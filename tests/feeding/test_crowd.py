@@ -1,0 +1,111 @@
+"""Many parts at once: against the trials of single parts, from the same law of starts and noise."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.stats import binomtest, norm
+
+import limitsets as ls
+from limitsets.errors import AnswerError
+from limitsets.feeding.crowd import run_crowd
+from limitsets.feeding.falling import FATES, arm_end_of
+from limitsets.feeding.trials import run_trials
+from limitsets.files import as_json
+from limitsets.robust import Gaussian, Given, Scattering
+from tests.feeding.scenes import with_cavity
+
+pytest.importorskip("pymunk")
+
+NOISE = Scattering(speed=Gaussian(0.005), landing=Gaussian(0.02))
+
+
+def scene(name="paper-designed", **changes):
+    tables = {"effects": {"contact": True}, "world": {"friction": 0.9}, **changes}
+    return with_cavity(name, tables=tables)
+
+
+def assert_alike(found, trials, throws):
+    """Counts within binomial intervals of those of single parts, and the mean number of throws."""
+    count = int(found.fates.sum())
+    for name in FATES:
+        low, high = binomtest(found.counts[name], count).proportion_ci(0.9999, method="exact")
+        assert low - 2e-3 <= trials.counts[name] / trials.fate.size <= high + 2e-3, name
+    if throws:
+        error = trials.throws.std() / np.sqrt(found.throws.size)
+        assert abs(found.throws.mean() - trials.throws.mean()) < 4.0 * error
+
+
+@pytest.mark.parametrize("name", ["paper-designed", "paper-initial"])
+def test_one_part_does_what_single_parts_do(name):
+    end = arm_end_of(scene(name))
+    found = run_crowd(end, NOISE, 1, batches=120, seed=2)
+    assert_alike(found, run_trials(end, NOISE, 20_000, seed=3), throws=True)
+    assert not found.met.any()
+    assert not found.spilled.any()
+
+
+def test_parts_that_pass_through_each_other_do_too():
+    end = arm_end_of(scene("paper-initial"))
+    found = run_crowd(end, NOISE, 6, batches=25, between=False, seed=4)
+    assert found.fates.sum() == 150
+    assert_alike(found, run_trials(end, NOISE, 20_000, seed=3), throws=False)
+
+
+def test_parts_that_push_each_other_are_counted_and_come_out_alike_again():
+    end = arm_end_of(scene())
+    one, two = (run_crowd(end, NOISE, 5, batches=4, seed=1, throws=40) for _ in range(2))
+    assert one.to_json() | {"seconds_per_part_and_throw": 0} == two.to_json() | {
+        "seconds_per_part_and_throw": 0
+    }
+    assert one.met.all()
+    assert (one.fates.sum(axis=1) + one.spilled == 5).all()
+    assert (
+        one.counts["left"] + one.counts["wrong"] > 0
+    )  # of single parts nothing leaves or feeds another side
+
+
+def test_more_parts_than_find_a_place_are_dropped_and_some_spill():
+    """The arm before its end takes three or four side by side."""
+    found = run_crowd(arm_end_of(scene()), NOISE, 30, batches=1, throws=5)
+    assert found.spilled[0] > 5
+    assert found.fates.sum() + found.spilled[0] == 30
+    assert found.throws.tolist() == [5]
+
+
+def test_rates_count_right_feeds_per_throw():
+    found = run_crowd(arm_end_of(scene()), NOISE, 1, batches=2)
+    made = replace(found, fates=np.array([[3, 0, 0, 0, 0], [1, 0, 0, 0, 2]]), throws=np.array([10, 30]))
+    rate, error = made.right_per_throw
+    assert rate == pytest.approx(0.1)
+    # residuals 3 - 1 and 1 - 3: standard deviation sqrt(8), over sqrt(2) batches of 20 throws in the mean
+    assert error == pytest.approx(np.sqrt(8.0) / np.sqrt(2.0) / 20.0)
+    assert made.per_minute(2.0) == pytest.approx(12.0)
+    assert made.per_minute(None) is None
+
+
+def test_feed_has_both_kinds_and_its_json():
+    found = ls.feed(scene(), NOISE, prove=False, level=False, trials=50, cells=32, parts=2, batches=2, seed=5)
+    assert [crowd.between for crowd in found.crowds] == [True, False]
+    table = json.loads(as_json(found))
+    first = table["crowds"][0]
+    assert first["parts"] == first["batches"] == 2
+    assert sum(first["counts"].values()) + 2 * first["spilled"] == 4
+    assert first["right_per_minute"] is None
+    assert first["seed"] == 5
+
+
+@pytest.mark.parametrize(
+    ("changes", "asked", "said"),
+    [
+        ({"effects": {}}, {}, "effects.contact"),
+        ({"world": {}}, {}, "world.friction"),
+        ({}, {"parts": 0}, "1 or more"),
+        ({}, {"scatter": Scattering(speed=Given(norm(scale=0.01)))}, "Gaussian or Uniform"),
+    ],
+)
+def test_what_cannot_be_thrown_is_refused(changes, asked, said):
+    asked = {"parts": 2, "scatter": NOISE, **asked}
+    with pytest.raises(AnswerError, match=said):
+        ls.feed(scene(**changes), trials=10, prove=False, **asked)
