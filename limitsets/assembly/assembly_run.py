@@ -7,10 +7,10 @@ from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import asdict, dataclass
 from functools import lru_cache
+from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from limitsets import __version__
 from limitsets.assembly.counting import Joint, Overlaps, Rate, joint_of, overlaps_of, rate_of
 from limitsets.assembly.pairing import Pair, Start, pair_of, require_apart
 from limitsets.assembly.passing import pass_through
@@ -59,7 +59,7 @@ class Series:
             name: value for name, value in asdict(self).items() if name not in ("scenes", "scatter", "trials")
         }
         scenes = [json.loads(text) for text in self.scenes]
-        return {"limitsets": __version__, "scenes": scenes, "scatter": self.scatter.words(), **words}
+        return {"limitsets": version("limitsets"), "scenes": scenes, "scatter": self.scatter.words(), **words}
 
     def film(self, number: int, last: int) -> Recording:
         """Make a trial in contact again, and keep poses from throw `last` on."""
