@@ -18,12 +18,13 @@ from limitsets.engine.depression import UNFINISHED
 from limitsets.robust.noise.proportions import binomial_interval
 from limitsets.trays import TrayDesign, TrayFill, tray_design
 from limitsets.trays.histories import Histories
+from limitsets.trays.histories import histories as follow
 from limitsets.trays.passing import passes_of, random_of
 
 HERE = Path(__file__).resolve().parent
 DEPTHS = (0.4, 0.75, 1.1, 1.53, 2.0, 2.5, 3.0)
 AGITATIONS = (0.1, 0.2, 0.4, 0.8, 1.6)
-PASSES = 200
+PASSES, SHORT = 200, 3
 STEP = 4e-3
 
 
@@ -54,6 +55,16 @@ def halved(seed: int, trials: int) -> dict[str, Any]:
         rows[f"{word}: trials that differ"] = int((met[:, 0] != met[:, 1]).sum())
     rows["trials"], rows["unfinished"] = trials, int((table == UNFINISHED).sum())
     return rows
+
+
+def forgetting(seed: int, number: int) -> dict[str, Any]:
+    """Count captures after misses in many short histories, which are mostly about the empty depression."""
+    asked = passes_of(scene(), None, STEP)
+    found = {}
+    for returning, word in ((False, "new parts"), (True, "parts return")):
+        short = follow(asked, number, SHORT, seed + 1, returning=returning)
+        found[word] = after(short.captures())
+    return found
 
 
 def agreement(found: TrayFill, each: Histories) -> list[dict[str, Any]]:
@@ -101,6 +112,7 @@ def main(
             "new parts": after(new.releases()),
             "parts return": after(back.releases()),
         },
+        "captured rightly after misses, short": forgetting(seed, 30 * histories),
         "step halved": halved(seed, max(drops // 4, 10)),
     }
     if design:
@@ -136,7 +148,8 @@ def table(numbers: dict[str, Any]) -> str:
         cells += [_share(each["histories"], each["interval"]) for each in (new, back)]
         lines.append(f"| {' | '.join(cells)} |")
     lines += ["", "| | parts | after 0 | after 1 | after 2 or more |", "|---|---|---|---|---|"]
-    for what in ("captured rightly after misses", "released after kicks stood"):
+    captured, released = "captured rightly after misses", "released after kicks stood"
+    for what in (captured, f"{captured}, short", released):
         for parts, rows in numbers[what].items():
             cells = [f"{each['count']} of {each['of']}, {_span(each['interval'])}" for each in rows]
             lines.append(f"| {what} | {parts} | {' | '.join(cells)} |")
