@@ -25,6 +25,8 @@ KINDS = {
     "Synthesis": "run_policies:film_of_policy",
     "Margin": "refuting:film_of_margin",
     "Recording": "recorded:film_of_recording",
+    "Assembly": "recorded:film_of_assembly",
+    "TrayFill": "recorded:film_of_tray",
 }
 """What can be shown, by the name of its class, and which function makes a film of it."""
 
@@ -78,7 +80,7 @@ def film_of(
         raise AnswerError("the throws", throws, "a whole number from 1", "show one at least")
     where = next((KINDS[each.__name__] for each in type(shown).__mro__ if each.__name__ in KINDS), None)
     if where is None:
-        allowed = "a scene, an analysis, or what feed, feedback, margin or a recording of the engine gives"
+        allowed = "a scene, or what analyse, feed, feedback, margin, assemble, tray or a recording gives"
         raise AnswerError("what to animate", type(shown).__name__, allowed, "pass one of these")
     made: Film = _found(where)(shown, start, throws, fps, slow, progress)
     return made
@@ -98,10 +100,11 @@ def animate(
 
     Parameters
     ----------
-    scene : Scene, str, Path, Analysis, ArmEnd, Feeding, Synthesis, Margin or Recording
+    scene : Scene, str, Path, Analysis, ArmEnd, Feeding, Synthesis, Margin, Assembly, TrayFill or Recording
         What to show: throws of a scene, or of an analysis of it; a part that is fed, from `limitsets.feed` or of
         `limitsets.feeding.arm_end_of`; what a policy of `limitsets.feedback` does; the orbit that refutes a goal, from
-        `limitsets.margin`; a recording of the rigid-body engine.
+        `limitsets.margin`; a pair of `limitsets.assemble` in contact; a depression of `limitsets.tray`; a recording of
+        the rigid-body engine.
     file : str or Path
         Where to: .html (a page that stands alone), .gif, or .mp4 (with ``pip install 'limitsets[animate]'``).
     start : (float, int), optional

@@ -12,19 +12,10 @@ from typing import Any
 import numpy as np
 
 from limitsets.animation.film import Film
-from limitsets.animation.picture import (
-    ARM,
-    EDGES,
-    KNOWN,
-    LANE,
-    LEANS,
-    PARTS,
-    THICK,
-    TOP,
-    Picture,
-    Shape,
-)
+from limitsets.animation.lanes_drawn import KNOWN, LANE
+from limitsets.animation.picture import ARM, EDGES, LEANS, PARTS, THICK, TOP, Picture
 from limitsets.animation.raster import Progress
+from limitsets.animation.shapes import Shape
 from limitsets.files import as_plain
 from limitsets.plot import style
 
@@ -68,14 +59,14 @@ def _data(picture: Picture) -> dict[str, Any]:
     def rounded(numbers: Any) -> Any:
         return as_plain(np.round(np.asarray(numbers, dtype=np.float64), digits))
 
-    lanes = film.lanes
+    lanes, rows = film.lanes, picture.rows
     return {
         "fps": film.fps,
         "clock": film.clock,
         "scale": picture.scale,
         "origin": picture.origin,
         "leans": LEANS,
-        "lane": [picture.lane(0.0), LANE],
+        "lane": [0.0 if rows is None else rows.height(0.0), LANE],
         "times": as_plain(np.round(film.times, 4)),
         "arm": as_plain(np.round(film.arm, 6)),
         "poses": rounded(film.poses),
@@ -97,8 +88,8 @@ def _data(picture: Picture) -> dict[str, Any]:
         "position": rounded(film.position) if lanes else None,
         "stage": film.stage.tolist(),
         "known": []
-        if lanes is None
-        else [[rounded(shape.points) for shape in picture.bars(each, 10.0, **KNOWN)] for each in lanes.known],
+        if rows is None
+        else [[rounded(bar.points) for bar in rows.bars(each, 10.0, **KNOWN)] for each in rows.lanes.known],
         "look": {
             "parts": PARTS,
             "edges": EDGES,

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from limitsets.animation.picture import Picture, Shape
+from limitsets.animation.picture import Picture
+from limitsets.animation.shapes import Shape
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -1,108 +1,218 @@
-"""A film of a recording of the engine: several parts, the ground, and what happened to whom."""
+"""Films of what the engine recorded: several parts, the ground, and what happened to whom.
+
+Where the scenes of the parts are known their sides are named, times are theirs, and the swing of the arm before each
+throw is drawn, with the parts that it throws lying on it.
+"""
 
 from __future__ import annotations
 
+import math
 from collections import Counter
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from limitsets.animation.cutting import Pace, require_length
+from limitsets.animation.cutting import Pace, labels_of, require_length
 from limitsets.animation.film import Film, Mark
 from limitsets.animation.lanes import Progress
+from limitsets.animation.legs import LOWERS, STAYS, SWING
+from limitsets.engine.ground import ground_of
 from limitsets.errors import AnswerError
 
 if TYPE_CHECKING:
+    from limitsets.assembly import Assembly
     from limitsets.engine.recording import Recording
+    from limitsets.scene import Scene
+    from limitsets.trays import TrayFill
 
-__all__ = ["film_of_recording"]
+__all__ = ["film_of_assembly", "film_of_recording", "film_of_tray"]
+
+Array = NDArray[np.float64]
+Start = tuple[float, int] | None
 
 # More parts than this are counted, not named.
 NAMED = 4
-# Seconds for which the last picture stays.
-STAYS = 1.5
+# Frames for which an impact is shown: there are many.
+BRIEFLY = 8
+# Throws of a pair, and passes of a tray, that are shown unless others are asked for.
+LAST, PASSES = 4, 12
+
+
+class _Frame(NamedTuple):
+    """What one frame shows: when, of the recording, the angle of the arm, and what is said."""
+
+    time: float
+    arm: float
+    said: str
 
 
 def film_of_recording(
     recording: Recording,
-    start: tuple[float, int] | None,
+    start: Start,
     throws: int | None,
     fps: float,
     slow: float,
     progress: Progress,
+    scenes: Sequence[Scene] = (),
+    title: str = "parts in the rigid-body engine",
 ) -> Film:
     """Show a recording from its beginning, up to so many throws."""
     if start is not None:
         raise AnswerError("the start", start, "none: a recording has its own", "leave it out")
-    times = recording.times
-    if not times.size:
+    if not recording.times.size:
         raise AnswerError("the recording", "empty", "one with frames", "record a throw")
-    marks = sorted(recording.marks)
-    thrown = sorted({time for time, _, word in marks if word == "thrown"})
-    last = float(times[-1]) if throws is None or len(thrown) <= throws else thrown[throws]
-    pace = Pace(fps, slow)
-    count = max(1, round((last - float(times[0])) * pace.unit * fps))
-    require_length(count)
-    at = float(times[0]) + np.arange(count + 1 + round(STAYS * fps)) / (pace.unit * fps)
-    at = np.minimum(at, last)
-    kept = np.maximum(np.searchsorted(times, at + 1e-9, side="right") - 1, 0)
-    texts = [_words(marks, thrown, float(time), len(recording.outlines)) for time in at]
+    pace = Pace.of(scenes[0], fps, slow) if scenes else Pace(fps, slow)
+    swing = 0.0
+    if scenes:
+        swing = 2.0 * SWING * pace.unit / pace.rate(scenes[0], scenes[0].kappa)
+    shown, thrown = _frames(recording, throws, pace, swing)
+    at = np.array([each.time for each in shown])
+    kept = np.maximum(np.searchsorted(recording.times, at + 1e-9, side="right") - 1, 0)
+    texts = [_words(recording, thrown, each) for each in shown]
     captions, notes = (tuple(dict.fromkeys(each)) for each in zip(*texts, strict=True))
-    frames = at.size
-
-    def shown(time: float, number: int, word: str) -> Mark:
-        frame = int(np.searchsorted(at, time))
-        until = next((int(np.searchsorted(at, each)) for each in thrown if each > time), frames)
-        pose = recording.poses[min(int(np.searchsorted(times, time)), times.size - 1), number]
-        return Mark(frame, until, number, word, float(pose[0]), float(pose[1]))
-
-    ground = tuple(recording.ground)
+    count, ground, surface = at.size, tuple(recording.ground), None
+    if scenes:
+        pieces = ground_of(scenes[0])
+        surface = (pieces.height, pieces.end)
+        ground = tuple(each.corners for each in pieces.pieces if each.name != "arm")
+    poses = _swung(recording, kept, shown, thrown)
     return Film(
-        "parts in the rigid-body engine",
-        "",
-        "",
+        title,
+        scenes[0].unit if scenes else "",
+        pace.clock if scenes else "",
         fps,
-        f"{pace.words}; the arm's swing is not shown",
-        at,
-        recording.poses[kept],
+        f"{pace.words}; " + ("the swing of the arm is drawn" if scenes else "the arm's swing is not shown"),
+        np.arange(count) / (pace.unit * fps),
+        poses,
         tuple(recording.outlines),
-        tuple(() for _ in recording.outlines),
-        recording.arm[kept],
-        None,
+        tuple(labels_of(each) for each in scenes) or tuple(() for _ in recording.outlines),
+        np.array([each.arm for each in shown]),
+        surface,
         ground,
         captions,
         notes,
         np.array([captions.index(caption) for caption, _ in texts]),
         np.array([notes.index(note) for _, note in texts]),
-        np.zeros((frames, 2), dtype=np.int64),
-        tuple(shown(*mark) for mark in marks if mark[0] <= last),
+        np.zeros((count, 2), dtype=np.int64),
+        _marks(recording, at, thrown),
         (),
         None,
-        np.full((frames, 2), np.nan),
-        np.full(frames, -1, dtype=np.int64),
-        _view(ground, recording.poses[kept]),
+        np.full((count, 2), np.nan),
+        np.full(count, -1, dtype=np.int64),
+        _view(tuple(recording.ground), poses),
     )
 
 
-def _words(
-    marks: list[tuple[float, int, str]], thrown: list[float], time: float, parts: int
-) -> tuple[str, str]:
-    count = sum(each <= time for each in thrown)
-    latest = {number: word for at, number, word in marks if at <= time}
-    if parts <= NAMED:
+def film_of_assembly(
+    found: Assembly, start: Start, throws: int | None, fps: float, slow: float, progress: Progress
+) -> Film:
+    """Show the first pair that was assembled, or else the first pair: its last throws."""
+    example = found.example("assembled")
+    number = 0 if example is None else example
+    scenes, last = found.pair.scenes, LAST if throws is None else throws
+    title = f"{scenes[0].name} and {scenes[1].name}, trial {number}: {found.rows[number]['outcome']}"
+    return film_of_recording(
+        found.film(number, last), start, None, fps, slow, progress, scenes=scenes, title=title
+    )
+
+
+def film_of_tray(
+    found: TrayFill, start: Start, throws: int | None, fps: float, slow: float, progress: Progress
+) -> Film:
+    """Show one depression of a tray, pass by pass."""
+    from limitsets.trays import filmed
+
+    scene = found.scene
+    recording = filmed(scene, PASSES if throws is None else throws, seed=found.seed)
+    title = f"{scene.name}, one depression of a tray"
+    film = film_of_recording(recording, start, None, fps, slow, progress, title=title)
+    pace = Pace.of(scene, fps, slow)
+    return replace(
+        film,
+        unit=scene.unit,
+        clock=pace.clock,
+        about=f"{pace.words}; times between passes are left out",
+        labels=(labels_of(scene),) * len(recording.outlines),
+        captions=tuple(
+            each.replace("Throw", "Kick").replace("the first throw", "the first kick")
+            for each in film.captions
+        ),
+    )
+
+
+def _frames(
+    recording: Recording, throws: int | None, pace: Pace, swing: float
+) -> tuple[list[_Frame], list[float]]:
+    """Choose the moments that are shown, before each throw the arm's swing, and say when parts are thrown."""
+    first, end = float(recording.times[0]), float(recording.times[-1])
+    thrown = sorted({time for time, _, word in recording.marks if word == "thrown"})
+    if throws is not None and len(thrown) > throws:
+        end = thrown[throws]
+        thrown = thrown[:throws]
+    ends = [*(time for time in thrown if time > first), end]
+    require_length(round((end - first) * pace.unit * pace.fps))
+    frames, begin = [_Frame(first, 0.0, "")], first
+    for end_of_leg in ends:
+        if swing and begin in thrown:
+            down, up = (max(1, round(seconds * pace.fps)) for seconds in (LOWERS, swing))
+            angles = [-SWING * 0.5 * (1.0 - math.cos(math.pi * k / down)) for k in range(1, down + 1)]
+            frames += [_Frame(begin, angle, ": the arm goes down") for angle in angles]
+            angles = [-SWING * (1.0 - (k / up) ** 2) for k in range(1, up + 1)]
+            frames += [_Frame(begin, angle, ": the arm swings up and stops") for angle in angles]
+        count = max(1, round((end_of_leg - begin) * pace.unit * pace.fps))
+        frames += [_Frame(begin + (end_of_leg - begin) * k / count, 0.0, "") for k in range(1, count + 1)]
+        begin = end_of_leg
+    frames += [frames[-1]] * round(STAYS * pace.fps)
+    require_length(len(frames))
+    return frames, thrown
+
+
+def _swung(recording: Recording, kept: NDArray[np.int64], shown: list[_Frame], thrown: list[float]) -> Array:
+    """Let the parts that are thrown lie on the arm while it swings."""
+    poses: Array = recording.poses[kept].copy()
+    for frame, each in enumerate(shown):
+        if each.arm:
+            riders = [part for time, part, word in recording.marks if word == "thrown" and time == each.time]
+            cos, sin = math.cos(each.arm), math.sin(each.arm)
+            x, y, _ = poses[frame, riders].T
+            poses[frame, riders] = np.stack(
+                [cos * x - sin * y, sin * x + cos * y, poses[frame, riders, 2] + each.arm], axis=-1
+            )
+    return poses
+
+
+def _marks(recording: Recording, at: Array, thrown: list[float]) -> tuple[Mark, ...]:
+    """Say where things happen: at the lowest corner of the part."""
+    found = []
+    for time, part, word in sorted(recording.marks):
+        if time <= at[-1]:
+            frame = int(np.searchsorted(at, time))
+            until = next((int(np.searchsorted(at, each)) for each in thrown if each > time), at.size)
+            until = min(until, frame + BRIEFLY)
+            number = min(int(np.searchsorted(recording.times, time)), recording.times.size - 1)
+            corners = recording.corners(number, part)
+            x, y = corners[int(np.argmin(corners[:, 1]))].tolist()
+            if math.isfinite(x):
+                found.append(Mark(frame, until, part, word, x, y))
+    return tuple(found)
+
+
+def _words(recording: Recording, thrown: list[float], frame: _Frame) -> tuple[str, str]:
+    count = sum(each <= frame.time for each in thrown)
+    latest = {number: word for at, number, word in sorted(recording.marks) if at <= frame.time}
+    if len(recording.outlines) <= NAMED:
         note = ", ".join(f"part {number + 1}: {word}" for number, word in sorted(latest.items()))
     else:
         note = ", ".join(f"{many} {word}" for word, many in sorted(Counter(latest.values()).items()))
-    return (f"Throw {count}" if count else "Before the first throw"), note
+    return (f"Throw {count}{frame.said}" if count else "Before the first throw"), note
 
 
-def _view(
-    ground: tuple[NDArray[np.float64], ...], poses: NDArray[np.float64]
-) -> tuple[tuple[float, float], ...]:
-    """Keep the surfaces in sight on which parts come to lie: those that begin where parts are."""
-    reach = float(np.nanmax(poses[:, :, 0])), float(np.nanmin(poses[:, :, 0]))
+def _view(ground: tuple[Array, ...], poses: Array) -> tuple[tuple[float, float], ...]:
+    """Keep the surfaces in sight on which parts come to lie."""
+    least, most = float(np.nanmin(poses[:, :, 0])), float(np.nanmax(poses[:, :, 0]))
     tops = [(float(each[:, 0].max()), float(each[:, 1].max())) for each in ground]
-    return tuple(
-        (min(x, reach[0]), y) for x, y in tops if x > reach[1] and y <= float(np.nanmax(poses[:, :, 1]))
-    )
+    highest = float(np.nanmax(poses[:, :, 1]))
+    return tuple((min(x, most), y) for x, y in tops if x > least and y <= highest)

@@ -13,6 +13,8 @@ from limitsets.errors import LimitsetsError
 
 __all__ = ["animate"]
 
+# Pairs that are thrown to find one that is assembled, and drops of a tray of which only the passes are shown.
+PAIRS, FEW = 40, 20
 HELP_START = "x and side of the start: 15,2 or '38 cm,2'; default a good one, on the limit set."
 
 
@@ -39,14 +41,19 @@ def animate(
         str | None,
         option("--margin", "QUANTITY", "Show the orbit that violates the goal, at its margin of QUANTITY."),
     ] = None,
+    assemble: Annotated[
+        str | None,
+        option("--assemble", "SCENE2", "Throw the part together with another; both scenes in contact."),
+    ] = None,
+    tray: Annotated[bool, typer.Option("--tray", help="Show a depression of the scene's [tray].")] = False,
     reading: Annotated[str | None, option("--reading", "R", "Of the margin: fixed or per-throw.")] = None,
     fps: Annotated[float, option("--fps", "N", "Frames per second.")] = 20.0,
     slow: Annotated[float, option("--slow", "N", "How many times slower than the machine.")] = 3.0,
     json: Json = False,
 ) -> None:
     """Write a film: the arm swings up and stops, the part flies and lands, and where that is on the limit set."""
-    if feed + feedback + (margin is not None) > 1:
-        value = "more than one of --feed, --feedback, --margin"
+    if feed + feedback + tray + (margin is not None) + (assemble is not None) > 1:
+        value = "more than one of --feed, --feedback, --margin, --assemble, --tray"
         raise LimitsetsError("what to show", value, "one of them", "make a film of each")
     if reading is not None and margin is None:
         raise LimitsetsError("the reading", reading, "with --margin", "name the quantity", key="--reading")
@@ -59,11 +66,17 @@ def animate(
         file = Path(f"{chosen.name}.html") if out is None else out
         require_file(file)  # before anything is searched or proved
         begin = None if start is None else _start(chosen, start)
-        if margin is not None and begin is not None:
-            raise LimitsetsError(
-                "the start", start, "none with --margin: its orbit has its own", "leave it out"
-            )
-        shown = _shown(chosen, tell, feed=feed, feedback=feedback, margin=margin, reading=reading)
+        if begin is not None and (tray or margin is not None or assemble is not None):
+            allowed = "none with --margin, --assemble and --tray, which have their own"
+            raise LimitsetsError("the start", start, allowed, "leave it out")
+        asked: dict[str, Any] = {
+            "feed": feed,
+            "feedback": feedback,
+            "tray": tray,
+            "margin": margin,
+            "assemble": assemble,
+        }
+        shown = _shown(chosen, tell, reading=reading, **asked)
         write(shown, file, start=begin, throws=throws, fps=fps, slow=slow, progress=tell)
     size = file.stat().st_size
     answer(
@@ -79,8 +92,17 @@ def _start(scene: Any, text: str) -> tuple[float, int]:
 
 
 def _shown(
-    scene: Any, tell: Any, *, feed: bool, feedback: bool, margin: str | None, reading: str | None
+    scene: Any,
+    tell: Any,
+    *,
+    feed: bool,
+    feedback: bool,
+    tray: bool,
+    margin: str | None,
+    assemble: str | None,
+    reading: str | None,
 ) -> Any:
+    """Compute what is asked, as far as a film needs it."""
     if feed:
         from limitsets.feeding.falling import arm_end_of
 
@@ -89,6 +111,14 @@ def _shown(
         from limitsets.policies import feedback as find
 
         return find(scene, progress=tell)
+    if tray:
+        from limitsets.trays import tray as fill
+
+        return fill(scene, passes=1, drops=FEW, kicks=FEW, progress=tell)
+    if assemble is not None:
+        from limitsets.assembly import assemble as pairs
+
+        return pairs(scene, assemble, trials=PAIRS, progress=tell)
     if margin is not None:
         from limitsets.robust import margin as bracket
 

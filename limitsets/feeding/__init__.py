@@ -2,7 +2,8 @@
 
 `falling` says what becomes of such a part; `proving` which sides can be fed, and that every start is; `fed_shares` the
 probabilities under noise, and the noise at which success falls to a share; `bracketing` proves brackets of them, and
-`trials` throws parts as experimenters do.  `feeding_run` joins them (`limitsets.feed`).
+`trials` throws parts as experimenters do, and `crowd` many at once, in the engine.  `feeding_run` joins them
+(`limitsets.feed`).
 """
 
 from limitsets.feeding.falling import FATES as FATES

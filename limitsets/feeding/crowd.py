@@ -59,7 +59,7 @@ class CrowdTrials:
     thrown : int
         Parts thrown, each counted at each throw.
     seconds : float
-        Time that the throws took on this machine.
+        Processor time that the throws took on this machine.
     seed : int
         Of starts and noise.
     """
@@ -175,9 +175,9 @@ def run_crowd(
         )
         tried = _Batch(crowd, end, random)
         spilled = tried.start()
-        began = time.perf_counter()
+        began = time.process_time()
         thrown += tried.throw(scatter, throws)
-        seconds += time.perf_counter() - began
+        seconds += time.process_time() - began
         rows.append((tried.fates(), tried.throws, spilled, bool(crowd.overlapped)))
     if progress is not None:
         progress(f"{parts} parts at once", batches, batches)

@@ -123,7 +123,7 @@ def errors_of_places(seed: int) -> dict[str, Any]:
 
 def draw(numbers: dict[str, Any]) -> Figure:
     """Draw rates, fates and cost against the number of parts."""
-    figure = Figure(figsize=(12.0, 4.0), layout="constrained")
+    figure = Figure(figsize=(13.0, 4.2), layout="constrained")
     rates, fates, cost = figure.subplots(1, 3)
     for name, colour, mark in (("passing", style.FLIP, "s"), ("pushing", style.JOG, "o")):
         rows = numbers[name]
@@ -135,8 +135,12 @@ def draw(numbers: dict[str, Any]) -> Figure:
         seconds = [1e3 * each["seconds per part and throw"] for each in rows.values()]
         cost.plot(parts, seconds, color=colour, marker=mark, label=label)
     rates.set(xscale="log", yscale="log", xlabel="parts given", ylabel="right feeds per throw")
-    rates.legend()
+    rates.legend(loc="upper left", fontsize=8)
+    rates.set_ylim(4e-3, 10.0)
     cost.set(xscale="log", yscale="log", xlabel="parts given", ylabel="time per part and throw [ms]")
+    for panel in (rates, cost):
+        panel.set_xticks([int(each) for each in numbers["pushing"]], list(numbers["pushing"]))
+        panel.set_xticks([], minor=True)
     rows = numbers["pushing"]
     below = [0.0] * len(rows)
     shades = {
@@ -158,7 +162,7 @@ def draw(numbers: dict[str, Any]) -> Figure:
         )
         below = [low + more for low, more in zip(below, high, strict=True)]
     fates.set(xlabel="parts given, that push each other", ylabel="share")
-    fates.legend(loc="lower left", fontsize=8)
+    fates.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=6, fontsize=8, columnspacing=1.0)
     return figure
 
 

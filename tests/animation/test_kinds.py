@@ -10,7 +10,9 @@ from limitsets.animation import film_of
 from limitsets.engine.recording import Recording
 from limitsets.errors import AnswerError
 from limitsets.feeding.falling import arm_end_of, time_to_tip
+from tests.assembly.pairs import pair as pair_of_tests
 from tests.feeding.scenes import with_cavity
+from tests.trays.scenes import with_tray
 
 
 def test_a_part_is_fed_tips_in_its_time_and_lies_on_the_ramp():
@@ -136,3 +138,31 @@ def test_nothing_else_can_be_shown(tmp_path):
     with pytest.raises(AnswerError, match=r"ends in \.gif, \.mp4, \.html"):
         ls.animate("paper-designed", tmp_path / "run.avi")
     assert not list(tmp_path.iterdir())
+
+
+def test_a_pair_in_contact_swings_with_the_arm_and_keeps_the_engine_s_poses():
+    pair = pair_of_tests(contact=True)
+    found = ls.assemble(*pair, trials=3, seed=1, starts=((8.0, 2), (18.0, 2)))
+    film = film_of(found, throws=1)
+    kept = found.film(found.example("assembled") or 0, 1)
+    height, end = film.surface
+    assert (height, end) == (pair[0].surface_height, pair[0].cavity.position)
+    assert film.poses[-1] == pytest.approx(kept.poses[-1], nan_ok=True)
+    assert [label.word for label in film.labels[1]] == ["0", "1", "2", "3"]
+    # a part that is thrown lies on the arm in the first frames of the swing
+    low = int(np.argmin(film.arm))
+    thrown = [part for time, part, word in kept.marks if word == "thrown" and time == kept.times[0]]
+    angle = -film.arm[low]
+    for part in thrown:
+        corners = film.polygon(low, part)
+        over = math.sin(angle) * corners[:, 0] + math.cos(angle) * corners[:, 1] - height
+        assert sorted(over)[:2] == pytest.approx([0.0, 0.0], abs=1e-3)  # the engine's own overlap
+    assert min(film.arm) == pytest.approx(-math.radians(12.0))
+
+
+def test_a_tray_shows_its_passes():
+    film = film_of(ls.tray(with_tray(), passes=1, drops=20, kicks=20), throws=4)
+    assert film.title == "paper-designed, one depression of a tray"
+    assert film.surface is None
+    assert any(caption.startswith("Kick") for caption in film.captions)
+    assert len(film.ground) == 3

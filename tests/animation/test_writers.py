@@ -120,11 +120,12 @@ def test_pixels_show_the_part_where_it_is():
             centre, corners = picture.at(film.poses[k, 0, :2]), picture.at(film.polygon(k))
             beside = centre + 0.25 * (corners.mean(axis=0) - centre) + (0.0, -9.0)
             x, y = np.round(beside).astype(int)
-            found = np.argwhere((np.abs(pixels.astype(int) - face) < 6).all(axis=2))
+            above = pixels[: int(picture.bottom)].astype(int)
+            found = np.argwhere((np.abs(above - face) < 6).all(axis=2))
             assert (np.abs(found - (y, x)).sum(axis=1) <= 12).any()
-            assert found[:, 1].min() >= corners[:, 0].min() - 1
-            assert found[:, 1].max() <= corners[:, 0].max() + 1
-            assert found[:, 0].max() <= corners[:, 1].max() + 1
+            assert found[:, 1].min() >= corners[:, 0].min() - 3
+            assert found[:, 1].max() <= corners[:, 0].max() + 3
+            assert found[:, 0].max() <= corners[:, 1].max() + 3
 
 
 def test_without_imageio_ffmpeg_one_line_says_what_to_install(tmp_path, monkeypatch):

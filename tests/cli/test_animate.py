@@ -53,7 +53,7 @@ def test_what_cannot_be_is_one_line_and_exit_2(capfd):
         (("--feed",), "without [cavity]"),
         (("--feedback",), "feedback.throws"),
         (("--reading", "fixed"), "--margin"),
-        (("--margin", "throw.speed", "--start", "15,2"), "none with --margin"),
+        (("--margin", "throw.speed", "--start", "15,2"), "none with --margin, --assemble"),
         (("--throws", "9999"), "the frames of the film"),
     ):
         code, out, err = run(capfd, "animate", "paper-designed", *words)

@@ -335,6 +335,23 @@ def test_places_off_the_arm_are_refused(place):
         Crowd([DESIGNED], friction=1.0).place(0, *place)
 
 
+def test_places_converge_where_parts_have_met():
+    """One flips towards the other; a quarter of the step at least halves the errors."""
+    random, places = np.random.default_rng(3), {}
+    starts = [(x, x + gap) for x, gap in zip(random.uniform(6, 9, 12), random.uniform(5, 6, 12), strict=True)]
+    for step in (8e-3, 2e-3, 5e-4):
+        places[step] = []
+        for inner, outer in starts:
+            crowd = Crowd([FED, FED], friction=1.0, step=step)
+            crowd.place(0, inner, 2)
+            crowd.place(1, outer, 0)
+            places[step].append([rest.x for rest in crowd.throw()])
+            assert crowd.overlapped == {(0, 1)}
+    coarse, middle = (np.abs(np.subtract(places[step], places[5e-4])).max(axis=1) for step in (8e-3, 2e-3))
+    assert np.median(middle) < 0.5 * np.median(coarse)
+    assert np.median(middle) < 0.02  # less than landings scatter
+
+
 @pytest.mark.sweep
 def test_the_step_halved_moves_no_rate_beyond_its_interval():
     """Pairs of two triangles on the same seeds: how often both end in the cavity, and how often on side 2."""
