@@ -11,8 +11,8 @@ import json
 from pathlib import Path
 from typing import Any
 
-from search import confirmed
-from serial import one_by_one
+from rate_search import confirmed
+from serial_feeding import one_by_one
 
 import limitsets as ls
 from limitsets.assembly import Assembly
