@@ -11,13 +11,14 @@ import json
 from pathlib import Path
 from typing import Any
 
-from search import confirmed
-from serial import one_by_one
+from rate_search import confirmed
+from serial_feeding import one_by_one
 
 import limitsets as ls
 from limitsets.assembly import Assembly
 from limitsets.assembly.assembly_run import OF, PAPER, SURVIVED
 from limitsets.assembly.counting import Rate, rate_of
+from limitsets.files import as_plain, as_table, picked
 from limitsets.robust import Gaussian, Scattering
 
 HERE = Path(__file__).resolve().parent
@@ -31,6 +32,16 @@ CASES: dict[str, dict[str, Any]] = {
     "unilateral, cavity stands": {"contact": "unilateral"},
 }
 LONG = ("pass through each other", "hinge, cavity stands")
+
+
+def initial_twice(seed: int, trials: int) -> dict[str, Any]:
+    """Two parts as in paper-initial, both of which can fail: the joint law, of which multiplying knows nothing."""
+    cavity = ls.load(NAMES[0]).as_dict()["cavity"]
+    part = ls.load({**ls.load("paper-initial").as_dict(), "cavity": cavity})
+    joint = ls.assemble(part, part, NOISE, trials=trials, seed=seed).joint
+    assert joint is not None
+    names = ("rates", "both", "product", "error", "error_interval")
+    return as_table(**picked(joint, *names))
 
 
 def scenes(*, contact: bool) -> list[Any]:
@@ -67,11 +78,15 @@ def words(rate: Rate) -> str:
 def table(found: dict[str, dict[str, Any]]) -> str:
     """Write outcomes as a Markdown table, the paper's counts in its first line."""
     names = ("assembled", "order", "wrong", "wall", "ejected", "left", "never", "unfinished")
-    lines = [f"| case | trials | {' | '.join(names)} | assembled, 95 % | first 20 | whole after the next throw |"]
+    lines = [
+        f"| case | trials | {' | '.join(names)} | assembled, 95 % | first 20 | whole after the next throw |"
+    ]
     lines.append("|---" * (len(names) + 5) + "|")
     interval = words(rate_of(PAPER, OF)).split(", ")[1]
     others = " | " * (len(names) - 1)
-    lines.append(f"| the paper | {OF} | {PAPER} |{others} | {interval} | {PAPER} | {words(rate_of(SURVIVED, OF))} |")
+    lines.append(
+        f"| the paper | {OF} | {PAPER} |{others} | {interval} | {PAPER} | {words(rate_of(SURVIVED, OF))} |"
+    )
     for name, each in found.items():
         low, high = each["assembled"]["interval"]
         survived = "; ".join(
@@ -102,12 +117,14 @@ def main(
     for name, file in ((LONG[0], "passing.png"), (LONG[1], "contact.png")):
         ls.plot.assembly(found[name]).savefig(out / file, dpi=110)
     answers: dict[str, Any] = {"cases": {name: row(each) for name, each in found.items()}}
+    answers["two initial parts"] = initial_twice(seed, trials)
     parts = scenes(contact=True)
     answers["one by one"] = {
-        contact: one_by_one(parts, NOISE, contact, few // 2, seed) for contact in ("hinge", "unilateral")
+        contact: as_plain(one_by_one(parts, NOISE, contact, few // 2, seed))
+        for contact in ("hinge", "unilateral")
     }
     if search:
-        answers["search"] = confirmed(parts, NOISE, seed)
+        answers["search"] = as_plain(confirmed(parts, NOISE, seed))
     return answers
 
 

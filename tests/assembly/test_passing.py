@@ -94,7 +94,7 @@ def test_ways_meet_where_many_looks_say_so():
     random, seen = np.random.default_rng(5), {True: 0, False: 0}
     near = TOLERANCE * float(one.sides.length.max())
     for _ in range(40):
-        starts = (float(random.uniform(5.0, 9.0)), 2), (float(random.uniform(14.0, 19.5)), 1)
+        starts = (float(random.uniform(5.0, 9.0)), 2), (float(random.uniform(11.5, 16.5)), 1)
         ways = [
             way_of(scene, scene.map, start, int(images(scene.map, [start[0]], start[1]).side[0]))
             for scene, start in zip((one, two), starts, strict=True)
@@ -106,7 +106,7 @@ def test_ways_meet_where_many_looks_say_so():
         elif deepest < -1.1 * near:
             assert not meet(*ways)
         seen[deepest > 0.0] += 1
-    assert min(seen.values()) > 3
+    assert min(seen.values()) >= 5
 
 
 def test_an_outline_has_its_centre_of_mass_where_it_is_said():

@@ -12,7 +12,7 @@ from limitsets.robust import Scattering
 
 # Between these: where the arm ends, as a multiple of where it does now, and the speed likewise.
 PLACES, SPEEDS = (0.85, 1.3), (0.88, 1.08)
-LOOKED_AT, KEPT = 24, 4
+LOOKED_AT, KEPT = 16, 4
 
 
 def changed(parts: list[Any], place: float, speed: float) -> list[Any]:
@@ -35,7 +35,7 @@ def count(parts: list[Any], noise: Scattering, seed: int, trials: int) -> int:
 
 
 def confirmed(
-    parts: list[Any], noise: Scattering, seed: int, *, trials: int = 40, last: int = 400, fresh: int = 1000
+    parts: list[Any], noise: Scattering, seed: int, *, trials: int = 30, last: int = 300, fresh: int = 1000
 ) -> dict[str, Any]:
     """Look at random places and speeds, all with the same draws; the best few at more trials; the best with fresh ones.
 
