@@ -342,7 +342,9 @@ LENGTHS = ("kappa", "surface_height", "arm_length", "radius_of_gyration", "a", "
 
 
 @pytest.mark.parametrize("power", [-1000 // 4, -40, -15, -1, 5, 15, 40, 1000 // 4])
-@pytest.mark.parametrize("name", [*([name for name in ls.scenes() if ls.load(name).cavity is None]), "several roots"])
+@pytest.mark.parametrize(
+    "name", [*([name for name in ls.scenes() if ls.load(name).cavity is None]), "several roots"]
+)
 def test_a_power_of_two_scales_to_the_bit(name: str, power: int) -> None:
     scene = ls.load("paper-designed" if name == "several roots" else name)
     if name == "several roots":
