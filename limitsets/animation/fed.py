@@ -18,7 +18,7 @@ from limitsets.animation.cutting import Leg, Pace, cut
 from limitsets.animation.film import Film
 from limitsets.animation.lanes import Progress, known_of, require_start
 from limitsets.animation.legs import RESTS, STAYS, drawn_of, legs_of, rest_leg
-from limitsets.animation.throwing import Throw, throws_of
+from limitsets.animation.throwing import Throw, motion, throws_of
 from limitsets.engine.ground import ground_of
 from limitsets.errors import AnswerError
 from limitsets.plot.poses import angle_on_side, outline
@@ -37,6 +37,7 @@ TRIED, ANGLES = 40, 400
 # Throws shown at most, and of a start that is chosen.
 MOST_THROWS, USUAL = 60, 8
 WORDS = ("fed rightly", "fed on a wrong side", "not clear of the wall")
+BEYOND = "the struck corner is beyond the end of the arm: the map throws as if the arm went on"
 # A place of rest nearer to the end than this share of the arm looks as if it were beyond.
 NEAR = 0.005
 
@@ -78,7 +79,8 @@ def film_of_end(
     legs = [rest_leg(scene, x, side, 1.0, f"Start: x = {x:.2f} {scene.unit} on side {side}")]
     for number, throw in enumerate(made, start=1):
         stays = STAYS if number == len(made) and fate < 0 else RESTS
-        legs += legs_of(scene, throw, pace, f"Throw {number}", stays=stays)
+        note = BEYOND if motion(scene, throw).struck[0] > end.x else ""
+        legs += legs_of(scene, throw, pace, f"Throw {number}", stays=stays, note=note)
     if fate >= 0:
         legs += _falls(end, scene, last, fate, pace)
     cavity = end.scene.cavity

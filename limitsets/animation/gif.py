@@ -13,19 +13,22 @@ __all__ = ["FPS", "write_gif"]
 FPS = 20.0
 """Delays are whole hundredths of a second."""
 
-ZOOM, COLOURS = 0.9, 48
+ZOOM = 0.9
+# Shades between a colour and white, for soft edges; and frames that are asked for their colours.
+SHADES, ASKED = (0.0, 0.35, 0.7), 25
 
 
 def write_gif(film: Film, file: Path, progress: Progress = None) -> None:
     """Write a film; it begins again when it is over."""
     from PIL import Image
 
-    pictures, palette = [], None
-    for pixels in frames(Picture.of(film), ZOOM, progress):
-        image = Image.fromarray(pixels)
-        if palette is None:
-            palette = image.quantize(COLOURS, dither=Image.Dither.NONE)
-        pictures.append(image.quantize(palette=palette, dither=Image.Dither.NONE))
+    picture = Picture.of(film)
+    palette = Image.new("P", (1, 1))
+    palette.putpalette(_colours(picture))
+    pictures = [
+        Image.fromarray(pixels).quantize(palette=palette, dither=Image.Dither.NONE)
+        for pixels in frames(picture, ZOOM, progress)
+    ]
     delay = 10 * round(100.0 / film.fps)
     pictures[0].save(
         file,
@@ -37,3 +40,15 @@ def write_gif(film: Film, file: Path, progress: Progress = None) -> None:
         optimize=False,
         disposal=1,
     )
+
+
+def _colours(picture: Picture) -> bytes:
+    """Give white, and all that is drawn with, in some shades: a palette chosen by areas loses small signs."""
+    asked = range(0, picture.film.frames, max(1, picture.film.frames // ASKED))
+    shapes = [*picture.still(), *(shape for k in asked for shape in picture.moving(k))]
+    words = (shape.look.get(name) for shape in shapes for name in ("fill", "stroke"))
+    drawn = dict.fromkeys(bytes.fromhex(word.removeprefix("#")) for word in words if word)
+    shades = {
+        bytes(round(each + (255 - each) * light) for each in colour) for light in SHADES for colour in drawn
+    }
+    return b"\xff\xff\xff" + b"".join(sorted(shades - {b"\xff\xff\xff"})[:255])

@@ -37,6 +37,8 @@ class LanePicture:
         Pixels for a unit of length, and where x is 0.
     top, wide : float
         Where they begin, and how wide the picture is [pixels].
+    rolls : bool
+        Whether a part rolls on in the film.
     """
 
     lanes: Lanes
@@ -45,6 +47,7 @@ class LanePicture:
     joint: float
     top: float
     wide: float
+    rolls: bool = False
 
     @staticmethod
     def room(lanes: Lanes) -> float:
@@ -132,7 +135,11 @@ class LanePicture:
         found.append(shape_of("circle", (x + 80, y - 4), radius=3.0, fill=style.INK, opacity=0.55))
         found.append(text_of("earlier rests", x + 88, y, **small))
         found.append(shape_of("polygon", pointer(x + 178.0, y - 10.0), fill=style.FLIP))
-        return [*found, text_of("impact", x + 188, y, **small)]
+        found.append(text_of("impact", x + 188, y, **small))
+        if self.rolls:
+            found.append(shape_of("polygon", pointer(x + 244.0, y - 10.0), fill=style.ROLL))
+            found.append(text_of("rolls on", x + 254, y, **small))
+        return found
 
     def _upright(
         self, x: float, top: float, foot: float, colour: str, dash: tuple[float, ...], words: str

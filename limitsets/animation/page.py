@@ -45,11 +45,19 @@ def write_page(film: Film, file: Path, progress: Progress = None) -> None:
         wide=wide,
         still=still,
         first=first,
-        starts=[(rest.begin, rest.sentence) for rest in film.rests],
+        starts=_starts(film),
         # a script ends at the first "</"
         data=json.dumps(_data(picture), allow_nan=False, separators=(",", ":")).replace("</", "<\\/"),
     )
     file.write_text(words, encoding="utf-8", newline="\n")
+
+
+def _starts(film: Film) -> list[tuple[int, str]]:
+    """Give the frame in which each throw begins, and a sentence about it."""
+    if film.rests:
+        return [(rest.begin, rest.sentence) for rest in film.rests]
+    thrown = sorted({mark.frame for mark in film.marks if mark.word == "thrown"})
+    return [(frame, film.captions[film.caption[frame]].partition(":")[0]) for frame in thrown]
 
 
 def _data(picture: Picture) -> dict[str, Any]:

@@ -88,7 +88,10 @@ class Picture:
         film = self.film
         if film.lanes is None:
             return None
-        return LanePicture(film.lanes, film.unit, self.scale, self.origin[0], self.bottom, self.size[0])
+        rolls = any(mark.word == "roll" for mark in film.marks)
+        return LanePicture(
+            film.lanes, film.unit, self.scale, self.origin[0], self.bottom, self.size[0], rolls
+        )
 
     # ---------------------------------------------------------------- what does not move
 

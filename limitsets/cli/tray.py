@@ -128,7 +128,7 @@ def _say_fill(found: TrayFill) -> None:
     sizes, plate = found.passes.tray, found.passes.plate
     typer.echo(
         f"{found.scene.name}: depressions {sizes.depression_width:g} {unit} wide and {sizes.depression_depth:g} "
-        f"{unit} deep, side {found.passes.side} is right; contact of the engine, friction {plate.friction:g}, "
+        f"{unit} deep, side {found.passes.side} is right; unilateral contact, friction {plate.friction:g}, "
         f"restitution {plate.restitution:g}"
     )
     numbers = [0, *counts.met]

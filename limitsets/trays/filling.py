@@ -122,7 +122,7 @@ def tray(
     ...     "effects": {"contact": True},
     ... }
     >>> found = ls.tray({**ls.load("paper-designed").as_dict(), **tables}, passes=20, drops=200)
-    >>> found.filled.right.size, 0.0 < found.filled.right[-1] < 1.0
+    >>> found.filled.right.size, bool(0.0 < found.filled.right[-1] < 1.0)
     (21, True)
     """
     read = scene if isinstance(scene, Scene) else load(scene)

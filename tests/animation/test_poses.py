@@ -87,8 +87,8 @@ def test_a_part_lies_on_the_arm_while_that_swings():
     [
         ("paper-initial", ROLLING, [(19.5, 1), (27.0, 0), (24.0, 1)]),
         ("paper-designed", SCATTERED, [(15.0, 2), (19.0, 0)]),
-        ("paper-designed", DRIVEN, [(15.0, 2), (19.0, 0)]),
-        ("paper-designed", SLIPPING, [(15.0, 2), (19.0, 0)]),
+        pytest.param("paper-designed", DRIVEN, [(15.0, 2), (19.0, 0)], marks=pytest.mark.sweep),
+        pytest.param("paper-designed", SLIPPING, [(15.0, 2), (19.0, 0)], marks=pytest.mark.sweep),
     ],
 )
 def test_effects_join_without_a_jump_and_end_where_the_map_says(name, more, starts):

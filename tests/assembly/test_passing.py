@@ -27,6 +27,7 @@ def found():
     return ls.assemble(*NAMES, NOISE, trials=TRIALS, seed=3)
 
 
+@pytest.mark.sweep  # thousands of trials
 @pytest.mark.parametrize("number", [0, 1])
 def test_each_part_by_itself_is_fed_as_alone(found, number):
     """The common speed couples the parts, but each sees the same law as alone: intervals of 99.9 % overlap."""
@@ -43,6 +44,7 @@ def test_each_part_by_itself_is_fed_as_alone(found, number):
     assert abs(throws.mean() - alone.throws.mean()) < 4.0 * error
 
 
+@pytest.mark.sweep
 def test_the_joint_law_adds_up(found):
     joint, counts = found.joint, found.counts
     assert sum(sum(row.values()) for row in joint.table.values()) == TRIALS

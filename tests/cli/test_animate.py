@@ -6,6 +6,7 @@ from pathlib import Path
 import limitsets as ls
 from tests.cli.command import run
 from tests.feeding.scenes import with_cavity
+from tests.trays.scenes import with_tray
 
 QUICK = ("--start", "21,2", "--throws", "1", "--slow", "1")
 
@@ -61,3 +62,16 @@ def test_what_cannot_be_is_one_line_and_exit_2(capfd):
         assert out == ""
         assert expected in err.splitlines()[-1]
     assert not list(Path().glob("*.html"))
+
+
+def test_a_tray_and_a_pair_that_cannot_be_filmed(capfd):
+    ls.dump(with_tray(), "tray.toml")
+    code, _, _ = run(capfd, "animate", "tray.toml", "--tray", "--throws", "3", "-o", "tray.html")
+    assert code == 0
+    assert "one depression of a tray" in Path("tray.html").read_text(encoding="utf-8")
+    code, _, err = run(
+        capfd, "animate", "paper-triangle", "--assemble", "paper-quadrilateral", "-o", "pair.html"
+    )
+    assert code == 2  # without contact they pass through each other, and the engine has nothing to show
+    assert "[effects] contact = true" in err
+    assert not Path("pair.html").exists()

@@ -35,7 +35,10 @@ def test_words_files_and_table(capfd):
         capfd, "tray", "tray.toml", *FEW, "--histories", "2", "-o", "out", "--csv", "filled.csv"
     )
     assert code == 0
-    assert "depressions 7.02 in wide and 1.53 in deep, side 2 is right" in out
+    assert (
+        "depressions 7.02 in wide and 1.53 in deep, side 2 is right; unilateral contact, friction 0.3, restitution 0.3"
+        in out
+    )
     assert "side 2: right" in out
     assert "filled rightly after 12 passes" in out
     assert "p_release/(p_capture + p_release)" in out

@@ -172,3 +172,24 @@ def test_scenes_with_effects_are_refused(whole):
     whole["effects"] = {"landing": True}
     with pytest.raises(SceneError, match=r"the minimal model.*leave \[effects\] out"):
         throw_stack(Scene.of(whole, None), {"throw.speed": [2.0]})
+
+
+@pytest.mark.parametrize("goal", [{"oriented_beyond": {"x": "20 in", "side": 2}}, None])
+def test_a_part_that_does_not_fit_the_tray_is_no_scene(goal):
+    tray = {
+        "depression_width": "7.02 in",
+        "depression_depth": "3 in",
+        "pitch": "14.04 in",
+        "agitation": "1 in",
+        "wash": "1 in",
+    }
+    tree = {**ls.load("paper-designed").as_dict(), "tray": tray}
+    if goal is None:
+        tree.pop("goal")
+    else:
+        tree["goal"] = goal
+    scene = ls.load(tree)
+    # side 2 becomes longer than the depression; and the part lower than it is deep
+    few = compared(scene, {"part.sides[2]": np.linspace(6.5, 7.5, 11)})
+    assert 0 < few < 11 or goal is None
+    assert 0 < compared(scene, {"part.sides[1]": np.linspace(2.9, 3.7, 9)}) <= 9

@@ -1,6 +1,9 @@
 """Counts and histories: seeds by number, whatever computes them; what is refused; the chain beside histories."""
 
+import subprocess
+import sys
 from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -120,6 +123,27 @@ def test_what_lacks_is_named(scene, key):
     assert key in str(caught.value)
 
 
+def test_without_contact_the_engine_is_not_even_loaded():
+    code = """
+import sys
+import limitsets as ls
+from limitsets.errors import AnswerError
+from tests.trays.scenes import with_tray
+try:
+    ls.tray(with_tray(contact=False))
+except AnswerError:
+    print("pymunk" in sys.modules)
+"""
+    done = subprocess.run(
+        [sys.executable, "-c", code],
+        cwd=Path(__file__).parents[2],
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert done.stdout.strip() == "False"
+
+
 def test_what_cannot_be_is_refused(monkeypatch):
     with pytest.raises(AnswerError, match="drops"):
         ls.tray(with_tray(), drops=0)
@@ -137,7 +161,7 @@ def test_what_cannot_be_is_refused(monkeypatch):
         tray_design(with_tray(), [3.2], [0.5], drops=1)
     with pytest.raises(AnswerError, match="depths and agitations"):
         tray_design(with_tray(), [], [0.5])
-    monkeypatch.setitem(__import__("sys").modules, "pymunk", None)
+    monkeypatch.setitem(sys.modules, "pymunk", None)
     with pytest.raises(AnswerError, match=r"limitsets\[engine\]"):
         ls.tray(with_tray(), drops=1)
 
