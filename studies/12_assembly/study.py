@@ -11,6 +11,7 @@ import json
 from pathlib import Path
 from typing import Any
 
+from halved_step import both_steps
 from rate_search import confirmed
 from serial_feeding import one_by_one
 
@@ -123,6 +124,7 @@ def main(
         contact: as_plain(one_by_one(parts, NOISE, contact, few // 2, seed))
         for contact in ("hinge", "unilateral")
     }
+    answers["halved step"] = as_plain(both_steps(parts, NOISE, few, seed))
     if search:
         answers["search"] = as_plain(confirmed(parts, NOISE, seed))
     return answers

@@ -1,6 +1,11 @@
 """Trials by any executor, in any order, cut off and gone on with; what cannot be; JSON and the command."""
 
 import json
+import os
+import signal
+import subprocess
+import sys
+import time
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
 
 import pytest
@@ -59,6 +64,39 @@ def test_a_killed_run_goes_on(whole, tmp_path):
     assert min(made) >= 2  # two of the five chunks were there
     assert found.rows == plain(whole)
     assert ls.assemble(*NAMES, NOISE, trials=7, seed=8, file=file).rows == plain(whole)[:7]
+
+
+@pytest.mark.sweep
+def test_a_run_killed_from_outside_goes_on(tmp_path):
+    file, command = tmp_path / "trials.json", [sys.executable, "-m", "limitsets", "assemble", *NAMES]
+    command += ["--scatter", "throw.speed=0.5 %", "--trials", "2000", "--seed", "8", "--json"]
+    begun = subprocess.Popen(
+        [*command, "--file", str(file)], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+    )
+    until = time.monotonic() + 120.0
+    while not file.exists() and time.monotonic() < until and begun.poll() is None:
+        time.sleep(0.01)
+    os.kill(begun.pid, signal.SIGKILL)
+    begun.wait()
+    kept = json.loads(file.read_text())["trials"]
+    assert 0 < len(kept) < 2000
+    command[command.index("2000")] = str(len(kept) + 30)
+    continued, afresh = (
+        subprocess.run([*command, *more], capture_output=True, check=True, text=True).stdout
+        for more in (["--file", str(file)], [])
+    )
+    assert json.loads(continued) == json.loads(afresh)
+    assert kept.items() <= json.loads(file.read_text())["trials"].items()
+
+
+@pytest.mark.sweep
+def test_a_dask_cluster_of_separate_processes_gives_the_same_trials(whole, tmp_path):
+    from distributed import LocalCluster
+
+    options = {"processes": True, "threads_per_worker": 1, "dashboard_address": None}
+    with LocalCluster(n_workers=2, local_directory=str(tmp_path / "dask"), **options) as cluster:
+        found = ls.assemble(*NAMES, NOISE, trials=COUNT, seed=8, cluster=cluster.scheduler_address)
+    assert found.rows == plain(whole)
 
 
 def test_a_file_of_other_trials_is_refused(tmp_path):

@@ -37,6 +37,17 @@ def test_as_expected(ran):
         assert (out / f"{name}.png").stat().st_size > 20_000
 
 
+def test_the_step_does_not_show(ran):
+    """On the same draws, with half the step: rates move within their intervals."""
+    _, numbers, _ = ran
+    halved = numbers["halved step"]
+    whole, half = halved["rates"].values()
+    assert halved["same"] > 0.5 * halved["trials"]
+    for word in whole:
+        assert whole[word]["interval"][0] <= half[word]["interval"][1]
+        assert half[word]["interval"][0] <= whole[word]["interval"][1]
+
+
 def test_the_design_is_that_of_the_scene():
     """`limitsets.design` comes to the mass that the built-in scene has, to its digits."""
     design = load_study("12_assembly", "design")
