@@ -91,6 +91,7 @@ def test_a_way_ends_where_the_map_lets_the_part_rest(name):
     assert flips > 5
 
 
+@pytest.mark.sweep
 def test_ways_meet_where_many_looks_say_so():
     one, two = (ls.load(name) for name in NAMES)
     random, seen = np.random.default_rng(5), {True: 0, False: 0}

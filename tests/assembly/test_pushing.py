@@ -117,6 +117,7 @@ def test_a_film_ends_with_the_parts_in_the_cavity(found):
     assert film.poses[-1, :, 1].max() < 2.0
 
 
+@pytest.mark.sweep
 def test_the_figure_has_a_case_of_each_outcome(found, tmp_path):
     figure = ls.plot.assembly(found)
     titles = [axes.get_title(loc="left") for axes in figure.axes]

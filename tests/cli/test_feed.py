@@ -88,6 +88,7 @@ def test_a_scene_without_a_cavity_is_told_so(capfd):
     assert "add [cavity]" in err
 
 
+@pytest.mark.sweep
 def test_many_parts_at_once(capfd):
     """The keys are those of docs/json.md; without contact nothing is thrown at once."""
     pytest.importorskip("pymunk")

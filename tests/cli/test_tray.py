@@ -63,6 +63,7 @@ def test_json_has_the_keys_of_the_page(capfd):
     assert [each["returning"] for each in record["histories"]] == [False, True]
 
 
+@pytest.mark.sweep
 def test_depths_and_agitations(capfd):
     words = ("--depths", "0.8:1.6:2", "--agitations", "0.4:0.8 in:2")
     code, out, _ = run(capfd, "tray", "tray.toml", *FEW, *words, "-o", "out", "--csv", "grid.csv", "--json")

@@ -53,6 +53,7 @@ def test_parts_that_pass_through_each_other_do_too():
     assert_alike(found, run_trials(end, NOISE, 20_000, seed=3), throws=False)
 
 
+@pytest.mark.sweep
 def test_parts_that_push_each_other_are_counted_and_come_out_alike_again():
     end = arm_end_of(scene())
     one, two = (run_crowd(end, NOISE, 5, batches=4, seed=1, throws=40) for _ in range(2))

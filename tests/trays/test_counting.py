@@ -166,6 +166,7 @@ def test_what_cannot_be_is_refused(monkeypatch):
         ls.tray(with_tray(), drops=1)
 
 
+@pytest.mark.sweep
 def test_a_design_confirms_its_best_on_fresh_seeds():
     found = tray_design(
         with_tray(), [0.8, 1.53], [0.4, 1.6], passes=20, drops=60, kicks=40, seed=3, step=8e-3
