@@ -7,6 +7,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from limitsets.animation.cutting import Asked
 from limitsets.errors import AnswerError
 from limitsets.files import replaced
 
@@ -82,7 +83,7 @@ def film_of(
     if where is None:
         allowed = "a scene, or what analyse, feed, feedback, margin, assemble, tray or a recording gives"
         raise AnswerError("what to animate", type(shown).__name__, allowed, "pass one of these")
-    made: Film = _found(where)(shown, start, throws, fps, slow, progress)
+    made: Film = _found(where)(shown, Asked(start, throws, fps, slow, progress))
     return made
 
 

@@ -17,7 +17,7 @@ from limitsets.plot.poses import about_centre
 if TYPE_CHECKING:
     from limitsets.scene import Scene
 
-__all__ = ["Leg", "Pace", "cut", "labels_of"]
+__all__ = ["Asked", "Leg", "Pace", "cut", "labels_of", "require_length"]
 
 Array = NDArray[np.float64]
 
@@ -93,11 +93,6 @@ class Pace:
         if not (0.01 <= self.slow <= 1000.0):
             raise AnswerError("the slow motion", self.slow, "0.01 to 1000", "1 is as fast as the machine")
 
-    @classmethod
-    def of(cls, scene: Scene, fps: float, slow: float) -> Pace:
-        """Know the seconds where the scene has gravity."""
-        return cls(fps, slow, "1/w" if scene.gravity is None else "s")
-
     @property
     def unit(self) -> float:
         """Seconds of film for one unit of the clock."""
@@ -117,6 +112,20 @@ class Pace:
                 else f"{self.slow:g} times slower than the machine"
             )
         return f"1/w, the time in which the throw turns by 1 rad, is shown in {self.unit:g} s"
+
+
+class Asked(NamedTuple):
+    """What is asked of a film, as in `limitsets.animate`; without a start or throws each film has its own."""
+
+    start: tuple[float, int] | None
+    throws: int | None
+    fps: float
+    slow: float
+    progress: Any = None
+
+    def pace(self, scene: Scene) -> Pace:
+        """Know the seconds where the scene has gravity."""
+        return Pace(self.fps, self.slow, "1/w" if scene.gravity is None else "s")
 
 
 def require_length(frames: int) -> None:

@@ -14,9 +14,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from limitsets.animation.cutting import Leg, Pace, cut
+from limitsets.animation.cutting import Asked, Leg, Pace, cut
 from limitsets.animation.film import Film
-from limitsets.animation.lanes import Progress, known_of, require_start
+from limitsets.animation.lanes import known_of, require_start
 from limitsets.animation.legs import RESTS, STAYS, drawn_of, legs_of, rest_leg
 from limitsets.animation.throwing import Throw, motion, throws_of
 from limitsets.engine.ground import ground_of
@@ -42,33 +42,20 @@ BEYOND = "the struck corner is beyond the end of the arm: the map throws as if t
 NEAR = 0.005
 
 
-def film_of_feeding(
-    found: Feeding,
-    start: tuple[float, int] | None,
-    throws: int | None,
-    fps: float,
-    slow: float,
-    progress: Progress,
-) -> Film:
+def film_of_feeding(found: Feeding, asked: Asked) -> Film:
     """Show a part until it is fed."""
-    return film_of_end(found.end, start, throws, fps, slow, progress)
+    return film_of_end(found.end, asked)
 
 
-def film_of_end(
-    end: ArmEnd,
-    start: tuple[float, int] | None,
-    throws: int | None,
-    fps: float,
-    slow: float,
-    progress: Progress,
-) -> Film:
+def film_of_end(end: ArmEnd, asked: Asked) -> Film:
     """Show a part until it is fed."""
+    start, throws = asked.start, asked.throws
     if start is not None and not start[0] < end.x:
         allowed = f"below {end.x:g} {end.scene.unit}, where the arm ends"
         raise AnswerError("x of the start", start[0], allowed, "start on the arm")
     goes_on = f"where the arm ends: side {end.side} is wanted"
-    found, lanes = known_of(end.scene, progress, lines=((end.x, goes_on),))
-    scene, pace = found.scene, Pace.of(found.scene, fps, slow)
+    found, lanes = known_of(end.scene, asked.progress, lines=((end.x, goes_on),))
+    scene, pace = found.scene, asked.pace(found.scene)
     most = MOST_THROWS if throws is None else throws
     x, side = _longest(end, most if throws else USUAL) if start is None else require_start(scene, start)
     made = _until_fed(end, scene, x, side, most)

@@ -19,7 +19,7 @@ from limitsets.plot.poses import angle_on_side
 if TYPE_CHECKING:
     from limitsets.scene import Scene
 
-__all__ = ["drawn_of", "legs_of", "rest_leg"]
+__all__ = ["drawn_of", "legs_of", "lowered", "raised", "rest_leg"]
 
 Array = NDArray[np.float64]
 
@@ -54,6 +54,16 @@ def _carried(pose: Array, angle: Array) -> Array:
     cos, sin = np.cos(angle), np.sin(angle)
     x, y = cos * pose[0] - sin * pose[1], sin * pose[0] + cos * pose[1]
     return np.stack([x, y, pose[2] + angle], axis=-1)
+
+
+def lowered(swing: float, share: Array) -> Array:
+    """Angle of the arm on its way down, which begins and ends at rest [rad]."""
+    return -swing * 0.5 * (1.0 - np.cos(np.pi * share))
+
+
+def raised(swing: float, share: Array) -> Array:
+    """Angle of the arm on its way up, with constant acceleration [rad]."""
+    return -swing * (1.0 - share * share)
 
 
 def _on_lane(x: float, side: float, share: Array) -> Array:
@@ -114,12 +124,6 @@ def legs_of(
     flown = moves.turning
     jumps = throw.turned
 
-    def lowered(share: Array) -> Array:
-        return -swing * 0.5 * (1.0 - np.cos(np.pi * share))
-
-    def raised(share: Array) -> Array:
-        return -swing * (1.0 - share * share)
-
     def turning_lane(share: Array) -> Array:
         poses = flown.pose(share)
         end = poses[-1] if share[-1] >= 1.0 else flown.pose(np.ones(1))[0]
@@ -135,8 +139,8 @@ def legs_of(
     return [
         Leg(
             LOWERS,
-            lambda share: _carried(lying, lowered(share)),
-            lowered,
+            lambda share: _carried(lying, lowered(swing, share)),
+            lambda share: lowered(swing, share),
             lambda share: _on_lane(throw.x, throw.side, share),
             f"{name}: the arm goes down",
             note,
@@ -145,8 +149,8 @@ def legs_of(
         ),
         Leg(
             2.0 * swing * unit,
-            lambda share: _carried(lying, raised(share)),
-            raised,
+            lambda share: _carried(lying, raised(swing, share)),
+            lambda share: raised(swing, share),
             lambda share: _on_lane(throw.x, throw.side, share),
             f"{name}: the arm swings up and stops",
             note,

@@ -15,10 +15,9 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from limitsets.animation.cutting import Pace, labels_of, require_length
+from limitsets.animation.cutting import Asked, Pace, labels_of, require_length
 from limitsets.animation.film import Film, Mark
-from limitsets.animation.lanes import Progress
-from limitsets.animation.legs import LOWERS, STAYS, SWING
+from limitsets.animation.legs import LOWERS, STAYS, SWING, lowered, raised
 from limitsets.engine.ground import ground_of
 from limitsets.errors import AnswerError
 
@@ -31,7 +30,6 @@ if TYPE_CHECKING:
 __all__ = ["film_of_assembly", "film_of_recording", "film_of_tray"]
 
 Array = NDArray[np.float64]
-Start = tuple[float, int] | None
 
 # More parts than this are counted, not named.
 NAMED = 4
@@ -51,24 +49,20 @@ class _Frame(NamedTuple):
 
 def film_of_recording(
     recording: Recording,
-    start: Start,
-    throws: int | None,
-    fps: float,
-    slow: float,
-    progress: Progress,
+    asked: Asked,
     scenes: Sequence[Scene] = (),
     title: str = "parts in the rigid-body engine",
 ) -> Film:
     """Show a recording from its beginning, up to so many throws."""
-    if start is not None:
-        raise AnswerError("the start", start, "none: a recording has its own", "leave it out")
+    if asked.start is not None:
+        raise AnswerError("the start", asked.start, "none: a recording has its own", "leave it out")
     if not recording.times.size:
         raise AnswerError("the recording", "empty", "one with frames", "record a throw")
-    pace = Pace.of(scenes[0], fps, slow) if scenes else Pace(fps, slow)
+    pace = asked.pace(scenes[0]) if scenes else Pace(asked.fps, asked.slow)
     swing = 0.0
     if scenes:
         swing = 2.0 * SWING * pace.unit / pace.rate(scenes[0], scenes[0].kappa)
-    shown, thrown = _frames(recording, throws, pace, swing)
+    shown, thrown = _frames(recording, asked.throws, pace, swing)
     at = np.array([each.time for each in shown])
     kept = np.maximum(np.searchsorted(recording.times, at + 1e-9, side="right") - 1, 0)
     texts = [_words(recording, thrown, each) for each in shown]
@@ -83,9 +77,9 @@ def film_of_recording(
         title,
         scenes[0].unit if scenes else "",
         pace.clock if scenes else "",
-        fps,
+        pace.fps,
         f"{pace.words}; " + ("the swing of the arm is drawn" if scenes else "the arm's swing is not shown"),
-        np.arange(count) / (pace.unit * fps),
+        np.arange(count) / (pace.unit * pace.fps),
         poses,
         tuple(recording.outlines),
         tuple(labels_of(each) for each in scenes) or tuple(() for _ in recording.outlines),
@@ -106,30 +100,24 @@ def film_of_recording(
     )
 
 
-def film_of_assembly(
-    found: Assembly, start: Start, throws: int | None, fps: float, slow: float, progress: Progress
-) -> Film:
+def film_of_assembly(found: Assembly, asked: Asked) -> Film:
     """Show the first pair that was assembled, or else the first pair: its last throws."""
     example = found.example("assembled")
     number = 0 if example is None else example
-    scenes, last = found.pair.scenes, LAST if throws is None else throws
+    scenes, last = found.pair.scenes, LAST if asked.throws is None else asked.throws
     title = f"{scenes[0].name} and {scenes[1].name}, trial {number}: {found.rows[number]['outcome']}"
-    return film_of_recording(
-        found.film(number, last), start, None, fps, slow, progress, scenes=scenes, title=title
-    )
+    return film_of_recording(found.film(number, last), asked._replace(throws=None), scenes, title)
 
 
-def film_of_tray(
-    found: TrayFill, start: Start, throws: int | None, fps: float, slow: float, progress: Progress
-) -> Film:
+def film_of_tray(found: TrayFill, asked: Asked) -> Film:
     """Show one depression of a tray, pass by pass."""
     from limitsets.trays import filmed
 
     scene = found.scene
-    recording = filmed(scene, PASSES if throws is None else throws, seed=found.seed)
+    recording = filmed(scene, PASSES if asked.throws is None else asked.throws, seed=found.seed)
     title = f"{scene.name}, one depression of a tray"
-    film = film_of_recording(recording, start, None, fps, slow, progress, title=title)
-    pace = Pace.of(scene, fps, slow)
+    film = film_of_recording(recording, asked._replace(throws=None), title=title)
+    pace = asked.pace(scene)
     return replace(
         film,
         unit=scene.unit,
@@ -158,10 +146,9 @@ def _frames(
     for end_of_leg in ends:
         if swing and begin in thrown:
             down, up = (max(1, round(seconds * pace.fps)) for seconds in (LOWERS, swing))
-            angles = [-SWING * 0.5 * (1.0 - math.cos(math.pi * k / down)) for k in range(1, down + 1)]
-            frames += [_Frame(begin, angle, ": the arm goes down") for angle in angles]
-            angles = [-SWING * (1.0 - (k / up) ** 2) for k in range(1, up + 1)]
-            frames += [_Frame(begin, angle, ": the arm swings up and stops") for angle in angles]
+            for way, count, said in ((lowered, down, "goes down"), (raised, up, "swings up and stops")):
+                angles = way(SWING, np.arange(1, count + 1) / count).tolist()
+                frames += [_Frame(begin, angle, f": the arm {said}") for angle in angles]
         count = max(1, round((end_of_leg - begin) * pace.unit * pace.fps))
         frames += [_Frame(begin + (end_of_leg - begin) * k / count, 0.0, "") for k in range(1, count + 1)]
         begin = end_of_leg

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from limitsets.animation.cutting import Pace, cut
+from limitsets.animation.cutting import Asked, cut
 from limitsets.animation.film import Film
-from limitsets.animation.lanes import Progress, known_of
+from limitsets.animation.lanes import known_of
 from limitsets.animation.legs import STAYS, drawn_of, legs_of, rest_leg
 from limitsets.animation.throwing import Throw, throws_of
 from limitsets.errors import AnswerError
@@ -21,17 +21,10 @@ __all__ = ["film_of_margin"]
 USUAL = 8
 
 
-def film_of_margin(
-    margin: Margin,
-    start: tuple[float, int] | None,
-    throws: int | None,
-    fps: float,
-    slow: float,
-    progress: Progress,
-) -> Film:
+def film_of_margin(margin: Margin, asked: Asked) -> Film:
     """Show the last throws of the orbit that refutes."""
-    if start is not None:
-        raise AnswerError("the start", start, "none: the orbit of a margin has its own", "leave it out")
+    if asked.start is not None:
+        raise AnswerError("the start", asked.start, "none: the orbit of a margin has its own", "leave it out")
     states = margin.counterexample
     if len(states) < 2:
         raise AnswerError(
@@ -41,9 +34,9 @@ def film_of_margin(
     piece = margin.against.piece
     texts = {} if piece is None else {name: pair[0] for name, pair in piece.texts().items()}
     scene: Scene = margin.scene.with_values(texts) if texts else margin.scene
-    made = [_thrown(scene, state) for state in states[:-1]][-(throws or USUAL) :]
-    _, lanes = known_of(scene, progress, goal=margin.goals[0])
-    pace, first = Pace.of(scene, fps, slow), len(states) - len(made)
+    made = [_thrown(scene, state) for state in states[:-1]][-(asked.throws or USUAL) :]
+    _, lanes = known_of(scene, asked.progress, goal=margin.goals[0])
+    pace, first = asked.pace(scene), len(states) - len(made)
     size = f"{margin.refuted:.4g} {margin.unit}".strip()
     when = "at every throw anew" if margin.reading == "per-throw" else "at all throws alike"
     what = f"{margin.quantity} deviates by {size}, {when}"

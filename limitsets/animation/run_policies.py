@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, NamedTuple
 
-from limitsets.animation.cutting import Pace, cut
+from limitsets.animation.cutting import Asked, cut
 from limitsets.animation.film import Film
-from limitsets.animation.lanes import Progress, lanes_of, require_start
+from limitsets.animation.lanes import lanes_of, require_start
 from limitsets.animation.legs import STAYS, drawn_of, legs_of, rest_leg
 from limitsets.animation.throwing import Throw, throws_of
 from limitsets.errors import AnswerError
@@ -27,24 +27,17 @@ class _Step(NamedTuple):
     throw: Throw | None
 
 
-def film_of_policy(
-    found: Synthesis,
-    start: tuple[float, int] | None,
-    throws: int | None,
-    fps: float,
-    slow: float,
-    progress: Progress,
-) -> Film:
+def film_of_policy(found: Synthesis, asked: Asked) -> Film:
     """Show what a policy does from a start, without noise."""
     policy = found.found.policy
     if policy is None:
         remedy = "more throws, other throws, another sensor or fewer starts may do it"
         raise AnswerError("the policy", found.found.verdict, "one that was found", remedy)
-    scene, pace = found.scene, Pace.of(found.scene, fps, slow)
-    if start is None:
+    scene, pace = found.scene, asked.pace(found.scene)
+    if asked.start is None:
         x, side = _longest(found, policy)
     else:
-        x, side = require_start(scene, start)
+        x, side = require_start(scene, asked.start)
         inside = found.starts.extents().get(side, [])
         if not any(lo <= x <= hi for lo, hi in inside):
             raise AnswerError(
@@ -59,7 +52,7 @@ def film_of_policy(
             scene, x, side, 1.5, f"Start: x = {x:.2f} {scene.unit} on side {side}", texts[0], steps[0].state
         )
     ]
-    made = [(each, each.throw) for each in steps if each.throw is not None][:throws]
+    made = [(each, each.throw) for each in steps if each.throw is not None][: asked.throws]
     for number, (each, throw) in enumerate(made):
         last = number + 1 == len(made)
         after = ("the part is caught", -1)

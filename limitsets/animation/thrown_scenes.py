@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from limitsets.animation.cutting import Pace, cut, require_length
+from limitsets.animation.cutting import Asked, cut, require_length
 from limitsets.animation.film import Film
-from limitsets.animation.lanes import Progress, good_start, known_of, lanes_of, require_start
+from limitsets.animation.lanes import good_start, known_of, lanes_of, require_start
 from limitsets.animation.legs import RESTS, STAYS, drawn_of, legs_of, rest_leg
 from limitsets.animation.throwing import throws_of
 from limitsets.errors import AnswerError
@@ -21,36 +21,22 @@ USUAL = 8
 """Throws that are shown unless others are asked for."""
 
 
-def film_of_scene(
-    scene: Scene,
-    start: tuple[float, int] | None,
-    throws: int | None,
-    fps: float,
-    slow: float,
-    progress: Progress,
-) -> Film:
+def film_of_scene(scene: Scene, asked: Asked) -> Film:
     """Show throws of a scene."""
-    if start is not None:
-        require_start(scene, start)
-    require_length(throws or USUAL)
-    found, _ = known_of(scene, progress)
-    return film_of_analysis(found, start, throws, fps, slow, progress)
+    if asked.start is not None:
+        require_start(scene, asked.start)
+    require_length(asked.throws or USUAL)
+    found, _ = known_of(scene, asked.progress)
+    return film_of_analysis(found, asked)
 
 
-def film_of_analysis(
-    found: Analysis,
-    start: tuple[float, int] | None,
-    throws: int | None,
-    fps: float,
-    slow: float,
-    progress: Progress,
-) -> Film:
+def film_of_analysis(found: Analysis, asked: Asked) -> Film:
     """Show throws of a scene that is analysed already."""
     from limitsets.thrower import trace
 
-    scene, pace = found.scene, Pace.of(found.scene, fps, slow)
-    count = USUAL if throws is None else throws
-    x, side = good_start(found, count) if start is None else require_start(scene, start)
+    scene, pace = found.scene, asked.pace(found.scene)
+    count = USUAL if asked.throws is None else asked.throws
+    x, side = good_start(found, count) if asked.start is None else require_start(scene, asked.start)
     path = trace(scene.map, x, side, count)
     made = throws_of(scene, path)
     if not made:
