@@ -195,7 +195,7 @@ def _tanh(a: Any) -> Interval:
 
 def _tan(a: Any) -> Interval:
     ratio: Any = math.sin(a) / math.cos(a)
-    return ratio  # type: ignore[no-any-return]  # an interval
+    return ratio  # type: ignore[no-any-return]  # `math` has types for floats alone; this is an interval
 
 
 def _atan2(a: Any, b: Any) -> Interval:
@@ -278,7 +278,7 @@ intervals_between = corners_as_numbers(Interval, PerSide)
 def square_root(x: Number) -> Number:
     """Return the square root."""
     root: Any = math.sqrt(x)
-    return root  # type: ignore[no-any-return]  # of the kind of x
+    return root  # type: ignore[no-any-return]  # `math` has types for floats alone; this is of the kind of x
 
 
 def smaller(x: Number, y: Number) -> Number:
@@ -293,12 +293,12 @@ def larger(x: Number, y: Number) -> Number:
 
 def signed_square(x: Number) -> Number:
     """Return x |x|, which grows with x."""
-    return x * abs(x)  # type: ignore[no-any-return]  # of their kind
+    return x * abs(x)  # type: ignore[no-any-return]  # the operators of floats, arrays and intervals share no type
 
 
 def with_sign_of(x: Number, size: Number) -> Number:
     """Return a size where x > 0, less the size where not."""
-    return size if x > 0.0 else -size  # type: ignore[no-any-return]  # of their kind
+    return size if x > 0.0 else -size  # type: ignore[no-any-return]  # the operators of floats, arrays and intervals share no type
 
 
 def where_positive(x: Number, yes: Number, no: Number) -> Number:

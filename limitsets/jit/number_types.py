@@ -247,7 +247,7 @@ def of_entries(function: Callable[..., Any]) -> Callable[..., Any]:
         calls = "".join(f"of(entries[{k}], {k}, *more), " for k in range(len(entries)))
         scope: dict[str, Any] = {"of": inlined}
         exec(f"def method(entries, *more):\n    return ({calls})", scope)  # noqa: S102  # our own text
-        return scope["method"]  # type: ignore[no-any-return]
+        return scope["method"]  # type: ignore[no-any-return]  # made by exec
 
     options = {**{key: PROOF[key] for key in OVERLOAD}, "forceinline": True}
     extending.overload(each, jit_options=options, strict=False)(choose)

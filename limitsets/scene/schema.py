@@ -290,7 +290,7 @@ def _goal_field(goal: type[Goal]) -> Any:
     given = {
         name: (WRITTEN[word], ... if own[name] is MISSING else own[name]) for name, word in words.items()
     }
-    return create_model(goal.__name__, __base__=Table, **given)  # type: ignore[call-overload]
+    return create_model(goal.__name__, __base__=Table, **given)  # type: ignore[call-overload]  # pydantic has no types for fields by name
 
 
 def _fact_field(fact: Fact) -> Any:

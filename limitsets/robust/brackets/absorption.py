@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -194,8 +195,7 @@ def absorption_brackets(
     within, values = {}, {}
     for name in (ANY, *chain.absorbs):
         value = {each: float(name in (ANY, each)) for each in chain.absorbs}
-        told = lambda done, total, name=name: tell(name, done, total)  # noqa: E731
-        within[name], values[name] = within_brackets(chain, value, row, throws, told)
+        within[name], values[name] = within_brackets(chain, value, row, throws, partial(tell, name))
     tell("mean", 0, 1)
     means = mean_brackets(chain, row) if mean else (0.0, math.inf)
     tell("mean", 1, 1)

@@ -111,7 +111,8 @@ class Average:
     def _window(self, key: Any, span: Span) -> Windows:
         if id(key) not in self.windows:
             self.windows[id(key)] = Windows(span)
-        return self.windows[id(key)]  # type: ignore[no-any-return]
+        window: Windows = self.windows[id(key)]
+        return window
 
     def above(self, values: Array) -> Array:
         """Bound the mean of V from above, for all starts.
@@ -140,7 +141,8 @@ class Average:
             mean += self.beyond * most
         deficit = self._deficit(values, slopes, total, n)
         worst = np.maximum(deficit, np.concatenate([[0.0], deficit[:-1]]))
-        return mean + MORE * worst + size  # type: ignore[no-any-return]
+        bound: Array = mean + MORE * worst + size
+        return bound
 
     def _deficit(self, values: Array, slopes: Array, total: Running, n: int) -> Array:
         """How far the mean may lie above the chord, for each cell, named by its left node."""
@@ -184,7 +186,8 @@ class Average:
         close = np.flatnonzero(self.source.width < CLOSE_BY * np.median(self.source.width))
         for _ in range(CLUSTER):
             best[close] = np.maximum(best[close], np.maximum(best[close - 1], best[close + 1]))
-        return found + best  # type: ignore[no-any-return]
+        deficits: Array = found + best
+        return deficits
 
     def _difference(self, gap: Gaps, values: Array) -> Array:
         low, high = self._both(gap, values)
@@ -196,7 +199,8 @@ class Average:
         if -id(kink) not in self.windows:
             last = np.maximum(kink.span.last - 1, kink.span.first)
             self.windows[-id(kink)] = Windows(Span(kink.span.first, last))
-        return self.windows[-id(kink)]  # type: ignore[no-any-return]
+        window: Windows = self.windows[-id(kink)]
+        return window
 
     def _both(self, gap: Gaps, values: Array) -> tuple[Array, Array]:
         if id(gap) not in self.windows:

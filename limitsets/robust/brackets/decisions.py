@@ -26,6 +26,10 @@ from limitsets.robust.brackets.landings import OneSide, landed, slopes
 __all__ = ["Decided", "Piece", "crossings", "decided", "hull", "margin"]
 
 Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+Flags = NDArray[np.bool_]
+# Of all cells: surely flips, surely jogs, what is open, and the branches below and above the border.
+_Cells = tuple[Flags, Flags, Array, Flags, Flags]
 
 BISECTIONS = 48
 # Places at which critical points are looked for.
@@ -163,7 +167,16 @@ def decided(side: OneSide, x: Array, pieces: Sequence[Piece]) -> Decided:
     return Decided(cut, below, above, cell_below, cell_above, beta)
 
 
-def _by_corners(side, x, open_, by_x, rising, falling, bounds, cells) -> None:  # type: ignore[no-untyped-def]
+def _by_corners(
+    side: OneSide,
+    x: Array,
+    open_: Index,
+    by_x: Intervals,
+    rising: Flags,
+    falling: Flags,
+    bounds: tuple[float, float],
+    cells: _Cells,
+) -> None:
     """Where F is monotone in both, the sign at two corners decides."""
     yes, no, beta, cell_below, cell_above = cells
     up, down = by_x.lo > 0.0, by_x.hi < 0.0
@@ -183,7 +196,16 @@ def _by_corners(side, x, open_, by_x, rising, falling, bounds, cells) -> None:  
     cell_above[cell] |= flips
 
 
-def _by_border(side, x, open_, by_x, by_delta, bounds, nodes, cells) -> None:  # type: ignore[no-untyped-def]
+def _by_border(
+    side: OneSide,
+    x: Array,
+    open_: Index,
+    by_x: Intervals,
+    by_delta: Intervals,
+    bounds: tuple[float, float],
+    nodes: tuple[Array, Flags, Flags],
+    cells: _Cells,
+) -> None:
     """Cut the cells at a chord, and bound how far the border may be from it."""
     cut, below, above = nodes
     yes, no, beta, cell_below, cell_above = cells

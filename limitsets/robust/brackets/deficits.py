@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from limitsets.proofs.intervals import Intervals
+from limitsets.robust.brackets.decisions import Decided
 from limitsets.robust.brackets.densities import Staircase
 from limitsets.robust.brackets.landings import Derivatives, OneSide, landed, slopes
 from limitsets.robust.brackets.nodes import Nodes
@@ -21,6 +22,7 @@ __all__ = ["Deficits", "Rows"]
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
+Flags = NDArray[np.bool_]
 
 # Inflates coefficients against the rounding of the few operations that make them.
 MORE = 1.0 + 2.0**-40
@@ -37,7 +39,7 @@ class Rows(NamedTuple):
     place: Array  # where jogs land, (n, borders)
     phi: Array
     error: Array  # of angles and places, the largest of each node
-    good: NDArray[np.bool_]
+    good: Flags
 
 
 class _Border(NamedTuple):
@@ -68,21 +70,23 @@ class Deficits:
         self.target, self.law = target, law
         self.ways: list[Curvature] = []
 
-    def landing(self, side: OneSide, flips: NDArray[np.bool_], place: Array) -> tuple[Index, Array]:
+    def landing(self, side: OneSide, flips: Flags, place: Array) -> tuple[Index, Array]:
         """Return the side on which throws land, and where, of the places of jogs."""
         return np.where(flips, side.after, side.number), np.where(flips, place - side.shift, place)
 
-    def span_of(self, side: OneSide, flips: NDArray[np.bool_], lo: Array, hi: Array) -> Span:
+    def span_of(self, side: OneSide, flips: Flags, lo: Array, hi: Array) -> Span:
         """Return the cells between two such places."""
         number, low = self.landing(side, flips, lo)
         _, high = self.landing(side, flips, hi)
         return Span(self.target.cell(number, low), self.target.cell(number, high))
 
-    def gaps_of(self, cell, much, side, flips, lo, hi, both) -> Gaps:  # type: ignore[no-untyped-def]
+    def gaps_of(
+        self, cell: Index, much: Array, side: OneSide, flips: Flags, lo: Array, hi: Array, both: Flags
+    ) -> Gaps:
         """Return gaps between such places, on both branches where `both`."""
         return Gaps(cell, much, self.span_of(side, flips, lo, hi), self.span_of(side, flips ^ both, lo, hi))
 
-    def any_way(self, rows, found, some, lo, hi) -> None:  # type: ignore[no-untyped-def]
+    def any_way(self, rows: Rows, found: Decided, some: Index, lo: Array, hi: Array) -> None:
         """By all that V may be where throws land."""
         cell = rows.number[:-1][some]
         below, above = found.cell_below[some], found.cell_above[some]
@@ -93,7 +97,16 @@ class Deficits:
         """Width of the widest cell of the target on spans."""
         return Windows(span).ends(np.minimum(self.target.width, NEVER))[1]
 
-    def by_kinks(self, rows, found, all_of, some, lo, hi, density) -> None:  # type: ignore[no-untyped-def]
+    def by_kinks(
+        self,
+        rows: Rows,
+        found: Decided,
+        all_of: Derivatives,
+        some: Index,
+        lo: Array,
+        hi: Array,
+        density: float,
+    ) -> None:
         """By what the slope of V falls at nodes, each met by a share of the deviations only."""
         law, side, cell = self.law, rows.side, rows.number[:-1]
         h = np.diff(rows.x)[some]
@@ -123,15 +136,24 @@ class Deficits:
             drift = (found.cut[at + 1] - found.cut[at]) / h[split]
             moving = Intervals(drift, drift)
             by = h[split] ** 2 / 8.0 * density
-            much = moving * (2.0 * t.x[split] + moving * t.delta[split]) * Intervals(0.0 * by, by)
+            turned = moving * (2.0 * t.x[split] + moving * t.delta[split]) * Intervals(0.0 * by, by)
             none = np.full(at.size, NEVER)
             for flips, sign in ((below[split], 1.0), (above[split], -1.0)):
                 span = self.span_of(side, flips, lo[at], hi[at])
-                low, high = (much.lo, much.hi) if sign > 0.0 else (-much.hi, -much.lo)
+                low, high = (turned.lo, turned.hi) if sign > 0.0 else (-turned.hi, -turned.lo)
                 bends.append(Bends(cell[at], low, high, none, span))
         self.ways.append(Curvature(cell[some], tuple(bends), kinks=tuple(kinks)))
 
-    def by_borders(self, rows, found, all_of, some, lo, hi, density) -> None:  # type: ignore[no-untyped-def]
+    def by_borders(
+        self,
+        rows: Rows,
+        found: Decided,
+        all_of: Derivatives,
+        some: Index,
+        lo: Array,
+        hi: Array,
+        density: float,
+    ) -> None:
         """By the borders of strata and branches, where the densities jump."""
         bends: list[Bends] = []
         swings: list[Swings] = []
@@ -179,7 +201,9 @@ class Deficits:
             bends += self._moving(rows, found, some, here, below, above)
         self.ways.append(Curvature(cell[some], tuple(bends), tuple(swings), gaps=tuple(gaps)))
 
-    def _moving(self, rows, found, some, here, below, above) -> list[Bends]:  # type: ignore[no-untyped-def]
+    def _moving(
+        self, rows: Rows, found: Decided, some: Index, here: Index, below: Flags, above: Flags
+    ) -> list[Bends]:
         """Return what the border between the branches bends."""
         law, side = self.law, rows.side
         h = np.diff(rows.x)[some]
@@ -201,9 +225,7 @@ class Deficits:
         other = border._replace(low=-high, high=-low)
         return self._border(rows, some, here, below, border) + self._border(rows, some, here, above, other)
 
-    def _border(
-        self, rows: Rows, some: Index, here: Index, flips: NDArray[np.bool_], border: _Border
-    ) -> list[Bends]:
+    def _border(self, rows: Rows, some: Index, here: Index, flips: Flags, border: _Border) -> list[Bends]:
         """Return what the jump of the density at a border, fixed or moving with x, bends."""
         if not here.size:
             return []

@@ -47,5 +47,5 @@ def moments(phi: Array, most: int = 2) -> Moments:
     count = range(most + 1)
     return Moments(
         tuple(_horner(_COS[k], q) for k in count),  # type: ignore[arg-type]  # as many as asked for
-        tuple(phi * _horner(_SIN[k], q) for k in count),  # type: ignore[arg-type]
+        tuple(phi * _horner(_SIN[k], q) for k in count),  # type: ignore[arg-type]  # likewise
     )

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from limitsets.proofs.intervals import Intervals
 from limitsets.robust.brackets.averages import Average, mean_matrix
 from limitsets.robust.brackets.decisions import Decided, Piece, decided, hull
-from limitsets.robust.brackets.deficits import Deficits, Rows
+from limitsets.robust.brackets.deficits import Deficits, Flags, Rows
 from limitsets.robust.brackets.densities import Staircase
 from limitsets.robust.brackets.landings import Derivatives, OneSide, landed, slopes
 from limitsets.robust.brackets.nodes import Nodes
@@ -224,7 +224,9 @@ class _Parts(Deficits):
         if begin:
             at = np.arange(begin)
             both = found.beta[at] > 0.0
-            self._gap(cell[at], np.ones(begin), side, found.cell_below[at], lo[at], hi[at], both)
+            self.gaps.append(
+                self.gaps_of(cell[at], np.ones(begin), side, found.cell_below[at], lo[at], hi[at], both)
+            )
         live = np.flatnonzero(known & (np.arange(h.size) >= begin) & (h > 0.0))
         if law.ripple:
             for flips in (found.cell_below, found.cell_above):
@@ -239,12 +241,9 @@ class _Parts(Deficits):
         if curved.size:
             self.by_borders(rows, found, all_of, curved, lo, hi, density)
 
-    def _gap(self, cell, much, side, flips, lo, hi, both) -> None:  # type: ignore[no-untyped-def]
-        one = self.span_of(side, flips, lo, hi)
-        two = self.span_of(side, flips ^ both, lo, hi)
-        self.gaps.append(Gaps(cell, much, one, two))
-
-    def _undecided(self, rows, found, lo, hi, density, known) -> None:  # type: ignore[no-untyped-def]
+    def _undecided(
+        self, rows: Rows, found: Decided, lo: Array, hi: Array, density: float, known: Flags
+    ) -> None:
         """Where the branch is open, or not that of the node's row; where nothing is proved anything may be."""
         law, cell = self.law, rows.number[:-1]
         first, last = law.borders[0], law.borders[-1]
@@ -263,14 +262,9 @@ class _Parts(Deficits):
             much = much + np.where(found.cell_below == found.cell_above, 0.0, law.cut_ripple)
         some = np.flatnonzero((much > 0.0) & known)
         if some.size:
-            self._gap(
-                cell[some],
-                MORE * much[some],
-                rows.side,
-                found.cell_below[some],
-                lo[some],
-                hi[some],
-                np.ones(some.size, bool),
+            below, both = found.cell_below[some], np.ones(some.size, bool)
+            self.gaps.append(
+                self.gaps_of(cell[some], MORE * much[some], rows.side, below, lo[some], hi[some], both)
             )
         lost = cell[~known]
         if lost.size:
