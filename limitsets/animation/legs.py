@@ -19,7 +19,7 @@ from limitsets.plot.poses import angle_on_side
 if TYPE_CHECKING:
     from limitsets.scene import Scene
 
-__all__ = ["drawn_of", "legs_of", "lowered", "raised", "rest_leg"]
+__all__ = ["carried", "drawn_of", "legs_of", "lowered", "raised", "rest_leg"]
 
 Array = NDArray[np.float64]
 
@@ -49,11 +49,11 @@ def _lying(scene: Scene, x: float, side: int) -> Array:
     return np.array([x, scene.surface_height + float(scene.sides.d[side]), angle_on_side(scene, side)])
 
 
-def _carried(pose: Array, angle: Array) -> Array:
-    """Poses of a part that lies on the arm while that turns about the joint."""
+def carried(poses: Array, angle: Array | float) -> Array:
+    """Poses of parts that lie on the arm, once that is turned about the joint; shapes (3,) or (n, 3), () or (n,)."""
     cos, sin = np.cos(angle), np.sin(angle)
-    x, y = cos * pose[0] - sin * pose[1], sin * pose[0] + cos * pose[1]
-    return np.stack([x, y, pose[2] + angle], axis=-1)
+    x, y = cos * poses[..., 0] - sin * poses[..., 1], sin * poses[..., 0] + cos * poses[..., 1]
+    return np.stack([x, y, poses[..., 2] + angle], axis=-1)
 
 
 def lowered(swing: float, share: Array) -> Array:
@@ -139,7 +139,7 @@ def legs_of(
     return [
         Leg(
             LOWERS,
-            lambda share: _carried(lying, lowered(swing, share)),
+            lambda share: carried(lying, lowered(swing, share)),
             lambda share: lowered(swing, share),
             lambda share: _on_lane(throw.x, throw.side, share),
             f"{name}: the arm goes down",
@@ -149,7 +149,7 @@ def legs_of(
         ),
         Leg(
             2.0 * swing * unit,
-            lambda share: _carried(lying, raised(swing, share)),
+            lambda share: carried(lying, raised(swing, share)),
             lambda share: raised(swing, share),
             lambda share: _on_lane(throw.x, throw.side, share),
             f"{name}: the arm swings up and stops",

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from limitsets.animation.cutting import Asked, Pace, labels_of, require_length
 from limitsets.animation.film import Film, Mark
-from limitsets.animation.legs import LOWERS, STAYS, SWING, lowered, raised
+from limitsets.animation.legs import LOWERS, STAYS, SWING, carried, lowered, raised
 from limitsets.engine.ground import ground_of
 from limitsets.errors import AnswerError
 
@@ -163,11 +163,7 @@ def _swung(recording: Recording, kept: NDArray[np.int64], shown: list[_Frame], t
     for frame, each in enumerate(shown):
         if each.arm:
             riders = [part for time, part, word in recording.marks if word == "thrown" and time == each.time]
-            cos, sin = math.cos(each.arm), math.sin(each.arm)
-            x, y, _ = poses[frame, riders].T
-            poses[frame, riders] = np.stack(
-                [cos * x - sin * y, sin * x + cos * y, poses[frame, riders, 2] + each.arm], axis=-1
-            )
+            poses[frame, riders] = carried(poses[frame, riders], each.arm)
     return poses
 
 
