@@ -44,8 +44,13 @@ contracts: .venv/dev.stamp  ## which room may import which
 bench: .venv/bench.stamp  ## the benchmarks, with their rivals in the same run
 	$(PY) -m pytest tests/bench -s --benchmark-quiet
 
-docs: .venv/dev.stamp  ## the reference, from the docstrings, into docs/api
-	$(PY) docs/build.py
+docs: .venv/dev.stamp  ## the site, into build/site: pages, notebooks, and the reference from the docstrings
+	rm -rf docs/api
+	$(PY) -m sphinx -W --keep-going -q -c docs . build/site
+	@echo "open build/site/docs/index.html"
+
+linkcheck: .venv/dev.stamp  ## whether links of the pages to other sites are alive (needs the internet)
+	$(PY) -m sphinx -q -b linkcheck -c docs . build/linkcheck
 
 checker: $(PY)  ## the recheck of certificates in one file to copy away, dist/recheck.pyz
 	$(PY) limitsets/checker/build.py dist/recheck.pyz
@@ -62,7 +67,7 @@ clean:  ## remove .venv, caches and what was built
 	rm -rf .venv build dist docs/api .benchmarks .hypothesis .import_linter_cache .mypy_cache .pytest_cache .ruff_cache
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 
-.venv/run.stamp: extras := [animate,atlas,engine]
+.venv/run.stamp: extras := [animate,atlas,engine,explore]
 .venv/dev.stamp: extras := [dev]
 .venv/bench.stamp: extras := [dev,bench]
 .venv/run.stamp .venv/dev.stamp .venv/bench.stamp: pyproject.toml constraints.txt $(PY)
@@ -82,4 +87,7 @@ $(PY):
 	echo "or name it: make PYTHON=/path/to/python3.12" >&2; \
 	exit 1
 
-.PHONY: help analyse test test-all lint types contracts bench docs checker studies notebooks check clean
+gallery: .venv/dev.stamp  ## draw the pictures of docs/gallery.md again
+	cd docs/gallery && awk '/^```python/ { on = 1; next } /^```/ { on = 0 } on' ../gallery.md | ../../$(PY) -
+
+.PHONY: help analyse test test-all lint types contracts bench docs linkcheck checker studies notebooks gallery check clean

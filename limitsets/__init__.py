@@ -14,6 +14,7 @@ Names are loaded when first used, so the import itself costs next to nothing.
 
 from __future__ import annotations
 
+import sys
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
@@ -24,6 +25,7 @@ if TYPE_CHECKING:  # each from the file that holds it: most rooms have a file of
     from limitsets.assembly import assemble
     from limitsets.auditing import audit
     from limitsets.cells import grid
+    from limitsets.explorer import explore
     from limitsets.feeding import feed
     from limitsets.fitting import fit
     from limitsets.graph.morse import morse_graph
@@ -64,6 +66,7 @@ _ROOMS = {
     "dump": "scene",
     "engine": "engine",
     "assemble": "assembly",
+    "explore": "explorer",
     "feed": "feeding",
     "feedback": "policies",
     "fit": "fitting",
@@ -102,6 +105,7 @@ __all__ = [
     "design",
     "dump",
     "engine",
+    "explore",
     "feed",
     "feedback",
     "fit",
@@ -126,12 +130,16 @@ __all__ = [
 ]
 
 
-def __getattr__(name: str) -> Any:
-    room = _ROOMS.get(name)
-    if room is None:
-        raise AttributeError(f"module 'limitsets' has no attribute {name!r}")
-    module = import_module(f"limitsets.{room}")
-    return module if room == name else getattr(module, name)
+if not TYPE_CHECKING:  # a checker of types has the imports above, and finds a name that is not there
+
+    def __getattr__(name: str) -> Any:
+        room = _ROOMS.get(name)
+        if room is None:
+            # Python proposes a similar name where it knows whose name is missing
+            own = sys.modules[__name__]
+            raise AttributeError(f"module 'limitsets' has no attribute {name!r}", name=name, obj=own)
+        module = import_module(f"limitsets.{room}")
+        return module if room == name else getattr(module, name)
 
 
 def __dir__() -> list[str]:

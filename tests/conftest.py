@@ -7,6 +7,9 @@ from hypothesis import settings
 # Before anything imports matplotlib, in this process and in those that tests start.
 os.environ["MPLBACKEND"] = "Agg"
 
+# Tables are as wide as their text where nothing says how wide a line is; some runners of tests say it.
+os.environ.pop("COLUMNS", None)
+
 # Deadlines would fail the first example of a kernel, which compiles.  In CI the examples are the same at every run.
 settings.register_profile("here", deadline=None)
 settings.register_profile("ci", deadline=None, derandomize=True, print_blob=True)

@@ -12,9 +12,9 @@ def kept(loop: Any) -> Any:
 
     For loops that call kernels of these two only, with the package's classes.
     """
-    if cache._folder is not None:
+    if cache.FOLDER is not None:
         file = Path(loop.py_func.__code__.co_filename)
-        made = cache._source_cache(cache._folder / hashlib.sha256(file.read_bytes()).hexdigest()[:24])
+        made = cache._source_cache(cache.FOLDER / hashlib.sha256(file.read_bytes()).hexdigest()[:24])
         if made is not None:
             loop._cache = made(loop.py_func)
     return loop

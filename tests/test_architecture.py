@@ -129,12 +129,6 @@ def test_a_public_name_spelt_like_a_module_is_that_module():
         run_python(f"import types, limitsets; assert isinstance(limitsets.{name}, types.ModuleType)")
 
 
-def python_blocks(page: Path) -> str:
-    """Join a page's python blocks into one program."""
-    blocks = page.read_text(encoding="utf-8").split("```python\n")[1:]
-    return "\n".join(block.split("```")[0] for block in blocks)
-
-
 def test_files_that_the_glossary_names_are_there():
     """docs/words.md says for each word where in the package it stands."""
     named = re.findall(
@@ -144,10 +138,10 @@ def test_files_that_the_glossary_names_are_there():
     assert [name for name in named if not (PACKAGE / name).exists()] == []
 
 
-def test_code_in_the_readme_runs(tmp_path):
-    program = tmp_path / "readme.py"
-    program.write_text(python_blocks(ROOT / "README.md"), encoding="utf-8")
-    done = subprocess.run(
-        [sys.executable, program.name], cwd=tmp_path, capture_output=True, text=True, check=False
-    )
-    assert done.returncode == 0, done.stderr
+def test_the_citation_and_the_changelog_name_this_version():
+    text = (ROOT / "CITATION.cff").read_text(encoding="utf-8")
+    assert f"\nversion: {limitsets.__version__}\n" in text
+    released = re.search(r"\ndate-released: (\S+)\n", text)
+    assert released
+    changes = (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
+    assert f"\n## [{limitsets.__version__}] - {released[1]}\n" in changes

@@ -237,7 +237,8 @@ class Place:
             shutil.copytree(
                 source / room, self.maps.parent / room, ignore=shutil.ignore_patterns("__pycache__")
             )
-        shutil.copy(source / "errors.py", self.maps.parent / "errors.py")
+        for file in ("errors.py", "files.py", "tables.py"):
+            shutil.copy(source / file, self.maps.parent / file)
         (self.maps.parent / "__init__.py").write_text("from limitsets.maps import register\n")
         (self.maps / "probe.py").write_text(PROBE)
         self.user.mkdir()
@@ -328,6 +329,7 @@ def test_a_cache_that_cannot_be_written(place: Place, when: str) -> None:
     assert found["leslie"] == [ANSWERS["leslie"], 0]
 
 
+@pytest.mark.sweep
 def test_a_file_cut_short_is_written_anew(place: Place) -> None:
     for ending in (".nbi", ".nbc"):
         for file in place.cache.rglob("*" + ending):

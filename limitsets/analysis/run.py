@@ -25,6 +25,8 @@ from limitsets.analysis.starts import Starts, against_starts
 from limitsets.analysis.verifying import verified
 from limitsets.errors import AnswerError
 from limitsets.files import as_table, picked
+from limitsets.progress import shown_in_notebooks
+from limitsets.tables import Column, Table, Tabled, bands_of, facts
 
 if TYPE_CHECKING:
     import networkx as nx
@@ -49,7 +51,7 @@ FINER, MOST_CELLS = 4, 65_536
 
 
 @dataclass(frozen=True, eq=False)
-class Analysis:
+class Analysis(Tabled):
     """What is known about a scene; nothing here is proved.
 
     Attributes
@@ -125,6 +127,40 @@ class Analysis:
         """What cells have not settled, and what to do."""
         said = (self.basins.advice, None if self.starts is None else self.starts.advice)
         return tuple(text for text in said if text is not None)
+
+    def tables(self) -> tuple[Table, ...]:
+        """Give the tables that show it, the one that is saved as CSV first."""
+        unit, how = self.scene.unit, "sampled, not proved"
+        columns = (
+            "limit set",
+            "side",
+            Column("x", unit, ".3f", ends=True),
+            Column("jogs per visit", ends=True),
+        )
+        rows = [
+            (k, side, span, found.jogs_per_visit.get(side, (0, 0)))
+            for k, (found, extents) in enumerate(zip(self.attractors, self.extents, strict=True))
+            for side, span in bands_of(extents)
+        ]
+        shares = [
+            *((f"limit set {k}", share) for k, share in enumerate(self.basins.attractors)),
+            *((f"leave: {name}", share) for name, share in self.basins.exits.items()),
+            ("undecided", self.basins.undecided_between),
+        ]
+        points = [
+            (side, point.x, point.kind)
+            for side, found in sorted(self.critical_points.items())
+            for point in found
+        ]
+        shown = [
+            Table(columns, rows, f"{self.scene.name}: limit sets", how),
+            Table(("where starts end", Column("share", show=".4f")), shares, "Basins", how),
+            Table(("side", Column("x", unit, ".6f"), "change"), points, "Critical points", how),
+        ]
+        if self.goal is not None:
+            goal = {"kind": self.goal.goal.kind, "holds": self.goal.holds}
+            shown.append(facts("Goal", goal, how))
+        return tuple(shown)
 
     def to_json(self) -> dict[str, Any]:
         """Write it as tables, lists, text and finite numbers; None where a number is missing.
@@ -237,6 +273,7 @@ class _Steps:
         self.timings[name] = self.timings.get(name, 0.0) + time.perf_counter() - begin
 
 
+@shown_in_notebooks
 def analyse(
     scene: str | Path | Mapping[str, Any] | Scene,
     cells: int | None = None,

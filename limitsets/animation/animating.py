@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from limitsets.animation.cutting import Asked
 from limitsets.errors import AnswerError
 from limitsets.files import replaced
+from limitsets.progress import shown_in_notebooks
 
 if TYPE_CHECKING:
     from limitsets.animation.film import Film
@@ -87,6 +88,7 @@ def film_of(
     return made
 
 
+@shown_in_notebooks
 def animate(
     scene: Any,
     file: str | Path,

@@ -18,10 +18,10 @@ from limitsets.animation.cutting import Asked, Leg, Pace, cut
 from limitsets.animation.film import Film
 from limitsets.animation.lanes import known_of, require_start
 from limitsets.animation.legs import RESTS, STAYS, drawn_of, legs_of, rest_leg
-from limitsets.animation.throwing import Throw, motion, throws_of
 from limitsets.engine.ground import ground_of
 from limitsets.errors import AnswerError
 from limitsets.plot.poses import angle_on_side, outline
+from limitsets.plot.throwing import Throw, motion, throws_of
 
 if TYPE_CHECKING:
     from limitsets.feeding import Feeding

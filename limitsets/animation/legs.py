@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from limitsets.animation.cutting import Leg, Pace
-from limitsets.animation.throwing import Throw, motion, stroke_of
 from limitsets.plot.poses import angle_on_side
+from limitsets.plot.throwing import Throw, motion, stroke_of
 
 if TYPE_CHECKING:
     from limitsets.scene import Scene

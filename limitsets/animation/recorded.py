@@ -110,12 +110,18 @@ def film_of_assembly(found: Assembly, asked: Asked) -> Film:
 
 
 def film_of_tray(found: TrayFill, asked: Asked) -> Film:
-    """Show one depression of a tray, pass by pass."""
-    from limitsets.trays import filmed
+    """Show a tray pass by pass: one depression, or many parts at once that push each other, if they were asked for."""
+    from limitsets.trays import Pouring, filmed
 
-    scene = found.scene
-    recording = filmed(scene, PASSES if asked.throws is None else asked.throws, seed=found.seed)
-    title = f"{scene.name}, one depression of a tray"
+    scene, passes = found.scene, PASSES if asked.throws is None else asked.throws
+    if found.crowds:
+        parts, depressions = found.crowds[0].parts, found.crowds[0].depressions
+        pouring = Pouring(found.passes, parts, depressions, passes, found.seed)
+        recording = pouring.film(0, last=passes)
+        title = f"{scene.name}, {parts} parts a pass over {depressions} depressions"
+    else:
+        recording = filmed(scene, passes, seed=found.seed)
+        title = f"{scene.name}, one depression of a tray"
     film = film_of_recording(recording, asked._replace(throws=None), title=title)
     pace = asked.pace(scene)
     return replace(

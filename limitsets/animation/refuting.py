@@ -8,8 +8,8 @@ from limitsets.animation.cutting import Asked, cut
 from limitsets.animation.film import Film
 from limitsets.animation.lanes import known_of
 from limitsets.animation.legs import STAYS, drawn_of, legs_of, rest_leg
-from limitsets.animation.throwing import Throw, throws_of
 from limitsets.errors import AnswerError
+from limitsets.plot.throwing import Throw, throws_of
 
 if TYPE_CHECKING:
     from limitsets.robust import Margin

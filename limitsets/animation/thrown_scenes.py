@@ -4,18 +4,18 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from limitsets.animation.cutting import Asked, cut, require_length
-from limitsets.animation.film import Film
+from limitsets.animation.cutting import Asked, Pace, cut, require_length
+from limitsets.animation.film import Film, Lanes
 from limitsets.animation.lanes import good_start, known_of, lanes_of, require_start
 from limitsets.animation.legs import RESTS, STAYS, drawn_of, legs_of, rest_leg
-from limitsets.animation.throwing import throws_of
 from limitsets.errors import AnswerError
+from limitsets.plot.throwing import throws_of
 
 if TYPE_CHECKING:
     from limitsets.analysis import Analysis
     from limitsets.scene import Scene
 
-__all__ = ["film_of_analysis", "film_of_scene"]
+__all__ = ["film_of_analysis", "film_of_scene", "film_of_throws"]
 
 USUAL = 8
 """Throws that are shown unless others are asked for."""
@@ -32,11 +32,18 @@ def film_of_scene(scene: Scene, asked: Asked) -> Film:
 
 def film_of_analysis(found: Analysis, asked: Asked) -> Film:
     """Show throws of a scene that is analysed already."""
+    scene, count = found.scene, USUAL if asked.throws is None else asked.throws
+    start = good_start(found, count) if asked.start is None else require_start(scene, asked.start)
+    return film_of_throws(scene, start, count, asked.pace(scene), lanes_of(scene, found))
+
+
+def film_of_throws(
+    scene: Scene, start: tuple[float, int], count: int, pace: Pace, lanes: Lanes | None = None
+) -> Film:
+    """Show so many throws of a scene from a start; without lanes nothing is analysed."""
     from limitsets.thrower import trace
 
-    scene, pace = found.scene, asked.pace(found.scene)
-    count = USUAL if asked.throws is None else asked.throws
-    x, side = good_start(found, count) if asked.start is None else require_start(scene, asked.start)
+    x, side = start
     path = trace(scene.map, x, side, count)
     made = throws_of(scene, path)
     if not made:
@@ -48,4 +55,4 @@ def film_of_analysis(found: Analysis, asked: Asked) -> Film:
     for number, throw in enumerate(made, start=1):
         stays = STAYS if number == count else RESTS
         legs += legs_of(scene, throw, pace, f"Throw {number} of {count}", stays=stays)
-    return cut(scene, legs, pace, title=scene.name, about=drawn_of(scene), lanes=lanes_of(scene, found))
+    return cut(scene, legs, pace, title=scene.name, about=drawn_of(scene), lanes=lanes)

@@ -2,7 +2,7 @@
 
 `pairing` joins two scenes; `drawing` draws what a trial needs, by its number; `outlines` asks whether parts overlap;
 `passing` throws parts that pass through each other, as the paper assumes, `pushing` parts in contact, in the engine.
-`trial_file` keeps finished trials, `counting` counts them; `assembly_run` joins all (`limitsets.assemble`).
+`counting` counts finished trials; `assembly_run` joins all (`limitsets.assemble`).
 """
 
 from limitsets.assembly.assembly_run import Assembly as Assembly

@@ -12,15 +12,16 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from limitsets.assembly.counting import Joint, Overlaps, Rate, joint_of, overlaps_of, rate_of
-from limitsets.assembly.pairing import Pair, Start, pair_of, require_apart
+from limitsets.assembly.pairing import Pair, Start, pair_of, require_apart, seats_of
 from limitsets.assembly.passing import pass_through
-from limitsets.assembly.trial_file import Row, TrialFile
 from limitsets.errors import AnswerError
 from limitsets.files import as_table
+from limitsets.progress import shown_in_notebooks
+from limitsets.robust.noise.sampling import require_seed
 from limitsets.robust.noise.scattering import Scattering
 from limitsets.scene import Scene
-from limitsets.sweep.driving import Work, drive
-from limitsets.sweep.executors import chosen_pool
+from limitsets.sweep.trial_file import Row, TrialFile, complete
+from limitsets.tables import Column, Table, Tabled
 
 if TYPE_CHECKING:
     from limitsets.engine.recording import Recording
@@ -98,8 +99,21 @@ def made(series: Series, chunk: int, number: int) -> list[tuple[int, Row]]:
     return [(k, series.row(k)) for k in numbers]
 
 
+# Outcomes for people.
+ENDED = {
+    "assembled": "assembled",
+    "ejected": "a part came out of the cavity again",
+    "order": "the second part lies below the first",
+    "wrong": "stuck in a wrong orientation",
+    "wall": "stuck at the wall",
+    "left": "a part left the arm otherwise",
+    "never": "a part stays on the arm",
+    "unfinished": "still in motion",
+}
+
+
 @dataclass(frozen=True, eq=False)
-class Assembly:
+class Assembly(Tabled):
     """What became of pairs of parts.
 
     Attributes
@@ -133,9 +147,10 @@ class Assembly:
         return rate_of(self.counts["assembled"], len(self.rows))
 
     @property
-    def first_series(self) -> int:
-        """Pairs assembled in the first 20 trials."""
-        return sum(row["outcome"] == "assembled" for row in self.rows[:SERIES])
+    def first_series(self) -> Rate:
+        """The rate of assembly in the first 20 trials, or in all where there are fewer."""
+        first = self.rows[:SERIES]
+        return rate_of(sum(row["outcome"] == "assembled" for row in first), len(first))
 
     @property
     def overlaps(self) -> Overlaps | None:
@@ -146,6 +161,15 @@ class Assembly:
     def joint(self) -> Joint | None:
         """The joint law of both fates, and the error that multiplying makes; None with contact."""
         return joint_of(self.rows) if self.series.contact is None else None
+
+    @property
+    def misfit(self) -> str | None:
+        """Why the parts cannot lie in the cavity one on the other, whatever their fates; None where they fit."""
+        try:
+            seats_of(self.pair)
+        except AnswerError as error:
+            return f"{error.thing}: {error.value}"
+        return None
 
     @property
     def survived(self) -> dict[str, Rate]:
@@ -167,12 +191,25 @@ class Assembly:
         Raises
         ------
         AnswerError
-            Parts that pass through each other are not in the engine.
+            Parts that pass through each other are not in the engine; no trial has this number.
         """
         if self.series.contact is None:
             remedy = "switch contact on in both scenes: [effects] contact = true"
             raise AnswerError("the film", "of parts without contact", "trials in the engine", remedy)
+        if not 0 <= number < len(self.rows):
+            raise AnswerError("the trial", number, f"0 to {len(self.rows) - 1}", "name one that was made")
         return self.series.film(number, max(max(self.rows[number]["throws"]) - throws + 1, 1))
+
+    def tables(self) -> tuple[Table, ...]:
+        """Give the tables that show it, the one that is saved as CSV first."""
+        count = len(self.rows)
+        rows = [
+            (ENDED[name], name, met, count, rate_of(met, count).interval) for name, met in self.counts.items()
+        ]
+        interval = Column("95 % interval", show=".4f", ends=True)
+        columns = ("what becomes of a pair", "outcome", "met", "trials", interval)
+        one, two = self.pair.scenes
+        return (Table(columns, rows, f"{one.name} below, {two.name} on top", "sampled, not proved"),)
 
     def to_json(self) -> dict[str, Any]:
         """Give it as JSON takes it: docs/json.md."""
@@ -182,19 +219,21 @@ class Assembly:
             unit=one.unit,
             contact=self.contact,
             carried=self.series.carried,
+            misfit=self.misfit,
             overlaps=self.overlaps,
             trials=len(self.rows),
             seed=self.series.seed,
             scatter=self.pair.scatter.words() or None,
             counts=self.counts,
             assembled=self.assembled,
-            first_series={"of": SERIES, "assembled": self.first_series},
+            first_series={"of": self.first_series.of, "assembled": self.first_series.count},
             joint=self.joint,
             survived=self.survived or None,
             paper={"assembled": rate_of(PAPER, OF), "survived": rate_of(SURVIVED, OF)},
         )
 
 
+@shown_in_notebooks
 def assemble(
     scene: Scene | str | Path | Mapping[str, Any],
     scene2: Scene | str | Path | Mapping[str, Any],
@@ -261,6 +300,7 @@ def assemble(
     pair = pair_of(scene, scene2, scatter)
     if trials < 1:
         raise AnswerError("the trials", trials, "1 or more", "throw some parts")
+    require_seed(seed)
     if not pair.contact and (contact is not None or carried):
         remedy = "switch it on in both scenes: [effects] contact = true"
         raise AnswerError("effects.contact", False, "true, for trials in the engine", remedy)
@@ -274,18 +314,6 @@ def assemble(
     side_by_side = bool(how if apart is None else apart)
     series = Series((one, two), pair.scatter, how, carried, side_by_side, given, seed, trials)
     kept = TrialFile(None if file is None else Path(file), series.question(), trials, CHUNK)
-    if len(kept.done) < kept.chunks:
-        work = Work(
-            kept.chunks,
-            made,
-            (series, CHUNK),
-            lambda chunk: len(kept.numbers(chunk)),
-            lambda chunk: f"trials {kept.numbers(chunk).start} to {kept.numbers(chunk).stop - 1}",
-            "the trials",
-            "assembly",
-            "trials",
-        )
-        here = executor is None and cluster is None and workers is None
-        with chosen_pool(1 if here else kept.chunks, executor, cluster, workers) as pool:
-            drive(work, kept, pool, progress)
+    where: dict[str, Any] = {"executor": executor, "cluster": cluster, "workers": workers}
+    complete(kept, made, (series, CHUNK), "assembly", "trials", **where, progress=progress)
     return Assembly(pair, series, tuple(kept))

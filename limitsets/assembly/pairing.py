@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from limitsets.engine.overlaps import depth_of_overlap
+from limitsets.engine.seats import seat_of
 from limitsets.errors import AnswerError
 from limitsets.feeding.falling import ArmEnd, arm_end_of
 from limitsets.geometry import side_ends
@@ -30,6 +31,7 @@ __all__ = [
     "outline_at",
     "pair_of",
     "require_apart",
+    "seats_of",
 ]
 
 SHARED = ("unit", "kappa", "surface_height", "arm_length", "gravity", "flight", "flip", "cavity")
@@ -98,6 +100,9 @@ def pair_of(
         if each.flight != "exact":
             remedy = "outlines in flight are those of the exact one"
             raise AnswerError(f"the flight of {each.name}", each.flight, "exact", remedy)
+        if each.flip != "signed":
+            remedy = "a part that flips by another criterion has no way from its impact to rest"
+            raise AnswerError(f"the flip of {each.name}", each.flip, "signed", remedy)
     if scatter is None:
         drawn = [Scattering() if each.effects.spread is None else scattering_of(each) for each in (one, two)]
         if drawn[0] != drawn[1]:
@@ -109,6 +114,19 @@ def pair_of(
         allowed = "Gaussian or Uniform, of speed and landing"
         raise AnswerError("the noise to throw with", scatter.words(), allowed, "choose one of these")
     return Pair((arm_end_of(still(one)), arm_end_of(still(two))), scatter)
+
+
+def seats_of(pair: Pair) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Give the corners of both parts in their seats, the second on the first, shapes (n, 2) [length].
+
+    Raises
+    ------
+    AnswerError
+        A part that would stand out of the cavity.
+    """
+    first, second = pair.ends
+    below = seat_of(first.scene, first.side)
+    return below, seat_of(second.scene, second.side, [below])
 
 
 def outline_at(scene: Scene, x: float, height: float, angle: float) -> list[tuple[float, float]]:

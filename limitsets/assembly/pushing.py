@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from limitsets.assembly.drawing import Draws
-from limitsets.assembly.pairing import Pair, Start
+from limitsets.assembly.pairing import Pair, Start, seats_of
 from limitsets.engine.crowd import Crowd
-from limitsets.engine.seats import SEATED, off_seat, seat_of
+from limitsets.engine.seats import SEATED, off_seat
 
 if TYPE_CHECKING:
     from limitsets.engine.recording import Recording
@@ -75,10 +75,8 @@ class _Watched:
 
     def __init__(self, pair: Pair, crowd: Crowd) -> None:
         self.pair, self.crowd = pair, crowd
-        first, second = pair.ends
-        below = seat_of(first.scene, first.side)
-        self.seats = below, seat_of(second.scene, second.side, [below])
-        cavity = first.scene.cavity
+        self.seats = seats_of(pair)
+        cavity = pair.scenes[0].cavity
         assert cavity is not None  # `pair_of` refuses scenes without one
         self.near = SEATED * cavity.width
         self.throws = [0, 0]
@@ -91,7 +89,7 @@ class _Watched:
         """Take note of where the parts are after a throw."""
         for k, rest in enumerate(rests):
             inside = rest.where == "cavity"
-            if self.entered[k] is not None and not inside:
+            if self.entered[k] is not None and not inside and rest.where != "unfinished":
                 self.ejected = True
                 self.entered[k] = None
             if not self.ended[k]:
@@ -99,13 +97,11 @@ class _Watched:
             if inside and self.entered[k] is None:
                 self.entered[k] = rest.side
                 self.wall[k] = "wall" in rest.met
-            lost = rest.where == "lost" or (rest.where == "arm" and rest.x <= self._least(k, rest.side))
+            least = self.pair.scenes[k].sides.a
+            lost = rest.where == "lost" or (rest.where == "arm" and rest.x <= float(least[rest.side]))
             self.left |= lost
             self.ended[k] = inside or lost
             self.touched |= any(name.startswith("part") for name in rest.met)
-
-    def _least(self, k: int, side: int) -> float:
-        return float(self.pair.scenes[k].sides.a[side]) if side >= 0 else 0.0
 
     def assembled(self) -> bool:
         """Whether both parts lie in their seats."""

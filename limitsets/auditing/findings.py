@@ -20,6 +20,7 @@ from limitsets.auditing.judging import Row, all_hold, enclosed_at
 from limitsets.auditing.places import Places, Sample, places
 from limitsets.auditing.stretches import where
 from limitsets.files import as_table, picked
+from limitsets.tables import Column, Table, Tabled
 
 if TYPE_CHECKING:
     from limitsets.proofs.parameters import ParameterBox
@@ -96,7 +97,7 @@ class Finding:
 
 
 @dataclass(frozen=True, eq=False)
-class Audit:
+class Audit(Tabled):
     """What a scene calls for.
 
     Attributes
@@ -119,6 +120,40 @@ class Audit:
     def on(self, place: str) -> tuple[Finding, ...]:
         """Give the findings of one place: "limit-set" or "domain"."""
         return tuple(finding for finding in self.findings if finding.place == place)
+
+    def tables(self) -> tuple[Table, ...]:
+        """Give the tables that show it, the one that is saved as CSV first."""
+        columns = (
+            "effect",
+            "assumed",
+            "where",
+            Column("called for", show=lambda value: "yes" if value else "no"),
+            "how",
+            "side",
+            Column("x", self.scene.unit, ".4f"),
+            Column("worst", show=".4g"),
+            Column("threshold", show=".4g"),
+            "unit",
+            "missing",
+        )
+        units = {"length": self.scene.unit, "angle": "rad"}
+        rows = [
+            (
+                each.effect,
+                each.about.name,
+                each.place,
+                each.called_for,
+                each.how,
+                each.side,
+                each.x,
+                each.worst,
+                each.threshold,
+                units.get(each.about.dimension, ""),
+                each.missing or None,
+            )
+            for each in self.findings
+        ]
+        return (Table(columns, rows, f"{self.scene.name}: what the model leaves out"),)
 
     def to_json(self) -> list[dict[str, Any]]:
         """Give it as plain tables for JSON, one per finding."""

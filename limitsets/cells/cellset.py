@@ -112,20 +112,41 @@ class CellSet:
             inside |= states == edges[-1]  # of the last cell, whose upper border is nobody else's
         return inside
 
-    def extents(self) -> dict[int, list[tuple[float, float]]]:
-        """Per side the intervals that the cells make up; in more dimensions their ranges along the first axis.
+    def extents(self, axis: int = 0) -> dict[int, list[tuple[float, float]]]:
+        """Per side the intervals that the cells make up; in more dimensions their ranges along one axis.
+
+        Parameters
+        ----------
+        axis : int
+            Which one; the first by default.
 
         Returns
         -------
         dict of int to list of (lo, hi)
             Ascending; a side without cells is left out.
+
+        Raises
+        ------
+        GridError
+            An axis that the grid has not.
+
+        Examples
+        --------
+        >>> import limitsets as ls
+        >>> cells = CellSet.of(ls.grid([(0.0, 1.0), (0.0, 4.0)], cells=4), [5])
+        >>> cells.extents(), cells.extents(axis=1)
+        ({0: [(0.25, 0.5)]}, {0: [(1.0, 2.0)]})
         """
+        if axis not in range(self.grid.dimension):
+            allowed = f"0 to {self.grid.dimension - 1}"
+            raise GridError("the axis", axis, allowed, "name an axis of the grid")
         found: dict[int, list[tuple[float, float]]] = {}
         for side in range(self.grid.sides):
-            rows = self.mask[self.grid.of_side(side)].reshape(int(self.grid.shape[side, 0]), -1)
-            met = np.any(rows, axis=1).astype(np.int8)
+            block = self.mask[self.grid.of_side(side)].reshape(tuple(self.grid.shape[side]))
+            others = tuple(each for each in range(self.grid.dimension) if each != axis)
+            met = np.any(block, axis=others).astype(np.int8)
             border = np.flatnonzero(np.diff(np.concatenate([[0], met, [0]])))
-            edges = self.grid.edges[side][0]
+            edges = self.grid.edges[side][axis]
             if border.size:
                 found[side] = [(float(edges[a]), float(edges[b])) for a, b in border.reshape(-1, 2)]
         return found

@@ -94,5 +94,7 @@ def as_domain(domain: Domain | ArrayLike) -> Domain:
     if pairs.shape == (2,):
         pairs = pairs[None, :]
     if pairs.ndim != 2 or pairs.shape[1] != 2:
+        if isinstance(getattr(domain, "domain", None), Domain):  # of a scene
+            raise GridError("the domain", type(domain).__name__, "a Domain", "pass its .domain")
         raise GridError("the domain", domain, "a Domain, or one (lo, hi) per axis", "pass [(lo, hi), ...]")
     return Domain(pairs[:, 0][None, :], pairs[:, 1][None, :])

@@ -9,6 +9,7 @@ import re
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from html import escape
 from typing import Any
 
 import flint
@@ -75,6 +76,18 @@ class Report:
     seconds: float = 0.0
     cells: int = 0
     boxes: int = 0
+
+    def _repr_html_(self) -> str:
+        """Show it in a notebook."""
+        rows = [(name, WORDS[state], why) for name, state, why in self.claims]
+        rows.append(("certificate", WORDS[self.verdict], self.reason))
+        lines = "".join(
+            "<tr>" + "".join(f"<td>{escape(text)}</td>" for text in row) + "</tr>" for row in rows
+        )
+        heads = "".join(f'<th scope="col">{head}</th>' for head in ("claim", "verdict", "reason"))
+        return (
+            f"<table><caption>Recheck</caption><thead><tr>{heads}</tr></thead><tbody>{lines}</tbody></table>"
+        )
 
 
 @dataclass

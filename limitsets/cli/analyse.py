@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import math
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from limitsets.cli.output import Json, Scene, answer, opened, option, progress, table
+from limitsets.cli.output import Csv, Form, Format, Json, Scene, answer, opened, option, progress, table
 
 if TYPE_CHECKING:
     from limitsets.analysis import Analysis, Plan
@@ -16,6 +17,10 @@ if TYPE_CHECKING:
 __all__ = ["analyse"]
 
 MOST_CELLS = 10_000_000
+
+# Share of the starts that leave the model, above which the speed is likely to have a wrong unit.
+MOST = 0.99
+HELP_HTML = "Write report.html too: the report in one file, figures inside."
 
 
 def analyse(
@@ -35,6 +40,9 @@ def analyse(
     out: Annotated[
         Path | None, option("--out -o", "DIR", "Folder of the report, ./NAME-analysis by default.")
     ] = None,
+    html: Annotated[bool, typer.Option("--html", help=HELP_HTML)] = False,
+    form: Format = Form.PNG,
+    csv: Csv = None,
     json: Json = False,
 ) -> None:
     """Find limit sets, basins and critical points, and write report.md, analysis.json and figures."""
@@ -44,8 +52,8 @@ def analyse(
         from limitsets.report.writing import write
 
         analysis = run(chosen, cells, error=error, progress=tell, announce=_announce)
-        files = write(analysis, folder, progress=tell)
-    answer(analysis, json, lambda: _text(analysis, files[0]))
+        files = write(analysis, folder, form=form, html=html, progress=tell)
+    answer(analysis, json, lambda: _text(analysis, files[0]), csv=(csv, analysis.table))
 
 
 def _announce(plan: Plan) -> None:
@@ -53,7 +61,8 @@ def _announce(plan: Plan) -> None:
 
 
 def _text(analysis: Analysis, page: Path) -> None:
-    from limitsets.report.goals import verdict_of, void_of
+    from limitsets.report.goals import next_command, verdict_of, void_of
+    from limitsets.report.pages import other_vertex_in_limit_sets
     from limitsets.report.tables import count, intervals, percent
 
     unit = analysis.scene.unit
@@ -61,6 +70,12 @@ def _text(analysis: Analysis, page: Path) -> None:
         undecided = analysis.basins.undecided_between
         left = f"no limit set was found, and {percent(undecided)} of all starts are undecided"
         typer.echo(left if undecided else "no start was found to stay on the arm")
+        if analysis.basins.exits.get("outside-model", 0.0) > MOST:
+            kappa = f"{analysis.scene.kappa:.6g} {unit}"
+            typer.echo(
+                "outside the model: a throw after which the part has not landed within a full turn. "
+                f"Almost all starts are; kappa is {kappa}: has the speed the right unit?"
+            )
     for k, (attractor, extents) in enumerate(zip(analysis.attractors, analysis.extents, strict=True)):
         typer.echo(f"limit set {k}: from {percent(analysis.basins.attractors[k])} of all starts")
         rows = [
@@ -68,6 +83,12 @@ def _text(analysis: Analysis, page: Path) -> None:
             for side, parts in extents.items()
         ]
         table(["side", f"x [{unit}]", "jogs per visit"], rows)
+    broken = ", ".join(str(side) for side in sorted(other_vertex_in_limit_sets(analysis)))
+    if broken:
+        typer.echo(
+            f"careful: of some throws of the limit set from side {broken} another vertex lands first, and the model "
+            "does not describe them; limitsets audit says what else is broken"
+        )
     for text in analysis.advice:
         typer.echo(f"not settled: {text}")
     if analysis.goal is not None:
@@ -76,6 +97,10 @@ def _text(analysis: Analysis, page: Path) -> None:
             f"goal {analysis.goal.goal.kind}: {verdict_of(analysis.goal)} ({analysis.goal.how}, not proved)"
             + (f"; but {void}" if void else "")
         )
+        threshold = analysis.goal.threshold
+        if analysis.goal.holds is False and threshold is not None and math.isfinite(threshold):
+            typer.echo(analysis.goal.goal.explained(threshold, unit))
+        typer.echo(f"next: {next_command(analysis)}")
     found = analysis.accuracy
     if found is not None and found.reached is not None:
         typer.echo(f"error of the ends: {found.reached:.2g} {unit} ({found.how})")

@@ -46,6 +46,9 @@ def animate(
         option("--assemble", "SCENE2", "Throw the part together with another; both scenes in contact."),
     ] = None,
     tray: Annotated[bool, typer.Option("--tray", help="Show a depression of the scene's [tray].")] = False,
+    parts: Annotated[
+        int | None, option("--parts", "N", "With --tray: N parts a pass that push each other.", min=1, max=50)
+    ] = None,
     reading: Annotated[str | None, option("--reading", "R", "Of the margin: fixed or per-throw.")] = None,
     fps: Annotated[float, option("--fps", "N", "Frames per second.")] = 20.0,
     slow: Annotated[float, option("--slow", "N", "How many times slower than the machine.")] = 3.0,
@@ -57,6 +60,8 @@ def animate(
         raise LimitsetsError("what to show", value, "one of them", "make a film of each")
     if reading is not None and margin is None:
         raise LimitsetsError("the reading", reading, "with --margin", "name the quantity", key="--reading")
+    if parts is not None and not tray:
+        raise LimitsetsError("the parts", parts, "with --tray", "ask for a tray", key="--parts")
     with progress() as tell:
         from limitsets.animation import animate as write
         from limitsets.animation import require_file
@@ -76,7 +81,7 @@ def animate(
             "margin": margin,
             "assemble": assemble,
         }
-        shown = _shown(chosen, tell, reading=reading, **asked)
+        shown = _shown(chosen, tell, reading=reading, parts=parts, **asked)
         write(shown, file, start=begin, throws=throws, fps=fps, slow=slow, progress=tell)
     size = file.stat().st_size
     answer(
@@ -101,6 +106,7 @@ def _shown(
     margin: str | None,
     assemble: str | None,
     reading: str | None,
+    parts: int | None,
 ) -> Any:
     """Compute what is asked, as far as a film needs it."""
     if feed:
@@ -114,7 +120,7 @@ def _shown(
     if tray:
         from limitsets.trays import tray as fill
 
-        return fill(scene, passes=1, drops=FEW, kicks=FEW, progress=tell)
+        return fill(scene, passes=1, drops=FEW, kicks=FEW, parts=parts, batches=1, progress=tell)
     if assemble is not None:
         from limitsets.assembly import assemble as pairs
 

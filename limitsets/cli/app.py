@@ -12,11 +12,15 @@ from limitsets.cli.assemble import assemble
 from limitsets.cli.atlas import atlas
 from limitsets.cli.audit import audit
 from limitsets.cli.certify import certify
+from limitsets.cli.check import check
 from limitsets.cli.design import design
+from limitsets.cli.doctor import doctor
+from limitsets.cli.explore import explore
 from limitsets.cli.feed import feed
 from limitsets.cli.feedback import feedback
 from limitsets.cli.fit import fit
 from limitsets.cli.margin import margin
+from limitsets.cli.new import new
 from limitsets.cli.plot import plot
 from limitsets.cli.recheck import recheck
 from limitsets.cli.robustness import robustness
@@ -27,7 +31,6 @@ from limitsets.cli.tray import tray
 __all__ = ["app"]
 
 app = typer.Typer(
-    add_completion=False,
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
     rich_markup_mode=None,
@@ -72,5 +75,10 @@ for command in (
     assemble,
     fit,
     tray,
+    new,
+    check,
+    doctor,
+    explore,
 ):
-    app.command()(command)
+    # click would cut the summary where a line ends
+    app.command(short_help=(command.__doc__ or "").partition("\n")[0])(command)

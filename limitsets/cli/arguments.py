@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import re
 from typing import TYPE_CHECKING, TypeAlias
 
@@ -49,11 +48,11 @@ def position(scene: Scene, text: str) -> float:
     Raises
     ------
     LimitsetsError
-        No number, a unit of something else, or a place beyond the arm's end.
+        No number, a unit of something else, or a place before the joint or beyond the arm's end.
     """
     value = place(scene, text)
-    if not (math.isfinite(value) and value <= scene.arm_length):
-        allowed = f"a place on the arm, up to {scene.arm_length:g} {scene.unit}"
+    if not 0.0 <= value <= scene.arm_length:
+        allowed = f"a place on the arm, from 0 to {scene.arm_length:g} {scene.unit}"
         raise LimitsetsError("x", text, allowed, "start where a part can rest", key="--x")
     return value
 

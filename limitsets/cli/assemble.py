@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from limitsets.cli.arguments import deviations
-from limitsets.cli.output import Json, Scene, Words, answer, opened, option, progress, table
+from limitsets.cli.output import Csv, Form, Format, Json, Scene, Words, answer, opened, option, progress, show
 
 if TYPE_CHECKING:
     from limitsets.assembly import Assembly
@@ -21,17 +21,6 @@ HELP_SCATTER = (
 )
 HELP_CONTACT = "With contact in the scenes: hinge (a struck corner is held, the default) or unilateral."
 HELP_FILE = "Keep finished trials there; the same command goes on with what is left."
-HEADS = ("what becomes of a pair", "trials", "95 % interval")
-WORDS = {
-    "assembled": "assembled",
-    "ejected": "a part came out of the cavity again",
-    "order": "the second part lies below the first",
-    "wrong": "stuck in a wrong orientation",
-    "wall": "stuck at the wall",
-    "left": "a part left the arm otherwise",
-    "never": "a part stays on the arm",
-    "unfinished": "still in motion",
-}
 
 
 def assemble(
@@ -51,9 +40,9 @@ def assemble(
     workers: Annotated[int | None, option("--workers", "N", "Processes that throw.", min=1)] = None,
     cluster: Annotated[str | None, option("--cluster", "ADDRESS", "Of a Dask scheduler, instead.")] = None,
     file: Annotated[Path | None, option("--file", "FILE", HELP_FILE)] = None,
-    out: Annotated[
-        Path | None, option("--out -o", "DIR", "Write assembly.json and assembly.png there.")
-    ] = None,
+    out: Annotated[Path | None, option("--out -o", "DIR", "Write assembly.json and a figure there.")] = None,
+    form: Format = Form.PNG,
+    csv: Csv = None,
     json: Json = False,
 ) -> None:
     """Count how often two parts, thrown together, come to lie in the cavity as they should, and how they fail.
@@ -87,19 +76,21 @@ def assemble(
 
             tell("figure", 0, 1)
             figures = [("assembly", plot.assembly(found))]
-            files = laid(out, figures, lambda _: {"assembly.json": as_json(found)})
-    answer(found.to_json(), json, lambda: _text(found, files))
+            files = laid(out, figures, lambda _: {"assembly.json": as_json(found)}, form)
+    answer(found.to_json(), json, lambda: _text(found, files), csv=(csv, found.table))
 
 
 def _text(found: Assembly, files: list[Path]) -> None:
-    from limitsets.assembly.counting import rate_of
-
     one, two = found.pair.scenes
     how = "the cavity is thrown too" if found.series.carried else "the cavity stands"
     meet = (
         "pass through each other" if found.contact == "none" else f"push each other, {found.contact}, {how}"
     )
     typer.echo(f"{one.name} below, {two.name} on top: {len(found.rows)} trials, the parts {meet}")
+    if found.misfit is not None:
+        typer.echo(
+            f"THEY DO NOT FIT: {found.misfit}; 'assembled' says only that both were fed rightly, one after the other"
+        )
     overlaps, joint = found.overlaps, found.joint
     if overlaps is not None:
         low, high = overlaps.ever.interval
@@ -107,11 +98,7 @@ def _text(found: Assembly, files: list[Path]) -> None:
             f"the outlines overlap in {100 * overlaps.ever.share:.1f} % of the trials ({100 * low:.1f} to "
             f"{100 * high:.1f} %), in flight in {100 * overlaps.in_flight.share:.1f} %: of these the rates say nothing"
         )
-    rows = []
-    for name, count in found.counts.items():
-        low, high = rate_of(count, len(found.rows)).interval
-        rows.append([WORDS[name], count, f"{low:.4f} to {high:.4f}"])
-    table(HEADS, rows)
+    show(found.table())
     if joint is not None:
         first, second = joint.rates
         typer.echo(f"fed rightly: {first.share:.4f} and {second.share:.4f}; both {joint.both.share:.4f}")
@@ -126,6 +113,7 @@ def _text(found: Assembly, files: list[Path]) -> None:
         what = "the cavity standing" if name == "standing" else "the cavity thrown too"
         whole = f"{rate.count} of {rate.of} ({low:.3f} to {high:.3f})"
         typer.echo(f"whole after the next throw, {what}: {whole}; the paper: 17 of 20")
-    typer.echo(f"{found.first_series} assembled in the first 20 trials; the paper: 11 of 20")
+    first = found.first_series
+    typer.echo(f"{first.count} assembled in the first {first.of} trials; the paper: 11 of 20")
     if files:
         typer.echo(f"written: {', '.join(map(str, files))}")

@@ -3,18 +3,14 @@
 from __future__ import annotations
 
 import sys
-from contextlib import nullcontext
-from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from limitsets.cli.output import Json, Scene, answer, opened, option, progress, saved, table
+from limitsets.cli.output import Csv, Form, Format, Json, Scene, answer, opened, option, progress, saved, show
 
 if TYPE_CHECKING:
-    import xarray as xr
-
     from limitsets.sweep import Atlas
     from limitsets.sweep.driving import Progress
 
@@ -28,16 +24,6 @@ HELP_OUT = "The store (Zarr), ./NAME-atlas.zarr by default; one that was begun i
 HELP_CLUSTER = "Compute on a Dask cluster, by its scheduler's address: tcp://10.0.0.1:8786."
 HELP_REFINE = "Compute a coarse grid, then only points near boundaries of classes; fill the rest."
 HELP_COARSE = "With --refine: the coarse grid has every N-th point of each axis."
-HELP_FORMAT = "Of the picture beside the store, NAME-atlas.png: png, svg or pdf."
-HELP_CSV = "Write a table with a row for each point."
-
-
-class Form(StrEnum):
-    """Of a picture."""
-
-    PNG = "png"
-    SVG = "svg"
-    PDF = "pdf"
 
 
 def atlas(
@@ -58,15 +44,15 @@ def atlas(
     cluster: Annotated[str | None, option("--cluster", "URL", HELP_CLUSTER)] = None,
     refine: Annotated[bool, typer.Option("--refine", help=HELP_REFINE)] = False,
     coarse: Annotated[int, option("--coarse", "N", HELP_COARSE, min=2)] = 8,
-    form: Annotated[Form, option("--format", "FORMAT", HELP_FORMAT)] = Form.PNG,
-    csv: Annotated[Path | None, option("--csv", "FILE", HELP_CSV)] = None,
+    form: Format = Form.PNG,
+    csv: Csv = None,
     json: Json = False,
 ) -> None:
     """Vary one or two quantities of a scene, and keep what a task says at every point.
 
     A run that was interrupted goes on when the same command is given again.
     """
-    with progress() as tell, saved(csv) if csv is not None else nullcontext() as draft:
+    with progress() as tell:
         from limitsets.sweep import atlas as run
 
         if task is not None:  # a file of the present folder is found, as `python -m` would find it
@@ -88,13 +74,12 @@ def atlas(
             cluster=cluster,
             progress=tell,
         )
-        if draft is not None:
-            found.to_dataframe().to_csv(draft, index=False)
         picture = store.with_name(f"{store.name.removesuffix('.zarr')}.{form}")
         drawn = _draw(found, picture)
         proof = Path(f"{chosen.name}-regions.proof.zip") if certify else None
         shares = _certified(found, proof, workers, tell) if proof is not None else {}
-    answer(found if json else None, json, lambda: _text(found, csv, picture if drawn else None))
+    place = picture if drawn else None
+    answer(found if json else None, json, lambda: _text(found, csv, place), csv=(csv, found.table))
     if proof is not None and not json:
         said = ", ".join(f"{100 * share:.2f} % {word}" for word, share in shares.items())
         typer.echo(f"regions: {said}: {proof}")
@@ -132,10 +117,7 @@ def _text(found: Atlas, csv: Path | None, picture: Path | None) -> None:
 
     for each in legend(found.dataset) if is_classified(found.dataset) else ():
         typer.echo(f"{100 * each.share:6.2f} %  {each.words}")
-    rows = [
-        _row(str(name), found.dataset[name]) for name in sorted(found.dataset, key=str) if name != "class"
-    ]
-    table(["variable", "values", "unit"], rows)
+    show(found.tables()[0])
     points = found.dataset["status"].size
     again = f", {found.kept} of its {found.kept + found.new} chunks by earlier runs" if found.kept else ""
     typer.echo(f"{points} points{again}: {found.store}")
@@ -143,17 +125,3 @@ def _text(found: Atlas, csv: Path | None, picture: Path | None) -> None:
         typer.echo(f"table: {csv}")
     if picture is not None:
         typer.echo(f"figure: {picture}")
-
-
-def _row(name: str, variable: xr.DataArray) -> list[str]:
-    """Say what one variable ranges over, apart from where there is nothing; of codes how many there are of each."""
-    import numpy as np
-
-    values, attributes = np.asarray(variable.values), variable.attrs
-    if "flag_meanings" in attributes:
-        codes = zip(attributes["flag_meanings"].split(), attributes["flag_values"], strict=True)
-        counts = [(word, int((values == code).sum())) for word, code in codes]
-        return [name, ", ".join(f"{count} {word}" for word, count in counts if count), ""]
-    good = values[np.isfinite(values) if values.dtype.kind == "f" else values >= 0]
-    said = f"{good.min():.9g} to {good.max():.9g}" if good.size else "none"
-    return [name, said, attributes.get("units", "")]

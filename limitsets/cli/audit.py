@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from limitsets.cli.output import Json, Scene, answer, opened, option, progress, table
+from limitsets.cli.output import Csv, Form, Format, Json, Scene, answer, opened, option, progress, table
 
 if TYPE_CHECKING:
     from limitsets.auditing import Audit
@@ -18,8 +18,10 @@ __all__ = ["audit"]
 def audit(
     scene: Scene,
     out: Annotated[
-        Path | None, option("--out -o", "DIR", "Write audit.md, audit.json and audit.png there.")
+        Path | None, option("--out -o", "DIR", "Write audit.md, audit.json and figures there.")
     ] = None,
+    form: Format = Form.PNG,
+    csv: Csv = None,
     json: Json = False,
 ) -> None:
     """Ask which assumptions of the model a scene breaks: on its limit set, and on the whole arm."""
@@ -34,8 +36,8 @@ def audit(
             from limitsets.report.audit_pages import write_audit
 
             tell("files", 1, 2)
-            files = write_audit(found, out)
-    answer(found, json, lambda: _text(found, files))
+            files = write_audit(found, out, form)
+    answer(found, json, lambda: _text(found, files), csv=(csv, found.table))
 
 
 def _text(found: Audit, files: list[Path]) -> None:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from limitsets.cli.arguments import HELP_NO_RECHECK, deviations
-from limitsets.cli.output import Json, Scene, Words, answer, option, progress, saved, table
+from limitsets.cli.output import Csv, Json, Scene, Words, answer, option, progress, saved, table
 
 if TYPE_CHECKING:
     from limitsets.proofs import Claim, Proof
@@ -43,6 +43,7 @@ def certify(
     out: Annotated[
         Path | None, option("--out -o", "FILE", "The certificate, ./NAME.proof.zip by default.")
     ] = None,
+    csv: Csv = None,
     json: Json = False,
     no_recheck: Annotated[bool, typer.Option("--no-recheck", help=HELP_NO_RECHECK)] = False,
 ) -> None:
@@ -72,7 +73,8 @@ def certify(
                     proof, kept = proof.denied(error.claims), str(file.with_name(Path(error.file or "").name))
             seconds = None if no_recheck or not written else time.perf_counter() - begin
     records = [each | {"timings": each["timings"] | {"recheck": seconds}} for each in proof.to_json()]
-    answer(records, json, lambda: _text(proof, file if written else None, kept, seconds))
+    place = file if written else None
+    answer(records, json, lambda: _text(proof, place, kept, seconds), csv=(csv, proof.table))
     raise typer.Exit(0 if proof.proved else 1)
 
 

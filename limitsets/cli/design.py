@@ -9,6 +9,9 @@ import typer
 
 from limitsets.cli.arguments import HELP_NO_RECHECK, ends_of, number
 from limitsets.cli.output import (
+    Csv,
+    Form,
+    Format,
     Json,
     Scene,
     Words,
@@ -17,8 +20,8 @@ from limitsets.cli.output import (
     option,
     progress,
     save_scene,
+    show,
     show_scene,
-    table,
 )
 from limitsets.errors import LimitsetsError
 from limitsets.files import as_json
@@ -36,10 +39,11 @@ HELP_POINTS = "First critical point wanted on each side, like 10,10,20 or '25 cm
 HELP_ROBUST = (
     "Make the proved joint margin of [tolerance] large: only one side beyond X, and almost every orbit there."
 )
+HELP_GOAL = "Meet the scene's own goal, at the X that it asks for; bounds come by themselves."
 HELP_VARY = "Quantities to vary, like part.mass.center.along,throw.speed; repeatable."
 HELP_STARTS = "With --critical-points: other starts to draw at most."
-HELP_STAGES = "With --critical-points: move them there in N steps, all of them shown."
-HELP_EVALUATIONS = "With --robust: designs to look at."
+HELP_STAGES = "With --critical-points: move them there in N steps, of which the figure shows twelve at most."
+HELP_EVALUATIONS = "Designs to look at: with --robust 1200 by default, with --goal 600."
 HELP_BOUNDS = (
     "Bounds of one of them, like part.mass.center.along='4 in':'5 in'; either may be left out; repeatable."
 )
@@ -49,9 +53,12 @@ def design(
     scene: Scene,
     critical_points: Annotated[str | None, option("--critical-points", "R,R,R", HELP_POINTS)] = None,
     robust: Annotated[bool, typer.Option("--robust", help=HELP_ROBUST)] = False,
+    goal: Annotated[bool, typer.Option("--goal", help=HELP_GOAL)] = False,
     vary: Annotated[Words, option("--vary", "Q,Q", HELP_VARY)] = None,
     bounds: Annotated[Words, option("--bounds", "Q=LO:HI", HELP_BOUNDS)] = None,
-    evaluations: Annotated[int, option("--evaluations", "N", HELP_EVALUATIONS, min=1, max=1_000_000)] = 1200,
+    evaluations: Annotated[
+        int | None, option("--evaluations", "N", HELP_EVALUATIONS, min=1, max=1_000_000)
+    ] = None,
     seconds: Annotated[
         float, option("--seconds", "S", "With --robust: for the proof of each margin.", min=0.0)
     ] = 240.0,
@@ -61,28 +68,49 @@ def design(
         Path | None,
         option("--out -o", "FILE", "NAME.toml for the scene; else a folder: scene, JSON and figure."),
     ] = None,
+    form: Format = Form.PNG,
+    csv: Csv = None,
     json: Json = False,
     no_recheck: Annotated[
         bool, typer.Option("--no-recheck", help=f"With --robust: {HELP_NO_RECHECK}")
     ] = False,
 ) -> None:
-    """Find a scene whose critical points are where they are wanted, or that is fed in spite of large deviations.
+    """Find a scene whose critical points are as wanted, that meets its goal, or is fed in spite of large deviations.
 
     Exit 1 where none is found, or no margin is proved.
     """
-    if (critical_points is None) != robust:
+    wanted = (critical_points is not None) + robust + goal
+    if wanted != 1:
         raise LimitsetsError(
             "the design",
-            "nothing is wanted" if critical_points is None else "two things are wanted",
-            "--critical-points R,R,R or --robust",
+            "nothing is wanted" if not wanted else "two things are wanted",
+            "--critical-points R,R,R, --goal or --robust",
             "give one of them",
         )
     names = [name.strip() for words in vary or [] for name in words.split(",")]
+    if goal:
+        from limitsets.cli.design_goal import run_goal
+
+        raise typer.Exit(
+            run_goal(scene, names, ends_of(bounds), evaluations or 600, out, form, csv, json=json)
+        )
     if critical_points is None:
         from limitsets.cli.design_robust import run_robust
 
-        told = {"json": json, "recheck": not no_recheck}
-        raise typer.Exit(run_robust(scene, names, ends_of(bounds), evaluations, seconds, out, **told))
+        raise typer.Exit(
+            run_robust(
+                scene,
+                names,
+                ends_of(bounds),
+                evaluations or 1200,
+                seconds,
+                out,
+                form,
+                csv,
+                json=json,
+                recheck=not no_recheck,
+            )
+        )
     with progress() as tell:
         from limitsets.inverse import design as run
 
@@ -96,8 +124,8 @@ def design(
             stages=stages,
             progress=tell,
         )
-        files = [] if out is None else _written(found, out, tell)
-    answer(found, json, lambda: _text(found, files))
+        files = [] if out is None else _written(found, out, form, tell)
+    answer(found, json, lambda: _text(found, files), csv=(csv, found.table))
     raise typer.Exit(0 if found.reached else 1)
 
 
@@ -105,7 +133,7 @@ def _points(words: str) -> list[float | str | None]:
     return [None if word.strip() == FREE else number(word) for word in words.split(",")]
 
 
-def _written(found: Design, out: Path, tell: Callable[[str, int, int], None]) -> list[Path]:
+def _written(found: Design, out: Path, form: str, tell: Callable[[str, int, int], None]) -> list[Path]:
     """Write the scene, or a folder with the scene, the answer as JSON and the figure of the way there."""
     from limitsets.scene import dump
 
@@ -117,24 +145,12 @@ def _written(found: Design, out: Path, tell: Callable[[str, int, int], None]) ->
 
     drawn = plot.design(found, limit_sets_along(found, tell))
     texts = {f"{found.scene.name}.toml": dump(found.scene), "design.json": as_json(found)}
-    return laid(out, [("design", drawn)], lambda _: texts)
+    return laid(out, [("part", plot.part(found.scene)), ("design", drawn)], lambda _: texts, form)
 
 
 def _text(found: Design, files: list[Path]) -> None:
     """Print what changed, how well it is reached, and the scene."""
-    unit = found.start.unit
-    rows = [
-        [name, f"{before:.9g}", f"{after:.9g}", unit_of]
-        for name, (before, after, unit_of) in found.quantities().items()
-    ]
-    points = zip(
-        found.before.x.tolist(), found.jacobian.x.tolist(), found.targets, found.residual, strict=True
-    )
-    for side, (before, after, target, miss) in enumerate(points):
-        wanted = "free" if target is None else f"wanted {target:.9g}"
-        missed = "" if miss is None else f", off by {miss:.1e}"
-        rows.append([f"r_{side}", f"{before:.9g}", f"{after:.9g}", f"{unit} ({wanted}{missed})"])
-    table(["", "before", "after", "unit"], rows)
+    show(found.table())
     typer.echo(found.message[:1].upper() + found.message[1:] + ".")
     condition = "not known" if found.condition is None else f"{found.condition:.4g}"
     typer.echo(

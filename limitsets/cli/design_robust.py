@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import typer
 
-from limitsets.cli.output import answer, opened, progress, save_scene, show_scene, table
+from limitsets.cli.output import answer, opened, progress, save_scene, show, show_scene
 from limitsets.errors import LimitsetsError
 
 if TYPE_CHECKING:
@@ -27,6 +28,8 @@ def run_robust(
     evaluations: int,
     seconds: float,
     out: Path | None,
+    form: str,
+    csv: Path | None,
     *,
     json: bool,
     recheck: bool,
@@ -36,16 +39,26 @@ def run_robust(
         from limitsets.inverse import robust_design
 
         scene, _ = opened(name, None if out and out.suffix == ".toml" else out)
+        so_far = None if out is None else out if out.suffix == ".toml" else out / f"{scene.name}-so-far.toml"
         found = robust_design(
             scene,
             vary=_varied(scene, vary, bounds),
             evaluations=evaluations,
             prove=seconds,
             progress=tell,
+            keep=None if so_far is None else lambda best: _kept(best, so_far),
         )
-        found, files = (found, []) if out is None else _written(found, out, recheck=recheck)
-    answer(found, json, lambda: _text(found, files))
+        found, files = (found, []) if out is None else _written(found, out, form, recheck=recheck)
+        if so_far is not None and so_far != out:
+            so_far.unlink(missing_ok=True)
+    answer(found, json, lambda: _text(found, files), csv=(csv, found.table))
     return 0 if seconds == 0.0 or all(one.proved > 0.0 for one in found.margins) else 1
+
+
+def _kept(best: Scene, file: Path) -> None:
+    """Write the best design so far: a search that is ended has it."""
+    file.parent.mkdir(parents=True, exist_ok=True)
+    save_scene(best, file)
 
 
 def _varied(
@@ -70,7 +83,7 @@ def _ends(scene: Scene, name: str, ends: Ends) -> tuple[float, float]:
     return in_units(scene.unit, name, lo, key="--bounds"), in_units(scene.unit, name, hi, key="--bounds")
 
 
-def _written(found: RobustDesign, out: Path, *, recheck: bool) -> tuple[RobustDesign, list[Path]]:
+def _written(found: RobustDesign, out: Path, form: str, *, recheck: bool) -> tuple[RobustDesign, list[Path]]:
     """Write the scene, or a folder: scene, answer, certificates, figure; the design without what the checker denies."""
     if out.suffix == ".toml":
         return found, save_scene(found.scene, out)
@@ -80,27 +93,25 @@ def _written(found: RobustDesign, out: Path, *, recheck: bool) -> tuple[RobustDe
 
     with filled(out) as folder:
         found, paths = save(found, folder, recheck=recheck)
-        names = [path.name for path in paths]
+        names = [path.name for path in paths] + [f"part.{form}"]
+        plot.part(found.scene).savefig(folder / names[-1], dpi=DPI)
         if found.front:
-            plot.robust_design(found).savefig(folder / "front.png", dpi=DPI)
-            names.append("front.png")
+            names.append(f"front.{form}")
+            plot.robust_design(found).savefig(folder / names[-1], dpi=DPI)
     return found, [out / name for name in names]
 
 
 def _text(found: RobustDesign, files: list[Path]) -> None:
     """Print what changed, both margins, the throws, the lead weight, and the scene."""
-    unit = found.scene.unit
-    sides = [f"part.sides[{k}]" for k in range(3) if "sides" in found.scene.text["part"]]
-    rows = [
-        [name, f"{found.before.value(name):.6g}", f"{found.scene.value(name):.6g}"]
-        for name in (*sides, *found.varied)
-    ]
-    table(["", "before", f"design [{unit}]"], rows)
+    from limitsets.report.tables import in_time
+
+    unit, rate = found.scene.unit, found.scene.world.throw_rate
+    show(found.table())
     for label, margins, sampled, feeding in (
         ("before", found.before_margins, found.before_sampled, found.before_feeding),
         ("design", found.margins, found.sampled, found.feeding),
     ):
-        if sampled is None:
+        if sampled is None or not isfinite(sampled.x):
             typer.echo(f"{label}: fed at no X in spite of any deviation")
             continue
         typer.echo(f"{label}: X = {sampled.x:.4g} {unit}, joint margin by floats {sampled.margin:.4g}")
@@ -109,8 +120,12 @@ def _text(found: RobustDesign, files: list[Path]) -> None:
             typer.echo(f"  {one.goals[0].kind}: proved up to {one.proved:.4g}{fails}")
         if feeding is not None:
             typer.echo(
-                f"  throws to feed (sampled): mean {feeding.mean:.3g}, 95 % after {feeding.quantile_95:.3g}"
+                f"  throws to feed (sampled): mean {feeding.mean:.3g}{in_time(feeding.mean, rate, parts=True)},"
+                f" 95 % after {feeding.quantile_95:.3g}{in_time(feeding.quantile_95, rate)}"
             )
+    asked = getattr(found.before.goal, "x", None)
+    if asked is not None and asked != found.x:
+        typer.echo(f"the goal's X has moved from {asked:g} to {found.x:g} {unit} (design --goal keeps it)")
     lead = found.lead
     typer.echo(
         f"lead weight: {100 * lead.share:.1f} % of the mass at x = {lead.x:.4g}, y = {lead.y:.4g} {unit}"

@@ -10,7 +10,7 @@ import typer
 
 from limitsets.cli.arguments import HELP_NO_RECHECK, deviations
 from limitsets.cli.certificates import certified, said_of
-from limitsets.cli.output import Json, Scene, Words, answer, opened, option, progress, table
+from limitsets.cli.output import Csv, Form, Format, Json, Scene, Words, answer, opened, option, progress, show
 
 if TYPE_CHECKING:
     from limitsets.feeding import Feeding
@@ -22,14 +22,6 @@ HELP_SCATTER = (
     "Random noise at every throw, like throw.speed='0.5 %'; repeatable. Default: that of the scene, if any."
 )
 HELP_NOISE = "What may differ at every throw in the proofs, like throw.speed='0.3 %'; repeatable."
-HEADS = ("a part is fed", "probability", "its error", "trials", "95 % interval")
-WORDS = {
-    "right": "on the wanted side, clear of the wall",
-    "wrong": "on another side",
-    "wall": "on the wanted side, but meets the wall",
-    "left": "not: it leaves the arm otherwise",
-    "never": "not: it stays on the arm",
-}
 
 
 def feed(
@@ -59,12 +51,12 @@ def feed(
     ] = None,
     batches: Annotated[int, option("--batches", "N", "How often --parts are thrown.", min=1)] = 20,
     no_proof: Annotated[bool, typer.Option("--no-proof", help="Probabilities and trials only.")] = False,
-    out: Annotated[
-        Path | None, option("--out -o", "DIR", "Write feeding.json and feeding.png there.")
-    ] = None,
+    out: Annotated[Path | None, option("--out -o", "DIR", "Write feeding.json and figures there.")] = None,
     certificate: Annotated[
         Path | None, option("--certificate", "FILE", "Write the proofs' certificate, NAME.proof.zip.")
     ] = None,
+    form: Format = Form.PNG,
+    csv: Csv = None,
     json: Json = False,
     no_recheck: Annotated[bool, typer.Option("--no-recheck", help=HELP_NO_RECHECK)] = False,
 ) -> None:
@@ -104,13 +96,14 @@ def feed(
             from limitsets.files import as_json
             from limitsets.report.writing import laid
 
-            files = laid(out, [("feeding", plot.feeding(found))], lambda _: {"feeding.json": as_json(record)})
-    answer(record, json, lambda: _text(found, files, written))
+            drawn = [("part", plot.part(chosen)), ("feeding", plot.feeding(found))]
+            files = laid(out, drawn, lambda _: {"feeding.json": as_json(record)}, form)
+    answer(record, json, lambda: _text(found, files, written), csv=(csv, found.table))
     raise typer.Exit(0 if no_proof or found.proved else 1)
 
 
 def _text(found: Feeding, files: list[Path], written: dict[str, Any] | None) -> None:
-    from limitsets.robust.noise.proportions import binomial_interval
+    from limitsets.report.tables import in_time
 
     end, unit = found.end, found.end.scene.unit
     typer.echo(f"{end.scene.name}: the arm ends at x = {end.x:g} {unit}, side {end.side} is wanted")
@@ -119,29 +112,24 @@ def _text(found: Feeding, files: list[Path], written: dict[str, Any] | None) -> 
     if found.safe is not None and found.fed is not None:
         for line in (*found.safe.lines(end.side), *found.fed.lines(unit)):
             typer.echo(line)
-    rows = []
-    count = found.trials.fate.size
-    for name, share in found.shares.shares.items():
-        met = found.trials.counts[name]
-        low, high = binomial_interval(met, count)
-        rows.append(
-            [WORDS[name], f"{share:.6f}", f"{found.errors[name]:.1e}", met, f"{low:.4f} to {high:.4f}"]
-        )
-    table(HEADS, rows)
+    show(found.table())
     if found.brackets is not None:
         for line in _proved(found.brackets):
             typer.echo(line)
     most = found.shares.quantile(0.95)
-    until = "" if most is None else f", 95 % of the starts after {most}"
-    typer.echo(f"throws until a part is fed: {found.shares.mean_throws:.1f} in the mean{until}")
-    rate = found.shares.per_minute(end.scene.world.throw_rate)
+    throw_rate = end.scene.world.throw_rate
+    until = "" if most is None else f", 95 % of the starts after {most}{in_time(most, throw_rate)}"
+    mean = found.shares.mean_throws
+    if math.isnan(mean):
+        typer.echo("no part comes beyond the end of the arm: limitsets analyse says how far they come")
+    else:
+        typer.echo(f"throws until a part is fed: {mean:.1f} in the mean{in_time(mean, throw_rate)}{until}")
+    rate = found.shares.per_minute(throw_rate)
     if rate is not None:
         typer.echo(f"{rate:.2f} parts per minute are fed on the wanted side, one after the other")
     series = found.trials.series()
     if series.size:
-        typer.echo(
-            f"{series[0]} right in the first series of 20 trials, {series.mean():.2f} in the mean; the paper: 19"
-        )
+        typer.echo(f"{series[0]} right in the first series of 20 trials, {series.mean():.2f} in the mean")
     if found.curve is not None:
         typer.echo(found.curve.line())
     for crowd in found.crowds:
@@ -160,13 +148,15 @@ def _text(found: Feeding, files: list[Path], written: dict[str, Any] | None) -> 
 
 def _proved(brackets: AbsorptionBrackets) -> list[str]:
     """Put proved brackets in words, rounded outward."""
+    from limitsets.feeding.feeding_run import FED
+
     last = brackets.within["any"].shape[1] - 1
     found = []
     for name in ("right", "wrong", "wall"):
         if name in brackets.within:
             low, high = (float(end) for end in brackets.within[name][:, -1])
             lo, hi = math.floor(low * 1e6) / 1e6, math.ceil(high * 1e6) / 1e6
-            found.append(f"PROVED: {WORDS[name]} within {last} throws: {lo:.6f} to {hi:.6f}")
+            found.append(f"PROVED: {FED[name]} within {last} throws: {lo:.6f} to {hi:.6f}")
     first, by = brackets.quantile(0.95)
     if first is not None and by is not None:
         count = f"{first}" if first == by else f"{first} to {by}"

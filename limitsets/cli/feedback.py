@@ -9,7 +9,19 @@ import typer
 
 from limitsets.cli.arguments import HELP_NO_RECHECK, deviations, place, places_of
 from limitsets.cli.certificates import certified, said_of
-from limitsets.cli.output import Json, Scene, Words, answer, opened, option, progress, saved, table
+from limitsets.cli.output import (
+    Csv,
+    Form,
+    Format,
+    Json,
+    Scene,
+    Words,
+    answer,
+    opened,
+    option,
+    progress,
+    table,
+)
 from limitsets.errors import LimitsetsError
 
 if TYPE_CHECKING:
@@ -38,9 +50,10 @@ def feedback(
     noise: Annotated[Words, option("--noise", "Q=DEV", "At every throw, like throw.speed='0.3 %'.")] = None,
     seconds: Annotated[float, option("--seconds", "S", "The most time of a search.", min=0.0)] = 60.0,
     parts: Annotated[int, option("--parts", "N", "Parts thrown by the policy.", min=1)] = 10_000,
-    csv: Annotated[Path | None, option("--csv", "FILE", "Write the policy as a table.")] = None,
+    form: Format = Form.PNG,
+    csv: Csv = None,
     out: Annotated[
-        Path | None, option("--out -o", "DIR", "Write feedback.json, policy.csv and policy.png there.")
+        Path | None, option("--out -o", "DIR", "Write feedback.json, policy.csv and a figure there.")
     ] = None,
     certificate: Annotated[
         Path | None, option("--certificate", "FILE", "Write the policy's certificate, NAME.proof.zip.")
@@ -90,12 +103,13 @@ def feedback(
             ],
         }
         if out is not None:
-            _write(found, record, out)
-    policy = found.found.policy
-    if csv is not None and policy is not None:
-        with saved(csv) as draft:
-            draft.write_text(policy.csv(), encoding="utf-8", newline="\n")
-    answer(record, json, lambda: _text(found, tried, thrown, out, written))
+            _write(found, record, out, form)
+    answer(
+        record,
+        json,
+        lambda: _text(found, tried, thrown, out, written),
+        csv=(csv if found.solved else None, found.table),
+    )
     raise typer.Exit(0 if found.solved else 1)
 
 
@@ -139,7 +153,7 @@ def _starts(scene: Any, words: list[str] | None, begin: str | None) -> Any:
     return found or None
 
 
-def _write(found: Synthesis, record: dict[str, Any], out: Path) -> None:
+def _write(found: Synthesis, record: dict[str, Any], out: Path, form: str) -> None:
     from limitsets.files import as_json
     from limitsets.report.writing import laid
 
@@ -151,8 +165,8 @@ def _write(found: Synthesis, record: dict[str, Any], out: Path) -> None:
         drawn = [("policy", draw(found))]
     text = {"feedback.json": as_json(record)}
     if policy is not None:
-        text["policy.csv"] = policy.csv()
-    laid(out, drawn, lambda _: text)
+        text["policy.csv"] = found.table().csv()
+    laid(out, drawn, lambda _: text, form)
 
 
 def _text(
@@ -162,6 +176,8 @@ def _text(
     out: Path | None,
     written: dict[str, Any] | None,
 ) -> None:
+    from limitsets.report.tables import in_time
+
     unit = found.scene.unit
     x, side = found.goal
     wanted = {"stop": "known to lie", "catch": "to be caught"}[found.mode]
@@ -178,9 +194,7 @@ def _text(
     if written is not None:
         typer.echo(said_of(written, "there is no policy"))
     if out is not None:
-        typer.echo(
-            f"written to {out}: feedback.json" + ("" if policy is None else ", policy.csv, policy.png")
-        )
+        typer.echo(f"written to {out}: feedback.json" + ("" if policy is None else ", policy.csv, figure"))
     if policy is None:
         return
     rows = []
@@ -191,9 +205,10 @@ def _text(
     first = policy.to_json()["first"]
     typer.echo("begin: " + ", ".join(f"{word}: state {at}" for word, at in first.items() if at is not None))
     if thrown is not None:
+        timed = in_time(thrown.mean, found.scene.world.throw_rate, parts=True)
         more = "".join(f", {count} {what}" for what, count in thrown.failures.items())
         typer.echo(
-            f"thrown: {thrown.reached} of {thrown.parts} came, in {thrown.mean:.3g} throws on average{more}"
+            f"thrown: {thrown.reached} of {thrown.parts} came, in {thrown.mean:.3g} throws on average{timed}{more}"
         )
 
 

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from contextlib import nullcontext
-from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from limitsets.cli.arguments import number
-from limitsets.cli.output import Json, Scene, answer, opened, option, progress, saved, table
+from limitsets.cli.output import Csv, Form, Format, Json, Scene, answer, opened, option, progress, show
 
 if TYPE_CHECKING:
     from limitsets.fitting import Enough, Fit
@@ -19,10 +17,8 @@ __all__ = ["fit"]
 
 HELP_FILE = "Throws: x_before [mm], side_before, x_after [mm], side_after, and, if known, error [mm], run."
 HELP_ERROR = "Standard deviation of a measured place: '0.5 mm', or a number in the scene's unit."
-HELP_OUT = "Write fitted.toml, fit.json and residuals.png."
+HELP_OUT = "Write fitted.toml, fit.json and figures."
 HELP_NO_MARGIN = "Do not ask whether the goal's margin is large enough (proofs: a minute)."
-
-Row = tuple[str, float, float, float, str]
 
 
 def fit(
@@ -30,7 +26,8 @@ def fit(
     file: Annotated[Path, typer.Argument(metavar="FILE.csv", help=HELP_FILE)],
     error: Annotated[str | None, option("--error", "E", HELP_ERROR)] = None,
     out: Annotated[Path | None, option("--out -o", "DIR", HELP_OUT)] = None,
-    csv: Annotated[Path | None, option("--csv", "FILE", "Write the table of the fitted values.")] = None,
+    form: Format = Form.PNG,
+    csv: Csv = None,
     json: Json = False,
     no_margin: Annotated[bool, typer.Option("--no-margin", help=HELP_NO_MARGIN)] = False,
 ) -> None:
@@ -38,7 +35,7 @@ def fit(
 
     Exit 1 where the goal is not proved for every machine that the film leaves possible, with its scatter.
     """
-    with progress() as tell, saved(csv) if csv is not None else nullcontext() as draft:
+    with progress() as tell:
         chosen, _ = opened(scene, out)
         from limitsets.fitting import enough
         from limitsets.fitting import fit as run
@@ -46,51 +43,27 @@ def fit(
         found = run(chosen, file, error=None if error is None else number(error), progress=tell)
         judged = None if no_margin or chosen.goal is None else enough(found, progress=tell)
         record = found.to_json() | {"enough": None if judged is None else judged.to_json()}
-        if draft is not None:
-            _write_table(draft, _rows(found))
-        files = _write(found, record, out) if out is not None else []
-    answer(record, json, lambda: _text(found, judged, files))
+        files = _write(found, record, out, form) if out is not None else []
+    answer(record, json, lambda: _text(found, judged, files), csv=(csv, found.table))
     raise typer.Exit(0 if judged is None or judged.verdict == "enough" else 1)
 
 
-def _rows(found: Fit) -> list[Row]:
-    unit = found.scene.unit
-    rows = [(each.name, each.value, each.lo, each.hi, each.unit) for each in found.quantities]
-    for name, each, factor, word in (
-        ("scatter of throw.speed", found.speed, 100.0, "%"),
-        ("scatter of landing.x", found.landing, 1.0, unit),
-    ):
-        rows.append((name, factor * each.value, factor * each.lo, factor * each.hi, word))
-    return rows
-
-
-def _write_table(file: Path, rows: list[Row]) -> None:
-    from csv import writer
-
-    with file.open("w", encoding="utf-8", newline="") as stream:
-        lines = writer(stream, lineterminator="\n")
-        lines.writerow(("quantity", "value", "lo", "hi", "unit"))
-        lines.writerows(rows)
-
-
-def _write(found: Fit, record: dict[str, Any], out: Path) -> list[Path]:
+def _write(found: Fit, record: dict[str, Any], out: Path, form: str) -> list[Path]:
     from limitsets.files import as_json
+    from limitsets.plot.parts import part
     from limitsets.plot.residuals import fit_residuals
     from limitsets.report.writing import laid
     from limitsets.scene import dump
 
     texts = {"fitted.toml": dump(found.scene), "fit.json": as_json(record)}
-    return laid(out, [("residuals", fit_residuals(found))], lambda _: texts)
+    drawn = [("part", part(found.scene)), ("residuals", fit_residuals(found))]
+    return laid(out, drawn, lambda _: texts, form)
 
 
 def _text(found: Fit, judged: Enough | None, files: list[Path]) -> None:
     from limitsets.report.fits import lines_of
 
-    rows = [
-        (name, *(f"{x:.6g}" if isfinite(x) else "open" for x in (value, lo, hi)), unit)
-        for name, value, lo, hi, unit in _rows(found)
-    ]
-    table(("quantity", "value", "from", "to (95 %)", "unit"), rows)
+    show(found.table())
     for line in lines_of(found):
         typer.echo(line)
     for line in judged.sentences if judged is not None else ():

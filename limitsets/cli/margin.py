@@ -8,12 +8,14 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from limitsets.cli.arguments import HELP_NO_RECHECK, place
-from limitsets.cli.output import Json, Scene, answer, opened, option, progress, table
+from limitsets.cli.output import Csv, Form, Format, Json, Scene, answer, opened, option, progress, table
 from limitsets.errors import LimitsetsError
 from limitsets.files import as_json
+from limitsets.tables import joined
 
 if TYPE_CHECKING:
     from limitsets.robust.margins.finding import Margin
+    from limitsets.scene import Scene as SceneOf
 
 __all__ = ["margin"]
 
@@ -32,6 +34,8 @@ def margin(
     out: Annotated[
         Path | None, option("--out -o", "DIR", "Write margins.json, certificates, orbits, a figure.")
     ] = None,
+    form: Format = Form.PNG,
+    csv: Csv = None,
     json: Json = False,
     no_recheck: Annotated[bool, typer.Option("--no-recheck", help=HELP_NO_RECHECK)] = False,
 ) -> None:
@@ -48,8 +52,13 @@ def margin(
         records = [each.to_json() for each in found]
         if out is not None:
             tell("files", len(found), len(found) + 1)
-            found, records = _write(found, out, recheck=not no_recheck)
-    answer(records, json, lambda: _text(found, out, no_recheck=no_recheck))
+            found, records = _write(found, out, form, recheck=not no_recheck)
+    answer(
+        records,
+        json,
+        lambda: _text(chosen, found, out, no_recheck=no_recheck),
+        csv=(csv, lambda: joined(found)),
+    )
     raise typer.Exit(
         0 if all(each.proved > 0 and (each.closed or each.refuted is None) for each in found) else 1
     )
@@ -72,11 +81,12 @@ def _goal_at(scene: Any, text: str) -> Any:
 
 
 def _write(
-    given: tuple[Margin, ...], out: Path, *, recheck: bool
+    given: tuple[Margin, ...], out: Path, form: str, *, recheck: bool
 ) -> tuple[tuple[Margin, ...], list[dict[str, Any]]]:
     """Write the files; the margins and their JSON without what the checker denies."""
     from limitsets.errors import AnswerError
     from limitsets.plot.margins import tolerance_box, tornado
+    from limitsets.plot.parts import part
     from limitsets.report.writing import laid
     from limitsets.robust.margins.margin_result import settled
 
@@ -89,14 +99,15 @@ def _write(
         found.append(left)
         records.append(left.to_json() | {"certificate": [path.name for path in paths] or None})
     single = [each for each in found if each.reading != "tolerance"]
-    drawn = [("margins", tornado(single))] if single else []
+    drawn = [("part", part(given[0].scene))]
+    drawn += [("margins", tornado(single))] if single else []
     drawn += [("joint", tolerance_box(each)) for each in found if each.reading == "tolerance"]
-    laid(out, drawn, lambda _: {"margins.json": as_json(records)})
+    laid(out, drawn, lambda _: {"margins.json": as_json(records)}, form)
     return tuple(found), records
 
 
-def _text(found: tuple[Margin, ...], out: Path | None, *, no_recheck: bool) -> None:
-    from limitsets.report.goals import goal_sentence
+def _text(given: SceneOf, found: tuple[Margin, ...], out: Path | None, *, no_recheck: bool) -> None:
+    from limitsets.report.goals import goal_sentence, without_margin
     from limitsets.report.robust_pages import READINGS
     from limitsets.robust.margins.margin_texts import bound, reach_of, void_of
 
@@ -107,7 +118,13 @@ def _text(found: tuple[Margin, ...], out: Path | None, *, no_recheck: bool) -> N
         rows.append([each.quantity, READINGS[each.reading], low, high])
     scene = found[0].scene
     typer.echo(f"{scene.name}: {' and '.join(goal_sentence(goal, scene.unit) for goal in found[0].goals)}")
-    table(HEADS, rows)
+    if len(found) == 1 or any(each.proved > 0.0 or each.refuted for each in found):
+        table(HEADS, rows)
+    else:
+        typer.echo(f"{len(found)} margins, all of them 0: {found[0].reason}")
+        fails = any(each.refuted == 0.0 for each in found)
+        typer.echo(f"next: {without_margin(given, found[0].goals, fails=fails)}")
+        found = ()
     for each in found:
         void = void_of(each.goals, reach_of(each.pieces), scene.unit)
         if void:

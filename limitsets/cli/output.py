@@ -2,24 +2,33 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import sys
 import threading
-import time
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
+from enum import StrEnum
+from json import loads
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
 
 import typer
 
+from limitsets.cli.claims import claim
 from limitsets.errors import LimitsetsError
 from limitsets.files import as_json, replaced
+from limitsets.progress import bar
+from limitsets.tables import aligned
 
 if TYPE_CHECKING:
     from limitsets.scene import Scene as SceneOf
+    from limitsets.tables import Table
 
 __all__ = [
+    "Csv",
+    "Form",
+    "Format",
     "Json",
     "Out",
     "Scene",
@@ -30,6 +39,7 @@ __all__ = [
     "progress",
     "save_scene",
     "saved",
+    "show",
     "show_scene",
     "table",
 ]
@@ -42,29 +52,88 @@ def option(flags: str, metavar: str, help: str, **limits: Any) -> Any:  # noqa: 
     return typer.Option(*flags.split(), metavar=metavar, help=help, **limits)
 
 
+def _names(begun: str) -> list[str]:
+    """Give the built-in scenes for the shell's completion; it adds files by itself where none fits."""
+    from limitsets.scene import scenes
+
+    return [name for name in scenes() if name.startswith(begun)]
+
+
 Scene = Annotated[
-    str, typer.Argument(metavar="SCENE", help="A built-in name (see: limitsets scenes) or a TOML file.")
+    str,
+    typer.Argument(
+        metavar="SCENE",
+        help="A built-in name (see: limitsets scenes) or a TOML file.",
+        autocompletion=_names,
+    ),
 ]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON, and nothing else, on stdout.")]
 Out = Annotated[Path | None, option("--out -o", "FILE", "Write the JSON to this file as well.")]
 
-# What takes longer than this says what it is doing.
-PATIENCE = 2.0
+
+class Form(StrEnum):
+    """Of a picture."""
+
+    PNG = "png"
+    SVG = "svg"
+    PDF = "pdf"
+
+
+Format = Annotated[Form, option("--format", "FORMAT", "Of the figures: png, svg or pdf.")]
+
+
+def _require_file(file: Path | None) -> Path | None:
+    """Refuse a file that plainly cannot be written, before anything is computed for it."""
+    if file is not None and file.is_dir():
+        raise LimitsetsError("the table's file", str(file), "a regular file", "it is a folder; name a file")
+    if file is not None and not file.parent.is_dir():
+        raise LimitsetsError(
+            "the table's file",
+            str(file),
+            "a file in a folder that is there",
+            "make the folder, or name another",
+        )
+    return file
+
+
+Csv = Annotated[
+    Path | None,
+    option(
+        "--csv",
+        "FILE",
+        "Write the table as CSV: units in the head, numbers in full.",
+        callback=_require_file,
+    ),
+]
+
+
+# A longer table is printed by ourselves: rich takes a second for four thousand rows.
+LONG = 500
 
 
 def table(heads: Sequence[str], rows: Sequence[Sequence[object]]) -> None:
     """Print a table, wide enough for its text where nobody looks at it on a terminal."""
+    if len(rows) > LONG:
+        print("\n".join(aligned(heads, [[str(cell) for cell in row] for row in rows])))
+        return
     from rich.box import SIMPLE_HEAD
     from rich.console import Console
     from rich.markup import escape
     from rich.table import Table
 
+    # rich asks the terminal, or COLUMNS; where neither says anything lines are as long as they are
+    wide = None if sys.stdout.isatty() or os.environ.get("COLUMNS") else 200
     grid = Table(box=SIMPLE_HEAD, pad_edge=False)
     for head in heads:
-        grid.add_column(escape(head), no_wrap=not sys.stdout.isatty())
+        grid.add_column(escape(head), no_wrap=wide is not None)
     for row in rows:
         grid.add_row(*(escape(str(cell)) for cell in row))
-    Console(width=None if sys.stdout.isatty() else 200).print(grid)
+    Console(width=wide).print(grid)
+
+
+def show(found: Table) -> None:
+    """Print a table of an answer, its numbers rounded."""
+    table(found.heads, found.shown())
 
 
 def opened(scene: str, out: Path | None, word: str = "") -> tuple[SceneOf, Path]:
@@ -77,7 +146,25 @@ def opened(scene: str, out: Path | None, word: str = "") -> tuple[SceneOf, Path]
         from limitsets.report.writing import require_place
 
         require_place(folder)
+        claim(folder)
+        other = _other_scene(folder, chosen)
+        if other:
+            print(
+                f"limitsets: {folder} holds the report of another scene, {other}: it is replaced",
+                file=sys.stderr,
+            )
     return chosen, folder
+
+
+def _other_scene(folder: Path, scene: SceneOf) -> str:
+    """Name the scene of a report that is in a folder already, where it is another one."""
+    for file in sorted(folder.glob("*.json")):
+        with suppress(OSError, ValueError, TypeError, KeyError):
+            found = loads(file.read_text(encoding="utf-8"))["scene"]
+            if found != scene.as_dict():
+                name = str(found["name"])
+                return name if name != scene.name else f"{name} with other values"
+    return ""
 
 
 @contextmanager
@@ -97,9 +184,18 @@ def saved(file: Path) -> Iterator[Path]:
         ) from None
 
 
-def answer(record: Any, json: bool, text: Callable[[], None], out: Path | None = None) -> None:
-    """Give an answer as JSON or as text, and write it to a file where one is named."""
+def answer(
+    record: Any,
+    json: bool,
+    text: Callable[[], None],
+    out: Path | None = None,
+    csv: tuple[Path | None, Callable[[], Table]] | None = None,
+) -> None:
+    """Give an answer as JSON or as text; write it to a file, and its table as CSV, where they are named."""
     words = as_json(record)
+    if csv is not None and csv[0] is not None:
+        with saved(csv[0]) as draft:
+            draft.write_text(csv[1]().csv(), encoding="utf-8", newline="")
     if out is not None:
         with saved(out) as draft:
             draft.write_text(words, encoding="utf-8", newline="\n")
@@ -123,29 +219,6 @@ def show_scene(scene: SceneOf, files: list[Path]) -> None:
     from limitsets.scene import dump
 
     typer.echo(f"scene: {files[0]}" if files else "\n" + dump(scene).rstrip("\n"))
-
-
-class _Lines:
-    """A line for a step that lasts: at once where the last line is two seconds old, else as soon as it is."""
-
-    def __init__(self) -> None:
-        self.last, self.timer = time.monotonic(), threading.Timer(0.0, print)
-
-    def tell(self, step: str, done: int, of: int) -> None:
-        self.stop()
-        text = f"limitsets: {step} ({done + 1} of {of})"
-        self.timer = threading.Timer(max(self.last + PATIENCE - time.monotonic(), 0.0), self._say, (text,))
-        self.timer.daemon = True
-        self.timer.start()
-
-    def stop(self) -> None:
-        self.timer.cancel()
-        if self.timer.is_alive():  # it may be printing: not after the command is over
-            self.timer.join()
-
-    def _say(self, text: str) -> None:
-        self.last = time.monotonic()
-        print(text, file=sys.stderr, flush=True)
 
 
 class _Interrupts:
@@ -177,37 +250,14 @@ def progress() -> Iterator[Callable[[str, int, int], None]]:
     if ours:
         signal.signal(signal.SIGINT, interrupts)
     try:
-        with _shown() as show:
+        with bar() as shown:
 
             def tell(step: str, done: int, of: int) -> None:
                 interrupts.check()
-                show(step, done, of)
+                shown(step, done, of)
 
             yield tell
     finally:
         if ours:
             signal.signal(signal.SIGINT, signal.default_int_handler)
     interrupts.check()
-
-
-@contextmanager
-def _shown() -> Iterator[Callable[[str, int, int], None]]:
-    if not sys.stderr.isatty():
-        lines = _Lines()
-        try:
-            yield lines.tell
-        finally:
-            lines.stop()
-        return
-    from rich.console import Console
-    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
-
-    columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task("reading")
-
-        def show(step: str, done: int, of: int) -> None:
-            note = " (a first run compiles: up to half a minute)" if step == "transitions" else ""
-            bar.update(task, description=step + note, completed=done, total=of)
-
-        yield show

@@ -9,11 +9,13 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from limitsets.cli.arguments import position
-from limitsets.cli.output import Json, Scene, answer, option, progress, saved
+from limitsets.cli.output import Form, Json, Scene, answer, option, progress, saved
 from limitsets.errors import LimitsetsError
 
 if TYPE_CHECKING:
-    from limitsets.analysis import Analysis
+    from collections.abc import Callable
+
+    from matplotlib.figure import Figure
 
 __all__ = ["plot"]
 
@@ -23,6 +25,7 @@ FORMATS = (".png", ".svg", ".pdf")
 class Picture(StrEnum):
     """What to draw."""
 
+    PART = "part"
     LIMIT_SET = "limit-set"
     MAP = "map"
     BASINS = "basins"
@@ -34,14 +37,20 @@ def plot(
     scene: Scene,
     kind: Annotated[Picture, typer.Argument(metavar="KIND", help="What to draw.")],
     out: Annotated[
-        Path | None, option("--out -o", "FILE", f"File ({', '.join(FORMATS)}), ./NAME-KIND.png by default.")
+        Path | None,
+        option("--out -o", "FILE", f"File ({', '.join(FORMATS)}), ./NAME-KIND.FORMAT by default."),
     ] = None,
     cells: Annotated[int, option("--cells", "N", "Cells per side.", min=1, max=10_000_000)] = 4096,
     x: Annotated[str | None, option("--x", "X", "For flight: where the part rests.")] = None,
     side: Annotated[int | None, option("--side", "I", "For flight: on which side.")] = None,
+    form: Annotated[
+        Form | None, option("--format", "FORMAT", "png, svg or pdf; by default what FILE says, else png.")
+    ] = None,
     json: Json = False,
 ) -> None:
     """Draw one figure of a scene."""
+    if form is not None and out is not None and out.suffix.lower() != f".{form}":
+        raise LimitsetsError("the figure's file", str(out), f"a name that ends in .{form}", "leave one out")
     if out is not None and out.suffix.lower() not in FORMATS:
         raise LimitsetsError(
             "the figure's file", str(out), f"a name that ends in {', '.join(FORMATS)}", "rename it"
@@ -50,18 +59,35 @@ def plot(
         value = "half given" if kind is Picture.FLIGHT else "given"
         raise LimitsetsError("the throw to draw", value, "--x and --side, for a flight", "give both or none")
     with progress() as tell:
-        from limitsets.analysis import analyse as run
+        from limitsets.report.writing import DPI
 
-        analysis = run(scene, cells, progress=tell)
-        file = out if out is not None else Path(f"{analysis.scene.name}-{kind}.png")
-        _draw(analysis, kind, file, x, side)
+        name, drawn = _part(scene) if kind is Picture.PART else _figure(scene, kind, cells, x, side, tell)
+        file = out if out is not None else Path(f"{name}-{kind}.{form or Form.PNG}")
+        with saved(file) as draft:
+            drawn.savefig(draft, dpi=DPI)
     answer({"figure": str(file)}, json, lambda: typer.echo(f"figure: {file}"))
 
 
-def _draw(analysis: Analysis, kind: Picture, file: Path, x: str | None, side: int | None) -> None:
-    from limitsets.report.writing import DPI, figure
+def _part(scene: str) -> tuple[str, Figure]:
+    """Draw what needs no analysis."""
+    from limitsets.plot.parts import part
+    from limitsets.scene import load
 
+    chosen = load(scene)
+    return chosen.name, part(chosen)
+
+
+def _figure(
+    scene: str,
+    kind: Picture,
+    cells: int,
+    x: str | None,
+    side: int | None,
+    tell: Callable[[str, int, int], None],
+) -> tuple[str, Figure]:
+    from limitsets.analysis import analyse as run
+    from limitsets.report.writing import figure
+
+    analysis = run(scene, cells, progress=tell)
     throw = None if x is None or side is None else (position(analysis.scene, x), side)
-    drawn = figure(analysis, str(kind), throw)
-    with saved(file) as draft:
-        drawn.savefig(draft, dpi=DPI)
+    return analysis.scene.name, figure(analysis, str(kind), throw)

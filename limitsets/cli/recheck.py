@@ -7,7 +7,8 @@ from typing import Annotated
 
 import typer
 
-from limitsets.cli.output import Json, Out, answer, progress
+from limitsets.cli.output import Csv, Json, Out, answer, progress
+from limitsets.tables import Table
 
 __all__ = ["recheck"]
 
@@ -15,6 +16,7 @@ __all__ = ["recheck"]
 def recheck(
     file: Annotated[Path, typer.Argument(metavar="FILE", help="A certificate, NAME.proof.zip.")],
     out: Out = None,
+    csv: Csv = None,
     json: Json = False,
 ) -> None:
     """Check a certificate by other code and in other arithmetic than those that made it.
@@ -32,5 +34,6 @@ def recheck(
 
     from limitsets.checker import EXITS, show
 
-    answer(report, json, lambda: show(report, str(file)), out)
+    found = Table(("claim", "verdict", "reason"), report.claims, str(file))
+    answer(report, json, lambda: show(report, str(file)), out, (csv, lambda: found))
     raise typer.Exit(EXITS[report.verdict])

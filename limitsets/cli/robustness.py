@@ -8,10 +8,23 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from limitsets.cli.arguments import HELP_NO_RECHECK, deviations
-from limitsets.cli.output import Json, Scene, Words, answer, opened, option, progress, table
+from limitsets.cli.output import (
+    Csv,
+    Form,
+    Format,
+    Json,
+    Scene,
+    Words,
+    answer,
+    opened,
+    option,
+    progress,
+    table,
+)
 
 if TYPE_CHECKING:
     from limitsets.robust.sheet.summary import Robustness
+    from limitsets.scene import Scene as SceneOf
 
 __all__ = ["robustness"]
 
@@ -38,10 +51,15 @@ def robustness(
     cells: Annotated[
         int, option("--cells", "N", "Cells per side, for the noise.", min=8, max=100_000)
     ] = 1024,
+    seconds: Annotated[
+        float, option("--seconds", "S", "For the proofs of the joint margin and of the curve.", min=0.0)
+    ] = 24.0,
     without: Annotated[Words, option("--without", "PART", HELP_WITHOUT)] = None,
     out: Annotated[
         Path | None, option("--out -o", "DIR", "Folder of the report, ./NAME-robustness by default.")
     ] = None,
+    form: Format = Form.PNG,
+    csv: Csv = None,
     json: Json = False,
     no_recheck: Annotated[bool, typer.Option("--no-recheck", help=HELP_NO_RECHECK)] = False,
 ) -> None:
@@ -66,23 +84,28 @@ def robustness(
             width=width,
             cells=cells,
             leave_out=without or (),
+            seconds=seconds,
             folder=folder,
             recheck=not no_recheck,
             progress=tell,
         )
         tell("files", len(found.entries), len(found.entries) + 1)
-        files = write_robustness(found, folder)
-    answer(found, json, lambda: _text(found, files))
+        files = write_robustness(found, folder, form)
+    answer(found, json, lambda: _text(chosen, found, files), csv=(csv, found.table))
     raise typer.Exit(0 if found.verdict == "proved" else 1)
 
 
-def _text(found: Robustness, files: list[Any]) -> None:
-    from limitsets.report.robust_pages import HEADS, lines_of
+def _text(given: SceneOf, found: Robustness, files: list[Any]) -> None:
+    from limitsets.report.goals import without_margin
+    from limitsets.report.robust_pages import HEADS, lines_of, none_holds
     from limitsets.report.robust_pages import answer as said
 
     typer.echo(said(found).replace("**", ""))
-    if found.singles:
+    if any(entry.holds for entry in found.singles):
         table(HEADS, lines_of(found))
+    elif found.singles:
+        typer.echo(none_holds(found))
+        typer.echo(f"next: {without_margin(given, found.goals, fails=found.verdict == 'refuted')}")
     for part in ("joint", "curve", "noise"):
         reason = found.left_out.get(part)
         if reason and reason != "it was not asked for":

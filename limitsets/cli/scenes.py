@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from limitsets.cli.output import Json, Out, answer, table
+from limitsets.cli.output import Csv, Json, Out, answer, show
+from limitsets.tables import Column, Table
 
 __all__ = ["scenes"]
 
 
-def scenes(out: Out = None, json: Json = False) -> None:
+def scenes(out: Out = None, csv: Csv = None, json: Json = False) -> None:
     """List the built-in scenes."""
     from limitsets.scene import load
     from limitsets.scene import scenes as names
@@ -26,19 +27,16 @@ def scenes(out: Out = None, json: Json = False) -> None:
         for scene in map(load, names())
     ]
 
-    def text() -> None:
-        rows = [
-            [
-                record["name"],
-                record["sides"],
-                f"{record['kappa']:.6g} {record['unit']}",
-                f"{record['arm_length']:g} {record['unit']}",
-                record["flight"],
-                record["flip"],
-                record["goal"] or "-",
-            ]
-            for record in records
-        ]
-        table(["scene", "sides", "kappa", "arm", "flight", "flip", "goal"], rows)
-
-    answer(records, json, text, out)
+    columns = (
+        "scene",
+        "sides",
+        Column("kappa", show=".6g"),
+        Column("arm", show="g"),
+        "unit",
+        "flight",
+        "flip",
+        "goal",
+    )
+    words = ("name", "sides", "kappa", "arm_length", "unit", "flight", "flip", "goal")
+    found = Table(columns, [[record[word] for word in words] for record in records], "Built-in scenes")
+    answer(records, json, lambda: show(found), out, (csv, lambda: found))

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from limitsets.cli.arguments import position
-from limitsets.cli.output import Json, Out, Scene, answer, option, table
+from limitsets.cli.output import Csv, Json, Out, Scene, answer, option, progress, show
 from limitsets.files import as_table
+from limitsets.tables import Column, Table
 
 if TYPE_CHECKING:
     from limitsets.thrower import Trace
@@ -24,7 +25,9 @@ def throw(
     x: Annotated[str, option("--x", "X", "Where the part rests: 8, or '20 cm'.")],
     side: Annotated[int, option("--side", "I", "On which side.")],
     count: Annotated[int, option("--count", "N", "How many throws.", min=1, max=MOST_THROWS)] = 1,
+    seed: Annotated[int, option("--seed", "N", "Of throws that scatter ([effects] spread).", min=0)] = 0,
     out: Out = None,
+    csv: Csv = None,
     json: Json = False,
 ) -> None:
     """Throw a part, and say what each throw does; ends at the first exit."""
@@ -32,16 +35,14 @@ def throw(
     from limitsets.thrower import trace
 
     chosen = load(scene)
-    path = trace(chosen.map, position(chosen, x), side, count)
+    start = position(chosen, x)
+    with progress() as tell:
+        tell("throws (a first run compiles: up to half a minute)", 0, 1)
+        path = trace(chosen.map_of_seed(seed), start, side, count)
     records = _records(path)
 
-    def text() -> None:
-        rows = [[0, f"{path.x[0]:.6f}", int(path.side[0]), "start", "", "", ""]]
-        rows += [_row(number, record) for number, record in enumerate(records, start=1)]
-        unit = chosen.unit
-        table(["throw", f"x [{unit}]", "side", "status", "turned by", f"displacement [{unit}]", "flag"], rows)
-
-    answer(records, json, text, out)
+    found = _table(chosen.unit, (float(path.x[0]), int(path.side[0])), records)
+    answer(records, json, lambda: show(found), out, (csv, lambda: found))
     if chosen.effects.auto:
         typer.echo(
             "limitsets: auto in [effects] is resolved by limitsets analyse; thrown with: "
@@ -74,14 +75,23 @@ def _records(path: Trace) -> list[dict[str, Any]]:
     ]
 
 
-def _row(number: int, record: dict[str, Any]) -> list[Any]:
-    phi, shift = record["phi"], record["displacement"]
-    return [
-        number,
-        f"{record['x']:.6f}",
-        record["side"],
-        record["status"],
-        "-" if phi is None else f"{math.degrees(phi):.3f} deg",
-        "-" if shift is None else f"{shift:+.6g}",
-        "another vertex lands first" if record["other_vertex_first"] else "",
-    ]
+def _table(unit: str, start: tuple[float, int], records: list[dict[str, Any]]) -> Table:
+    columns = (
+        "throw",
+        Column("x", unit, ".6f"),
+        "side",
+        "status",
+        Column("turned by", "deg", ".3f"),
+        Column("displacement", unit, "+.6g"),
+        Column("another vertex lands first", show=lambda value: "yes" if value else ""),
+    )
+    rows: list[tuple[Any, ...]] = [(0, *start, "start", None, None, False)]
+    for number, record in enumerate(records, start=1):
+        phi = record["phi"]
+        told = (
+            None if phi is None else math.degrees(phi),
+            record["displacement"],
+            record["other_vertex_first"],
+        )
+        rows.append((number, record["x"], record["side"], record["status"], *told))
+    return Table(columns, rows, "Throws", "computed, not proved")

@@ -2,21 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from limitsets.cli.arguments import places_of
-from limitsets.cli.output import Json, Scene, answer, opened, option, progress, saved, table
+from limitsets.cli.output import Csv, Form, Format, Json, Scene, answer, opened, option, progress, show, table
 
 if TYPE_CHECKING:
     from limitsets.trays import TrayDesign, TrayFill
 
 __all__ = ["tray"]
 
-HELP_OUT = "Write tray.json and tray.png there; with --depths or --agitations design.json and design.png."
+HELP_OUT = "Write tray.json and a figure there; with --depths or --agitations design.json."
+HELP_PARTS = "Let N parts come by at once in each pass, in the engine, that push each other."
+HELP_FILE = "Keep finished batches of --parts there; the same command goes on with what is left."
 HELP_HISTORIES = "Depressions followed pass by pass in the engine, with new parts and with parts that return."
 
 
@@ -32,11 +33,20 @@ def tray(
     ] = None,
     histories: Annotated[int, option("--histories", "N", HELP_HISTORIES, min=0)] = 0,
     seed: Annotated[int, option("--seed", "N", "Of all draws.", min=0)] = 0,
+    parts: Annotated[int | None, option("--parts", "N", HELP_PARTS, min=1, max=1000)] = None,
+    depressions: Annotated[
+        int | None,
+        option("--depressions", "N", "Of the tray, for --parts. Default: one a part.", min=1, max=1000),
+    ] = None,
+    batches: Annotated[int, option("--batches", "N", "How often --parts are tried.", min=1)] = 10,
+    workers: Annotated[int | None, option("--workers", "N", "Processes that run the batches.", min=1)] = None,
+    file: Annotated[Path | None, option("--file", "FILE", HELP_FILE)] = None,
     depths: Annotated[
         str | None, option("--depths", "LO:HI:N", "Try N depths of the depressions instead.")
     ] = None,
     agitations: Annotated[str | None, option("--agitations", "LO:HI:N", "Try N agitations instead.")] = None,
-    csv: Annotated[Path | None, option("--csv", "FILE", "Write the fractions filled as a table.")] = None,
+    form: Format = Form.PNG,
+    csv: Csv = None,
     out: Annotated[Path | None, option("--out -o", "DIR", HELP_OUT)] = None,
     json: Json = False,
 ) -> None:
@@ -58,15 +68,18 @@ def tray(
         if depths is None and agitations is None:
             from limitsets.trays import tray as run
 
-            found = run(chosen, **common, histories=histories)
+            crowd: dict[str, Any] = {
+                "parts": parts,
+                "depressions": depressions,
+                "batches": batches,
+                "file": file,
+            }
+            found = run(chosen, **common, histories=histories, **crowd, workers=workers)
         else:
             found = _designed(chosen, depths, agitations, common)
         record = found.to_json()
-        files = [] if out is None else _written(found, record, out)
-    if csv is not None:
-        with saved(csv) as draft:
-            draft.write_text(_table(found), encoding="utf-8", newline="\n")
-    answer(record, json, lambda: _text(found, files))
+        files = [] if out is None else _written(found, record, out, form)
+    answer(record, json, lambda: _text(found, files), csv=(csv, found.table))
 
 
 def _designed(chosen: Any, depths: str | None, agitations: str | None, common: dict[str, Any]) -> TrayDesign:
@@ -81,35 +94,16 @@ def _designed(chosen: Any, depths: str | None, agitations: str | None, common: d
     return tray_design(chosen, at, kicks, **common)
 
 
-def _written(found: TrayFill | TrayDesign, record: dict[str, Any], out: Path) -> list[Path]:
+def _written(found: TrayFill | TrayDesign, record: dict[str, Any], out: Path, form: str) -> list[Path]:
     from limitsets import plot
     from limitsets.files import as_json
     from limitsets.report.writing import laid
     from limitsets.trays import TrayDesign
 
-    design = isinstance(found, TrayDesign)
-    name, draw = ("design", plot.tray_design) if design else ("tray", plot.tray)
-    return laid(out, [(name, draw(found))], lambda _: {f"{name}.json": as_json(record)})
-
-
-def _table(found: TrayFill | TrayDesign) -> str:
-    """Write the fractions filled, a line each."""
-    from limitsets.trays import TrayDesign
-
-    rows: Iterable[Sequence[float]]
-    if isinstance(found, TrayDesign):
-        heads = "depth,agitation,right,low,high,empty,wrong"
-        rows = (
-            (depth, agitation, found.right[at], *found.interval[at], found.empty[at], found.wrong[at])
-            for i, depth in enumerate(found.depths)
-            for k, agitation in enumerate(found.agitations)
-            for at in [(i, k)]
-        )
-    else:
-        heads = "passes,right,low,high"
-        pairs = zip(found.filled.right, found.filled.interval, strict=True)
-        rows = ((n, share, *ends) for n, (share, ends) in enumerate(pairs))
-    return "\n".join([heads, *(",".join(f"{value:.10g}" for value in row) for row in rows)]) + "\n"
+    drawn = (
+        ("design", plot.tray_design(found)) if isinstance(found, TrayDesign) else ("tray", plot.tray(found))
+    )
+    return laid(out, [drawn], lambda _: {f"{drawn[0]}.json": as_json(record)}, form)
 
 
 def _text(found: TrayFill | TrayDesign, files: list[Path]) -> None:
@@ -131,22 +125,12 @@ def _say_fill(found: TrayFill) -> None:
         f"{unit} deep, side {found.passes.side} is right; unilateral contact, friction {plate.friction:g}, "
         f"restitution {plate.restitution:g}"
     )
-    numbers = [0, *counts.met]
-    came = counts.captured[numbers] / max(int(counts.captured.sum()), 1)
-    rows = []
-    for k, (number, name) in enumerate(zip(numbers, filled.states, strict=True)):
-        low, high = filled.last_interval[k].tolist()
-        kept = counts.kicked[number]
-        stays = f"{kept[number] / kept.sum():.4f}" if number else ""
-        word = f"{name}: right" if k == filled.number else name
-        rows.append([word, f"{came[k]:.4f}", stays, f"{filled.last[k]:.4f}", f"{low:.4f} to {high:.4f}"])
-    table(
-        ("a depression", "after a part came by", "stands a kick", "after endless passes", "95 % interval"),
-        rows,
-    )
+    show(found.tables()[0])
     for n in sorted({1, 10, len(filled.right) - 1} & set(range(len(filled.right)))):
         low, high = filled.interval[n].tolist()
-        typer.echo(f"filled rightly after {n} passes: {filled.right[n]:.4f} ({low:.4f} to {high:.4f})")
+        typer.echo(
+            f"filled rightly after {n} pass{'es' if n > 1 else ''}: {filled.right[n]:.4f} ({low:.4f} to {high:.4f})"
+        )
     rest = filled.unfilled
     typer.echo(
         f"the rest after endless passes: {rest['empty']:.4f} empty, {rest['wrong']:.4f} with a wrong part; "
@@ -158,6 +142,12 @@ def _say_fill(found: TrayFill) -> None:
         typer.echo(
             f"{len(each.after_pass)} histories with {words}: {each.filled[-1]:.4f} ({low:.4f} to {high:.4f})"
         )
+    for at_once in found.tables()[2:]:
+        typer.echo(at_once.caption)
+        show(at_once)
+    if found.crowd_chain is not None:
+        right, (low, high) = found.crowd_chain.right[-1], found.crowd_chain.interval[-1].tolist()
+        typer.echo(f"by the chain, of as many parts one by one: right {right:.4f} ({low:.4f} to {high:.4f})")
     if counts.unfinished:
         typer.echo(f"{counts.unfinished} parts did not come to rest; they are left out")
 

@@ -33,9 +33,10 @@ def check_asked(
             raise AnswerError(f"{name} of the scenes", ", ".join(sorted(values)), "one value", remedy)
     if contact not in ("hinge", "unilateral"):
         raise AnswerError("the contact", contact, "'hinge' or 'unilateral'", "choose one")
-    if mu is None or not (0.0 <= mu < math.inf and 0.0 <= sliding < math.inf):
-        remedy = "pass friction=0.5, or give world.friction in the scene"
-        raise AnswerError("the friction", (mu, sliding), "numbers from 0", remedy)
+    remedies = "give world.friction in the scene, or pass friction=0.5", "pass sliding=0.2"
+    for name, value, remedy in zip(("on the arm", "elsewhere"), (mu, sliding), remedies, strict=True):
+        if value is None or not 0.0 <= value < math.inf:
+            raise AnswerError(f"the friction {name}", value, "a number from 0", remedy)
     if not 0.0 <= e <= 1.0:
         raise AnswerError("the restitution", e, "0 to 1", "pass restitution=0 for a plastic contact")
     if not 0.0 < step <= 0.05:

@@ -156,7 +156,8 @@ class Crowd:
         if self.between:
             corners, most = member.world(), 2.0 * OVERLAP * member.size
             for other in self.members:
-                if other.mode != OUT and depth_of_overlap(corners, other.world()) > most:
+                near = math.dist(pose[:2], other.pose()[:2]) < member.reach + other.reach
+                if near and other.mode != OUT and depth_of_overlap(corners, other.world()) > most:
                     thing = f"the places of parts {other.number} and {number}"
                     remedy = "move one of them: the engine would throw them apart"
                     raise AnswerError(thing, "overlapping", "outlines that do not overlap", remedy)

@@ -7,7 +7,7 @@ The depression's middle is at x = 0, the plate's surface at y = 0.  Lengths are 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -21,15 +21,15 @@ from limitsets.engine.stage import Stage, pymunk_module, set_up
 if TYPE_CHECKING:
     from limitsets.scene import Scene
 
-__all__ = ["EMPTY", "UNFINISHED", "Motion", "Plate", "Pose", "Rest", "fall_speed"]
+__all__ = ["EMPTY", "FAR", "UNFINISHED", "Motion", "Plate", "Pose", "Rest", "fall_speed", "state_of"]
 
 EMPTY, UNFINISHED = 0, -1
 """States in which no part rests in the depression: none of it is below the plate's surface; it did not come to rest."""
 
 # A part that is less far below the surface than this share of its size is not in the depression.
 IN_IT = 1e-3
-# The plate goes on to either side for so many sizes.
 FAR = 60.0
+"""The plate goes on to either side for so many sizes of the part."""
 
 
 class Pose(NamedTuple):
@@ -161,19 +161,26 @@ class Plate:
         return shapes
 
     def _rest(self, stage: Stage, time: float) -> Rest:
-        body, sides = stage.body, len(stage.flat)
+        body = stage.body
         pose = _seen(body)[0]
         if not body.is_sleeping:
             return Rest(pose, UNFINISHED, -1, time)
-        off = [abs(math.remainder(body.angle - flat, math.tau)) for flat in stage.flat]
-        nearest = off.index(min(off))
-        flush, low = off[nearest] < LEANING, stage.lowest()
-        depth = -float(body.local_to_world(stage.corners[low]).y)
-        if depth < IN_IT * self.size:
-            return Rest(pose, EMPTY, nearest if flush else -1, time)
-        if flush and depth > self.depth - IN_IT * self.size:
-            return Rest(pose, 1 + nearest, -1, time)
-        return Rest(pose, 1 + sides + low, -1, time)
+        heights = [float(body.local_to_world(corner).y) for corner in stage.corners]
+        return Rest(pose, *state_of(heights, body.angle, stage.flat, self.depth, self.size), time)
+
+
+def state_of(
+    heights: Sequence[float], angle: float, flat: Sequence[float], depth: float, size: float
+) -> tuple[int, int]:
+    """Say how a part at rest lies: state and side, as in `Rest`, from the heights of its corners over the plate."""
+    off = [abs(math.remainder(angle - each, math.tau)) for each in flat]
+    nearest = off.index(min(off))
+    flush, low = off[nearest] < LEANING, heights.index(min(heights))
+    if -heights[low] < IN_IT * size:
+        return EMPTY, nearest if flush else -1
+    if flush and -heights[low] > depth - IN_IT * size:
+        return 1 + nearest, -1
+    return 1 + len(flat) + low, -1
 
 
 def _seen(body: Any) -> tuple[Pose, Motion]:

@@ -50,7 +50,10 @@ class Film:
         self.frame(time)
         inside = set()
         for rest in rests:
-            if rest.where == "cavity":
+            still = (
+                rest.where == "unfinished" and rest.number in self.inside
+            )  # in motion: it has not come out
+            if rest.where == "cavity" or still:
                 inside.add(rest.number)
             elif rest.number in self.inside and rest.where != "out":
                 self.mark(time, [rest.number], "ejected")

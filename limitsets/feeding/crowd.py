@@ -6,9 +6,11 @@ fate.  Parts that find no free place on the arm are dropped onto the others.  Wh
 
 from __future__ import annotations
 
+import functools
 import math
 import time
 from collections.abc import Callable
+from concurrent.futures import Executor
 from dataclasses import dataclass
 from typing import Any
 
@@ -125,6 +127,7 @@ def run_crowd(
     throws: int = MOST_THROWS,
     seed: int = 0,
     step: float = 4e-3,
+    executor: Executor | None = None,
     progress: Callable[[str, int, int], None] | None = None,
 ) -> CrowdTrials:
     """Throw batches of parts until each part has met its fate.
@@ -143,6 +146,8 @@ def run_crowd(
         Throws after which a batch ends.
     seed : int
         Of starts and noise: batch k draws from Philox of key (seed, k), the same with `between` and without.
+    executor : concurrent.futures.Executor, optional
+        Where the batches are thrown; default here. The numbers are the same.
     progress : callable, optional
         Told (stage, done, all).
 
@@ -165,35 +170,43 @@ def run_crowd(
     if not (isinstance(scatter.speed, LAWS) and isinstance(scatter.landing, LAWS) and scatter.tilt is None):
         allowed = "Gaussian or Uniform of speed and landing"
         raise AnswerError("the noise to throw with", scatter.words(), allowed, "take another law")
-    rows, thrown, seconds = [], 0, 0.0
-    for batch in range(batches):
+    how: dict[str, Any] = {"between": between, "contact": contact, "step": step}
+    task = functools.partial(_thrown, end, scatter, parts, throws, seed, how)
+    every = range(batches)
+    rows: list[Any] = []
+    for row in map(task, every) if executor is None else executor.map(task, every):
         if progress is not None:
-            progress(f"{parts} parts at once", batch, batches)
-        random = np.random.Generator(np.random.Philox(key=[seed, batch]))
-        crowd = Crowd(
-            [scene] * parts, between=between, watch=False, contact=contact, step=step, patience=PATIENCE
-        )
-        tried = _Batch(crowd, end, random)
-        spilled = tried.start()
-        began = time.process_time()
-        thrown += tried.throw(scatter, throws)
-        seconds += time.process_time() - began
-        rows.append((tried.fates(), tried.throws, spilled, bool(crowd.overlapped)))
+            progress(f"{parts} parts at once", len(rows), batches)
+        rows.append(row)
     if progress is not None:
         progress(f"{parts} parts at once", batches, batches)
-    fates, made, spilled_by, met = zip(*rows, strict=True)
+    fates, made, spilled, met, thrown, seconds = zip(*rows, strict=True)
     return CrowdTrials(
         parts,
         between,
         contact,
         np.array(fates),
         np.array(made),
-        np.array(spilled_by),
+        np.array(spilled),
         np.array(met),
-        thrown,
-        seconds,
+        sum(thrown),
+        sum(seconds),
         seed,
     )
+
+
+def _thrown(
+    end: ArmEnd, scatter: Scattering, parts: int, throws: int, seed: int, how: dict[str, Any], batch: int
+) -> tuple[list[int], int, int, bool, int, float]:
+    """Throw one batch: fates, throws made, parts spilled, whether two met, parts thrown, processor time."""
+    random = np.random.Generator(np.random.Philox(key=[seed, batch]))
+    crowd = Crowd([end.scene] * parts, watch=False, patience=PATIENCE, **how)
+    tried = _Batch(crowd, end, random)
+    spilled = tried.start()
+    began = time.thread_time()
+    thrown = tried.throw(scatter, throws)
+    seconds = time.thread_time() - began
+    return tried.fates(), tried.throws, spilled, bool(crowd.overlapped), thrown, seconds
 
 
 class _Batch:

@@ -15,6 +15,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cache
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
@@ -37,6 +38,12 @@ still tipping at the next throw); it leaves the arm otherwise; it is still on th
 
 # Abscissae of the integral, and places between which the time to tip is searched for the dwell.
 NODES, PLACES = 96, 200
+
+
+@cache
+def _rule() -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Nodes and weights of Gauss and Legendre: numpy solves an eigenvalue problem for them at each call."""
+    return np.polynomial.legendre.leggauss(NODES)
 
 
 def time_to_tip(
@@ -68,7 +75,7 @@ def time_to_tip(
     array([  inf, 0.282])
     """
     e = np.asarray(beyond, dtype=np.float64)
-    node, weight = np.polynomial.legendre.leggauss(NODES)
+    node, weight = _rule()
     with np.errstate(divide="ignore", invalid="ignore"):
         last = 2.0 * np.arcsinh(np.sqrt(0.5 * height * angle / e))
         s = 0.5 * last[..., None] * (1.0 + node)
@@ -215,7 +222,7 @@ def arm_end_of(scene: Scene, side: int | None = None, starts: Mapping[int, float
     if side is None or not 0 <= side < len(scene.sides):
         allowed = f"0 to {len(scene.sides) - 1}"
         raise AnswerError(
-            "the side wanted", side, allowed, "pass side=, or give the scene a goal with a side"
+            "the side wanted", side, allowed, "pass side= (--side), or give the scene a goal with a side"
         )
     if not x < scene.arm_length:
         allowed = f"above the cavity's position, {x:g} {scene.unit}"

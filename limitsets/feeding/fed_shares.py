@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
@@ -56,9 +57,10 @@ class FedShares:
 
     @property
     def mean_throws(self) -> float:
-        """Mean number of throws of those that end."""
+        """Mean number of throws of those that end; nan where none do."""
         total = self.by_throw.sum(axis=1)
-        return float(total @ np.arange(1, total.size + 1) / total.sum())
+        ended = float(total.sum())
+        return float(total @ np.arange(1, total.size + 1)) / ended if ended > 0.0 else math.nan
 
     def quantile(self, share: float) -> int | None:
         """Throws after which `share` of all starts have ended; None where so many never do."""

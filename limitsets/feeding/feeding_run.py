@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from concurrent.futures import Executor
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any
@@ -17,10 +18,14 @@ from limitsets.feeding.trials import Trials, run_trials
 from limitsets.feeding.verdicts import Fed, Safe
 from limitsets.feeding.writing import holds, write_proof
 from limitsets.files import as_table, picked
+from limitsets.progress import shown_in_notebooks
 from limitsets.robust.brackets.result import AbsorptionBrackets
+from limitsets.robust.noise.proportions import binomial_interval
+from limitsets.robust.noise.sampling import require_seed
 from limitsets.robust.noise.scattering import Scattering, scattering_of
 from limitsets.robust.sheet.noise_input import still
 from limitsets.scene import Scene, load
+from limitsets.tables import Column, Table, Tabled
 
 __all__ = ["Feeding", "feed"]
 
@@ -28,9 +33,18 @@ Progress = Callable[[str, int, int], None]
 
 CELLS, STRATA, TRIALS = 1024, 24, 10_000
 
+# Fates for people.
+FED = {
+    "right": "on the wanted side, clear of the wall",
+    "wrong": "on another side",
+    "wall": "on the wanted side, but meets the wall",
+    "left": "not: it leaves the arm otherwise",
+    "never": "not: it stays on the arm",
+}
+
 
 @dataclass(frozen=True, eq=False)
-class Feeding:
+class Feeding(Tabled):
     """What becomes of parts at the end of the arm.
 
     Attributes
@@ -138,6 +152,43 @@ class Feeding:
         fed = Fed("undecided", None, {}, 0.0, reason=f"the checker denies it: {reason}")
         return replace(self, proof=self.proof._replace(safe=safe, fed=fed))
 
+    def tables(self) -> tuple[Table, ...]:
+        """Give the tables that show it, the one that is saved as CSV first."""
+        count = self.trials.fate.size
+        rows = [
+            (
+                FED[name],
+                name,
+                share,
+                self.errors[name],
+                self.trials.counts[name],
+                count,
+                binomial_interval(self.trials.counts[name], count),
+            )
+            for name, share in self.shares.shares.items()
+        ]
+        columns = (
+            "a part is fed",
+            "fate",
+            Column("probability", show=".6f"),
+            Column("its error", show=".1e"),
+            "met",
+            "trials",
+            Column("95 % interval", show=".4f", ends=True),
+        )
+        name = self.end.scene.name
+        found = [Table(columns, rows, f"{name}: what is fed", "computed and sampled, not proved")]
+        if self.safe is not None and self.fed is not None:
+            lines = [
+                ("only the wanted side is fed", self.safe.verdict),
+                ("every start is fed", self.fed.verdict),
+            ]
+            lines += [("almost every start is fed", self.fed.almost_every)] if self.fed.almost_every else []
+            found.append(Table(("claim", "verdict"), lines, "Proofs"))
+        if self.brackets is not None:
+            found += self.brackets.tables()
+        return tuple(found)
+
     def to_json(self) -> dict[str, Any]:
         """Give it as JSON takes it: docs/json.md."""
         scene, shares = self.end.scene, self.shares
@@ -170,6 +221,7 @@ class Feeding:
         )
 
 
+@shown_in_notebooks
 def feed(
     scene: Scene | str | Path | Mapping[str, Any],
     scatter: Scattering | None = None,
@@ -186,6 +238,7 @@ def feed(
     brackets: int | None = None,
     parts: int | None = None,
     batches: int = BATCHES,
+    executor: Executor | None = None,
     progress: Progress | None = None,
 ) -> Feeding:
     """Say what becomes of parts that are thrown along an arm with a cavity at its end.
@@ -219,6 +272,8 @@ def feed(
         Throw so many parts at once, in the engine: for a scene with ``effects.contact = true`` and `world.friction`.
     batches : int
         How often that is tried.
+    executor : concurrent.futures.Executor, optional
+        Where these batches are thrown; default here. The numbers are the same.
     progress : callable, optional
         Told (stage, done, all).
 
@@ -247,10 +302,11 @@ def feed(
     end = arm_end_of(read, side, starts)
     if trials < 1:
         raise AnswerError("the trials", trials, "1 or more", "throw some parts")
+    require_seed(seed)
     if scatter is None:
         scatter = Scattering() if read.effects.spread is None else scattering_of(read)
     # first, as they may be refused: with contact between the parts and without
-    how: dict[str, Any] = {"batches": batches, "seed": seed, "progress": progress}
+    how: dict[str, Any] = {"batches": batches, "seed": seed, "executor": executor, "progress": progress}
     both = () if parts is None else (True, False)
     crowds = tuple(run_crowd(end, scatter, parts or 0, between=between, **how) for between in both)
     # normal deviations have no bound, so that nothing holds for every sequence: the proofs are of the still scene then

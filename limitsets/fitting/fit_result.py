@@ -19,6 +19,7 @@ from limitsets.fitting.rows import Rows
 from limitsets.robust.margins.deviations import deviation_scale
 from limitsets.scene import Scene
 from limitsets.scene.quantities import base_unit, find
+from limitsets.tables import Column, Table, Tabled
 
 __all__ = ["Fit", "Fitted", "Scatter"]
 
@@ -77,7 +78,7 @@ class Scatter:
 
 
 @dataclass(frozen=True, eq=False)
-class Fit:
+class Fit(Tabled):
     """A scene fitted to filmed throws.
 
     Attributes
@@ -157,6 +158,22 @@ class Fit:
 
         return 2.0 * (self.best.value - maximised(function, at[free]).value)
 
+    def tables(self) -> tuple[Table, ...]:
+        """Give the tables that show it, the one that is saved as CSV first."""
+        rows = [(each.name, each.value, (each.lo, each.hi), each.unit) for each in self.quantities]
+        for name, each, factor, unit in (
+            ("scatter of throw.speed", self.speed, 100.0, "%"),
+            ("scatter of landing.x", self.landing, 1.0, self.scene.unit),
+        ):
+            rows.append((name, factor * each.value, (factor * each.lo, factor * each.hi), unit))
+        columns = (
+            "quantity",
+            Column("value", show=_number),
+            Column("95 % interval", show=_number, ends=True),
+            "unit",
+        )
+        return (Table(columns, rows, f"{self.scene.name}: fitted", "95 % intervals, not proved"),)
+
     def to_json(self) -> dict[str, Any]:
         """Give it as plain tables for JSON; every number is finite or null."""
         rows, sides = self.rows, len(self.given.sides)
@@ -191,6 +208,11 @@ class Fit:
             ],
             timings={"fit": self.seconds},
         )
+
+
+def _number(value: float) -> str:
+    """Write a number; an end that the data do not bound is open."""
+    return f"{value:.6g}" if math.isfinite(value) else "open"
 
 
 def rounded_up(value: float) -> str:

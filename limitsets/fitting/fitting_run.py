@@ -26,6 +26,7 @@ from limitsets.fitting.starting import (
     units_of_change,
 )
 from limitsets.fitting.throws import Throws, length_of, read_throws
+from limitsets.progress import shown_in_notebooks
 from limitsets.scene import Scene, load
 from limitsets.scene.quantities import base_unit, find
 
@@ -40,6 +41,7 @@ Array = NDArray[np.float64]
 Progress = Callable[[str, int, int], None]
 
 
+@shown_in_notebooks
 def fit(
     scene: Scene | str | Path,
     throws: Throws | str | Path,

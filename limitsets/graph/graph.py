@@ -19,6 +19,7 @@ from limitsets.graph.components import Components, strong_components
 from limitsets.graph.condensation import Condensation, condense
 from limitsets.graph.ranges import Ranges, count_edges, expand
 from limitsets.maps import kind_of
+from limitsets.tables import Table, Tabled, facts
 
 if TYPE_CHECKING:
     import networkx as nx
@@ -27,7 +28,7 @@ __all__ = ["TransitionGraph"]
 
 
 @dataclass(frozen=True, eq=False)
-class TransitionGraph:
+class TransitionGraph(Tabled):
     """Transitions between the cells of a grid under a map.
 
     Nodes are the cells ``0 .. n_cells - 1`` and then one sink per way out, in the order of `exits`, each with an edge
@@ -80,6 +81,17 @@ class TransitionGraph:
 
     def __repr__(self) -> str:
         return f"TransitionGraph({type(self.map).__name__}, {self.n_cells} cells, {self.method})"
+
+    def tables(self) -> tuple[Table, ...]:
+        """Give the tables that show it, the one that is saved as CSV first."""
+        how = "proved" if self.method == "boxes" else "sampled, not proved"
+        values = {
+            "cells": self.n_cells,
+            "transitions": self.number_of_cell_edges(),
+            "method": self.method,
+            "exits": ", ".join(self.exits),
+        }
+        return (facts(f"Transitions of {type(self.map).__name__}", values, how),)
 
     def is_directed(self) -> bool:
         """Tell networkx that edges have a direction."""

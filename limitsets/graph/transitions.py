@@ -58,6 +58,11 @@ def transitions(map: Any, grid: Grid, method: str | None = None, **options: Any)
     5
     """
     kind = kind_of(map)
+    if not isinstance(grid, Grid):
+        given = type(grid).__name__
+        raise AnswerError(
+            "the grid", given, "what limitsets.grid gives", "pass limitsets.grid(scene.domain, cells=1024)"
+        )
     if kind.dimension != grid.dimension:
         raise AnswerError(
             "the dimension of the grid",

@@ -30,6 +30,7 @@ from numba import types
 __all__ = [
     "CACHE",
     "COMPILED",
+    "FOLDER",
     "FOREIGN",
     "KEPT_DIGESTS",
     "PACKAGE",
@@ -43,6 +44,8 @@ PACKAGE = Path(__file__).resolve().parents[1]
 # Rooms without kernels: editing a picture must not throw away every compiled loop.  An import contract keeps
 # them from importing this file.
 KERNEL_FREE = {
+    "progress.py",
+    "tables.py",
     "checker",
     "scene",
     "goals",
@@ -54,12 +57,15 @@ KERNEL_FREE = {
     "robust",
     "regions",
     "feeding",
+    "assembly",
+    "trays",
     "fitting",
     "inverse",
     "sweep",
     "plot",
     "animation",
     "report",
+    "explorer",
     "cli",
 }
 
@@ -332,5 +338,5 @@ def _source_cache(folder: Path) -> type | None:
         return None
 
 
-_folder = _open_cache()
-CACHE = _source_cache(_folder) if _folder is not None else None
+FOLDER = _open_cache()
+CACHE = _source_cache(FOLDER) if FOLDER is not None else None

@@ -258,7 +258,9 @@ def kind_of(params: Any) -> MapKind:
             "the map",
             type(params).__name__,
             "parameters of a registered class",
-            "register it with limitsets.register",
+            "pass its .map"
+            if type(getattr(params, "map", None)) in _KINDS
+            else "register it with limitsets.register",
         )
     return kind
 

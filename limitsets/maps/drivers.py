@@ -17,6 +17,7 @@ from limitsets.jit import kernel
 from limitsets.maps import codes
 from limitsets.maps.contract import kind_of, require_codes, require_sides
 from limitsets.maps.kernels import displacement, fallback, image, image_on, on_side, pick, put, scattered
+from limitsets.tables import Table, Tabled
 
 __all__ = [
     "Images",
@@ -205,7 +206,7 @@ def images_on(
 
 
 @dataclass(frozen=True)
-class Orbit:
+class Orbit(Tabled):
     """Successive states of one start.
 
     Attributes
@@ -225,6 +226,12 @@ class Orbit:
     side: NDArray[np.int64]
     code: NDArray[np.int64]
     stopped: str | None
+
+    def tables(self) -> tuple[Table, ...]:
+        """Give the tables that show it, the one that is saved as CSV first."""
+        codes: list[int | None] = [None, *self.code.tolist()]
+        rows = zip(range(len(codes)), self.x.tolist(), self.side.tolist(), codes, strict=True)
+        return (Table(("step", "x", "side", "code"), rows, "Orbit", "computed, not proved"),)
 
 
 def start_of(params: Any, x: Any, side: int) -> tuple[float, ...]:

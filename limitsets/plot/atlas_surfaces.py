@@ -51,7 +51,7 @@ def atlas_surface(found: Atlas, variable: str, side: int | None = None) -> Figur
         A number of its dataset: `lyapunov`, `flips_per_throw`, `threshold`, `margin`, `leaves`, ...  Of several
         attractors, that of the attractor with the largest share.
     side : int, optional
-        For variables that have sides: of which.
+        For variables that have sides: of which; a map with one side needs none.
 
     Returns
     -------
@@ -94,6 +94,8 @@ def _values(found: Atlas, variable: str, side: int | None) -> Array:
         known = [str(name) for name in data if "flag_values" not in data[name].attrs]
         raise AnswerError("the variable to draw", variable, ", ".join(known), "name one of these")
     array = data[variable]
+    if side is None and array.sizes.get("side") == 1:
+        side = 0
     if ("side" in array.dims) != (side is not None) or (
         side is not None and not 0 <= side < array.sizes["side"]
     ):

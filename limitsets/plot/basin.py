@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
@@ -9,16 +10,16 @@ import numpy as np
 from matplotlib.colors import BoundaryNorm, ListedColormap
 from matplotlib.patches import Patch
 
-from limitsets.cells import Grid
+from limitsets.cells import CellSet, Grid
 from limitsets.errors import AnswerError
 from limitsets.maps import codes
 from limitsets.plot import style
+from limitsets.scene import Scene
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from matplotlib.typing import ColorType
 
-    from limitsets.scene import Scene
     from limitsets.sets import Basins
 
 __all__ = ["basins"]
@@ -36,17 +37,17 @@ OUT: dict[int, tuple[str, str, str]] = {
 }
 
 
-def basins(source: Scene | Grid, shares: Basins, found: Any = None) -> Figure:
+def basins(source: Any, shares: Basins, found: Any = None) -> Figure:
     """Draw from where each attractor is reached.
 
     Parameters
     ----------
-    source : Scene or Grid
-        What the basins belong to; a scene gives names and units.
+    source : Scene, TransitionGraph, map or Grid
+        What the basins belong to; a scene gives names and units, a map of one's own or its graph a name.
     shares : Basins
         From `limitsets.basins`, in one or two dimensions.
     found : attractors, limit sets, one of them, or an Analysis, optional
-        Drawn as dark bars inside their basins (one dimension).
+        Drawn dark inside their basins: as bars, in two dimensions as the cells of attractors.
 
     Returns
     -------
@@ -55,7 +56,7 @@ def basins(source: Scene | Grid, shares: Basins, found: Any = None) -> Figure:
     Raises
     ------
     AnswerError
-        For basins in three dimensions.
+        For basins in three dimensions, or something without extents (in two dimensions: without cells).
 
     Examples
     --------
@@ -68,16 +69,38 @@ def basins(source: Scene | Grid, shares: Basins, found: Any = None) -> Figure:
     if grid.dimension > 2:
         remedy = "draw a section of them yourself"
         raise AnswerError("the dimension of the basins", grid.dimension, "1 or 2", remedy)
-    name = "" if isinstance(source, Grid) else f" of {source.name}"
-    unit = "" if isinstance(source, Grid) else f" [{source.unit}]"
+    (name, unit), cells = _words(source), list[CellSet]()
     if grid.dimension == 1:
         figure = _strips(shares, [] if found is None else style.extents_of(found), unit)
     else:
-        figure = _plane(shares)
+        cells = [] if found is None else _cells_of(found)
+        figure = _plane(shares, cells)
     style.title(figure, f"Basins{name}: where a start ends up")
-    handles = _legend(shares, found is not None and grid.dimension == 1)
-    style.legend(figure, handles, 3)
+    handles = _legend(shares)
+    if (found is not None and grid.dimension == 1) or any(cells):
+        shown = style.INK if grid.dimension == 1 else style.FLIP
+        handles.append(Patch(facecolor=shown, label="the limit set itself"))
+    style.legend(figure, handles, 3 if figure.get_figwidth() > 8.0 else 2)
     return figure
+
+
+def _words(source: Any) -> tuple[str, str]:
+    """Say whose basins they are, and the unit of x in brackets."""
+    if isinstance(source, Scene):
+        return f" of {source.name}", f" [{source.unit}]"
+    if isinstance(source, Grid):
+        return "", ""
+    return f" of {type(getattr(source, 'map', source)).__name__}", ""
+
+
+def _cells_of(found: Any) -> list[CellSet]:
+    """Read sets of cells off attractors, or one of them."""
+    several = found if isinstance(found, Iterable) else [found]
+    cells = [getattr(each, "cells", None) for each in several]
+    known = [each for each in cells if isinstance(each, CellSet)]
+    if len(known) < len(cells):
+        raise AnswerError("what to draw", type(found).__name__, "attractors", "pass those of ls.attractors")
+    return known
 
 
 def _look(label: int) -> dict[str, Any]:
@@ -107,7 +130,7 @@ def _strips(shares: Basins, sets: list[style.Extents], unit: str) -> Figure:
     return figure
 
 
-def _plane(shares: Basins) -> Figure:
+def _plane(shares: Basins, attractors: list[CellSet]) -> Figure:
     grid = shares.grid
     figure, panels = style.canvas(4.6 * grid.sides + 0.6, 5.2, 1, grid.sides)
     kinds = sorted(set(shares.labels.tolist()))
@@ -119,6 +142,12 @@ def _plane(shares: Basins) -> Figure:
         axes.pcolormesh(
             *grid.edges[side], picture.T, cmap=ListedColormap(colours), norm=norm, rasterized=True
         )
+        for each in attractors:
+            inside = each.mask[grid.of_side(side)].reshape(tuple(grid.shape[side]))
+            axes.pcolormesh(
+                *grid.edges[side], np.ma.masked_where(~inside, inside).T, cmap=ListedColormap([style.FLIP]),
+                rasterized=True, gid="attractor",
+            )  # fmt: skip
         axes.set_xlabel("$x_0$")
         axes.set_ylabel("$x_1$")
         if grid.sides > 1:
@@ -126,9 +155,9 @@ def _plane(shares: Basins) -> Figure:
     return figure
 
 
-def _legend(shares: Basins, bars: bool) -> list[Patch]:
+def _legend(shares: Basins) -> list[Patch]:
     texts = {
-        k: f"to attractor {k}: {_percent(share)} of all starts"
+        k: f"to limit set {k}: {_percent(share)} of all starts"
         for k, share in enumerate(shares.attractors[: len(ATTRACTORS)])
     }
     parts = {codes.UNDECIDED: shares.undecided_between}
@@ -137,12 +166,12 @@ def _legend(shares: Basins, bars: bool) -> list[Patch]:
     present = set(shares.labels.tolist())
     for label, share in sorted(parts.items(), reverse=True):
         if label in present:
-            texts[label] = f"{OUT[label][2]}: {_percent(share)}"
+            way = (
+                "leaves the domain" if label == codes.OUTSIDE and "outside" in shares.exits else OUT[label][2]
+            )
+            texts[label] = f"{way}: {_percent(share)}"
     plain = {} if shares.grid.dimension == 1 else {"hatch": ""}  # the picture of the plane has none
-    handles = [Patch(label=text, **{**_look(label), **plain}) for label, text in texts.items()]
-    if bars:
-        handles.append(Patch(facecolor=style.INK, label="the attractor itself"))
-    return handles
+    return [Patch(label=text, **{**_look(label), **plain}) for label, text in texts.items()]
 
 
 def _percent(share: float) -> str:

@@ -10,6 +10,7 @@ from matplotlib.ticker import MaxNLocator
 
 from limitsets.errors import AnswerError
 from limitsets.goals import Goal, OrientedBeyond, Reaches
+from limitsets.maps import orbit as orbit_of
 from limitsets.plot import style
 
 if TYPE_CHECKING:
@@ -20,8 +21,8 @@ if TYPE_CHECKING:
 
 __all__ = ["counterexample"]
 
-# States that are drawn: the last of them.
-LAST = 40
+# States that are drawn: the last of them; and throws after an orbit of a single state.
+LAST, ONWARD = 40, 12
 
 MARKERS = ("o", "s", "^", "D", "v", "P", "X", "h")
 COLOURS = (style.JOG, style.FLIP, style.GOAL, style.ROLL, "#8A6D00", style.INK)
@@ -74,12 +75,24 @@ def counterexample(
     x = [float(state["x"]) for state in orbit[first:]]
     sides = [int(state["side"]) for state in orbit[first:]]
     throws = range(first, first + len(x))
+    onward = _thrown_on(scene, x[-1], sides[-1]) if len(x) == 1 else ()
     figure, (axes,) = style.canvas(8.0, 4.2)
     axes.plot(throws, x, color=style.FAINT, lw=0.9, zorder=2)
     for side in sorted(set(sides)):
         mine = [k for k, on in enumerate(sides) if on == side]
         axes.plot([throws[k] for k in mine], [x[k] for k in mine], zorder=3, **_mark(side))
-    low, high = min(x), max([*x, *([violated.x] if isinstance(violated, OrientedBeyond | Reaches) else [])])
+    if onward:
+        after = range(throws[-1], throws[-1] + len(onward) + 1)
+        axes.plot(
+            after, [x[-1], *(place for place, _ in onward)], color=style.FAINT, lw=0.9, ls=":", zorder=2
+        )
+        for k, (place, side) in enumerate(onward, start=1):
+            axes.plot(throws[-1] + k, place, zorder=3, gid="thrown on", **{**_mark(side), "mfc": "white"})
+    seen = [*x, *(place for place, _ in onward)]
+    low, high = (
+        min(seen),
+        max([*seen, *([violated.x] if isinstance(violated, OrientedBeyond | Reaches) else [])]),
+    )
     span = max(high - low, 1e-3 * scene.arm_length)
     axes.set_ylim(low - 0.12 * span, high + 0.22 * span)
     areas = _areas(axes, violated, scene.unit)
@@ -90,10 +103,26 @@ def counterexample(
     axes.set_xlabel("throws")
     axes.set_ylabel(f"x at rest [{scene.unit}]")
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
-    style.title(figure, f"{scene.name}: an orbit that violates the goal" + (f"\n{name}" if name else ""))
-    marks = [style.key(f"on side {side}", **_mark(side)) for side in sorted(set(sides))]
+    at_once = " at once" if len(orbit) == 1 else ""
+    style.title(
+        figure, f"{scene.name}: an orbit that violates the goal{at_once}" + (f"\n{name}" if name else "")
+    )
+    marks = [
+        style.key(f"on side {side}", **_mark(side)) for side in sorted({*sides, *(s for _, s in onward)})
+    ]
+    if onward:
+        areas.append(
+            style.key("thrown on, in the scene as it is", color=style.FAINT, ls=":", marker="o", mfc="white")
+        )
     style.legend(figure, [*marks, *areas], 3)
     return figure
+
+
+def _thrown_on(scene: Scene, x: float, side: int) -> list[tuple[float, int]]:
+    """Give the next rests: a single state says nothing of where it comes from."""
+    path = orbit_of(scene.map, x, side, ONWARD)
+    stays = path.code >= 0
+    return [(float(x), int(side)) for x, side in zip(path.x[1:][stays], path.side[1:][stays], strict=True)]
 
 
 def _areas(axes: Axes, violated: Goal | None, unit: str) -> list[Any]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 from matplotlib.patches import Patch
 
 from limitsets.maps import critical_points
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
 __all__ = ["design"]
 
 HALF = 0.3  # half the height of a bar; lanes are 1 apart
+MOST = 12  # scenes that are drawn: start, design, and of those between evenly many
 GAP = 0.9  # between the lanes of one scene and the next, beside the 1
 # A second attractor of the same scene.
 ANOTHER: dict[str, Any] = {"facecolor": "white", "edgecolor": style.INK, "ls": ":"}
@@ -28,6 +30,8 @@ ANOTHER: dict[str, Any] = {"facecolor": "white", "edgecolor": style.INK, "ls": "
 
 def design(found: Design, sets: Sequence[Sequence[Extents]] | None = None) -> Figure:
     """Draw the limit sets of the scenes on a design's path, one group of bars per scene, one bar row per side.
+
+    Of more than twelve scenes start, design and evenly many of the steps between are drawn.
 
     Parameters
     ----------
@@ -52,12 +56,14 @@ def design(found: Design, sets: Sequence[Sequence[Extents]] | None = None) -> Fi
         from limitsets.inverse import limit_sets_along
 
         sets = limit_sets_along(found)
-    count, rows = len(found.start.sides), len(found.path)
+    count, rows = len(found.start.sides), min(len(found.path), MOST)
+    steps = np.linspace(0, len(found.path) - 1, rows).round().astype(int).tolist()
+    drawn = [sets[step] for step in steps]
     deep = count + GAP
     figure, (axes,) = style.canvas(9.4, 0.27 * deep * rows + 1.75)
     ticks = []
-    for row, (scene, attractors) in enumerate(zip(found.path, sets, strict=True)):
-        top = -deep * row
+    for row, (step, attractors) in enumerate(zip(steps, drawn, strict=True)):
+        scene, top = found.path[step], -deep * row
         ticks += [top - side for side in range(count)]
         _lanes(axes, scene, top)
         for number, extents in enumerate(attractors):
@@ -66,13 +72,14 @@ def design(found: Design, sets: Sequence[Sequence[Extents]] | None = None) -> Fi
                 for lo, hi in parts:
                     style.bar(axes, lo, hi, top - side, HALF, lw=0.8, zorder=2, gid="limit set", **look)
         _marks(axes, scene, top)
-        _words(axes, found, scene, row, top - 0.5 * (count - 1))
+        _words(axes, found, scene, step, top - 0.5 * (count - 1))
     axes.set_yticks(
         ticks, [f"side {side}" for _ in range(rows) for side in range(count)], fontsize=style.SMALL
     )
-    _frame(axes, found, sets, deep * rows)
-    several = max((len(attractors) for attractors in sets), default=1) > 1
-    style.title(figure, f"{found.start.name}: limit sets while the critical points move")
+    _frame(axes, found, drawn, deep * rows)
+    several = max((len(attractors) for attractors in drawn), default=1) > 1
+    some = f"\n({rows} of {len(found.path)} scenes are drawn)" if rows < len(found.path) else ""
+    style.title(figure, f"{found.start.name}: limit sets while the critical points move{some}")
     style.legend(figure, _legend(found, count, several), 5)
     return figure
 
@@ -93,9 +100,9 @@ def _marks(axes: Axes, scene: Scene, top: float) -> None:
             axes.plot([point.x] * 2, ends, color=style.FLIP, zorder=4, **look)
 
 
-def _words(axes: Axes, found: Design, scene: Scene, row: int, middle: float) -> None:
+def _words(axes: Axes, found: Design, scene: Scene, step: int, middle: float) -> None:
     """Say beside each scene what its quantities are."""
-    head = "start" if row == 0 else "design" if row == len(found.path) - 1 else f"step {row}"
+    head = "start" if step == 0 else "design" if step == len(found.path) - 1 else f"step {step}"
     values = []
     for name in found.jacobian.names[:4]:
         if name.startswith("throw."):

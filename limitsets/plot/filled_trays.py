@@ -15,6 +15,7 @@ from limitsets.robust.noise.proportions import binomial_interval
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+    from matplotlib.patches import Patch
     from numpy.typing import NDArray
 
     from limitsets.engine.depression import Pose
@@ -38,8 +39,9 @@ def tray(found: TrayFill) -> Figure:
     -------
     matplotlib.figure.Figure
         Parts in a depression as they came to lie, one of each state; the fraction filled rightly against passes, by the
-        chain with its interval and in histories, if there are any; what a part that comes by leaves, and what endless
-        passes; captures after misses and releases after kicks that were stood, or without histories what a kick leaves.
+        chain with its interval, in histories and of many parts at once, if there are any; what a part that comes by
+        leaves, and what endless passes; captures after misses and releases after kicks that were stood, or without
+        histories what a kick leaves.
     """
     figure, axes = style.canvas(10.4, 7.6, 2, 2)
     _poses(axes[0], found)
@@ -114,6 +116,7 @@ def _curve(axes: Axes, found: TrayFill) -> None:
         axes.errorbar(
             places * shift, shares, bars, ls="", marker=marker, ms=4, lw=0.9, color=colour, label=label
         )
+    _crowds(axes, found, places)
     axes.set_xscale("symlog", linthresh=1.0)
     axes.xaxis.set_major_formatter("{x:g}")
     axes.set_xlim(0.0, 1.3 * passes[-1])
@@ -123,6 +126,35 @@ def _curve(axes: Axes, found: TrayFill) -> None:
     axes.set_ylabel("fraction of the depressions", fontsize=style.SMALL)
     axes.legend(fontsize=style.SMALL, frameon=False, loc="upper left")
     style.open_frame(axes)
+
+
+def _crowds(axes: Axes, found: TrayFill, places: NDArray[np.intp]) -> None:
+    """Draw many parts at once beside the chain of single ones, where they were asked for."""
+    chain = found.crowd_chain
+    if chain is not None and not np.array_equal(chain.right, found.filled.right):
+        words = f"chain, {found.crowds[0].parts / found.crowds[0].depressions:g} parts a pass and depression"
+        axes.plot(np.arange(chain.right.size), chain.right, color=style.GOAL, lw=1.2, ls="--", label=words)
+    for crowd in found.crowds:
+        colour, shift = (style.ROLL, 0.96) if crowd.between else (style.JOG, 1.04)
+        how = "push" if crowd.between else "pass through"
+        words = f"{crowd.parts} at once that {how} each other"
+        shown = [(crowd.right, colour, words)]
+        if crowd.between:
+            shown.append((crowd.right + crowd.covered, "white", "the same, also under others"))
+        for counts, face, label in shown:
+            shares, ends = (each[places] for each in crowd.share(counts))
+            axes.errorbar(
+                places * shift,
+                shares,
+                np.abs(ends - shares[:, None]).T,
+                ls="",
+                marker="^",
+                ms=4.5,
+                lw=0.9,
+                color=colour,
+                mfc=face,
+                label=label,
+            )
 
 
 def _shares(axes: Axes, found: TrayFill) -> None:
@@ -199,6 +231,13 @@ def _grid(axes: Axes, shares: NDArray[np.float64], rows: list[str], columns: lis
     axes.set_yticks(range(len(rows)), rows, fontsize=style.SMALL)
 
 
+def _marked(axes: Axes, cells: NDArray[np.bool_]) -> list[Patch]:
+    """Mark cells of a grid in a corner."""
+    corner = np.array([[0.5, -0.5], [0.5, -0.2], [0.32, -0.5]])
+    places = np.argwhere(cells)[:, ::-1]
+    return [axes.add_patch(Polygon(corner + place, fc=style.FLIP, ec="white", lw=0.5)) for place in places]
+
+
 def tray_design(found: TrayDesign) -> Figure:
     """Draw how a tray fills by depth and agitation.
 
@@ -210,9 +249,10 @@ def tray_design(found: TrayDesign) -> Figure:
     Returns
     -------
     matplotlib.figure.Figure
-        The fraction filled rightly after the passes; the rest after endless ones, as empty and as wrong parts.
+        The fraction filled rightly after the passes; the rest after endless ones, as empty and as wrong parts, marked
+        where no counted kick changed some wrong state.
     """
-    figure, axes = style.canvas(12.6, 4.6, 1, 3)
+    figure, axes = style.canvas(12.6, 4.9, 1, 3)
     unit = found.scene.unit
     endless = "after endless passes"
     titles = f"filled rightly after {found.passes} passes", f"empty, {endless}", f"wrong, {endless}"
@@ -221,6 +261,10 @@ def tray_design(found: TrayDesign) -> Figure:
         _grid(each, shares, rows, columns)
         each.set_title(title, loc="left", fontsize=style.TEXT)
         each.set_xlabel(f"agitation [{unit}]", fontsize=style.SMALL)
+    marks = [_marked(each, found.held) for each in axes[1:]]
+    if found.held.any():
+        words = "no counted kick changed some wrong state: endless passes never leave it, by the counts"
+        figure.legend(marks[0][:1], [words], loc="outside lower right", fontsize=style.SMALL, frameon=False)
     axes[0].set_ylabel(f"depth of the depressions [{unit}]", fontsize=style.SMALL)
     depth, agitation = found.best
     at = found.agitations.tolist().index(agitation), found.depths.tolist().index(depth)

@@ -12,13 +12,15 @@ from numpy.typing import NDArray
 from limitsets.errors import AnswerError
 from limitsets.maps import codes
 from limitsets.plot import style
-from limitsets.plot.poses import centre_in_flight, outline, turned
-from limitsets.thrower import fly, trace
+from limitsets.plot.poses import angle_on_side, outline, turned
+from limitsets.plot.throwing import motion, throws_of
+from limitsets.thrower import trace
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+    from limitsets.plot.throwing import Motion, Throw
     from limitsets.scene import Scene
 
 __all__ = ["flight"]
@@ -35,7 +37,7 @@ CENTRE: dict[str, Any] = {"marker": "o", "ms": 4, "mfc": "white", "mec": style.I
 
 
 def flight(scene: Scene, x: float, side: int) -> Figure:
-    """Draw one throw: above the flight up to the impact, below the way from there to rest.
+    r"""Draw one throw: above the flight up to the impact, below the way from there to rest.
 
     Parameters
     ----------
@@ -61,18 +63,26 @@ def flight(scene: Scene, x: float, side: int) -> Figure:
     --------
     >>> import limitsets as ls
     >>> figure = ls.plot.flight(ls.load("paper-designed"), 21.0, 2)
-    >>> [axes.get_title(loc="left") for axes in figure.axes][1]
+    >>> figure.axes[1].get_title(loc="left").replace("\n", " ")
     'After the impact: a flip, 21.00 to 16.55 in, onto side 0'
     """
-    seen = trace(scene.map, x, side, 1)
-    phi = float(seen.phi[0]) if seen.code.size else fly(scene.map, x, side).phi
-    if seen.code.size == 0 or seen.code[0] == codes.OUTSIDE_MODEL or not math.isfinite(phi):
+    throws = throws_of(scene, trace(scene.map, x, side, 1))
+    if not throws:
         least = float(scene.sides.a[side])
         allowed = f"more than {least:.6g} on side {side}"
+        if x > least:  # thrown, and not down again within a full turn
+            kappa = f"{scene.kappa:.6g} {scene.unit}"
+            raise AnswerError(
+                "the throw",
+                f"outside the model, from x = {x:.6g} on side {side}",
+                "one that lands within a full turn",
+                f"kappa is {kappa}: throw more softly, and see whether the speed has the right unit",
+            )
         raise AnswerError("x of the throw", x, allowed, "start where a throw lifts the part")
-    after, side_after, code = float(seen.x[1]), int(seen.side[1]), int(seen.code[0])
-    air = [_in_air(scene, x, side, angle) for angle in np.linspace(0.0, phi, SHOWN + 2)]
-    rolled = _to_rest(scene, air[-1], (side, side_after), after, phi, code)
+    throw, moves = throws[0], motion(scene, throws[0])
+    air = _placed(scene, side, moves.flight(np.linspace(0.0, 1.0, SHOWN + 2)))
+    stops = [0.0, 1.0] if moves.turning.drawn else np.linspace(0.0, 1.0, SHOWN + 1)
+    rolled = _placed(scene, side, moves.turning.pose(np.array(stops)))
     everything = np.concatenate([*air, *rolled])
     lo, hi = float(everything[:, 0].min()), float(everything[:, 0].max())
     height = float(everything[:, 1].max() - min(0.0, scene.surface_height))
@@ -85,9 +95,9 @@ def flight(scene: Scene, x: float, side: int) -> Figure:
         axes.set_xlabel(f"distance from the joint [{scene.unit}]")
         axes.set_ylabel(f"height over the joint [{scene.unit}]")
         axes.label_outer()  # last: it takes the inner labels away
-    _flight(above, scene, x, side, phi, air)
-    _landing(below, scene, rolled, (x, side), (after, side_after), code)
-    caveat = " (small-angle formulas: the vertex need not be on the arm at the impact)"
+    _flight(above, scene, throw, moves, air)
+    _landing(below, scene, throw, moves, rolled)
+    caveat = " (small-angle formulas: the part hangs at its left vertex, whose path they give)"
     style.title(figure, f"One throw of {scene.name}{'' if scene.flight == 'exact' else caveat}")
     style.legend(figure, _legend(len(rolled) > 2), 3)
     return figure
@@ -101,34 +111,10 @@ def _canvas(width: float, height: float) -> tuple[Figure, list[Axes]]:
     return style.canvas(9.0, 2 * max(1.6, 8.2 * height / width) + 1.9, 2, 1, sharex=True, sharey=True)
 
 
-def _in_air(scene: Scene, x: float, side: int, phi: float) -> Array:
-    return turned(outline(scene, side), phi) + centre_in_flight(scene, x, side, phi)
-
-
-def _to_rest(
-    scene: Scene, landed: Array, sides: tuple[int, int], after: float, phi: float, code: int
-) -> list[Array]:
-    """Outlines from the impact to rest, turned about the struck vertex, which is the first.
-
-    The last one is where the map says.  By the small-angle formulas the struck vertex is not on the arm, and no turning
-    about it leads there; nor does one turning where the part rolls on, or has landed on another vertex.
-    """
-    side, side_after = sides
-    at_rest = np.array([after, scene.surface_height + float(scene.sides.d[side_after])])
-    rest = outline(scene, side_after) + at_rest
-    if scene.flight != "exact" or code == codes.ROLL or _struck(scene, landed) != 0:
-        return [landed, rest]
-    turn = -phi if side_after == side else float(scene.sides.corner[side]) - phi
-    pivot = landed[0]
-    return [
-        *(turned(landed - pivot, angle) + pivot for angle in np.linspace(0.0, turn, SHOWN + 1)[:-1]),
-        rest,
-    ]
-
-
-def _struck(scene: Scene, landed: Array) -> int:
-    """Vertex on the arm at the impact: the first, unless the scene lets another one land before it."""
-    return int(landed[:, 1].argmin()) if scene.effects.landing else 0
+def _placed(scene: Scene, side: int, poses: Array) -> list[Array]:
+    """Outlines in some poses, the left end of the side thrown from first."""
+    shape, start = outline(scene, side), angle_on_side(scene, side)
+    return [np.array([x, y]) + turned(shape, angle - start) for x, y, angle in poses.tolist()]
 
 
 def _arm(axes: Axes, scene: Scene, lo: float, hi: float) -> None:
@@ -144,42 +130,46 @@ def _part(axes: Axes, corners: Array, **look: Any) -> None:
     axes.add_patch(Polygon(corners, closed=True, **look))
 
 
-def _impact(axes: Axes, scene: Scene, corners: Array, zorder: float) -> None:
+def _impact(axes: Axes, moves: Motion, corners: Array, zorder: float) -> None:
     """Draw the part when it meets the arm, and the vertex that is struck."""
     _part(axes, corners, facecolor=(0.72, 0.84, 0.93, 0.8), zorder=zorder, gid="impact", **STRUCK)
-    axes.plot(*corners[_struck(scene, corners)], **VERTEX, ms=9, zorder=7, gid="struck vertex")
+    axes.plot(*moves.struck, **VERTEX, ms=9, zorder=7, gid="struck vertex")
 
 
-def _flight(axes: Axes, scene: Scene, x: float, side: int, phi: float, air: list[Array]) -> None:
+def _flight(axes: Axes, scene: Scene, throw: Throw, moves: Motion, air: list[Array]) -> None:
     _part(axes, air[0], facecolor="#dcdcdc", zorder=2, gid="start", **REST)
     for k, corners in enumerate(air[1:-1]):
         # Later ones cover earlier ones in part, as a photograph with a strobe would show them.
         look = {"facecolor": (0.86, 0.92, 0.97, 0.72), "lw": 1.0, "zorder": 3 + 0.1 * k, **FLYING}
         _part(axes, corners, gid="in the air", **look)
-    _impact(axes, scene, air[-1], zorder=4)
-    path = np.array([centre_in_flight(scene, x, side, angle) for angle in np.linspace(0.0, phi, 80)])
+    _impact(axes, moves, air[-1], zorder=4)
+    path, stops = (moves.flight(np.linspace(0.0, 1.0, count)) for count in (80, len(air)))
     axes.plot(path[:, 0], path[:, 1], color=style.INK, lw=1.1, ls="-.", zorder=5, gid="path")
-    stops = np.array([centre_in_flight(scene, x, side, angle) for angle in np.linspace(0.0, phi, len(air))])
     axes.plot(stops[:, 0], stops[:, 1], ls="", zorder=6, gid="centre of mass", **CENTRE)
-    text = f"In the air: from x = {x:.2f} {scene.unit} on side {side}, turning by {math.degrees(phi):.1f}°"
-    axes.set_title(text, fontsize=style.TEXT, loc="left")
+    start = f"from x = {throw.x:.2f} {scene.unit} on side {throw.side}"
+    text = f"In the air: {start}, turning by {math.degrees(throw.phi):.1f}°"
+    _head(axes, text)
 
 
-def _landing(
-    axes: Axes, scene: Scene, rolled: list[Array], start: tuple[float, int], end: tuple[float, int], code: int
-) -> None:
-    (x, before), (after, side) = start, end
+def _landing(axes: Axes, scene: Scene, throw: Throw, moves: Motion, rolled: list[Array]) -> None:
+    before, after, side = throw.side, throw.after, throw.side_after
     _part(axes, rolled[-1], facecolor=(0.86, 0.86, 0.86, 0.85), zorder=2, gid="rest", **REST)
-    _impact(axes, scene, rolled[0], zorder=1.5)
+    _impact(axes, moves, rolled[0], zorder=1.5)
     for corners in rolled[1:-1]:
         _part(axes, corners, facecolor="none", edgecolor=LANDED, lw=1.0, ls=":", zorder=3, gid="turning")
     height = scene.surface_height + float(scene.sides.d[side])
     axes.plot(after, height, ls="", zorder=6, gid="centre at rest", **CENTRE)
-    how = "roll" if code == codes.ROLL else ("flip" if side != before else "jog")
+    how = "roll" if throw.code == codes.ROLL else ("flip" if side != before else "jog")
     where = f"onto side {side}" if side != before else f"still on side {side}"
-    note = {codes.OUTWARD: "; off the arm's end", codes.INWARD: "; into the joint"}.get(code, "")
-    text = f"After the impact: a {how}, {x:.2f} to {after:.2f} {scene.unit}, {where}{note}"
-    axes.set_title(text, fontsize=style.TEXT, loc="left")
+    note = {codes.OUTWARD: "; off the arm's end", codes.INWARD: "; into the joint"}.get(throw.code, "")
+    text = f"After the impact: a {how}, {throw.x:.2f} to {after:.2f} {scene.unit}, {where}{note}"
+    _head(axes, text)
+
+
+def _head(axes: Axes, text: str) -> None:
+    """Write a title, in lines of a phrase each where panels stand beside each other."""
+    beside = axes.get_subplotspec().get_gridspec().ncols > 1  # type: ignore[union-attr]  # of a grid
+    axes.set_title(text.replace(", ", ",\n") if beside else text, fontsize=style.TEXT, loc="left")
 
 
 def _legend(turns: bool) -> list[Any]:

@@ -9,15 +9,16 @@ from matplotlib.patches import FancyArrowPatch, Patch, Polygon
 from matplotlib.path import Path
 
 from limitsets.goals import OrientedBeyond
-from limitsets.maps import FLIP as FLIPS
 from limitsets.maps import ROLL, Orbit, critical_points, images
 from limitsets.plot import style
 from limitsets.plot.style import Extents
+from limitsets.plot.subjects import Subject, subject_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+    from limitsets.graph import TransitionGraph
     from limitsets.scene import Scene
 
 __all__ = ["limit_set"]
@@ -31,7 +32,7 @@ FLIPPED: dict[str, Any] = {"color": style.FLIP, "ls": style.FLIP_LINE}
 ROLLED: dict[str, Any] = {"color": style.ROLL, "ls": style.ROLL_LINE}
 
 
-def limit_set(scene: Scene, found: Any, *, axes: Axes | None = None) -> Figure:
+def limit_set(scene: Scene | TransitionGraph, found: Any, *, axes: Axes | None = None) -> Figure:
     r"""Draw where a part comes to rest on each side, and how throws carry it on.
 
     One lane per side; the first is repeated below the last, so that every flip goes down by one lane.  Bars are the
@@ -39,8 +40,8 @@ def limit_set(scene: Scene, found: Any, *, axes: Axes | None = None) -> Figure:
 
     Parameters
     ----------
-    scene : Scene
-        The scene.
+    scene : Scene or TransitionGraph
+        The scene, or a map of one's own in one dimension with its domain, as `limitsets.transitions` gives them.
     found : attractors, limit sets, one of them, or an Analysis
         What to draw: anything with `extents`.
     axes : matplotlib.axes.Axes, optional
@@ -53,7 +54,7 @@ def limit_set(scene: Scene, found: Any, *, axes: Axes | None = None) -> Figure:
     Raises
     ------
     AnswerError
-        For something without extents.
+        For something without extents, a bare map, which does not say where its states lie, or one of more dimensions.
 
     Examples
     --------
@@ -63,37 +64,41 @@ def limit_set(scene: Scene, found: Any, *, axes: Axes | None = None) -> Figure:
     >>> [label.get_text() for label in figure.axes[0].get_yticklabels()]
     ['side 0', 'side 1', 'side 2', 'side 0\nagain']
     """
-    sets = style.extents_of(found)
-    count = len(scene.sides)
+    about, sets = subject_of(scene), style.extents_of(found)
+    count = about.sides
     alone = axes is None
     if axes is None:
-        figure, (axes,) = style.canvas(9.0, 1.02 * (count + 1) + 1.3)
-    _lanes(axes, scene)
+        figure, (axes,) = style.canvas(9.0, 1.02 * _lanes_of(about) + 1.3)
+    _lanes(axes, about)
     for number, extents in enumerate(sets):
-        _bars(axes, extents, number, count)
-        _bands(axes, scene, extents)
-        path = style.stretch(scene, extents)
+        _bars(axes, extents, number, _lanes_of(about) - 1)
+        _bands(axes, about, extents)
+        path = style.stretch(about, extents)
         if path is not None:
-            _throws(axes, path)
-    marked = _critical(axes, scene)
-    style.goal(axes, scene, zorder=2)
-    _frame(axes, scene, sets, marked)
+            _throws(axes, path, count)
+    marked = _critical(axes, about)
+    style.goal(axes, about, zorder=2)
+    _frame(axes, about, sets, marked)
     style.keep_apart(axes, 0.1)
-    text = f"Limit set of {scene.name}: where the part comes to rest"
+    text = f"Limit set of {about.name}" + (": where the part comes to rest" if about.thrown else "")
     axes.set_title(text, fontsize=style.TEXT + 1.5, loc="left")
     if alone:
-        rolls = any(patch.get_gid() == "roll" for patch in axes.patches)
-        style.legend(figure, _legend(scene, len(sets), rolls), 4)
+        style.legend(figure, _legend(axes, about, len(sets)), 4)
     return axes.get_figure(root=True)  # type: ignore[return-value]  # these axes are in a figure: it is not None
 
 
-def _lanes(axes: Axes, scene: Scene) -> None:
-    count = len(scene.sides)
-    for lane in range(count + 1):
-        a = float(scene.sides.a[lane % count])
-        axes.plot([a, scene.arm_length], [-lane, -lane], color=style.FAINT, lw=0.8, zorder=1)
-    names = [*(f"side {side}" for side in range(count)), "side 0\nagain"]
-    axes.set_yticks([-lane for lane in range(count + 1)], names)
+def _lanes_of(about: Subject) -> int:
+    """One for each side, and of several the first one again."""
+    return about.sides + (about.sides > 1)
+
+
+def _lanes(axes: Axes, about: Subject) -> None:
+    lanes = range(_lanes_of(about))
+    for lane in lanes:
+        least = float(about.least[lane % about.sides])
+        axes.plot([least, about.most], [-lane, -lane], color=style.FAINT, lw=0.8, zorder=1)
+    names = [*(f"side {side}" for side in range(about.sides)), "side 0\nagain"]
+    axes.set_yticks([-lane for lane in lanes], names[: len(lanes)] if about.sides > 1 else [""])
 
 
 def _bars(axes: Axes, extents: Extents, number: int, count: int) -> None:
@@ -101,17 +106,18 @@ def _bars(axes: Axes, extents: Extents, number: int, count: int) -> None:
     for side, parts in extents.items():
         for lo, hi in parts:
             style.bar(axes, lo, hi, -side, BAR, zorder=3, gid="limit set", **style.of_set(number))
-            if side == 0:
+            if side == 0 and count:
                 style.bar(axes, lo, hi, -count, BAR, zorder=3, gid="limit set again", **again)
 
 
-def _bands(axes: Axes, scene: Scene, extents: Extents) -> None:
+def _bands(axes: Axes, about: Subject, extents: Extents) -> None:
     """Shade from each stretch of a bar that flips to where it lands."""
     for side, parts in extents.items():
         for lo, hi in parts:
             x = np.linspace(lo, hi, SAMPLES)
-            there = images(scene.map, x, side)
-            flips = np.flatnonzero(there.code == FLIPS)
+            there = images(about.map, x, side)
+            onward = (there.side == (side + 1) % about.sides) & (there.side != side)
+            flips = np.flatnonzero((there.code >= 0) & (there.code != ROLL) & onward)
             for run in np.split(flips, np.flatnonzero(np.diff(flips) > 1) + 1):
                 if run.size > 1:
                     top, bottom = -side - BAR, -side - 1 + BAR
@@ -120,14 +126,14 @@ def _bands(axes: Axes, scene: Scene, extents: Extents) -> None:
                     axes.add_patch(Polygon(corners, lw=0.6, zorder=0, **BAND))
 
 
-def _throws(axes: Axes, path: Orbit) -> None:
+def _throws(axes: Axes, path: Orbit, count: int) -> None:
     wide = 0.06 * float(np.ptp(path.x)) or 1.0
     steps = zip(path.x[:-1], path.x[1:], path.side[:-1], path.side[1:], path.code, strict=True)
     for x, to, side, after, code in steps:
         rolls = code == ROLL and after != side
-        if code == FLIPS or rolls:
+        if rolls or (code >= 0 and after != side):
             # a flip goes down by one lane, from the last to the first one's repetition; a roll to wherever it goes
-            lane = after if rolls else side + 1
+            lane = side + 1 if not rolls and after == (side + 1) % count else after
             up = BAR if lane < side else -BAR
             look: dict[str, Any] = {"gid": "roll", **ROLLED} if rolls else {"gid": "flip", **FLIPPED}
             look |= {"arrowstyle": "-|>", "mutation_scale": 9, "shrinkA": 0, "shrinkB": 0}
@@ -145,46 +151,49 @@ def _throws(axes: Axes, path: Orbit) -> None:
     axes.plot([path.x[0]], [-path.side[0] + BAR], zorder=5, gid="start", **START)
 
 
-def _critical(axes: Axes, scene: Scene) -> list[float]:
+def _critical(axes: Axes, about: Subject) -> list[float]:
     marked = []
-    for side, points in critical_points(scene.map, scene.domain).items():
+    for side, points in critical_points(about.map, about.domain).items():
         for number, point in enumerate(points):
             ends = [-side - 0.2, -side + 0.2]
             axes.plot([point.x] * 2, ends, color=style.INK, lw=1.6, zorder=6, gid="critical point")
-            words = f"$r_{side}$" + "'" * number + f" = {point.x:.2f}"
+            words = f"$r_{{{side}}}$" + "'" * number + f" = {point.x:.2f}"
             box = {"boxstyle": "square,pad=0.1", "fc": "white", "ec": "none", "alpha": 0.85}
             style.name(axes, words, (point.x, ends[0]), (-3, -1), zorder=7, bbox=box)
             marked.append(point.x)
     return marked
 
 
-def _frame(axes: Axes, scene: Scene, sets: list[Extents], marked: list[float]) -> None:
+def _frame(axes: Axes, about: Subject, sets: list[Extents], marked: list[float]) -> None:
     """Limits, labels, and the intervals in figures beside each lane."""
-    count = len(scene.sides)
     ends = style.ends_of(sets) + marked
-    if isinstance(scene.goal, OrientedBeyond):
-        ends.append(scene.goal.x)
-    lo, hi = min(ends, default=0.0), max(ends, default=scene.arm_length)
+    if isinstance(about.goal, OrientedBeyond):
+        ends.append(about.goal.x)
+    if len(set(ends)) < 2:  # no set and no critical point: the whole arm
+        ends += [float(np.min(about.least)), about.most]
+    lo, hi = min(ends), max(ends)
     margin = 0.06 * (hi - lo)
-    axes.set_xlim(lo - 1.8 * margin, min(hi + margin, scene.arm_length) if hi < scene.arm_length else hi)
-    axes.set_ylim(-count - 0.35, 0.62)
-    axes.set_xlabel(f"x of the centre of mass from the joint [{scene.unit}]")
+    axes.set_xlim(lo - 1.8 * margin, min(hi + margin, about.most) if hi < about.most else hi)
+    axes.set_ylim(0.65 - _lanes_of(about), 0.62)
+    place = f"x of the centre of mass from the joint{about.in_brackets}"
+    axes.set_xlabel(place if about.thrown else "x")
     style.lanes(axes)
-    for side in range(count):
+    for side in range(about.sides):
         parts = [pair for extents in sets for pair in extents.get(side, ())]
-        words = f"{style.interval_text(parts)} {scene.unit}" if parts else "never"
+        words = f"{style.interval_text(parts)} {about.unit}".strip() if parts else "never"
         style.note(axes, words, (1.0, -side), (4, 0), xycoords=("axes fraction", "data"), va="center")
 
 
-def _legend(scene: Scene, sets: int, rolls: bool) -> list[Any]:
+def _legend(axes: Axes, about: Subject, sets: int) -> list[Any]:
+    drawn = {artist.get_gid() for artist in axes.get_children()}
     shown = range(min(sets, len(style.SETS)))
     return [
         *(Patch(label="limit set" if sets == 1 else f"limit set {k}", **style.of_set(k)) for k in shown),
-        style.key("jog (stays on its side)", color=style.JOG),
-        style.key("flip (to the next side)", **FLIPPED),
-        *([style.key("roll (on, or back)", **ROLLED)] if rolls else []),
-        Patch(label="where the flipping part lands", **BAND),
+        style.key("jog (stays on its side)" if about.thrown else "step", color=style.JOG),
+        *([style.key("flip (to the next side)", **FLIPPED)] if about.sides > 1 else []),
+        *([style.key("roll (on, or back)", **ROLLED)] if "roll" in drawn else []),
+        *([Patch(label="where the flipping part lands", **BAND)] if about.sides > 1 else []),
         style.key("start of the orbit shown", **START),
         style.key("critical point", color=style.INK, marker="|", ms=10, mew=1.6, ls=""),
-        *style.key_of_goal(scene),
+        *style.key_of_goal(about),
     ]

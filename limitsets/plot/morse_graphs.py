@@ -22,7 +22,7 @@ MOST = 12
 Place = tuple[float, float]
 
 
-def morse(graph: nx.DiGraph[int] | TransitionGraph, name: str = "") -> Figure:
+def morse(graph: nx.DiGraph[int] | TransitionGraph, name: str = "", unit: str = "") -> Figure:
     """Draw recurrent components and the order among them.
 
     Parameters
@@ -31,6 +31,8 @@ def morse(graph: nx.DiGraph[int] | TransitionGraph, name: str = "") -> Figure:
         From `limitsets.morse_graph`, or the transition graph itself.
     name : str
         Whose it is, for the title.
+    unit : str
+        Of x, behind the intervals.
 
     Returns
     -------
@@ -54,7 +56,7 @@ def morse(graph: nx.DiGraph[int] | TransitionGraph, name: str = "") -> Figure:
     for one, other in drawn.edges:
         _arrow(axes, place[one], place[other], dotted=isinstance(other, str))
     for node, (x, y) in place.items():
-        _node(axes, node, drawn.nodes[node], x, y, few=few)
+        _node(axes, node, drawn.nodes[node], x, y, few=few, unit=unit)
     axes.set_xlim(-0.5 * max(widest, 2) - 0.1, 0.5 * max(widest, 2) + 0.1)
     axes.set_ylim(-0.72, depth + 0.55)
     axes.set_axis_off()
@@ -102,7 +104,7 @@ def _radius(cells: int) -> float:
     return 7.0 + 17.0 * math.sqrt(math.sqrt(min(cells / 200_000, 1.0)))
 
 
-def _node(axes: Axes, node: Any, data: dict[str, Any], x: float, y: float, *, few: bool) -> None:
+def _node(axes: Axes, node: Any, data: dict[str, Any], x: float, y: float, *, few: bool, unit: str) -> None:
     if isinstance(node, str):
         axes.plot([x], [y], "s", ms=16, mfc="white", mec=style.FAINT, ls="none", gid="exit")
         style.note(axes, f"leaves:\n{node}", (x, y), (0, -13), ha="center", va="top")
@@ -116,9 +118,14 @@ def _node(axes: Axes, node: Any, data: dict[str, Any], x: float, y: float, *, fe
     axes.annotate(str(node), (x, y), ha="center", va="center", fontsize=style.SMALL)
     lines = [f"{data['cells']} cell{'' if data['cells'] == 1 else 's'}"]
     if few:
-        for side, parts in data["extents"].items():
+        members = data.get("members")  # a graph made elsewhere has intervals only
+        axes_of = range(1 if members is None else members.grid.dimension)
+        along = [data["extents"], *(data["members"].extents(axis) for axis in axes_of[1:])]
+        every = [(side, axis, parts) for axis in axes_of for side, parts in along[axis].items()]
+        for side, axis, parts in every:
             shown = ", ".join(f"{lo:z.2f} to {hi:z.2f}" for lo, hi in parts[:2])
-            lines.append(f"side {side}: {shown}{' ...' if len(parts) > 2 else ''}")
+            shown = f"$x_{axis}$ {shown}" if len(axes_of) > 1 else shown
+            lines.append(f"side {side}: {shown}{' ...' if len(parts) > 2 else ''} {unit}".rstrip())
     style.note(axes, "\n".join(lines), (x, y), (size / 2 + 7, 0), va="center")
 
 

@@ -19,6 +19,7 @@ from limitsets.maps import Orbit, orbit
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+    from limitsets.plot.subjects import Subject
     from limitsets.scene import Scene
 
 __all__ = [
@@ -117,7 +118,7 @@ def ends_of(sets: Iterable[Extents]) -> list[float]:
     return [x for extents in sets for parts in extents.values() for pair in parts for x in pair]
 
 
-def stretch(scene: Scene, extents: Extents, throws: int = 12) -> Orbit | None:
+def stretch(scene: Scene | Subject, extents: Extents, throws: int = 12) -> Orbit | None:
     """Cut whole rounds out of an orbit: from an arrival on its first side to a later one, `throws` of them or more.
 
     Parameters
@@ -184,7 +185,7 @@ def lanes(axes: Axes) -> None:
     axes.tick_params(axis="y", length=0)
 
 
-def goal(axes: Axes, scene: Scene, zorder: float) -> None:
+def goal(axes: Axes, scene: Scene | Subject, zorder: float) -> None:
     """Draw a line where the goal begins beyond which only one side is allowed, if that is the scene's goal."""
     if isinstance(scene.goal, OrientedBeyond):
         axes.axvline(scene.goal.x, zorder=zorder, gid="goal", **GOAL_LINE)
@@ -195,7 +196,7 @@ def key(label: str, **look: Any) -> Line2D:
     return Line2D([], [], label=label, **look)
 
 
-def key_of_goal(scene: Scene) -> list[Line2D]:
+def key_of_goal(scene: Scene | Subject) -> list[Line2D]:
     """Make the entry of what `goal` draws."""
     if not isinstance(scene.goal, OrientedBeyond):
         return []

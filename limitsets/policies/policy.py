@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from limitsets.policies.beliefs import Kept, cells_of
 from limitsets.policies.game import Game, Mask
+from limitsets.tables import Table, Tabled
 
 __all__ = ["NONE", "Policy", "broken", "policy_of"]
 
@@ -19,7 +20,7 @@ NONE = -1
 
 
 @dataclass(frozen=True, eq=False)
-class Policy:
+class Policy(Tabled):
     """A table that a controller can run.
 
     Attributes
@@ -53,6 +54,18 @@ class Policy:
         """Number of states."""
         return int(self.throw.size)
 
+    def tables(self) -> tuple[Table, ...]:
+        """Give the tables that show it, the one that is saved as CSV first."""
+        words = [word or "any" for word in self.answers]
+        columns = ("state", "begin", "throw", *(f"next_{word}" for word in words), "left")
+        rows = []
+        for k in range(self.states):
+            begin = " ".join(word for word, at in zip(words, self.first.tolist(), strict=True) if at == k)
+            throw = "stop" if self.throw[k] == NONE else self.throws[int(self.throw[k])]
+            after = [None if number == NONE else number for number in self.after[k].tolist()]
+            rows.append((k, begin or None, throw, *after, int(self.left[k])))
+        return (Table(columns, rows, "Policy"),)
+
     def to_json(self) -> dict[str, Any]:
         """Give what a controller needs, without the beliefs."""
 
@@ -74,17 +87,6 @@ class Policy:
                 for k in range(self.states)
             ],
         }
-
-    def csv(self) -> str:
-        """Write the table as text: a line per state, `begin` on those in which to begin, by the answer at first."""
-        words = [word or "any" for word in self.answers]
-        lines = [",".join(["state", "begin", "throw", *(f"next_{word}" for word in words), "left"])]
-        for k in range(self.states):
-            begin = " ".join(word for word, at in zip(words, self.first.tolist(), strict=True) if at == k)
-            throw = "stop" if self.throw[k] == NONE else self.throws[int(self.throw[k])]
-            after = ["" if number == NONE else str(number) for number in self.after[k].tolist()]
-            lines.append(",".join([str(k), begin, throw, *after, str(self.left[k])]))
-        return "\n".join(lines) + "\n"
 
 
 def policy_of(

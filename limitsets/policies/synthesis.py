@@ -9,12 +9,14 @@ from typing import Any, NamedTuple
 
 from limitsets.cells import CellSet, Grid
 from limitsets.errors import AnswerError
-from limitsets.files import as_table
+from limitsets.files import as_table, picked
 from limitsets.policies.board import Board, Progress, Starts, board_of
 from limitsets.policies.search import NOT_DECIDED, SOLVED, Found, search
 from limitsets.policies.writing import write
+from limitsets.progress import shown_in_notebooks
 from limitsets.scene import Scene, load
 from limitsets.scene.sensing import BeyondSensor, Sensor
+from limitsets.tables import Table, Tabled, facts
 
 __all__ = ["Synthesis", "feedback", "places"]
 
@@ -28,7 +30,7 @@ class Limits(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Synthesis(Board):
+class Synthesis(Board, Tabled):
     """What one bit of feedback was found to do, and the game in which: its sensor included.
 
     Attributes
@@ -101,6 +103,18 @@ class Synthesis(Board):
         policy = self.found.policy
         return [] if policy is None else [CellSet(self.grid, mask).extents() for mask in policy.belief]
 
+    def tables(self) -> tuple[Table, ...]:
+        """Give the tables that show it, the one that is saved as CSV first."""
+        policy = self.found.policy
+        caption = f"{self.scene.name}: {self.question}"
+        verdict = facts(caption, picked(self.found, "verdict", "throws", "beliefs"))
+        if policy is None:
+            return (verdict,)
+        return (
+            replace(policy.tables()[0], caption=caption, how="proved for the starts and noise named"),
+            verdict,
+        )
+
     def to_json(self) -> dict[str, Any]:
         """Give its tables for JSON."""
         policy = None
@@ -138,6 +152,7 @@ def _play(board: Board, sensor: Sensor | None, limits: Limits, progress: Progres
     return Synthesis(**{**own, "game": game}, sensor=sensor, limits=limits, found=found)
 
 
+@shown_in_notebooks
 def feedback(
     scene: Scene | str,
     sensor: Sensor | str | None = None,

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any, cast
 
 from limitsets.errors import AnswerError
+from limitsets.progress import shown_in_notebooks
 from limitsets.proofs.attraction import Attraction, attraction, near_section
 from limitsets.proofs.cover import cover
 from limitsets.proofs.end_points import proved_ends
@@ -198,6 +199,7 @@ def spelled_deviations(scene: Scene, given: Mapping[str, str] | None) -> dict[st
 
 
 @singledispatch
+@shown_in_notebooks
 def certify(
     scene: Scene | str | Path,
     claims: Sequence[str] | None = None,

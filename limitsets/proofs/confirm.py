@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from limitsets.errors import AnswerError
+from limitsets.progress import bar, in_notebook
 
 if TYPE_CHECKING:
     from limitsets.checker import Report
@@ -125,4 +126,7 @@ def recheck(
         )
     from limitsets.checker import recheck as check
 
+    if progress is None and in_notebook():
+        with bar() as tell:
+            return check(path, workers, lambda done, of: tell("cells checked", done - 1, of))
     return check(path, workers, progress)

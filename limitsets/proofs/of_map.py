@@ -37,6 +37,7 @@ from limitsets.maps.derived import NEVER, SURE, UNKNOWN, BranchBoxes, branch_box
 from limitsets.proofs.intervals import Intervals
 from limitsets.proofs.proof import Claim
 from limitsets.sets import Cycle, cycles
+from limitsets.tables import Table, Tabled
 
 __all__ = ["CLAIMS_OF_MAP", "CycleOfMap", "ProofOfMap", "certify_map"]
 
@@ -81,7 +82,7 @@ class CycleOfMap:
 
 
 @dataclass(frozen=True, eq=False)
-class ProofOfMap:
+class ProofOfMap(Tabled):
     """What was proved of a map on a grid.
 
     Attributes
@@ -123,6 +124,11 @@ class ProofOfMap:
         """The cells all of whose points are proved to enter the attracting cells."""
         destination = self.graph.condensation().destination
         return CellSet(self.graph.grid, destination >= 0)
+
+    def tables(self) -> tuple[Table, ...]:
+        """Give the tables that show it, the one that is saved as CSV first."""
+        rows = [(each.claim, each.verdict, each.reason or None) for each in self.claims]
+        return (Table(("claim", "verdict", "missing"), rows, f"Proofs of {type(self.map).__name__}"),)
 
 
 # ---------------------------------------------------------------- claims about cells

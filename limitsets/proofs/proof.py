@@ -21,6 +21,7 @@ from limitsets.proofs.tolerance import whole
 from limitsets.scene import Scene
 from limitsets.scene.quantities import texts
 from limitsets.scene.units import convert, parse
+from limitsets.tables import Column, Table, Tabled, bands_of
 
 __all__ = ["SHARES", "Claim", "Proof"]
 
@@ -87,8 +88,15 @@ class Claim:
         return found if found and all(found.values()) else None
 
 
+def _starts(starts: Any) -> str | None:
+    """Write for which starts a goal is proved."""
+    if not isinstance(starts, dict):
+        return None if starts is None else str(starts)
+    return "from " + ", ".join(f"x = {x:.6g} on side {side}" for side, x in starts["from"].items())
+
+
 @dataclass(frozen=True, eq=False)
-class Proof:
+class Proof(Tabled):
     """What was proved of a scene.
 
     Attributes
@@ -126,6 +134,26 @@ class Proof:
     def effects(self) -> tuple[str, ...]:
         """The effects of the scene that the proof is about, but for a spread, which is noise."""
         return tuple(name for name in self.scene.effects.on() if name != "spread")
+
+    def tables(self) -> tuple[Table, ...]:
+        """Give the tables that show it, the one that is saved as CSV first."""
+        rows = [
+            (
+                each.claim,
+                each.verdict,
+                _starts(each.starts),
+                *(each.shares.get(word) for word in SHARES),
+                each.reason or None,
+            )
+            for each in self.claims
+        ]
+        shares = [Column(word, show=".4f") for word in SHARES]
+        claims = Table(("claim", "verdict", "starts", *shares, "missing"), rows, f"{self.scene.name}: proofs")
+        if not any(each.written for each in self.claims):
+            return (claims,)
+        columns = ("side", Column("x", self.scene.unit, ".6f", ends=True))
+        kept = bands_of(self.outer_extents())
+        return claims, Table(columns, kept, "Attracting cells", "proved: no throw leads out")
 
     def to_json(self) -> list[dict[str, Any]]:
         """Give it as plain tables for JSON, one per claim, in the words of docs/certificates.md."""

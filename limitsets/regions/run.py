@@ -18,6 +18,7 @@ from limitsets.regions.gluing import regions
 from limitsets.regions.record import CELLS, Record, certify_cell
 from limitsets.regions.writing import write
 from limitsets.scene import Scene, load
+from limitsets.tables import Column, Table, Tabled
 
 __all__ = ["CODES", "Regions", "certified"]
 
@@ -29,7 +30,7 @@ Index = NDArray[np.int32]
 
 
 @dataclass(frozen=True, eq=False)
-class Regions:
+class Regions(Tabled):
     """A plane of two quantities in cells, and the proved record of each.
 
     Attributes
@@ -76,6 +77,12 @@ class Regions:
         area = self.area
         total = float(area.sum())
         return {word: float(area[self.code == k].sum()) / total for k, word in enumerate(CODES)}
+
+    def tables(self) -> tuple[Table, ...]:
+        """Give the tables that show it, the one that is saved as CSV first."""
+        rows = list(self.shares().items())
+        caption = f"{self.scene.name}: regions of {' and '.join(axis.quantity for axis in self.axes)}"
+        return (Table(("verdict", Column("share of the area", show=".6f")), rows, caption, "proved"),)
 
     def raster(self, of: NDArray[Any] | None = None) -> NDArray[Any]:
         """Spread numbers of the cells, by default their own, over the raster of the smallest cells.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -98,15 +99,15 @@ def summary(found: Audit) -> list[str]:
     return words("audit_summary", found=found).split("\n\n")
 
 
-def audit_page(found: Audit, figure: str | None = None) -> str:
+def audit_page(found: Audit, figures: Mapping[str, str] | None = None) -> str:
     """Write the page.
 
     Parameters
     ----------
     found : Audit
         From `limitsets.audit`.
-    figure : str, optional
-        File name of the picture.
+    figures : mapping of str to str, optional
+        File names of the pictures by kind: "part", "audit".
 
     Returns
     -------
@@ -119,13 +120,12 @@ def audit_page(found: Audit, figure: str | None = None) -> str:
     >>> audit_page(ls.audit("paper-designed")).splitlines()[0]
     '# paper-designed: what the model leaves out'
     """
-    figures = {} if figure is None else {"audit": figure}
     told = {"summary": summary(found), "heads": HEADS, "rows": lines_of(found)}
-    return words("audit", figures, found=found, **told) + "\n"
+    return words("audit", figures or {}, found=found, **told) + "\n"
 
 
-def write_audit(found: Audit, folder: str | Path) -> list[Path]:
-    """Write audit.md, audit.json and audit.png into a folder, all of them or none.
+def write_audit(found: Audit, folder: str | Path, form: str = "png") -> list[Path]:
+    """Write audit.md, audit.json and the figures into a folder, all of them or none.
 
     Raises
     ------
@@ -134,6 +134,7 @@ def write_audit(found: Audit, folder: str | Path) -> list[Path]:
     """
     return laid(
         folder,
-        [("audit", plot.audit(found))],
-        lambda figures: {"audit.md": audit_page(found, figures["audit"]), "audit.json": as_json(found)},
+        [("part", plot.part(found.scene)), ("audit", plot.audit(found))],
+        lambda figures: {"audit.md": audit_page(found, figures), "audit.json": as_json(found)},
+        form,
     )

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import shlex
 from typing import TYPE_CHECKING
 
-from limitsets.goals import Goal, OrientedBeyond, StaysOnArm, unknown_goal
+from limitsets.goals import Goal, OrientedBeyond, Reaches, StaysOnArm, unknown_goal
 
 if TYPE_CHECKING:
-    from limitsets.analysis import GoalOutcome
+    from collections.abc import Sequence
 
-__all__ = ["goal_sentence", "verdict_of", "void_of"]
+    from limitsets.analysis import Analysis, GoalOutcome
+    from limitsets.scene import Scene
+
+__all__ = ["goal_sentence", "next_command", "verdict_of", "void_of", "without_margin"]
 
 
 def goal_sentence(goal: Goal, unit: str) -> str:
@@ -40,6 +44,43 @@ def verdict_of(outcome: GoalOutcome) -> str:
     if outcome.vacuous:
         return "holds vacuously"
     return {True: "holds", False: "does not hold", None: "was not decided"}[outcome.holds]
+
+
+def next_command(analysis: Analysis) -> str:
+    """Name the command that goes on from an analysis with a goal: prove it, find what can deviate, or a design.
+
+    Examples
+    --------
+    >>> import limitsets as ls
+    >>> next_command(ls.analyse("paper-initial", 1024))
+    'limitsets design paper-initial --goal (a scene that meets it: centre of mass, throw and surface moved)'
+    """
+    outcome, scene = analysis.goal, analysis.scene
+    source = _source(scene)
+    assert outcome is not None
+    if outcome.holds and not outcome.vacuous:
+        return f"limitsets certify {source} (a proof), limitsets margin {source} (how much each quantity may deviate)"
+    if outcome.holds is None:
+        return f"limitsets certify {source} (whether it can be proved)"
+    return design_command(scene, [outcome.goal]) or f"limitsets audit {source} (which assumptions it breaks)"
+
+
+def without_margin(scene: Scene, goals: Sequence[Goal], *, fails: bool) -> str:
+    """Name the command that goes on from a scene without margins: its goal fails, or is not proved of it."""
+    certify = f"limitsets certify {_source(scene)} (what is proved of it, and what is not)"
+    return (design_command(scene, goals) if fails else "") or certify
+
+
+def design_command(scene: Scene, goals: Sequence[Goal]) -> str:
+    """Name the command that looks for a scene that meets a goal; empty where there is none for it."""
+    if scene.effects.on() or not any(isinstance(goal, OrientedBeyond | Reaches) for goal in goals):
+        return ""
+    words = "a scene that meets it: centre of mass, throw and surface moved"
+    return f"limitsets design {_source(scene)} --goal ({words})"
+
+
+def _source(scene: Scene) -> str:
+    return shlex.quote(scene.file or f"{scene.name}.toml")
 
 
 def void_of(outcome: GoalOutcome, unit: str) -> str:

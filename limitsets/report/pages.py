@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 from limitsets.analysis import overlap
 from limitsets.goals import order_of
-from limitsets.report.goals import goal_sentence, verdict_of, void_of
+from limitsets.report.goals import goal_sentence, next_command, verdict_of, void_of
 from limitsets.report.tables import bands, count, intervals, percent, table
 
 if TYPE_CHECKING:
@@ -22,14 +22,15 @@ if TYPE_CHECKING:
 
     from limitsets.analysis import Analysis
 
-__all__ = ["page", "words"]
+__all__ = ["environment", "page", "words"]
 
 # Blocks of these signs keep their lines: headings, tables, lists, commands.
 LINES = ("#", "|", "* ", "    ")
 
 
 @cache
-def _environment() -> Environment:
+def environment() -> Environment:
+    """Give the templates, with what they call."""
     from jinja2 import Environment, PackageLoader, StrictUndefined
 
     found = Environment(
@@ -48,6 +49,7 @@ def _environment() -> Environment:
         "percent": percent,
     }
     found.globals |= {
+        "next_command": next_command,
         "order_of": order_of,
         "question_of": goal_sentence,
         "table": table,
@@ -71,9 +73,12 @@ def words(template: str, figures: Mapping[str, str] | None = None, **answers: An
     """
 
     def figure(kind: str, caption: str) -> str:
-        return f"![{caption}]({figures[kind]})" if figures and kind in figures else ""
+        if not figures or kind not in figures:
+            return ""
+        link = f"[{caption}]({figures[kind]})"
+        return link if figures[kind].endswith(".pdf") else f"!{link}"  # no page shows PDF in its text
 
-    text = _environment().get_template(f"{template}.md.j2").render(figure=figure, **answers)
+    text = environment().get_template(f"{template}.md.j2").render(figure=figure, **answers)
     blocks = [block.strip("\n") for block in re.split(r"\n\s*\n", text)]
     return "\n\n".join(
         block if block.startswith(LINES) else re.sub(r"\s*\n\s*", " ", block) for block in blocks if block
@@ -88,7 +93,7 @@ def page(analysis: Analysis, figures: Mapping[str, str]) -> str:
     analysis : Analysis
         From `limitsets.analyse`.
     figures : mapping of str to str
-        File names of the pictures by kind: "limit-set", "map", "basins", "morse", "flight".
+        File names of the pictures by kind: "part", "limit-set", "map", "basins", "morse", "flight".
 
     Returns
     -------
@@ -108,9 +113,14 @@ def page(analysis: Analysis, figures: Mapping[str, str]) -> str:
     assumed = [each.lifts for name, each in EFFECTS.items() if name not in effects.words]
     # of the throw; no effect lifts this
     assumed.insert(0 if effects.drive else 1, "it does not tip the part")
+    broken = other_vertex_in_limit_sets(analysis)
+    return words("report", figures, analysis=analysis, broken=broken, assumed=assumed) + "\n"
+
+
+def other_vertex_in_limit_sets(analysis: Analysis) -> dict[int, list[tuple[float, float]]]:
+    """Give, per side, where in a limit set another vertex than the left one lands first [length]."""
     everything: dict[int, list[tuple[float, float]]] = {}
     for extents in analysis.extents:
         for side, parts in extents.items():
             everything.setdefault(side, []).extend(parts)
-    broken = overlap(analysis.other_vertex_first, everything)
-    return words("report", figures, analysis=analysis, broken=broken, assumed=assumed) + "\n"
+    return overlap(analysis.other_vertex_first, everything)

@@ -21,6 +21,7 @@ __all__ = ["write_robustness"]
 
 def _drawn(found: Robustness) -> Iterator[tuple[str, Figure]]:
     """Draw what there is to draw."""
+    yield "part", plot.part(found.scene)
     single = [each for each in found.margins() if each.quantity != "joint"]
     if found.verdict == "proved" and single:
         yield "margins", plot.tornado(single)
@@ -49,7 +50,7 @@ def _noise(found: Robustness) -> Iterator[tuple[str, Figure]]:
     yield "levels", plot.noise_levels(found.levels, {"level of the noise, as given = 1": 1.0})
 
 
-def write_robustness(found: Robustness, folder: str | Path) -> list[Path]:
+def write_robustness(found: Robustness, folder: str | Path, form: str = "png") -> list[Path]:
     """Write report.md, robustness.json and the figures into a folder, all of them or none.
 
     Raises
@@ -61,4 +62,5 @@ def write_robustness(found: Robustness, folder: str | Path) -> list[Path]:
         folder,
         _drawn(found),
         lambda figures: {"report.md": robustness_page(found, figures), "robustness.json": as_json(found)},
+        form,
     )

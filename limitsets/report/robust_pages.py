@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from limitsets.goals import Goal, OrientedBeyond, Reaches
 from limitsets.report.pages import words
+from limitsets.report.tables import in_time
 from limitsets.robust.margins.margin_texts import bound, void_of
 from limitsets.robust.noise.laws import Gaussian, Law, Uniform
 from limitsets.robust.sheet.entries import Entry, in_unit_of, percent_of
@@ -24,6 +25,7 @@ __all__ = [
     "answer",
     "deviation_of",
     "lines_of",
+    "none_holds",
     "robustness_page",
     "shown",
     "tightest",
@@ -65,7 +67,7 @@ def robustness_page(found: Robustness, figures: Mapping[str, str]) -> str:
     found : Robustness
         From `limitsets.robustness`.
     figures : mapping of str to str
-        File names of the pictures by kind: "margins", "joint", "curve", "counterexample", and those of the noise.
+        File names of the pictures by kind: "part", "margins", "joint", "curve", "counterexample", and of noise.
 
     Returns
     -------
@@ -83,6 +85,7 @@ def robustness_page(found: Robustness, figures: Mapping[str, str]) -> str:
             scene=found.scene,
             heads=HEADS,
             rows=lines_of(found),
+            none_holds=none_holds,
             first=first,
             states=first and _states(first, found),
             violated_of=violated_of,
@@ -93,7 +96,7 @@ def robustness_page(found: Robustness, figures: Mapping[str, str]) -> str:
             places=found.curve and _places(found.curve),
             laws=noise
             and [_law(name, getattr(noise.scatter, name), noise.unit) for name in noise.scatter.given()],
-            numbers=noise and _numbers(noise, len(found.scene.sides)),
+            numbers=noise and _numbers(noise, len(found.scene.sides), found.scene.world.throw_rate),
             changes=noise and _changes(noise),
             files=list(dict.fromkeys(proofs)),
         )
@@ -168,6 +171,15 @@ def lines_of(found: Robustness) -> list[list[str]]:
             ]
         )
     return rows
+
+
+def none_holds(found: Robustness) -> str:
+    """Say of margins that are all nothing what a table of zeros would."""
+    count = len({entry.quantity for entry in found.singles})
+    whose = "1 quantity has" if count == 1 else f"{count} quantities have"
+    why = "the goal fails already" if found.verdict == "refuted" else "the goal is not proved of it"
+    reason = next((entry.reason for entry in found.singles if entry.reason), why)
+    return f"{whose} no margin about the scene as it is: {reason}."
 
 
 def shown(found: Robustness) -> Entry | None:
@@ -288,10 +300,19 @@ def _law(name: str, law: Law, unit: str) -> str:
     return f"{name}: {law!r}"
 
 
-def _numbers(noise: NoiseStatistics, sides: int) -> Table:
+def _numbers(noise: NoiseStatistics, sides: int, rate: float | None) -> Table:
     rests = {f"time on side {k}": (f"rests on side {k}", "share") for k in range(sides)}
     rows = [
-        [told, _value(noise.numbers.get(name), kind), _error(noise.errors.get(name), kind)]
+        [
+            told,
+            _value(noise.numbers.get(name), kind)
+            + (
+                in_time(noise.numbers.get(name), rate, parts=name == "mean throws")
+                if kind == "throws"
+                else ""
+            ),
+            _error(noise.errors.get(name), kind),
+        ]
         for name, (told, kind) in (rests | NUMBERS).items()
         if name in noise.numbers
     ]

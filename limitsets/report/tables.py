@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from itertools import pairwise
+from math import isfinite
 
-__all__ = ["bands", "count", "intervals", "number", "percent", "table"]
+__all__ = ["bands", "count", "in_time", "intervals", "number", "percent", "table"]
 
 Extents = Mapping[int, Sequence[tuple[float, float]]]
 
@@ -62,6 +63,29 @@ def count(least: int, most: int) -> str:
     ('3 to 11', '0')
     """
     return str(least) if least == most else f"{least} to {most}"
+
+
+def in_time(throws: float | None, rate: float | None, *, parts: bool = False) -> str:
+    """Write a number of throws in seconds, and as parts per minute one after the other; empty where no rate is known.
+
+    Parameters
+    ----------
+    throws : float or None
+        How many.
+    rate : float or None
+        Throws per second (`world.throw_rate`).
+    parts : bool
+        Whether a part is fed after so many.
+
+    Examples
+    --------
+    >>> in_time(12.0, 2.0, parts=True), in_time(12.0, None)
+    (' (6 s, 10 parts per minute)', '')
+    """
+    if throws is None or rate is None or not isfinite(throws) or throws <= 0.0:
+        return ""
+    minute = f", {60.0 * rate / throws:.3g} parts per minute" if parts else ""
+    return f" ({throws / rate:.3g} s{minute})"
 
 
 def intervals(parts: Iterable[tuple[float, float]], digits: int = 3) -> str:

@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from limitsets.errors import LimitsetsError
+from limitsets.errors import AnswerError, LimitsetsError
 from limitsets.files import as_json, replaced
 from limitsets.maps import FLIP
 from limitsets.plot.basin import basins
@@ -16,7 +16,9 @@ from limitsets.plot.flights import flight
 from limitsets.plot.limit_sets import limit_set
 from limitsets.plot.maps import map as map_of_scene
 from limitsets.plot.morse_graphs import morse
+from limitsets.plot.parts import part
 from limitsets.plot.style import stretch
+from limitsets.report.html_pages import as_html, as_uri
 from limitsets.report.pages import page
 
 if TYPE_CHECKING:
@@ -29,7 +31,7 @@ __all__ = ["DPI", "FIGURES", "figure", "filled", "laid", "require_place", "write
 Progress = Callable[[str, int, int], None]
 
 DPI = 150
-FIGURES = ("limit-set", "map", "basins", "morse", "flight")
+FIGURES = ("part", "limit-set", "map", "basins", "morse", "flight")
 
 
 def _typical_throw(analysis: Analysis) -> tuple[float, int]:
@@ -65,6 +67,8 @@ def figure(analysis: Analysis, kind: str, throw: tuple[float, int] | None = None
         For another kind.
     """
     scene, sets = analysis.scene, analysis.extents
+    if kind == "part":
+        return part(scene)
     if kind == "limit-set":
         return limit_set(scene, sets)
     if kind == "map":
@@ -72,7 +76,7 @@ def figure(analysis: Analysis, kind: str, throw: tuple[float, int] | None = None
     if kind == "basins":
         return basins(scene, analysis.basins, sets)
     if kind == "morse":
-        return morse(analysis.morse, scene.name)
+        return morse(analysis.morse, scene.name, scene.unit)
     if kind == "flight":
         return flight(scene, *(throw or _typical_throw(analysis)))
     raise LimitsetsError("the kind of figure", kind, ", ".join(FIGURES), "correct the word")
@@ -117,6 +121,7 @@ def laid(
     folder: str | Path,
     drawn: Iterable[tuple[str, Figure]],
     texts: Callable[[dict[str, str]], dict[str, str]],
+    form: str = "png",
 ) -> list[Path]:
     """Write figures and texts into a folder, all of them or none.
 
@@ -125,9 +130,11 @@ def laid(
     folder : str or Path
         Where to; made if it is not there.
     drawn : iterable of (str, Figure)
-        Figures by kind: KIND.png.
+        Figures by kind: KIND.png, or of the form asked for.
     texts : callable
         Takes the figures' files by kind, gives texts by file.
+    form : str
+        Of the figures: "png", "svg" or "pdf".
 
     Returns
     -------
@@ -142,7 +149,7 @@ def laid(
     figures: dict[str, str] = {}
     with filled(folder) as draft:
         for kind, figure in drawn:
-            figures[kind] = f"{kind}.png"
+            figures[kind] = f"{kind}.{form}"
             figure.savefig(draft / figures[kind], dpi=DPI)
         told = texts(figures)
         for name, text in told.items():
@@ -150,7 +157,14 @@ def laid(
     return [Path(folder) / name for name in (*told, *figures.values())]
 
 
-def write(analysis: Analysis, folder: str | Path, *, progress: Progress | None = None) -> list[Path]:
+def write(
+    analysis: Analysis,
+    folder: str | Path,
+    *,
+    form: str = "png",
+    html: bool = False,
+    progress: Progress | None = None,
+) -> list[Path]:
     """Write report.md, analysis.json and the figures into a folder.
 
     Files that are there are replaced once all new ones are written, each in one step.
@@ -161,6 +175,10 @@ def write(analysis: Analysis, folder: str | Path, *, progress: Progress | None =
         From `limitsets.analyse`.
     folder : str or Path
         Where to; made if it is not there.
+    form : str
+        Of the figures: "png", "svg" or "pdf".
+    html : bool
+        Whether to write report.html too: one file that stands alone, figures inside.
     progress : callable, optional
         Called as ``progress(file, done, of)`` before each file.
 
@@ -185,14 +203,26 @@ def write(analysis: Analysis, folder: str | Path, *, progress: Progress | None =
     tell = progress or (lambda file, done, of: None)
     count = len(FIGURES) + 2
 
+    inside: dict[str, str] = {}
+
     def drawn() -> Iterator[tuple[str, Figure]]:
         for number, kind in enumerate(FIGURES):
-            tell(f"{kind}.png", number, count)
-            yield kind, figure(analysis, kind)
+            tell(f"{kind}.{form}", number, count)
+            try:
+                shown = figure(analysis, kind)
+            except AnswerError:
+                if kind != "flight":
+                    raise
+                continue  # throws too hard for the model have no flight to draw
+            if html:
+                inside[kind] = as_uri(shown)
+            yield kind, shown
         tell("report.md", len(FIGURES), count)
 
-    return laid(
-        folder,
-        drawn(),
-        lambda figures: {"report.md": page(analysis, figures), "analysis.json": as_json(analysis)},
-    )
+    def texts(figures: dict[str, str]) -> dict[str, str]:
+        text = page(analysis, figures)
+        found = {"report.md": text, "analysis.json": as_json(analysis)}
+        uris = {figures[kind]: uri for kind, uri in inside.items()}
+        return found | {"report.html": as_html(text, uris)} if html else found
+
+    return laid(folder, drawn(), texts, form)

@@ -25,6 +25,7 @@ from limitsets.resilience.colours import Colours, colours
 from limitsets.resilience.orbits import STEPS, follow, random_starts
 from limitsets.sets import Attractor
 from limitsets.sets.passing import longest_stays
+from limitsets.tables import Column, Table, Tabled, how_found
 
 __all__ = ["ConvergenceTimes", "Times", "convergence_times"]
 
@@ -56,7 +57,7 @@ class Times:
 
 
 @dataclass(frozen=True, eq=False)
-class ConvergenceTimes:
+class ConvergenceTimes(Tabled):
     """Steps to each attractor's cells, and out by each exit.
 
     Attributes
@@ -79,6 +80,21 @@ class ConvergenceTimes:
     starts: int
     steps: int
     how: str = "sampled"
+
+    def tables(self) -> tuple[Table, ...]:
+        """Give the tables that show it, the one that is saved as CSV first."""
+        named = [*((f"attractor {k}", each) for k, each in enumerate(self.attractors)), *self.exits.items()]
+        rows = [
+            (name, each.starts, each.mean, each.median, each.longest, each.at_most, each.mean_at_most)
+            for name, each in named
+        ]
+        means = (
+            Column("mean", "steps", ".4g"),
+            Column("median", "steps", ".4g"),
+            Column("longest", "steps", ".4g"),
+        )
+        proved = ("at most, proved", Column("mean at most, proved", "steps", ".4g"))
+        return (Table(("to", "starts", *means, *proved), rows, "Convergence times", how_found(self.how)),)
 
     def to_json(self) -> dict[str, Any]:
         """Give the times as JSON takes them."""

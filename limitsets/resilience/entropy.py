@@ -28,6 +28,7 @@ from limitsets.files import as_table, picked
 from limitsets.graph import TransitionGraph
 from limitsets.resilience.colours import ROUNDING, colours
 from limitsets.sets import Attractor
+from limitsets.tables import Column, Table, Tabled, how_found
 
 __all__ = ["BasinEntropy", "basin_entropy", "boundary_basin_entropy"]
 
@@ -38,7 +39,7 @@ BOX = 20
 
 
 @dataclass(frozen=True)
-class BasinEntropy:
+class BasinEntropy(Tabled):
     """Mean entropy of boxes [natural logarithm].
 
     Attributes
@@ -64,6 +65,18 @@ class BasinEntropy:
     boxes: int
     box: int
     undecided: float
+
+    def tables(self) -> tuple[Table, ...]:
+        """Give the tables that show it, the one that is saved as CSV first."""
+        row = (self.value, (self.lo, self.hi), self.boxes, self.box, self.undecided)
+        columns = (
+            Column("basin entropy", show=".6f"),
+            Column("bracket", show=".6f", ends=True),
+            "boxes",
+            "cells along a box",
+            Column("undecided share", show=".4f"),
+        )
+        return (Table(columns, [row], "Basin entropy, natural logarithm", how_found(self.how)),)
 
     def to_json(self) -> dict[str, Any]:
         """Give the numbers as JSON takes them."""

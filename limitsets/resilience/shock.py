@@ -22,6 +22,7 @@ from limitsets.graph.target import Target
 from limitsets.maps import codes
 from limitsets.resilience.colours import ROUNDING, Colours, colours
 from limitsets.sets import Attractor
+from limitsets.tables import Column, Table, Tabled, how_found
 
 __all__ = ["FatalShock", "minimal_fatal_shock"]
 
@@ -32,7 +33,7 @@ Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
-class FatalShock:
+class FatalShock(Tabled):
     """The smallest fatal push of a state.
 
     Attributes
@@ -59,6 +60,12 @@ class FatalShock:
     basin: int | str
     shock: Floats
     into: int | str
+
+    def tables(self) -> tuple[Table, ...]:
+        """Give the tables that show it, the one that is saved as CSV first."""
+        row = (str(self.basin), (self.lo, self.hi), str(self.into))
+        columns = ("basin", Column("smallest fatal push", show=".6g", ends=True), "into")
+        return (Table(columns, [row], "Smallest fatal shock", how_found(self.how)),)
 
     def to_json(self) -> dict[str, Any]:
         """Give the shock as JSON takes it."""

@@ -19,6 +19,7 @@ from limitsets.maps import codes
 from limitsets.resilience.colours import ROUNDING, Colours, colours
 from limitsets.resilience.orbits import STEPS, follow, random_starts
 from limitsets.sets import Attractor
+from limitsets.tables import Column, Table, Tabled, how_found
 
 __all__ = ["BasinStability", "Share", "basin_stability"]
 
@@ -36,7 +37,7 @@ class Share:
 
 
 @dataclass(frozen=True, eq=False)
-class BasinStability:
+class BasinStability(Tabled):
     """Shares of the basins, weighted by length (area, volume) over all sides.
 
     Attributes
@@ -63,6 +64,13 @@ class BasinStability:
     starts: int | None
     inner: tuple[CellSet, ...]
     outer: tuple[CellSet, ...]
+
+    def tables(self) -> tuple[Table, ...]:
+        """Give the tables that show it, the one that is saved as CSV first."""
+        named = [*((f"attractor {k}", each) for k, each in enumerate(self.attractors)), *self.exits.items()]
+        rows = [(name, each.share, (each.lo, each.hi)) for name, each in named]
+        columns = ("basin", Column("share", show=".6f"), Column("bracket", show=".6f", ends=True))
+        return (Table(columns, rows, "Basin stability", how_found(self.how)),)
 
     def to_json(self) -> dict[str, Any]:
         """Give the shares as JSON takes them."""

@@ -25,6 +25,7 @@ from limitsets.maps import codes
 from limitsets.resilience.colours import colours
 from limitsets.resilience.orbits import STEPS, labelled_starts
 from limitsets.sets import Attractor
+from limitsets.tables import Column, Table, Tabled, how_found
 
 __all__ = ["UncertaintyExponent", "uncertainty_exponent"]
 
@@ -36,7 +37,7 @@ FEWEST = 40
 
 
 @dataclass(frozen=True, eq=False)
-class UncertaintyExponent:
+class UncertaintyExponent(Tabled):
     """How uncertain starts become fewer.
 
     Attributes
@@ -69,6 +70,13 @@ class UncertaintyExponent:
     def boundary_dimension(self) -> float:
         """Box-counting dimension of the boundary, d - a."""
         return self.dimension - self.exponent
+
+    def tables(self) -> tuple[Table, ...]:
+        """Give the tables that show it, the one that is saved as CSV first."""
+        rows = list(zip(self.apart.tolist(), self.shares.tolist(), strict=True))
+        caption = f"Uncertainty exponent {self.exponent:.4g} +- {self.error:.2g}"
+        columns = (Column("apart", "cells"), Column("uncertain share", show=".6f"))
+        return (Table(columns, rows, caption, how_found(self.how)),)
 
     def to_json(self) -> dict[str, Any]:
         """Give the exponent and what it was fitted to as JSON takes them."""

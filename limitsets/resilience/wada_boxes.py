@@ -26,6 +26,7 @@ from limitsets.maps import codes
 from limitsets.resilience.colours import Colours, colours
 from limitsets.resilience.orbits import STEPS, follow, labelled_starts, starts_in
 from limitsets.sets import Attractor
+from limitsets.tables import Column, Table, Tabled
 
 __all__ = ["Wada", "wada"]
 
@@ -43,7 +44,7 @@ BATCH = 2**18
 
 
 @dataclass(frozen=True)
-class Wada:
+class Wada(Tabled):
     """How many boundary boxes meet all basins.
 
     Attributes
@@ -70,6 +71,12 @@ class Wada:
     of: int
     undecided: float
     how: str = "sampled, at this resolution"
+
+    def tables(self) -> tuple[Table, ...]:
+        """Give the tables that show it, the one that is saved as CSV first."""
+        rows = list(zip(self.refinements, self.shares, strict=False))
+        columns = ("starts per cell and axis", Column("share of boxes that meet all basins", show=".6f"))
+        return (Table(columns, rows, f"Wada: {self.boxes} of {self.of} boxes", f"{self.how}, not proved"),)
 
     def to_json(self) -> dict[str, Any]:
         """Give the shares as JSON takes them."""

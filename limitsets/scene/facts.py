@@ -66,20 +66,27 @@ class Fact:
         The largest value; below it where it has a dimension [scene's units].
     words : str
         A plain number's example; of a quantity with a largest value the range: "above 0 and below 90 deg".
+    meaning : str
+        What it says, where its name does not.
     """
 
     thing: str
     dimension: str = ""
     most: float = math.inf
     words: str = ""
+    meaning: str = ""
 
 
 FACTS: dict[str, Fact] = {
     "friction": Fact("the coefficient of friction", most=1e6, words="0.9"),
     "restitution": Fact("the coefficient of restitution", most=1.0, words="0.4"),
-    "bounce_threshold": Fact("the threshold", "length"),
-    "stroke": Fact("the stroke", "angle", math.pi / 2, "above 0 and below 90 deg"),
-    "throw_rate": Fact("the rate of throws", "frequency"),
+    "bounce_threshold": Fact(
+        "the threshold", "length", meaning="height of a bounce below which a part stays put"
+    ),
+    "stroke": Fact(
+        "the stroke", "angle", math.pi / 2, "above 0 and below 90 deg", "angle over which the arm accelerates"
+    ),
+    "throw_rate": Fact("the rate of throws", "frequency", meaning="throws per time"),
 }
 """The numbers that `[world]` may have, by name; what an effect needs that none needed before is added here."""
 

@@ -14,7 +14,7 @@ from limitsets.errors import SceneError
 from limitsets.scene.scene import Scene
 from limitsets.scene.units import shown
 
-__all__ = ["load", "scenes"]
+__all__ = ["can_name", "load", "scenes", "structure_of"]
 
 _MOST_BYTES = 1 << 20
 _MOST_DOTS = 16
@@ -67,10 +67,20 @@ def load(source: str | Path | Mapping[str, Any]) -> Scene:
     >>> scene.kappa, scene.unit
     (25.3778518, 'in')
     """
+    return Scene.of(*structure_of(source))
+
+
+def structure_of(source: str | Path | Mapping[str, Any]) -> tuple[dict[str, Any], str | None]:
+    """Read what `load` takes: the structure, not yet checked, and the file it is from."""
     if isinstance(source, Mapping):
-        return Scene.of({"name": "scene", **source}, None)
+        return {"name": "scene", **source}, None
     if isinstance(source, str) and "\n" in source:
-        return Scene.of({"name": "scene", **_parsed(source, None)}, None)
+        return {"name": "scene", **_parsed(source, None)}, None
+    if isinstance(source, tuple) and hasattr(source, "_fields"):
+        remedy = (
+            "of a map of one's own: ls.transitions(map, grid) and what follows from it, ls.certify(map, grid)"
+        )
+        raise SceneError("the source of a scene", f"a map, {type(source).__name__}", "a scene", remedy)
     if not isinstance(source, str | Path):
         allowed = "a built-in name, a path, TOML text or a structure"
         raise SceneError("the source of a scene", shown(source), allowed, "give one of these")
@@ -79,10 +89,11 @@ def load(source: str | Path | Mapping[str, Any]) -> Scene:
     builtin = isinstance(source, str) and file in scenes()
     text = _builtin(file) if builtin else _decoded(_read(Path(source), file), file)
     stem = Path(file).stem
-    return Scene.of({"name": stem if _can_name(stem) else "scene", **_parsed(text, file)}, file)
+    return {"name": stem if can_name(stem) else "scene", **_parsed(text, file)}, file
 
 
-def _can_name(stem: str) -> bool:
+def can_name(stem: str) -> bool:
+    """Say whether the stem of a file can name a scene."""
     return re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9 ._-]{0,63}", stem) is not None
 
 
@@ -150,4 +161,17 @@ def _parsed(text: str, file: str | None) -> dict[str, Any]:
     except RecursionError:
         raise refuse("too deeply nested", "flatten it") from None
     except ValueError as error:  # TOMLDecodeError is one; so is a whole number of 5000 digits
-        raise refuse("not valid", str(shown(str(error)))) from None
+        raise refuse("not valid", _why_no_toml(str(error))) from None
+
+
+def _why_no_toml(found: str) -> str:
+    """Keep the line and column at the end of tomllib's message, however long what stands before them is.
+
+    Examples
+    --------
+    >>> _why_no_toml("Invalid value (at line 11, column 10)")
+    'Invalid value (at line 11, column 10); a quantity stands in quotation marks: length = "400 mm"'
+    """
+    what, at, place = found.rpartition(" (at ")
+    words = f"{shown(what)}{at}{place}" if at else str(shown(found))
+    return f'{words}; a quantity stands in quotation marks: length = "400 mm"'

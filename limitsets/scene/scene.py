@@ -7,7 +7,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 import numpy.typing as npt
@@ -19,6 +19,7 @@ from limitsets.scene.cavity import Cavity
 from limitsets.scene.facts import Deviation, Effects, World
 from limitsets.scene.sensing import Feedback
 from limitsets.scene.tray import Tray
+from limitsets.tables import Column, Table, Tabled, facts
 
 if TYPE_CHECKING:
     from limitsets.cells import Domain
@@ -38,7 +39,7 @@ def resting_places(a: Any, arm_length: Any) -> tuple[npt.NDArray[np.float64], np
 
 
 @dataclass(frozen=True, eq=False)
-class Scene:
+class Scene(Tabled):
     """A part, an arm, a throw and what is asked of them.  Build it with `limitsets.load`.
 
     Parameters
@@ -127,6 +128,30 @@ class Scene:
     def __hash__(self) -> int:
         return hash((self.name, self.unit, self.kappa, self.arm_length))
 
+    def tables(self) -> tuple[Table, ...]:
+        """Give the tables that show it, the one that is saved as CSV first."""
+        unit, sides = self.unit, self.sides
+        rows = [
+            (side, float(sides.length[side]), float(sides.a[side]), float(sides.d[side]))
+            for side in range(len(sides))
+        ]
+        columns = (
+            "side",
+            Column("length", unit, ".5g"),
+            Column("centre of mass from the left end", unit, ".5g"),
+            Column("centre of mass above it", unit, ".5g"),
+        )
+        values: dict[str, object] = {
+            f"arm length [{unit}]": self.arm_length,
+            f"arm surface height [{unit}]": self.surface_height,
+            f"kappa [{unit}]": self.kappa,
+            f"radius of gyration [{unit}]": self.radius_of_gyration,
+            "flight": self.flight,
+            "flip": self.flip,
+            "goal": None if self.goal is None else self.goal.question(unit),
+        }
+        return Table(columns, rows, self.name), facts("Arm and throw", values)
+
     @cached_property
     def map(self) -> Throw | FullThrow:
         """The throw map of the scene, as kernels take it, with the effects it switches on."""
@@ -135,6 +160,31 @@ class Scene:
         from limitsets.thrower.full import with_effects  # lazily: it loads numba
 
         return with_effects(self.bare_map, self.effects.words, self._facts())
+
+    def map_of_seed(self, seed: int) -> Throw | FullThrow:
+        """Give the map with the scatter of another seed; `map` has seed 0, and without scatter all are the same.
+
+        Raises
+        ------
+        SceneError
+            A seed that is no whole number from 0.
+
+        Examples
+        --------
+        >>> from limitsets.scene import load
+        >>> scene = load("paper-designed")
+        >>> scene.map_of_seed(3) is scene.map
+        True
+        """
+        if not (isinstance(seed, int) and 0 <= seed < 2**53):
+            raise SceneError("the seed", seed, "a whole number from 0", "correct it", file=self.file)
+        if self.effects.spread is None:
+            return self.map
+        full = cast("FullThrow", self.map)
+        own = {"seed": float(seed)}
+        return full._replace(effects=tuple(
+            each._replace(**own) if "seed" in each._fields else each for each in full.effects
+        ))  # fmt: skip
 
     def _facts(self) -> World:
         """Return the world with its scatter of the speed as a share, where the scene knows the speed."""
@@ -226,7 +276,8 @@ class Scene:
         Parameters
         ----------
         values : mapping of str to float or str
-            Numbers in the scene's units (see `value`), or text with a unit, by name of the quantity.
+            By name of the quantity, text with a unit (``"150 deg/s"``), or numbers in the scene's units: lengths in
+            `unit`, but angles in rad and speeds in rad/s.
 
         Returns
         -------

@@ -85,7 +85,8 @@ _OTHER_NAMES = {
     "rad/min": "1/60 rad/s",
     "oz": "28.349523125 g",
     "ug": "1/1000000 g",
-    "hz": "1 Hz",
+    **dict.fromkeys(("hz", "/s", "1/s"), "1 Hz"),
+    **dict.fromkeys(("/min", "1/min"), "1/60 Hz"),
     **dict.fromkeys(("meter", "metre", "meters", "metres"), "1 m"),
     **dict.fromkeys(("inch", "inches", '"'), "1 in"),
     **dict.fromkeys(("foot", "feet"), "1 ft"),
@@ -172,7 +173,7 @@ def parse(text: object, dimension: str, *, key: str | None = None, file: str | N
         raise refuse(shown(text), "shorten it")
     match = _QUANTITY.fullmatch(text.strip(" "))
     if match is None:
-        raise refuse(text, _why_no_quantity(text, example))
+        raise refuse(text, _why_no_quantity(text, dimension))
     number, unit = match[1], _SPELLINGS.get(match[2], match[2])
     if not (fits(float(number)) or _is_zero(number)):
         raise refuse(text, f"give 0 or a size from {_SMALLEST:g} to {_LARGEST:g}; choose another unit")
@@ -196,7 +197,8 @@ def _is_zero(number: str) -> bool:
     return not re.search(r"[1-9]", re.split(r"[eE]", number)[0])
 
 
-def _why_no_quantity(text: str, example: str) -> str:
+def _why_no_quantity(text: str, dimension: str) -> str:
+    example = _EXAMPLES[dimension]
     if "," in text:
         return f'write the decimal point as a point and leave no commas, like "{example}"'
     if re.fullmatch(_NUMBER, text.strip()):
@@ -204,6 +206,9 @@ def _why_no_quantity(text: str, example: str) -> str:
     close = re.fullmatch(rf"({_NUMBER})([a-zA-Z\u00b5\u03bc]\S*)", text.strip(" "))
     if close is not None:
         return f'put a space between number and unit: "{close[1]} {close[2]}"'
+    rate = re.fullmatch(rf"({_NUMBER})(/[a-z]+)", text.strip(" "))
+    if rate is not None and dimension == "frequency" and fits(float(rate[1])):
+        return _why_not_unit(rate[1], rate[2], dimension)
     return f'write one finite decimal number, a space and the unit, like "{example}"'
 
 

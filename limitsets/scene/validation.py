@@ -12,7 +12,7 @@ from limitsets.scene.units import shown
 if TYPE_CHECKING:
     from limitsets.scene.schema import SceneTable, Table
 
-__all__ = ["Tree", "plain", "validate"]
+__all__ = ["Tree", "plain", "refusals", "validate"]
 
 Tree: TypeAlias = dict[str, Any]
 """A scene as TOML holds it: tables, lists, text, switches and numbers."""
@@ -74,6 +74,14 @@ def validate(tree: Tree, file: str | None) -> SceneTable:
     SceneError
         For the first thing wrong: unknown keys before values, values before missing keys.
     """
+    table, found = refusals(tree, file)
+    if table is None:
+        raise found[0]
+    return table
+
+
+def refusals(tree: Tree, file: str | None) -> tuple[SceneTable | None, list[SceneError]]:
+    """Check a scene's words: its tables, or all that is wrong: unknown keys, then values, then missing keys."""
     # pydantic takes 0.1 s to import
     from pydantic import ValidationError
 
@@ -82,11 +90,12 @@ def validate(tree: Tree, file: str | None) -> SceneTable:
     on = tree.get("effects")
     table = scene_table(with_effects=isinstance(on, dict) and bool(on.keys() - {"auto", "contact"}))
     try:
-        return table.model_validate(tree)
+        return table.model_validate(tree), []
     except ValidationError as error:
-        problems = error.errors(include_url=False)
+        wrong = error.errors(include_url=False)
     rank = {"extra_forbidden": 0, "missing": 2}
-    raise _refusal(min(problems, key=lambda problem: rank.get(problem["type"], 1)), table, file)
+    wrong.sort(key=lambda problem: rank.get(problem["type"], 1))
+    return None, [_refusal(problem, table, file) for problem in wrong]
 
 
 def _refusal(problem: Any, table: type[SceneTable], file: str | None) -> SceneError:

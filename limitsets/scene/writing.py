@@ -10,7 +10,7 @@ from limitsets.errors import SceneError
 from limitsets.files import replaced
 from limitsets.scene.scene import Scene
 
-__all__ = ["dump"]
+__all__ = ["dump", "replace_file"]
 
 _WIDTH = 100
 # tables with a heading of their own below the first level; all others are written in one line
@@ -47,7 +47,7 @@ def dump(scene: Scene, path: str | Path | None = None) -> str:
 
     text = dumps({key: _item(value, key) for key, value in scene.text.items()})
     if path is not None:
-        _replace(Path(path), text)
+        replace_file(Path(path), text)
     return text
 
 
@@ -66,7 +66,8 @@ def _item(value: Any, path: str) -> Any:
     return value
 
 
-def _replace(path: Path, text: str) -> None:
+def replace_file(path: Path, text: str) -> None:
+    """Write the text of a scene to a file, whole or not at all."""
     try:
         if not path.parent.is_dir():  # rather a typing error than a wish
             raise FileNotFoundError(errno.ENOENT, "there is no such folder", str(path.parent))

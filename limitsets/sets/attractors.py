@@ -14,6 +14,7 @@ from limitsets.graph import TransitionGraph
 from limitsets.maps import has_slope, orbit
 from limitsets.maps.kernels import scattered
 from limitsets.maps.lyapunov import lyapunov, orbit_with_exponent
+from limitsets.tables import BY_CELLS, Column, Table, Tabled, bands_of, facts
 
 __all__ = ["Attractor", "attractors"]
 
@@ -22,7 +23,7 @@ TRANSIENT = 1000
 
 
 @dataclass(frozen=True, eq=False)
-class Attractor:
+class Attractor(Tabled):
     """An attracting component of the transition graph.
 
     The cells contain the attractor as far as their sampled images can tell; what happens inside is counted on one
@@ -61,6 +62,21 @@ class Attractor:
     throws: int
     in_cells: float
     stopped: str | None
+
+    def tables(self) -> tuple[Table, ...]:
+        """Give the tables that show it, the one that is saved as CSV first."""
+        rows = [(side, span, self.jogs_per_visit.get(side)) for side, span in bands_of(self.extents)]
+        order = None if self.flip_order is None else " ".join(map(str, self.flip_order))
+        of = {
+            "flip order": order,
+            "flips per throw": self.flips_per_throw,
+            "Lyapunov exponent per throw": self.lyapunov,
+            "throws": self.throws,
+            "share of the orbit in the cells": self.in_cells,
+            "stopped": self.stopped,
+        }
+        columns = ("side", Column("x", show=".6g", ends=True), Column("jogs per visit", ends=True))
+        return Table(columns, rows, "Attractor", BY_CELLS), facts("Its orbit", of, "sampled, not proved")
 
 
 def _visits(side: NDArray[np.int64]) -> tuple[tuple[int, ...] | None, dict[int, tuple[int, int]]]:
@@ -145,6 +161,9 @@ def attractors(graph: TransitionGraph, throws: int = 200_000) -> tuple[Attractor
     >>> found[0].flip_order, found[0].jogs_per_visit[2]
     ((0, 1, 2), (3, 11))
     """
+    if not isinstance(graph, TransitionGraph):
+        given, way = type(graph).__name__, "limitsets.transitions(scene.map, limitsets.grid(scene.domain))"
+        raise AnswerError("the graph", given, "what limitsets.transitions gives", f"pass {way}")
     if throws < 1:
         raise AnswerError("the number of throws", throws, "an integer from 1", "pass throws=200_000")
     sets = graph.recurrent_components()

@@ -16,12 +16,13 @@ from limitsets.graph.condensation import condense
 from limitsets.maps import codes
 from limitsets.sets.attractors import Attractor
 from limitsets.sets.passing import passing
+from limitsets.tables import BY_CELLS, Column, Table, Tabled
 
 __all__ = ["Basins", "basins"]
 
 
 @dataclass(frozen=True, eq=False)
-class Basins:
+class Basins(Tabled):
     """Where the paths from each cell end.
 
     Attributes
@@ -47,6 +48,15 @@ class Basins:
     undecided_between: float
     exits: dict[str, float]
     advice: str | None = None
+
+    def tables(self) -> tuple[Table, ...]:
+        """Give the tables that show it, the one that is saved as CSV first."""
+        rows = [
+            *((f"attractor {k}", share) for k, share in enumerate(self.attractors)),
+            *((f"leave: {name}", share) for name, share in self.exits.items()),
+            ("undecided", self.undecided_between),
+        ]
+        return (Table(("where paths end", Column("share", show=".6f")), rows, "Basins", BY_CELLS),)
 
 
 def basins(graph: TransitionGraph, found: tuple[Attractor, ...]) -> Basins:

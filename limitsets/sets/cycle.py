@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from limitsets.errors import AnswerError
+from limitsets.tables import Column, Table, Tabled
 
 __all__ = ["NEAR", "Array", "Cycle", "Cycles", "Ints", "distinct", "require_period"]
 
@@ -60,7 +61,7 @@ class Cycle:
         return cls(x[ahead], side[ahead], branches[ahead], multiplier, residual, True)
 
 
-class Cycles(tuple[Cycle, ...]):
+class Cycles(tuple[Cycle, ...], Tabled):
     """Cycles by period, then by their least point; a tuple that knows how it came about.
 
     Attributes
@@ -80,6 +81,22 @@ class Cycles(tuple[Cycle, ...]):
         self = super().__new__(cls, found)
         self.complete, self.how = complete, how
         return self
+
+    def tables(self) -> tuple[Table, ...]:
+        """Give the tables that show it, the one that is saved as CSV first."""
+        rows = [
+            (k, each.period, step, side, x, each.multiplier, each.admissible)
+            for k, each in enumerate(self)
+            for step, (side, x) in enumerate(zip(each.side.tolist(), each.x.tolist(), strict=True))
+        ]
+        heads = ("cycle", "period", "step", "side", Column("x", show=_place))
+        more = (Column("multiplier", show=".6g"), "admissible")
+        return (Table((*heads, *more), rows, f"Cycles: {self.how}", "sampled, not proved"),)
+
+
+def _place(x: Any) -> str:
+    """Write a point, of one dimension or more."""
+    return ", ".join(f"{each:.9g}" for each in x) if isinstance(x, list) else f"{x:.9g}"
 
 
 def require_period(up_to: int) -> None:

@@ -25,6 +25,7 @@ from limitsets.maps.critical import Sides
 from limitsets.sets.bottleneck import in_bottleneck
 from limitsets.sets.interval_map import IntervalMap
 from limitsets.sets.unions import Extents, Track, Union, read, same
+from limitsets.tables import Column, Table, Tabled, bands_of
 
 __all__ = ["End", "LimitSet", "Origin", "ends_of", "limit_set", "limit_set_of"]
 
@@ -93,7 +94,7 @@ class End:
 
 
 @dataclass(frozen=True)
-class LimitSet:
+class LimitSet(Tabled):
     """A limit set as intervals per side.
 
     Attributes
@@ -118,6 +119,13 @@ class LimitSet:
     converged: bool
     leaves: bool
     advice: str | None
+
+    def tables(self) -> tuple[Table, ...]:
+        """Give the tables that show it, the one that is saved as CSV first."""
+        rows = [(end.side, end.which, end.x, end.error, str(end.origin)) for end in self.ends]
+        columns = ("side", "end", Column("x", show=".9g"), Column("error", show=".1e"), "image of")
+        bands = Table(("side", Column("x", show=".6g", ends=True)), bands_of(self.extents), "Limit set")
+        return Table(columns, rows, "Ends of the limit set", "computed, not proved"), bands
 
 
 def _origin(names: tuple[str, ...], track: Track) -> Origin:

@@ -86,7 +86,8 @@ class _Told:
         if self.points and seconds > 0:
             rate = self.points / seconds
             left = (of - done) * seconds / (done - self.before)
-            words = f"{self.work.name}, {rate:,.0f} {self.work.points} a second, {_in_words(left)} left"
+            speed = f"{rate:,.0f}" if rate >= 10.0 else f"{rate:.2g}"
+            words = f"{self.work.name}, {speed} {self.work.points} a second, {_in_words(left)} left"
         self.progress(words, done, of)
 
 

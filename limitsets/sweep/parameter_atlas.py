@@ -9,10 +9,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from limitsets.cells import as_domain
 from limitsets.errors import LimitsetsError
 from limitsets.files import as_plain
 from limitsets.maps import coerce, kind_of
+from limitsets.progress import shown_in_notebooks
 from limitsets.scene import Scene, load
 from limitsets.sweep.axes import Axis, axis_of
 from limitsets.sweep.boundaries import STEP
@@ -23,6 +26,7 @@ from limitsets.sweep.store import CHECKSUM, Store, imported
 from limitsets.sweep.subjects import MapSubject, SceneSubject, Subject
 from limitsets.sweep.tasks import named, resolved
 from limitsets.sweep.work import answer
+from limitsets.tables import Column, Table, Tabled
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -36,7 +40,7 @@ TOPOLOGY = "limitsets.sweep.of_topology:topology"
 
 
 @dataclass(frozen=True, eq=False)
-class Atlas:
+class Atlas(Tabled):
     """What a task said at every point of a plan.
 
     Attributes
@@ -72,6 +76,34 @@ class Atlas:
         names = [str(axis) for axis in self.axes]
         index = pd.MultiIndex.from_product([data[name].values for name in names], names=names)
         return pd.DataFrame(columns, index=index).reset_index()
+
+    def table(self) -> Table:
+        """Give the table of `to_dataframe`, with units in the heads."""
+        frame, data = self.to_dataframe(), self.dataset
+        columns = [
+            Column(head, "" if name not in data else str(data[name].attrs.get("units", "")))
+            for head in map(str, frame.columns)
+            for name in [head.partition("[")[0] if head not in data else head]
+        ]
+        return Table(columns, frame.itertuples(index=False), "Atlas", "sampled, not proved")
+
+    def tables(self) -> tuple[Table, ...]:
+        """Give what the answers range over."""
+        rows = [self._range(str(name)) for name in sorted(self.dataset, key=str)]
+        axes = " and ".join(self.axes)
+        return (Table(("variable", "values", "unit"), rows, f"Atlas over {axes}", "sampled, not proved"),)
+
+    def _range(self, name: str) -> tuple[str, str, str]:
+        """Say what one variable ranges over, apart from where there is nothing; of codes how many there are of each."""
+        variable = self.dataset[name]
+        values, attributes = np.asarray(variable.values), variable.attrs
+        if "flag_meanings" in attributes:
+            codes = zip(attributes["flag_meanings"].split(), attributes["flag_values"], strict=True)
+            counts = [(word, int((values == code).sum())) for word, code in codes]
+            return name, ", ".join(f"{count} {word}" for word, count in counts if count), ""
+        good = values[np.isfinite(values) if values.dtype.kind == "f" else values >= 0]
+        said = f"{good.min():.9g} to {good.max():.9g}" if good.size else "none"
+        return name, said, attributes.get("units", "")
 
     def to_json(self) -> dict[str, Any]:
         """Give the document of docs/json.md: the scene, the axes, and every variable as nested lists."""
@@ -169,6 +201,7 @@ def _table(variable: xr.DataArray) -> dict[str, Any]:
     return found | ({"codes": codes} if codes else {})
 
 
+@shown_in_notebooks
 def atlas(
     subject: Any,
     x: str | Axis,

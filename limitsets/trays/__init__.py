@@ -3,10 +3,12 @@
 `passing` draws a part that comes by and a kick of the plate; `counting` counts what a depression does with both, in the
 engine; `chain` says what follows for n passes; `histories` follows one depression pass by pass, and asks whether it
 forgets; `filling` joins them (`limitsets.tray`), and `designing` does so for many depths and agitations.
-`filming` keeps the passes of one depression for a film.
+`filming` keeps the passes of one depression for a film.  `pouring` lets many parts come by many
+depressions at once, and `crowd` counts them.
 """
 
 from limitsets.trays.chain import Chain as Chain
+from limitsets.trays.crowd import TrayCrowd as TrayCrowd
 from limitsets.trays.designing import TrayDesign as TrayDesign
 from limitsets.trays.designing import tray_design as tray_design
 from limitsets.trays.filling import TrayFill as TrayFill
@@ -14,3 +16,4 @@ from limitsets.trays.filling import tray as tray
 from limitsets.trays.filming import filmed as filmed
 from limitsets.trays.histories import Histories as Histories
 from limitsets.trays.passing import Passes as Passes
+from limitsets.trays.pouring import Pouring as Pouring

@@ -64,6 +64,19 @@ class Chain:
             rows.append(rows[-1] @ step)
         return np.concatenate(rows, axis=-2)
 
+    def of_many(self, each: float) -> Chain:
+        """Give the chain of passes in which so many parts come by, one after the other.
+
+        What is left over of a whole number is the probability that one more does.
+        """
+        whole, more = divmod(each, 1.0)
+        missed = self.captured[..., :1]
+        missed_by_all = missed**whole * (1.0 - more * (1.0 - missed))
+        # of those that do not miss the first captured one stays: a geometric series
+        captured = self.captured * ((1.0 - missed_by_all) / np.maximum(1.0 - missed, 1e-300))
+        captured[..., :1] = missed_by_all
+        return Chain(captured, self.kicked, self.right)
+
     def at_last(self) -> Array:
         """Give the probabilities of the states after endless passes from the empty one, shape (..., states)."""
         power = self.passed
@@ -127,6 +140,8 @@ class Filled:
         Fraction of the depressions that are filled rightly after 0, 1, ... passes.
     interval : ndarray, shape (passes + 1, 2)
         Of it.
+    wrong, wrong_interval : ndarray, shape (passes + 1,) and (passes + 1, 2)
+        Those that hold a wrong part.
     states : tuple of str
         The states that came about; "empty" first.
     last : ndarray, shape (states,)
@@ -145,6 +160,8 @@ class Filled:
 
     right: Array
     interval: Array
+    wrong: Array
+    wrong_interval: Array
     states: tuple[str, ...]
     last: Array
     last_interval: Array
@@ -162,8 +179,9 @@ class Filled:
         return {"empty": empty, "wrong": max(1.0 - empty - right, 0.0)}
 
     def passes_to(self, share: float) -> int | None:
-        """Give the passes after which this share of the last fraction is filled; None where it takes more."""
-        found = np.flatnonzero(self.right >= share * self.last[self.number])
+        """Give the passes after which this share of the last fraction is filled; None where it takes more, or is 0."""
+        last = self.last[self.number]
+        found = np.flatnonzero((self.right >= share * last) & (last > 0.0))
         return int(found[0]) if found.size else None
 
     def to_json(self) -> dict[str, Any]:
@@ -172,6 +190,8 @@ class Filled:
         return as_table(
             right=self.right,
             interval=self.interval,
+            wrong=self.wrong,
+            wrong_interval=self.wrong_interval,
             last=dict(zip(names, self.last.tolist(), strict=True)),
             last_interval=dict(zip(names, self.last_interval.tolist(), strict=True)),
             stays=dict(zip(names, self.stays.tolist(), strict=True)),
@@ -186,9 +206,9 @@ class Filled:
         )
 
 
-def filled(counts: Counts, passes: int, random: np.random.Generator) -> Filled:
-    """Say what follows from the counts for so many passes."""
-    chain, drawn = chain_of(counts), drawn_chains(counts, random)
+def filled(counts: Counts, passes: int, random: np.random.Generator, each: float = 1.0) -> Filled:
+    """Say what follows from the counts for so many passes, in each of which so many parts come by a depression."""
+    chain, drawn = chain_of(counts).of_many(each), drawn_chains(counts, random).of_many(each)
     ends = [0.5 - 0.5 * CONFIDENCE, 0.5 + 0.5 * CONFIDENCE]
 
     def interval(values: Array) -> Array:
@@ -199,9 +219,13 @@ def filled(counts: Counts, passes: int, random: np.random.Generator) -> Filled:
     capture, release = chain.capture_and_release
     captures, releases = drawn.capture_and_release
     low, high = interval(releases / (captures + releases)).tolist()
+    now, nows = chain.occupied(passes), drawn.occupied(passes)
+    others = [k for k in range(1, now.shape[-1]) if k != chain.right]
     return Filled(
-        chain.occupied(passes)[:, chain.right],
-        interval(drawn.occupied(passes)[..., chain.right]),
+        now[:, chain.right],
+        interval(nows[..., chain.right]),
+        now[:, others].sum(axis=-1),
+        interval(nows[..., others].sum(axis=-1)),
         ("empty", *(counts.states[k] for k in counts.met)),
         chain.at_last(),
         interval(drawn.at_last()),

@@ -112,8 +112,12 @@ def _run(
     return rests
 
 
-def _tally(rests: Sequence[Rest], states: int) -> NDArray[np.int64]:
+def _tally(rests: Sequence[Rest], states: int, which: str) -> NDArray[np.int64]:
+    """Count states; without any the chain would have a row of nothing."""
     done = [rest.state for rest in rests if rest.state != UNFINISHED]
+    if not done:
+        remedy = "make more of them, or agitate less: these were still in motion when patience ended"
+        raise AnswerError(f"the parts at rest, of those {which},", 0, f"some of {len(rests)}", remedy)
     return np.bincount(np.array(done, dtype=np.int64), minlength=states)
 
 
@@ -134,7 +138,7 @@ def count(
     Raises
     ------
     AnswerError
-        No drops or no kicks.
+        No drops or no kicks, or of those from some state none came to rest.
     """
     if drops < 1 or kicks < 1:
         raise AnswerError("the drops and kicks", (drops, kicks), "1 or more", "let some parts fall")
@@ -144,7 +148,7 @@ def count(
         return lambda done: None if progress is None else progress(stage, min(done, of - 1), of)
 
     rests = _run(functools.partial(_arrivals, passes, seed), drops, executor, told("drops", drops))
-    captured = _tally(rests, states)
+    captured = _tally(rests, states, "that came by")
     kicked = np.zeros((states, states), dtype=np.int64)
     poses: dict[int, list[Pose]] = {passes.right: []}
     every = list(rests)
@@ -157,7 +161,7 @@ def count(
         state = waiting.pop(0)
         task = functools.partial(_kicks, passes, seed, state, poses[state])
         after = _run(task, kicks, executor, told(f"kicks, {passes.states[state]}", kicks))
-        kicked[state] = _tally(after, states)
+        kicked[state] = _tally(after, states, f"kicked from {passes.states[state]}")
         every += after
         fresh: dict[int, list[Pose]] = {}
         for rest in after:

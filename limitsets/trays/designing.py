@@ -13,8 +13,10 @@ from numpy.typing import NDArray
 
 from limitsets.errors import AnswerError
 from limitsets.files import as_table
+from limitsets.progress import shown_in_notebooks
 from limitsets.scene import Scene, load
 from limitsets.scene.units import written
+from limitsets.tables import Column, Table, Tabled
 from limitsets.trays.counting import Progress
 from limitsets.trays.filling import TrayFill, tray
 
@@ -24,7 +26,7 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
-class TrayDesign:
+class TrayDesign(Tabled):
     """How a tray fills, by depth (rows) and agitation (columns).
 
     Attributes
@@ -43,6 +45,8 @@ class TrayDesign:
         Of it, 95 %.
     empty, wrong : ndarray, shape (n, m)
         Fractions of the rest after endless passes.
+    held : ndarray of bool, shape (n, m)
+        Whether no counted kick changed some wrong state: endless passes never leave it, by the counts.
     confirmed : TrayFill
         The best point again, with another seed: the largest of many numbers that scatter is too large.
     """
@@ -55,6 +59,7 @@ class TrayDesign:
     interval: Array
     empty: Array
     wrong: Array
+    held: NDArray[np.bool_]
     confirmed: TrayFill
 
     @property
@@ -62,6 +67,26 @@ class TrayDesign:
         """Depth and agitation where the fraction counted is largest [length]."""
         row, column = np.unravel_index(self.right.argmax(), self.right.shape)
         return float(self.depths[row]), float(self.agitations[column])
+
+    def tables(self) -> tuple[Table, ...]:
+        """Give the tables that show it, the one that is saved as CSV first."""
+        unit = self.scene.unit
+        columns = (
+            Column("depth", unit, ".4g"),
+            Column("agitation", unit, ".4g"),
+            Column("filled rightly", show=".4f"),
+            Column("95 % interval", show=".4f", ends=True),
+            Column("empty", show=".4f"),
+            Column("wrong", show=".4f"),
+        )
+        rows = [
+            (depth, agitation, self.right[at], self.interval[at], self.empty[at], self.wrong[at])
+            for i, depth in enumerate(self.depths)
+            for k, agitation in enumerate(self.agitations)
+            for at in [(i, k)]
+        ]
+        caption = f"{self.scene.name}: filled rightly after {self.passes} passes"
+        return (Table(columns, rows, caption, "counted in the engine, not proved"),)
 
     def to_json(self) -> dict[str, Any]:
         """Give it as JSON takes it: docs/json.md."""
@@ -79,6 +104,7 @@ class TrayDesign:
             interval=self.interval,
             empty=self.empty,
             wrong=self.wrong,
+            held=self.held,
             best={
                 "depth": depth,
                 "agitation": agitation,
@@ -90,6 +116,7 @@ class TrayDesign:
         )
 
 
+@shown_in_notebooks
 def tray_design(
     scene: Scene | str | Path | Mapping[str, Any],
     depths: Sequence[float],
@@ -128,6 +155,17 @@ def tray_design(
         For a depth or an agitation that cannot be.
     AnswerError
         As `limitsets.tray`, or nothing to try.
+
+    Examples
+    --------
+    >>> import limitsets as ls
+    >>> tray = {"depression_width": "7.02 in", "depression_depth": "1.53 in", "pitch": "14.04 in",
+    ...         "agitation": "1 in", "wash": "1 in"}
+    >>> tables = {"tray": tray, "world": {"friction": 0.3, "restitution": 0.3}, "effects": {"contact": True}}
+    >>> scene = ls.load({**ls.load("paper-designed").as_dict(), **tables})
+    >>> found = tray_design(scene, [1.0, 1.5], [0.5], passes=10, drops=20)
+    >>> found.right.shape, found.best[0] in found.depths, found.confirmed.seed
+    ((2, 1), True, 1)
     """
     read = scene if isinstance(scene, Scene) else load(scene)
     if not len(depths) or not len(agitations) or read.tray is None:
@@ -150,16 +188,18 @@ def tray_design(
 
     shape = len(depths), len(agitations)
     right, interval, empty, wrong = np.zeros(shape), np.zeros((*shape, 2)), np.zeros(shape), np.zeros(shape)
+    held = np.zeros(shape, dtype=bool)
     for place in np.ndindex(shape):
         if progress is not None:
             progress("depths and agitations", int(np.ravel_multi_index(place, shape)), right.size + 1)
         found = at(depths[place[0]], agitations[place[1]], seed, 1, None).filled
         right[place], interval[place] = found.right[-1], found.interval[-1]
         empty[place], wrong[place] = found.unfilled["empty"], found.unfilled["wrong"]
+        held[place] = np.isinf(np.delete(found.stays, found.number)).any()
     tried = np.array(depths, dtype=np.float64), np.array(agitations, dtype=np.float64)
     row, column = np.unravel_index(right.argmax(), shape)
     again = at(float(tried[0][row]), float(tried[1][column]), seed + 1, 4, progress)
-    return TrayDesign(read, passes, *tried, right, interval, empty, wrong, again)
+    return TrayDesign(read, passes, *tried, right, interval, empty, wrong, held, again)
 
 
 def _with(scene: Scene, depth: float, agitation: float) -> Scene:

@@ -46,6 +46,17 @@ def filmed(
     ------
     AnswerError
         As `limitsets.tray`.
+
+    Examples
+    --------
+    >>> import limitsets as ls
+    >>> tray = {"depression_width": "7.02 in", "depression_depth": "1.53 in", "pitch": "14.04 in",
+    ...         "agitation": "1 in", "wash": "1 in"}
+    >>> tables = {"tray": tray, "world": {"friction": 0.3, "restitution": 0.3}, "effects": {"contact": True}}
+    >>> scene = ls.load({**ls.load("paper-designed").as_dict(), **tables})
+    >>> kept = filmed(scene, passes=2)
+    >>> kept.poses.shape[1] in (1, 2), kept.outlines[0].shape
+    (True, (3, 2))
     """
     if passes < 1:
         raise AnswerError("the passes", passes, "1 or more", "film some")

@@ -152,7 +152,7 @@ def histories(
         Of all draws.
     returning : bool
         Whether a part that missed comes by again, kicked and washed on from where it lies: the next depression is equal
-        to this one.  Else each pass has a part of its own.
+        to this one.  Else each pass has a part of its own, as it has after a capture or a part that lies on no side.
     executor, progress
         As in `limitsets.tray`.
     """

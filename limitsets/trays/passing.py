@@ -11,6 +11,7 @@ import numpy as np
 from limitsets.engine.depression import Motion, Plate, Pose, fall_speed
 from limitsets.errors import AnswerError
 from limitsets.files import as_table
+from limitsets.scene.tray import heights_over_sides
 
 if TYPE_CHECKING:
     from limitsets.scene import Scene, Tray
@@ -121,12 +122,17 @@ def passes_of(scene: Scene, side: int | None, step: float) -> Passes:
     wanted = getattr(scene.goal, "side", None) if side is None else side
     if wanted is None or not 0 <= wanted < len(scene.sides):
         allowed = f"0 to {len(scene.sides) - 1}"
-        remedy = "pass side=, or give the scene a goal with a side"
+        remedy = "pass side= (--side), or give the scene a goal with a side"
         raise refuse("the side wanted", wanted, allowed, remedy, "goal")
     if tray.depression_width < scene.sides.length[wanted]:
         allowed = f"at least {scene.sides.length[wanted]:.6g} {scene.unit}, the length of side {wanted}"
         remedy = "the part cannot lie in it: widen it"
         raise refuse("the width", tray.depression_width, allowed, remedy, "tray.depression_width")
+    height = heights_over_sides([(float(x), float(y)) for x, y in scene.vertices])[wanted]
+    if tray.depression_depth >= height:
+        allowed = f"below {height:.6g} {scene.unit}, the height of the part on side {wanted}"
+        remedy = "the depression is deeper than the part, and nothing would pop out: make it less deep"
+        raise refuse("the depth", tray.depression_depth, allowed, remedy, "tray.depression_depth")
     if not 0.0 < step <= 0.02:
         raise AnswerError("the engine's step", step, "above 0 and at most 0.02", "pass step=4e-3")
     friction, restitution = float(facts["friction"] or 0.0), float(facts["restitution"] or 0.0)

@@ -15,6 +15,7 @@ import numpy as np
 
 import limitsets as ls
 from limitsets.engine.depression import UNFINISHED
+from limitsets.files import as_json
 from limitsets.robust.noise.proportions import binomial_interval
 from limitsets.trays import TrayDesign, TrayFill, tray_design
 from limitsets.trays.histories import Histories
@@ -119,6 +120,7 @@ def main(
         best = designed(seed, max(drops // 16, 10), max(drops // 8, 10))
         ls.plot.tray_design(best).savefig(out / "design.png", dpi=130)
         numbers["design"] = best.to_json() | {"confirmed": best.confirmed.filled.to_json()}
+        (out / "design.json").write_text(as_json(numbers["design"]), encoding="utf-8")
     return numbers
 
 

@@ -7,6 +7,7 @@ import math
 from typing import Any
 
 import numpy as np
+import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
@@ -79,6 +80,7 @@ def check_throws(scene: ls.scene.Scene) -> None:
             assert ((path.side >= 0) & (path.side < len(scene.sides))).all()
 
 
+@pytest.mark.sweep
 @settings(max_examples=30, suppress_health_check=[HealthCheck.too_slow, HealthCheck.filter_too_much])
 @given(scenes())
 def test_an_answer_or_an_error(table: dict[str, Any]) -> None:

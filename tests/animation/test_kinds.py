@@ -107,7 +107,9 @@ def test_a_recording_keeps_its_poses_and_says_what_happened():
     assert film.poses[:21] == pytest.approx(kept.poses, nan_ok=True)
     assert film.notes[film.note[0]] == "part 1: thrown, part 2: thrown"
     assert film.notes[film.note[-1]] == "part 1: rest, part 2: lost"
-    assert film.captions[film.caption[-1]] == "Throw 1"
+    assert (
+        film.captions[film.caption[-1]] == film.captions[film.caption[0]] == "Throw 1"
+    )  # released in the first
 
 
 @pytest.mark.parametrize(
@@ -130,6 +132,13 @@ def test_a_recording_keeps_its_poses_and_says_what_happened():
 def test_what_cannot_be_shown_is_refused(asked, words):
     with pytest.raises(AnswerError, match=words):
         film_of("paper-designed", **asked)
+
+
+def test_marks_of_a_throw_go_when_the_next_one_begins():
+    film = film_of("paper-designed", start=(15.0, 2), throws=2)
+    impacts = [mark for mark in film.marks if mark.word == "impact"]
+    assert [mark.until for mark in impacts] == [film.rests[1].begin, film.frames]
+    assert impacts[0].frame < film.rests[0].frame < film.rests[1].begin < impacts[1].frame
 
 
 def test_nothing_else_can_be_shown(tmp_path):
@@ -158,6 +167,17 @@ def test_a_pair_in_contact_swings_with_the_arm_and_keeps_the_engine_s_poses():
         over = math.sin(angle) * corners[:, 0] + math.cos(angle) * corners[:, 1] - height
         assert sorted(over)[:2] == pytest.approx([0.0, 0.0], abs=1e-3)  # the engine's own overlap
     assert min(film.arm) == pytest.approx(-math.radians(12.0))
+
+
+def test_many_parts_on_a_tray_are_shown_kick_by_kick():
+    found = ls.tray(with_tray(), passes=1, drops=20, kicks=20, parts=3, depressions=2, batches=1, step=8e-3)
+    film = film_of(found, throws=3)
+    assert film.title == "paper-designed, 3 parts a pass over 2 depressions"
+    assert [caption for caption in film.captions if caption.startswith("Kick")] == ["Kick 1", "Kick 2"]
+    # the first pass has no kick, there is nothing to throw; 3 parts and more are on the tray in the last one
+    seen = np.isfinite(film.poses[..., 0]).sum(axis=1)
+    assert seen.max() >= 3
+    assert seen[-1] >= 3
 
 
 def test_a_tray_shows_its_passes():

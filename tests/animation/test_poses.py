@@ -7,8 +7,8 @@ import pytest
 
 import limitsets as ls
 from limitsets.animation import film_of
-from limitsets.animation.throwing import motion, throws_of
 from limitsets.plot.poses import about_centre, turned
+from limitsets.plot.throwing import motion, throws_of
 from limitsets.thrower import trace
 
 ROLLING = {"effects": {"landing": True, "roll": True}}

@@ -9,6 +9,7 @@ from scipy.stats import binomtest
 
 import limitsets as ls
 from limitsets.assembly.counting import joint_of
+from limitsets.assembly.drawing import Draws
 from limitsets.assembly.outlines import TOLERANCE, meet, way_of
 from limitsets.assembly.pairing import at_rest, outline_at, pair_of
 from limitsets.assembly.passing import pass_through
@@ -16,6 +17,7 @@ from limitsets.engine.overlaps import depth_of_overlap
 from limitsets.feeding.falling import arm_end_of
 from limitsets.feeding.trials import run_trials
 from limitsets.maps import images
+from limitsets.robust import Gaussian, Scattering, Uniform
 from limitsets.thrower import trace
 from tests.assembly.pairs import NAMES, NOISE
 
@@ -64,6 +66,12 @@ def test_the_error_of_multiplying():
     assert alone.error_interval[0] < 0.0 < alone.error_interval[1]
 
 
+def test_serial_feeding_holds_both_rates_at_once():
+    """Of n right feeds of n the least rate is (alpha/2)^(1/n); two intervals of 97.5 % both hold at 95 %."""
+    joint = joint_of([{"fates": ("right", "right")}] * 20)
+    assert joint.serial == pytest.approx((0.0125 ** (2 / 20), 1.0), rel=1e-9)
+
+
 @pytest.mark.parametrize("name", [*NAMES, "paper-designed", "paper-initial"])
 def test_a_way_ends_where_the_map_lets_the_part_rest(name):
     """Flight and turning about the struck corner, integrated here, end at the place that the map's formulas give."""
@@ -110,6 +118,61 @@ def test_ways_meet_where_many_looks_say_so():
             assert not meet(*ways)
         seen[deepest > 0.0] += 1
     assert min(seen.values()) >= 5
+
+
+def test_a_trial_says_in_which_throw_the_outlines_meet():
+    """One start of parts that meet in the second throw, by many looks at each throw; one of parts that never do."""
+    scenes, still = [ls.load(name) for name in NAMES], pair_of(*NAMES, Scattering())
+    for starts, throw in ((((8.0, 2), (17.0, 1)), 2), (((5.0, 2), (16.0, 1)), 0)):
+        found = pass_through(still, 0, 0, starts=starts)
+        assert not found.overlap_at_start
+        last, states, deepest = min(found.throws), list(starts), []
+        for _ in range(throw or last):
+            after = [images(scene.map, [x], side) for scene, (x, side) in zip(scenes, states, strict=True)]
+            sides = [int(each.side[0]) for each in after]
+            ways = [
+                way_of(scene, scene.map, *each) for scene, *each in zip(scenes, states, sides, strict=True)
+            ]
+            times = np.linspace(0.0, max(way.ends for way in ways), 800).tolist()
+            deepest.append(max(depth_of_overlap(*(way.corners(time) for way in ways)) for time in times))
+            states = [(float(each.x[0]), side) for each, side in zip(after, sides, strict=True)]
+        assert [depth > 0.0 for depth in deepest] == [False] * (len(deepest) - bool(throw)) + [True] * bool(
+            throw
+        )
+        assert found.overlap_in_flight == throw
+        assert found.overlaps == bool(throw)
+
+
+@pytest.mark.parametrize("deviation", [0.04, -0.02])
+def test_a_faster_throw_is_one_with_less_kappa(monkeypatch, deviation):
+    """kappa = g/w^2, for both parts at once: noise that is the same at every throw is another scene without noise."""
+    starts, by = ((5.0, 2), (16.0, 1)), {}
+    for name, factor in (
+        ("noise", 1.0),
+        ("scene", (1.0 + deviation) ** -2),
+        ("inverse", (1.0 + deviation) ** 2),
+    ):
+        scenes = [ls.load(each) for each in NAMES]
+        scenes = [each.with_values({"throw.kappa": each.kappa * factor}) for each in scenes]
+        with monkeypatch.context() as patched:
+            speed = deviation if name == "noise" else 0.0
+            patched.setattr(Draws, "throw", lambda _, speed=speed: (speed, (0.0, 0.0)))
+            by[name] = pass_through(pair_of(*scenes, Scattering()), 0, 0, starts=starts)
+    assert by["noise"] == by["scene"]
+    assert by["noise"].throws != by["inverse"].throws
+
+
+@pytest.mark.parametrize(("law", "deviation"), [(Gaussian, 1.0), (Uniform, 3.0**-0.5)])
+def test_a_throw_draws_a_speed_and_two_landings_by_the_laws(law, deviation):
+    noise = Scattering(speed=law(0.005), landing=law(0.02))
+    draws = Draws(pair_of(*NAMES, noise), 0, 0)
+    rows = np.array([(speed, *landing) for speed, landing in (draws.throw() for _ in range(6000))])
+    rows /= np.array([0.005, 0.02, 0.02]) * deviation
+    assert rows.mean(axis=0) == pytest.approx(np.zeros(3), abs=5 / np.sqrt(6000))
+    assert rows.std(axis=0) == pytest.approx(np.ones(3), abs=5 / np.sqrt(2 * 6000))
+    assert np.corrcoef(rows.T) == pytest.approx(np.eye(3), abs=5 / np.sqrt(6000))
+    if law is Uniform:
+        assert np.abs(rows).max() <= 3.0**0.5
 
 
 def test_an_outline_has_its_centre_of_mass_where_it_is_said():

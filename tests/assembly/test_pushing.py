@@ -9,8 +9,11 @@ import limitsets as ls
 from limitsets.assembly.assembly_run import OUTCOMES
 from limitsets.assembly.pairing import are_apart, pair_of
 from limitsets.assembly.pushing import Question, _Watched, crowd_of, push
+from limitsets.engine.overlaps import depth_of_overlap
+from limitsets.engine.rests import Rest
 from limitsets.engine.seats import seat_of
 from tests.assembly.pairs import NOISE, pair
+from tests.feeding.scenes import with_cavity
 
 pytest.importorskip("pymunk")
 TRIALS = 24
@@ -54,6 +57,21 @@ def test_the_seats_are_those_of_the_paper_s_sizes(joined):
     assert above[:, 1].max() < one.surface_height  # it does not stand out
 
 
+def test_what_points_at_a_part_that_slides_down_stops_it_at_its_side():
+    """A spike that meets the part's leading side between two corners: the part touches it, and slides no farther."""
+    scene = with_cavity()
+    free, slope = seat_of(scene, 2), scene.cavity.angle
+    down = np.array([math.cos(slope), -math.sin(slope)])
+    spike = np.array([[27.5, -4.2], [28.9, -4.3], [28.9, -4.1]])
+    seat = seat_of(scene, 2, [spike])
+    moved = (free - seat) @ down
+    assert moved == pytest.approx(np.full(3, moved[0]))
+    assert free - seat == pytest.approx(np.outer(moved, down), abs=1e-9)
+    assert moved[0] > 1.0
+    assert depth_of_overlap(seat.tolist(), spike.tolist()) == pytest.approx(0.0, abs=1e-9)
+    assert depth_of_overlap((seat + 0.1 * down).tolist(), spike.tolist()) > 0.05
+
+
 def test_parts_let_go_in_their_seats_stay_there_and_survive(joined):
     crowd = crowd_of(joined, Question())
     for number, pose in enumerate(seated(joined)):
@@ -88,6 +106,30 @@ def test_a_part_that_comes_out_is_ejected(joined):
     rests = crowd.rests()
     watched.seen(2, rests)
     assert watched.outcome(rests) == "ejected"
+
+
+def lying(number, where, side):
+    return Rest(number, where, 25.0, side, (25.0, -3.0, 0.0), ())
+
+
+@pytest.mark.parametrize(
+    ("first", "second", "word"),
+    [
+        ((("cavity", 2), ("unfinished", -1)), (("arm", 1), ("unfinished", -1)), "unfinished"),
+        ((("cavity", 2), ("arm", 2)), (("arm", 1), ("cavity", 0)), "ejected"),
+        ((("arm", 2), ("cavity", 2)), (("cavity", 1), ("cavity", 1)), "order"),
+        ((("arm", 2), ("arm", 2)), (("arm", 1), ("arm", 1)), "never"),
+        ((("arm", 2), ("cavity", 2)), (("arm", 1), ("lost", -1)), "left"),
+        ((("arm", 2), ("cavity", 2)), (("cavity", 1), ("lost", -1)), "ejected"),
+    ],
+)
+def test_a_trial_is_called_after_what_is_seen(joined, first, second, word):
+    """Where, and on which side, both parts are after two throws; a part that moves in the cavity has not come out."""
+    watched = _Watched(joined, crowd_of(joined, Question()))
+    for throw in (1, 2):
+        rests = [lying(number, *each[throw - 1]) for number, each in enumerate((first, second))]
+        watched.seen(throw, rests)
+    assert watched.outcome(rests) == word
 
 
 def test_trials_end_in_words_and_start_apart(found, joined):

@@ -7,6 +7,7 @@ import subprocess
 import sys
 import time
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
+from dataclasses import replace
 
 import pytest
 
@@ -119,7 +120,7 @@ def test_what_cannot_be():
         ls.assemble(NAMES[0], two.with_values({"throw.kappa": 24.0}), trials=1)
     with pytest.raises(AnswerError, match="surface_height of the two scenes"):
         ls.assemble(NAMES[0], two.with_values({"arm.surface_height": -0.4}), trials=1)
-    trees = [ls.load(name).as_dict() for name in NAMES]
+    trees = both()
     for tree in trees:
         del tree["cavity"]
     with pytest.raises(AnswerError, match="cavity"):
@@ -132,10 +133,51 @@ def test_what_cannot_be():
         ls.assemble(*pair(contact=True), contact="glue", trials=1)
     with pytest.raises(AnswerError, match="the trials"):
         ls.assemble(*NAMES, trials=0)
+    with pytest.raises(AnswerError, match=r"the seed is -1; allowed: a whole number from 0"):
+        ls.assemble(*NAMES, trials=1, seed=-1)
+    energy = [ls.load({**tree, "model": {"flight": "exact", "flip": "energy"}}) for tree in both()]
+    with pytest.raises(AnswerError, match="the flip of paper-triangle"):
+        ls.assemble(*energy, trials=1)
+
+
+def both():
+    return [ls.load(name).as_dict() for name in NAMES]
+
+
+def test_parts_that_do_not_fit_one_on_the_other_are_named(capfd, tmp_path):
+    """Two triangles: the second's side 2 lies on the ramp beyond the first, which fills it down to the wall."""
+    one = both()[0]
+    deep = {**one, "cavity": {**one["cavity"], "width": "7 in", "depth": "4.4 in"}}
+    ls.dump(ls.load(deep), tmp_path / "deep.toml")
+    found = ls.assemble(deep, deep, trials=1)
+    assert found.misfit.startswith("the part on side 2 in the cavity: standing out by")
+    _, out, _ = run(capfd, "assemble", *[str(tmp_path / "deep.toml")] * 2, "--trials", "1")
+    assert "THEY DO NOT FIT: the part on side 2" in out
+    deep["effects"] = {"contact": True}
+    with pytest.raises(AnswerError, match="standing out by"):
+        ls.assemble(deep, deep, trials=1)
+
+
+def test_a_film_is_of_a_trial_that_was_made():
+    pytest.importorskip("pymunk")
+    found = ls.assemble(*pair(contact=True), NOISE, trials=1)
+    for number in (1, -1):
+        with pytest.raises(AnswerError, match="the trial is"):
+            found.film(number)
+
+
+def test_the_first_series_is_of_twenty_or_of_all_there_are(whole):
+    found = ls.assemble(*NAMES, NOISE, trials=COUNT, seed=8)
+    words = [row["outcome"] for row in whole]
+    for made in (12, COUNT):
+        fewer = replace(found, rows=found.rows[:made])
+        first = words[: min(made, 20)]
+        assert fewer.to_json()["first_series"] == {"of": len(first), "assembled": first.count("assembled")}
+    assert "assembled" in words[20:]
 
 
 KEYS = {
-    "scenes", "unit", "contact", "carried", "overlaps", "trials", "seed", "scatter", "counts", "assembled",
+    "scenes", "unit", "contact", "carried", "misfit", "overlaps", "trials", "seed", "scatter", "counts", "assembled",
     "first_series", "joint", "survived", "paper",
 }  # fmt: skip
 
@@ -147,6 +189,7 @@ def test_json_and_the_command(capfd, tmp_path):
     assert code == 0
     assert set(found) == KEYS
     assert found["contact"] == "none"
+    assert found["misfit"] is None
     assert set(found["overlaps"]) == {"ever", "at_start", "at_rest", "in_flight"}
     assert set(found["assembled"]) == {"count", "of", "share", "interval"}
     assert set(found["joint"]) == {
@@ -159,6 +202,7 @@ def test_json_and_the_command(capfd, tmp_path):
     assert code == 0
     assert "the outlines overlap in" in out.splitlines()[1]  # reported first
     assert "one part after the other, or two arms" in out
+    assert f"{found['first_series']['assembled']} assembled in the first 12 trials" in out
     code, _, err = run(capfd, "assemble", NAMES[0], "paper-designed")
     assert code == 2
     assert err.count("\n") == 1

@@ -61,3 +61,12 @@ def test_sets_of_different_grids_do_not_mix():
         CellSet.of(COVER, [0]) | other
     with pytest.raises(GridError, match="16 booleans"):
         CellSet(COVER, np.zeros(3, dtype=bool))
+
+
+def test_ranges_along_every_axis():
+    """Cells 1 and 14 of 4 by 4 on [0, 1] x [0, 4] are (0, 1) and (3, 2), the last axis counting fastest."""
+    cells = CellSet.of(ls.grid([(0.0, 1.0), (0.0, 4.0)], cells=4), [1, 14])
+    assert cells.extents() == cells.extents(axis=0) == {0: [(0.0, 0.25), (0.75, 1.0)]}
+    assert cells.extents(axis=1) == {0: [(1.0, 3.0)]}
+    with pytest.raises(GridError, match="the axis"):
+        cells.extents(axis=2)

@@ -69,6 +69,9 @@ def test_a_tray_and_a_pair_that_cannot_be_filmed(capfd):
     code, _, _ = run(capfd, "animate", "tray.toml", "--tray", "--throws", "3", "-o", "tray.html")
     assert code == 0
     assert "one depression of a tray" in Path("tray.html").read_text(encoding="utf-8")
+    code, _, err = run(capfd, "animate", "tray.toml", "--parts", "2", "-o", "tray.html")
+    assert code == 2
+    assert "with --tray" in err
     code, _, err = run(
         capfd, "animate", "paper-triangle", "--assemble", "paper-quadrilateral", "-o", "pair.html"
     )

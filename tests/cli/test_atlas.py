@@ -20,7 +20,7 @@ def test_the_designed_critical_points_in_every_form(capfd, tmp_path):
     assert record["axes"] == [{"name": "throw.kappa", "unit": "in", "values": [25.3778518, 27.0]}]
     assert record["variables"]["critical_point"]["values"][0] == pytest.approx([10, 10, 20], abs=1e-6)
     rows = list(csv.DictReader((tmp_path / "a.csv").read_text(encoding="utf-8").splitlines()))
-    assert [float(row["throw.kappa"]) for row in rows] == [25.3778518, 27.0]
+    assert [float(row["throw.kappa [in]"]) for row in rows] == [25.3778518, 27.0]
     assert float(rows[0]["critical_point[2]"]) == record["variables"]["critical_point"]["values"][0][2]
     assert (tmp_path / "paper-designed-atlas.zarr" / "zarr.json").is_file()
     code, out, err = run(capfd, "atlas", "paper-designed", *KAPPA, "--task", TASK)

@@ -34,7 +34,7 @@ def test_files(capfd):
     assert code == 0
     assert out.splitlines()[-1] == "report: deep/down/audit.md"
     folder = Path("deep/down")
-    assert {path.name for path in folder.iterdir()} == {"audit.md", "audit.json", "audit.png"}
+    assert {path.name for path in folder.iterdir()} == {"audit.md", "audit.json", "part.png", "audit.png"}
     assert (folder / "audit.png").read_bytes().startswith(b"\x89PNG")
     page = (folder / "audit.md").read_text(encoding="utf-8")
     assert "(audit.png)" in page

@@ -140,12 +140,12 @@ def test_throw(capfd):
 
 
 def test_throw_ends_at_the_first_exit(capfd):
-    _, out, _ = run(capfd, "throw", "paper-designed", "--x", "-3", "--side", "2", "--count", "9", "--json")
+    _, out, _ = run(capfd, "throw", "paper-designed", "--x", "3", "--side", "2", "--count", "9", "--json")
     (record,) = json.loads(out)
     assert record == {
-        "x": -3.0, "side": 2, "status": "outside-model", "phi": None, "displacement": None, "sides_turned": 0,
+        "x": 3.0, "side": 2, "status": "outside-model", "phi": None, "displacement": None, "sides_turned": 0,
         "other_vertex_first": False,
-        "reason": "R <= a: no part rests on side 2 with its centre of mass at x = -3, for a = 4.22558",
+        "reason": "R <= a: no part rests on side 2 with its centre of mass at x = 3, for a = 4.22558",
     }  # fmt: skip
     scene = ls.load("paper-designed").with_values({"arm.surface_height": -3.0})
     ls.dump(scene, "high.toml")
@@ -306,7 +306,7 @@ def test_no_progress_is_printed_after_the_command(monkeypatch):
             time.sleep(0.1)
             return super().write(text)
 
-    monkeypatch.setattr(output, "PATIENCE", 0.0)
+    monkeypatch.setattr("limitsets.progress.PATIENCE", 0.0)
     monkeypatch.setattr(sys, "stderr", Slow())
     with output.progress() as tell:
         tell("throwing", 0, 1)

@@ -35,6 +35,7 @@ def test_a_search_writes_scene_answer_and_figure(here, capfd):
         "paper-designed-robust.toml",
         "design.json",
         "front.png",
+        "part.png",
     }
     again = ls.load(Path("found") / "paper-designed-robust.toml")
     assert again.value("throw.kappa") == record["values"]["throw.kappa"]

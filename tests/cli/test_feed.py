@@ -24,7 +24,7 @@ def test_words_files_and_exit(capfd):
     assert "the arm ends at x = 20 in, side 2 is wanted" in out
     assert "safety: PROVED" in out
     assert "within 786 throws" in out
-    assert {path.name for path in Path("fed").iterdir()} == {"feeding.json", "feeding.png"}
+    assert {path.name for path in Path("fed").iterdir()} == {"feeding.json", "part.png", "feeding.png"}
     assert json.loads(Path("fed/feeding.json").read_text())["scene"] == "paper-designed"
 
 

@@ -72,12 +72,17 @@ def test_a_table_and_files(capfd, throws):
     )
     code, out, _ = run(capfd, *words)
     assert code == 0
-    assert {path.name for path in Path("out").iterdir()} == {"fitted.toml", "fit.json", "residuals.png"}
+    assert {path.name for path in Path("out").iterdir()} == {
+        "fitted.toml",
+        "fit.json",
+        "part.png",
+        "residuals.png",
+    }
     rows = list(csv.DictReader(Path("t.csv").read_text(encoding="utf-8").splitlines()))
     speed = rows[0]
     assert speed["quantity"] == "throw.speed"
     wanted = np.sqrt(193.045 / TRUTH["throw.kappa"])
-    assert float(speed["lo"]) < wanted < float(speed["hi"])
+    assert float(speed["95 % interval low"]) < wanted < float(speed["95 % interval high"])
     assert "film next: throws from x = " in out
     assert "is recorded as" in out
     again = ls.load("out/fitted.toml")

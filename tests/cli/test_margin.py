@@ -60,7 +60,12 @@ def test_json_and_files_that_recheck_accepts(capfd):
     assert record["counterexample"][-1]["side"] != 2
     assert record["counterexample"][-1]["between"][0] > 20.0
     folder = Path("deep/down")
-    assert {path.name for path in folder.iterdir()} == {*record["certificate"], "margins.json", "margins.png"}
+    assert {path.name for path in folder.iterdir()} == {
+        *record["certificate"],
+        "margins.json",
+        "part.png",
+        "margins.png",
+    }
     assert json.loads((folder / "margins.json").read_text(encoding="utf-8")) == [record]
     for name in record["certificate"]:
         code, out, _ = run(capfd, "recheck", str(folder / name))

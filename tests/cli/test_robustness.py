@@ -43,7 +43,9 @@ def test_report_and_files(capfd):
     folder = Path("sheet")
     page = (folder / "report.md").read_text(encoding="utf-8")
     figures = set(re.findall(r"\]\((\S+\.png)\)", page))
-    assert figures == {f"{kind}.png" for kind in ("margins", "counterexample", "density", "throws", "levels")}
+    assert figures == {
+        f"{kind}.png" for kind in ("part", "margins", "counterexample", "density", "throws", "levels")
+    }
     assert {path.name for path in folder.iterdir()} == {
         *figures,
         "report.md",

@@ -45,10 +45,10 @@ def test_words_files_and_table(capfd):
     assert "2 histories with parts that return" in out
     assert {path.name for path in Path("out").iterdir()} == {"tray.json", "tray.png"}
     rows = list(csv.reader(Path("filled.csv").read_text().splitlines()))
-    assert rows[0] == ["passes", "right", "low", "high"]
+    assert rows[0] == ["passes", "filled rightly", "95 % interval low", "95 % interval high"]
     assert [int(row[0]) for row in rows[1:]] == list(range(13))
     record = json.loads(Path("out/tray.json").read_text())
-    assert [float(row[1]) for row in rows[1:]] == pytest.approx(record["filled"]["right"], abs=1e-9)
+    assert [float(row[1]) for row in rows[1:]] == record["filled"]["right"]
 
 
 def test_json_has_the_keys_of_the_page(capfd):
@@ -63,6 +63,34 @@ def test_json_has_the_keys_of_the_page(capfd):
     assert [each["returning"] for each in record["histories"]] == [False, True]
 
 
+def test_many_parts_at_once(capfd):
+    words = ("--parts", "3", "--depressions", "2", "--batches", "2", "--file", "kept.json")
+    code, out, _ = run(
+        capfd, "tray", "tray.toml", *FEW, "--passes", "3", *words, "-o", "out", "--csv", "f.csv"
+    )
+    assert code == 0
+    for words in ("3 parts at once over 2 depressions, after 3 passes", "pushing", "passing through"):
+        assert words in out
+    assert "by the chain, of as many parts one by one" in out
+    record = json.loads(Path("out/tray.json").read_text())
+    assert [each["between"] for each in record["crowds"]] == [True, False]
+    row = PAGE.split("## tray\n", 1)[1].split("| `crowds` |", 1)[1].split("\n", 1)[0]
+    keys = re.search(r"`\{([^}]*seconds_per_part_and_pass)\}`", row)[1]
+    for each in record["crowds"]:
+        assert set(each) == set(keys.split(", "))
+        for name in ("right", "covered", "wrong"):
+            assert len(each[name]["value"]) == len(each[name]["interval"]) == 4
+    assert set(record["crowd_chain"]) == set(record["filled"])
+    rows = list(csv.DictReader(Path("f.csv").read_text().splitlines()))
+    for name, each in zip(("pushing", "passing through"), record["crowds"], strict=True):
+        shares = [float(row[f"filled rightly, {name}"]) for row in rows]
+        assert shares == pytest.approx(each["right"]["value"])
+        lows = [float(row[f"95 % interval, {name} low"]) for row in rows]
+        assert lows == pytest.approx([low for low, _ in each["right"]["interval"]])
+    # the same command goes on from the file: nothing is left to do
+    assert len(json.loads(Path("kept.json").read_text())["trials"]) == 2
+
+
 @pytest.mark.sweep
 def test_depths_and_agitations(capfd):
     words = ("--depths", "0.8:1.6:2", "--agitations", "0.4:0.8 in:2")
@@ -73,7 +101,7 @@ def test_depths_and_agitations(capfd):
     assert (record["depths"], record["agitations"]) == ([0.8, 1.6], [0.4, 0.8])
     assert {path.name for path in Path("out").iterdir()} == {"design.json", "design.png"}
     rows = list(csv.DictReader(Path("grid.csv").read_text().splitlines()))
-    assert [float(row["right"]) for row in rows] == pytest.approx(
+    assert [float(row["filled rightly"]) for row in rows] == pytest.approx(
         [share for shares in record["right"] for share in shares], abs=1e-9
     )
     code, out, _ = run(capfd, "tray", "tray.toml", *FEW, "--depths", "1:2:2")

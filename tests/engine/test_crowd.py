@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 import limitsets as ls
-from limitsets.engine import Crowd, off_seat, seat_of
+from limitsets.engine import Crowd, Rest, off_seat, seat_of
+from limitsets.engine.filming import Film
 from limitsets.engine.overlaps import depth_of_overlap
 from limitsets.engine.stage import OVERLAP
 from limitsets.errors import AnswerError
@@ -225,6 +226,26 @@ def test_a_part_beyond_the_end_falls_into_its_seat():
     assert rest.met == ("arm", "ramp", "wall")
 
 
+def test_a_part_balanced_over_the_end_is_beyond_it():
+    """Its centre of mass is past the end by so little that it stands longer than the engine waits."""
+    for x, where in ((20.0 + 1e-9, "beyond"), (20.0, "arm")):
+        crowd = Crowd([FED], friction=1.0)
+        crowd.place(0, x, 2)
+        (rest,) = crowd.settle()
+        assert (rest.where, rest.side) == (where, 2)
+
+
+def test_a_part_in_motion_in_the_cavity_is_not_marked_as_ejected():
+    film = Film(True, 1.0, [])
+    for where in ("cavity", "unfinished", "cavity", "arm"):
+        film.end(1.0, [Rest(0, where, 25.0, -1, (25.0, -3.0, 0.0), ())])
+    assert [(at, word) for at, _, word in film.marks] == [
+        (1.0, "in the cavity"),
+        (4.0, "ejected"),
+        (4.0, "rest"),
+    ]
+
+
 @pytest.mark.parametrize("beyond", [0.05, 0.4, 1.2])
 def test_it_tips_in_the_time_that_the_pendulum_takes(beyond):
     """The integral of docs/feeding.md; the end of the arm holds by much friction, and a frame is 0.015 s."""
@@ -301,6 +322,8 @@ def test_parts_that_overlap_at_the_start_are_refused():
     crowd.place(0, 10.0, 2)
     with pytest.raises(AnswerError, match="parts 0 and 1 is 'overlapping'"):
         crowd.place(1, 12.0, 2)
+    with pytest.raises(AnswerError, match="overlapping"):
+        crowd.place(1, 10.0 + 6.75 - 0.05, 2)  # corner in corner: the engine would throw them apart
     crowd.place(1, 10.0 + 6.75, 2)
 
 
@@ -318,7 +341,8 @@ def test_a_cavity_that_does_not_take_the_part():
         ([DESIGNED, INITIAL], {"friction": 1.0}, "kappa of the scenes"),
         ([DESIGNED, FED], {"friction": 1.0}, "cavity of the scenes"),
         ([DESIGNED], {}, "world.friction"),
-        ([DESIGNED], {"friction": -1.0}, "numbers from 0"),
+        ([DESIGNED], {"friction": -1.0}, "friction on the arm is -1.0"),
+        ([DESIGNED], {"friction": 1.0, "sliding": math.inf}, "friction elsewhere is inf"),
         ([DESIGNED], {"friction": 1.0, "contact": "glue"}, "'hinge' or 'unilateral'"),
         ([DESIGNED], {"friction": 1.0, "restitution": 2.0}, "0 to 1"),
         ([DESIGNED], {"friction": 1.0, "step": 0.1}, "at most 0.05"),

@@ -119,6 +119,18 @@ def test_half_the_step_changes_hardly_any_rest():
     assert differ <= 6
 
 
+def test_a_part_that_hangs_level_between_the_edges_is_not_on_the_floor():
+    """A trapezoid 2 wide below and 4 above, 3 high, is 3 wide at half its height: it hangs 1.5 deep in a gap of 3."""
+    corners = [["0 in", "0 in"], ["2 in", "0 in"], ["3 in", "3 in"], ["-1 in", "3 in"]]
+    mass = {"center": {"side": 0, "along": "1 in", "above": "1.5 in"}, "radius_of_gyration": "1.1 in"}
+    tree = {**PART.as_dict(), "part": {"vertices": corners, "mass": mass}}
+    del tree["goal"]
+    hung = replace(plate(restitution=0.0, width=3.0, depth=2.5), part=ls.load(tree))
+    rest = hung.settle(hung.lowered(0.0, 0.0, -1.4), STILL)
+    assert rest.pose.y == pytest.approx(0.0, abs=0.01)
+    assert rest.state in (5, 6)  # it leans, one of its lower corners lowest; on the floor it would be 1
+
+
 def test_a_part_straight_up_and_down_stays_as_it_was():
     flat = plate()
     for speed in (0.5, 2.0, 4.0):

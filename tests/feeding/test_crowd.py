@@ -1,6 +1,8 @@
 """Many parts at once: against the trials of single parts, from the same law of starts and noise."""
 
 import json
+import pickle
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
 import numpy as np
@@ -8,8 +10,9 @@ import pytest
 from scipy.stats import binomtest, norm
 
 import limitsets as ls
+from limitsets.engine import Crowd
 from limitsets.errors import AnswerError
-from limitsets.feeding.crowd import run_crowd
+from limitsets.feeding.crowd import _Batch, run_crowd
 from limitsets.feeding.falling import FATES, arm_end_of
 from limitsets.feeding.trials import run_trials
 from limitsets.files import as_json
@@ -53,6 +56,18 @@ def test_parts_that_pass_through_each_other_do_too():
     assert_alike(found, run_trials(end, NOISE, 20_000, seed=3), throws=False)
 
 
+def test_batches_are_the_same_whoever_throws_them():
+    end = arm_end_of(scene())
+    how = {"batches": 3, "seed": 1, "throws": 10}
+    here = run_crowd(end, NOISE, 2, **how)
+    with ThreadPoolExecutor(2) as threads:
+        spread = run_crowd(end, NOISE, 2, **how, executor=threads)
+    told = [each.to_json() | {"seconds_per_part_and_throw": 0.0} for each in (here, spread)]
+    assert told[0] == told[1]
+    assert (here.fates == spread.fates).all()
+    assert len(pickle.dumps(end)) > 0  # processes are sent it
+
+
 @pytest.mark.sweep
 def test_parts_that_push_each_other_are_counted_and_come_out_alike_again():
     end = arm_end_of(scene())
@@ -73,6 +88,31 @@ def test_more_parts_than_find_a_place_are_dropped_and_some_spill():
     assert found.spilled[0] > 5
     assert found.fates.sum() + found.spilled[0] == 30
     assert found.throws.tolist() == [5]
+
+
+def test_the_lowest_part_is_taken_out_first_and_the_next_slides_down():
+    """Two of the same side, one on top of the other: alone each falls in rightly, so both do."""
+    fed = scene()
+    crowd = Crowd([fed] * 2)
+    for number in (0, 1):
+        crowd.place(number, 21.0, 2)
+        rests = crowd.settle()
+    assert [rest.where for rest in rests] == ["cavity", "cavity"]
+    assert [rest.side for rest in rests] == [2, -1]  # the second lies on the first
+    batch = _Batch(crowd, arm_end_of(fed), np.random.default_rng(0))
+    batch._take_out(rests)
+    assert batch.fates() == [2, 0, 0, 0, 0]
+
+
+@pytest.mark.parametrize(("off", "fate"), [(-0.01, "left"), (0.01, "never")])
+def test_a_part_that_rests_at_a_or_nearer_to_the_joint_has_left(off, fate):
+    """Side 2 of paper-designed has a = 4.22558 in: no throw lifts the left corner of a part that rests there."""
+    fed = scene()
+    crowd = Crowd([fed])
+    crowd.drop(0, (4.22558 + off, fed.surface_height + fed.sides.d[2], crowd.members[0].flat[2]))
+    batch = _Batch(crowd, arm_end_of(fed), np.random.default_rng(0))
+    batch._take_out(crowd.settle())
+    assert batch.fates()[FATES.index(fate)] == 1
 
 
 def test_rates_count_right_feeds_per_throw():

@@ -200,6 +200,7 @@ def test_landings_beyond_the_length_of_the_arm_are_on_a_side(tmp_path):
     assert any(lo < 19.95 < hi for lo, hi in proof.safe.possible[1][1])
 
 
+@pytest.mark.sweep
 def test_a_scene_whose_landings_scatter(tmp_path):
     tables = {"world": {"scatter": {"speed": "0.3 %"}}, "effects": {"spread": "bounded"}}
     proof, report = certified(with_cavity(tables=tables), tmp_path)

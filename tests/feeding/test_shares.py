@@ -8,8 +8,9 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from scipy.stats import beta, binomtest
 
 import limitsets as ls
+from limitsets.cli.feed import _text
 from limitsets.feeding.falling import FATES, arm_end_of
-from limitsets.feeding.fed_shares import FeedingProblem, success_curve
+from limitsets.feeding.fed_shares import FedShares, FeedingProblem, success_curve
 from limitsets.feeding.trials import run_trials
 from limitsets.files import as_json
 from limitsets.robust import Gaussian, Scattering, Uniform
@@ -54,6 +55,23 @@ def test_two_ways_agree(initial):
     assert_alike({"shares": found.shares, "errors": errors}, trials)
     mean = trials.throws.mean()
     assert abs(found.mean_throws - mean) < 5.0 * trials.throws.std() / np.sqrt(trials.throws.size)
+
+
+def test_of_parts_that_all_stay_no_mean_is_told():
+    stay = FedShares(np.zeros((5, 4)), 1.0, 0.0)
+    assert np.isnan(stay.mean_throws)
+    assert stay.per_minute(60.0) is None
+
+
+@pytest.mark.sweep  # all throws that may be made are made
+def test_where_no_part_comes_beyond_the_end_nothing_is_fed(capsys):
+    """The limit set of paper-designed ends at 23.38 in; the arm here at 26 in."""
+    found = ls.feed(with_cavity(position="26 in"), prove=False, level=False, trials=20, cells=32)
+    assert found.shares.shares["never"] == pytest.approx(1.0, abs=1e-9)
+    assert np.isnan(found.shares.mean_throws)
+    assert found.shares.quantile(0.95) is None
+    _text(found, [], None)
+    assert "no part comes beyond the end of the arm" in capsys.readouterr().out
 
 
 def test_parts_per_minute_are_right_feeds_over_the_time_of_all(initial):

@@ -250,16 +250,17 @@ def test_the_figure_of_the_front(small, tmp_path):
     assert path.stat().st_size > 10_000
 
 
+@pytest.mark.sweep
 def test_a_quantity_that_is_no_length_keeps_its_unit():
-    """The speed is in rad/s, whatever the unit of the part: kappa w^2 is the gravity of the scene."""
+    """The speed is written in deg/s, as in the scene: kappa w^2 is the gravity of the scene."""
     bounds = {"throw.speed": (2.6, 3.2), "part.mass.center.along": (4.0, 4.4)}
     found = robust_design(  # of a single design to look at, too, something is found
         "paper-designed", vary=bounds, tolerance=SPEED, evaluations=1, orders=False, prove=0.0
     )
     speed, unit = found.scene.as_dict()["throw"]["speed"].split()
-    assert unit == "rad/s"
-    assert 2.6 <= float(speed) <= 3.2
-    assert found.scene.kappa * float(speed) ** 2 == pytest.approx(193.045, rel=1e-12)
+    assert unit == "deg/s"
+    assert 2.6 <= math.radians(float(speed)) <= 3.2
+    assert found.scene.kappa * math.radians(float(speed)) ** 2 == pytest.approx(193.045, rel=1e-12)
 
 
 @pytest.mark.parametrize(

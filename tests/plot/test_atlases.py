@@ -177,3 +177,12 @@ def test_an_atlas_without_classes():
     )
     with pytest.raises(AnswerError, match="one with class"):
         ls.plot.atlas(found)
+
+
+def test_a_surface_of_a_map_with_one_side_needs_no_side():
+    """A fixed point of the logistic map lies at 1 - 1/r."""
+    found = ls.atlas(ls.maps.Logistic(2.5), "r=2:2.8:3", variables=["reach", "share"], domain=[(0.0, 1.0)])
+    (line, *_) = [
+        line for line in ls.plot.atlas_surface(found, "reach").axes[0].lines if len(line.get_ydata()) == 3
+    ]
+    assert line.get_ydata() == pytest.approx([0.5, 1 - 1 / 2.4, 1 - 1 / 2.8])

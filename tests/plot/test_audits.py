@@ -70,4 +70,8 @@ def test_a_throw_that_rolls():
     titles = [axes.get_title(loc="left") for axes in drawn.axes]
     assert "a roll" in titles[1]
     assert "onto side 0" in titles[1]
-    assert not any(named(axes, "turning") for axes in drawn.axes)
+    # it turns about one vertex and rolls on over others: at any time its lowest vertex is on the arm
+    outlines = [patch.get_xy() for patch in named(drawn.axes[1], "turning")]
+    assert len(outlines) == 2
+    surface = rolling().scene.surface_height
+    assert [outline[:, 1].min() for outline in outlines] == pytest.approx([surface] * 2, abs=1e-6)

@@ -56,3 +56,15 @@ def test_of_a_long_orbit_the_end_is_drawn():
 def test_nothing_to_draw_is_refused():
     with pytest.raises(AnswerError, match="empty"):
         drawn(None, [])
+
+
+def test_a_goal_that_fails_at_once_is_more_than_a_dot():
+    """The next rests are those of the map: the picture shows whether the part comes back."""
+    axes = drawn(OrientedBeyond(20.0, 2), [{"x": 21.0, "side": 0}])
+    path = ls.orbit(ls.load("paper-designed").map, 21.0, 0, 12)
+    onward = [line.get_xydata()[0] for line in axes.lines if line.get_gid() == "thrown on"]
+    assert onward == [pytest.approx((k, x)) for k, x in enumerate(path.x[1:], start=1)]
+    low, high = axes.get_ylim()
+    assert low < path.x.min() < path.x.max() < high
+    assert "at once" in axes.figure.get_suptitle()
+    assert not [line for line in drawn(OrientedBeyond(20.0, 2)).lines if line.get_gid() == "thrown on"]

@@ -32,3 +32,17 @@ def test_bars_are_the_limit_sets_of_each_scene_on_the_way():
     assert "kappa" in named(axes, "words")[0].get_text()
     assert len(named(axes, "goal")) == 1
     assert len({(bar.get_facecolor(), bar.get_hatch()) for bar in named(axes, "limit set")}) == 3
+
+
+def test_a_long_way_is_drawn_in_twelve_scenes():
+    found = ls.design("paper-initial", critical_points=[10, 10, 20], vary=VARY, stages=26)
+    assert len(found.path) == 27
+    drawn = ls.plot.design(found, [({0: [(5.0, 10.0)]},)] * 27)
+    (axes,) = drawn.axes
+    words = [text.get_text().splitlines()[0] for text in named(axes, "words")]
+    assert len(words) == len(named(axes, "limit set")) == 12
+    assert (words[0], words[-1]) == ("start", "design")
+    numbers = [int(word.removeprefix("step ")) for word in words[1:-1]]
+    assert numbers == sorted(set(numbers))
+    assert "(12 of 27 scenes are drawn)" in drawn.get_suptitle()
+    assert drawn.get_figheight() < 16

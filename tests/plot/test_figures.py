@@ -192,7 +192,7 @@ def test_basins_in_the_plane():
     assert (picture[:, 16:] == picture[0, -1]).all()
     assert picture[0, 0] != picture[0, -1]
     texts = [text.get_text() for text in figure.legends[0].get_texts()]
-    assert texts == ["to attractor 0: 50.0 % of all starts", "to attractor 1: 50.0 % of all starts"]
+    assert texts == ["to limit set 0: 50.0 % of all starts", "to limit set 1: 50.0 % of all starts"]
 
 
 def test_basins_in_space_are_refused():
@@ -286,10 +286,12 @@ def test_flight(source, x, side):
     assert f"{np.degrees(fly(scene.map, x, side).phi):.1f}" in above.get_title(loc="left")
 
 
-def test_flight_by_small_angles_says_that_it_leaves_a_gap():
+def test_flight_by_small_angles_hangs_at_the_vertex_whose_path_is_known():
     scene = ls.load("paper-designed-small-angle")
     figure = plot.flight(scene, 20.5, 2)
     assert "small-angle" in figure.get_suptitle()
+    (impact,) = named(figure.axes[0], "impact")
+    assert impact.get_xy()[0, 1] == pytest.approx(scene.surface_height, abs=1e-9)
     assert not named(figure.axes[1], "turning")
 
 

@@ -35,6 +35,7 @@ def test_the_best_place_lies_between():
         assert all(held) == good
 
 
+@pytest.mark.sweep
 def test_the_curve_is_drawn():
     curve = margins_beyond("paper-designed", 2, x=[20.0, 20.1], width=0.5)
     figure = ls.plot.margin_curve(curve)

@@ -75,7 +75,7 @@ def test_what_the_bit_buys(images):
     assert (found.verdict, found.throws) == ("not-solved", 9)
     last = search(game, cells(2), 9)
     assert last.throws == 1
-    assert last.policy.csv() == "state,begin,throw,next_any,left\n0,any,left,1,1\n1,,stop,,0\n"
+    assert last.policy.table().csv() == "state,begin,throw,next_any,left\n0,any,left,1,1\n1,,stop,,0\n"
     assert last.policy.to_json()["first"] == {"any": 0}
 
 

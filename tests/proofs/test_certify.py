@@ -165,6 +165,7 @@ def test_what_is_proved_is_proved_by_other_arithmetic_too(paper, tmp_path):
 # ---------------------------------------------------------------- noise and tolerance
 
 
+@pytest.mark.sweep
 def test_noise_at_every_throw(tmp_path):
     """The goal of the designed scene, sharp at 0.397 %: a slow throw jogs, a fast one then flips."""
     proof = ls.certify("paper-designed", noise={"throw.speed": "0.38 %"})

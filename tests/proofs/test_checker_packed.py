@@ -98,6 +98,7 @@ def test_several_processes(packed, large):
     assert done.stdout.rstrip().endswith("PROVED")
 
 
+@pytest.mark.sweep
 @pytest.mark.parametrize("method", METHODS)
 def test_several_processes_however_they_are_started(packed, large, method):
     for file, code, verdict in zip(large, (0, 1), ("proved", "failed"), strict=True):

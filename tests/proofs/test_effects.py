@@ -108,6 +108,7 @@ def test_what_cannot_be_proved_says_so(initial, tmp_path):
             ls.certify(case)
 
 
+@pytest.mark.sweep
 def test_a_bounded_spread_is_noise_and_is_rechecked(tmp_path):
     case = scene("paper-designed", {"spread": "bounded"}, world={"scatter": SCATTER})
     proof = ls.certify(case, ["goal", "invariant"])

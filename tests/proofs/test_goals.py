@@ -252,6 +252,7 @@ def test_no_orbit_gets_beyond_the_limit_set(every):
     assert all(state["between"][1] < 23.45 for state in require_orbit(proof, reference.paper("designed")))
 
 
+@pytest.mark.sweep
 def test_an_attracting_orbit_keeps_almost_every_orbit_from_getting_there(tmp_path):
     """The fixed point attracts: what comes near it never gets beyond it, though cells around it do."""
     scene = part_of(ONE_FIXED, {"reaches": {"x": "20 in", "side": 1}})

@@ -51,7 +51,7 @@ def chain_of(speed, landing, strata, tmp_path):
 # speed, landing, strata, midpoints of each law
 LAWS = [
     (0.0, 0.05, 1, 1000),
-    (0.01, 0.2, 8, 100),
+    pytest.param(0.01, 0.2, 8, 100, marks=pytest.mark.sweep),
     pytest.param(0.05, 0.1, 8, 100, marks=pytest.mark.sweep),
     pytest.param(0.3, 0.1, 8, 100, marks=pytest.mark.sweep),
 ]

@@ -185,6 +185,7 @@ def median_of(pair):
     return int(np.flatnonzero(pair[:, 1] >= 0.5)[0]), int(np.flatnonzero(pair[:, 0] >= 0.5)[0])
 
 
+@pytest.mark.sweep
 def test_brackets_of_the_checker_hold_what_is_thrown(good, thrown, tmp_path):
     right, wrong, times = thrown
     claimed = dict(

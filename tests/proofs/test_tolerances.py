@@ -16,6 +16,7 @@ from limitsets.proofs.parameters import parameter_box
 
 pytest.importorskip("flint", reason="the checker needs python-flint")
 
+from tests.lead_quad import LEAD_QUAD
 from tests.proofs import forge
 from tests.proofs.test_recheck import checker, verdict
 
@@ -179,19 +180,6 @@ def test_halves_hold_the_whole_together_and_narrow_it():
             for a, d, s in zip(m.a, m.d, piece.sides, strict=True):
                 assert float(s.a.lower()) - 1e-12 <= a <= float(s.a.upper()) + 1e-12
                 assert float(s.d.lower()) - 1e-12 <= d <= float(s.d.upper()) + 1e-12
-
-
-LEAD_QUAD = {
-    "name": "lead-quad",
-    "part": {
-        "vertices": [["0 mm", "0 mm"], ["130 mm", "0 mm"], ["150 mm", "70 mm"], ["30 mm", "100 mm"]],
-        "mass": {"plate_density": "3 kg/m^2", "points": [{"x": "110 mm", "y": "15 mm", "mass": "60 g"}]},
-    },
-    "arm": {"surface_height": "-15 mm", "length": "700 mm"},
-    "throw": {"speed": "160 deg/s"},
-    "gravity": {"tilt": "30 deg"},
-    "goal": {"oriented_beyond": {"x": "52 cm", "side": 0}},
-}
 
 
 OTHER_UNITS = {

@@ -11,7 +11,7 @@ from jinja2 import UndefinedError
 
 import limitsets as ls
 from limitsets.analysis import GoalOutcome
-from limitsets.errors import LimitsetsError
+from limitsets.errors import AnswerError, LimitsetsError
 from limitsets.goals import OrientedBeyond
 from limitsets.report.audit_pages import audit_page
 from limitsets.report.goals import verdict_of, void_of
@@ -22,7 +22,16 @@ from limitsets.report.writing import write as write_report
 
 SCENES = Path(__file__).parents[1] / "analysis"
 SOURCES = ["paper-designed", "paper-initial", SCENES / "four-sides.toml", SCENES / "five-sides.toml"]
-FILES = {"report.md", "analysis.json", "limit-set.png", "map.png", "basins.png", "morse.png", "flight.png"}
+FILES = {
+    "report.md",
+    "analysis.json",
+    "part.png",
+    "limit-set.png",
+    "map.png",
+    "basins.png",
+    "morse.png",
+    "flight.png",
+}
 
 
 @lru_cache(maxsize=8)
@@ -259,3 +268,15 @@ def test_a_place_that_cannot_be_written(tmp_path):
     for folder in (tmp_path / "file", tmp_path / "file" / "below"):
         with pytest.raises(LimitsetsError, match="a folder that can be written"):
             write(analysed("paper-initial"), folder)
+
+
+def test_a_scene_whose_throws_all_leave_the_model_has_a_report_without_a_flight(tmp_path):
+    """150 rad/s for 150 deg/s: the part turns many times before it lands, and there is nothing to draw."""
+    wild = ls.load("paper-designed").with_values({"throw.speed": "150 rad/s"})
+    written = write(ls.analyse(wild, 256), tmp_path)
+    assert {path.name for path in written} == FILES - {"flight.png"}
+    text = (tmp_path / "report.md").read_text(encoding="utf-8")
+    assert "no start was found to stay on the arm" in text
+    assert "flight.png" not in text
+    with pytest.raises(AnswerError, match=r"outside the model, from x = 15 on side 0.*right unit"):
+        ls.plot.flight(wild, 15.0, 0)

@@ -145,7 +145,9 @@ def test_an_interrupted_run_keeps_what_it_had_found(tmp_path, monkeypatch):
 
 def kept(folder, scene=None, goals=None, tolerance=None, width=0.1):
     scene = scene or ls.load("paper-designed")
-    return Checkpoint(folder, scene, goals or (scene.goal,), tolerance or {"throw.speed": "2 %"}, width)
+    return Checkpoint(
+        folder, scene, goals or (scene.goal,), tolerance or {"throw.speed": "2 %"}, width, seconds=24.0
+    )
 
 
 def test_only_the_same_question_is_found_again(sheet, folder):
@@ -276,6 +278,51 @@ def test_margins_against_x_begin_in_the_middle_and_go_on_where_they_stopped(monk
     assert whole.x.tolist() == pytest.approx(np.linspace(19.753, 23.383, 9)[1:-1].tolist(), abs=0.01)
     assert whole.proved[:, 0] == pytest.approx(1.0 - np.abs(whole.x - 21.5))
     assert whole.best()[0] == first.x[0]
+
+
+def test_the_seconds_of_a_curve_are_shared_by_its_places(monkeypatch):
+    """Of 14 s for seven places none has more than two for its first proof, nor less than one when time is short."""
+    given = []
+
+    def one(*about, seconds, **words):
+        given.append(seconds)
+        return tent_of(*about, **words)
+
+    monkeypatch.setattr(margin_curve, "margins_beyond", one)
+    told = {"tell": lambda *_: None, "keep": lambda _: None}
+    margin_curve.curve(ls.load("paper-designed"), 2, {"throw.speed": "1 %"}, None, seconds=14.0, **told)
+    assert given[0] == pytest.approx(2.0, abs=0.5)
+    assert all(1.0 <= each <= 15.0 for each in given)
+    assert len(given) == margin_curve.PLACES
+
+
+@pytest.mark.sweep
+def test_the_seconds_of_a_sheet_bound_the_proofs(monkeypatch):
+    asked = {}
+    plain_curve = sheet_run.curve
+
+    def joint(*about, seconds, **words):
+        asked["joint"] = seconds
+        return joint_of(*about, seconds=min(seconds, 1.0), **words)
+
+    def against(*about, seconds, **words):
+        asked["curve"] = seconds
+        return plain_curve(*about, seconds=0.0, **words)
+
+    joint_of = sheet_run.joint_margin
+    monkeypatch.setattr(sheet_run, "joint_margin", joint)
+    monkeypatch.setattr(sheet_run, "curve", against)
+    found = ls.robustness(
+        "paper-designed",
+        tolerance={"throw.speed": "1 %"},
+        leave_out=["margins", "noise", "audit"],
+        seconds=3600.0,
+    )
+    assert 1700.0 < asked["joint"] <= 1800.0  # half of what is left
+    assert asked["joint"] < asked["curve"] <= 3600.0
+    assert "6 more places" in found.left_out["rest of the curve"]
+    with pytest.raises(LimitsetsError, match="the seconds"):
+        ls.robustness("paper-designed", seconds=-1.0)
 
 
 def test_the_page_names_first_what_the_limit_set_calls_for(sheet):

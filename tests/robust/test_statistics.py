@@ -150,6 +150,7 @@ def test_levels_begin_without_noise(gaussian):
     assert levels.numbers["wrong beyond"][0] == 0.0 < levels.numbers["wrong beyond"][1]
 
 
+@pytest.mark.sweep
 def test_json(gaussian):
     text = json.dumps(gaussian.to_json(), allow_nan=False)
     back = json.loads(text)

@@ -69,7 +69,7 @@ def test_conversions_are_rounded_once(number: float, unit: str, target: str) -> 
         ("5.75,3 in", "commas"),
         ("9**9**9 in", "one finite decimal number"),
         ("1/s", "one finite decimal number"),
-        ("1 1/s", "unit '1/s' is not known"),
+        ("1 1/s", "1/s is a unit of frequency: the dimension is wrong"),
         ("nan in", "finite"),
         ("inf in", "finite"),
         ("-Infinity in", "finite"),
@@ -112,6 +112,9 @@ def test_refuses(text: object, words: str) -> None:
     ("text", "dimension", "words"),
     [
         ("2 rps", "angular speed", 'write "720 deg/s"'),
+        ("120 /min", "frequency", 'write "2 Hz"'),
+        ("120/min", "frequency", 'write "2 Hz"'),
+        ("2/s", "frequency", "did you mean 'Hz'?"),
         ("25 rev/min", "angular speed", "did you mean 'rpm'?"),
         ("25 RPM", "angular speed", "did you mean 'rpm'?"),
         ("158 \u00b0/s", "angular speed", "did you mean 'deg/s'?"),

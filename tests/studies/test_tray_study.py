@@ -67,3 +67,21 @@ def test_the_tables_are_written(ran):
     lines = study.table(numbers).splitlines()
     assert sum(line.startswith("| leaning") for line in lines) == 3
     assert sum(line.startswith("| captured rightly") for line in lines) == 4
+
+
+def test_many_parts_stand_beside_the_chain(tmp_path, monkeypatch):
+    study = load_study("14_tray", "many_parts")
+    monkeypatch.setattr(study, "BATCHES", {(10, 20): 2, (40, 20): 2})
+    numbers = study.main(seed=7, out=tmp_path)
+    for each in numbers.values():
+        passing, chain = each["passing"], each["chain"]
+        for word in ("right", "wrong"):
+            low, high = interval(round(40 * passing[word]["value"]), 40)
+            assert low <= chain[word]["interval"][1]
+            assert chain[word]["interval"][0] <= high
+        assert passing["covered"]["value"] == passing["met"] == 0.0
+        assert each["pushing"]["met"] == 1.0
+        assert each["pushing"]["right"]["value"] < chain["right"]["interval"][0]
+    assert (tmp_path / "many_parts.png").stat().st_size > 20_000
+    text = (STUDIES / "14_tray" / "README.md").read_text(encoding="utf-8")
+    assert study.table(numbers).splitlines()[0] in text

@@ -359,6 +359,7 @@ def test_gravity_does_not_vary_in_blocks_where_the_throw_is_given_by_kappa():
         atlas("paper-designed", "gravity.tilt=20:30:3", task=BLOCKS)
 
 
+@pytest.mark.sweep
 def test_what_stands_in_a_script_is_not_sent_to_processes():
     code = f"""
     import sys; sys.path.insert(0, {str(ROOT)!r})
@@ -454,6 +455,7 @@ def test_what_is_no_atlas_loads_none_of_its_libraries(code):
     assert not HEAVY & set(loaded)
 
 
+@pytest.mark.sweep
 def test_an_analysis_loads_none_of_them(tmp_path):
     words = ["analyse", "paper-designed", "--cells", "64", "--out", str(tmp_path / "a"), "--json"]
     code = f"import sys, limitsets.cli\nlimitsets.cli.main({words})\nprint('loaded', *sys.modules)"

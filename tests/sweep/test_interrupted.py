@@ -67,7 +67,8 @@ def test_a_killed_worker_costs_nothing_but_time(seed, tmp_path, whole):
     assert bytes_of(store) == whole
 
 
-@pytest.mark.parametrize("seed", SEEDS)
+@pytest.mark.sweep
+@pytest.mark.parametrize("seed", range(20))
 def test_a_killed_driver_is_continued_and_leaves_no_workers(seed, tmp_path, whole):
     store, rng = tmp_path / "s.zarr", random.Random(seed)
     for chunks in sorted(rng.randrange(20) for _ in range(2)):  # the second one kills a run that continues

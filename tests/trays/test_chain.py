@@ -80,6 +80,16 @@ def test_intervals_cover_as_often_as_they_say():
     assert 0.90 <= inside / repeats <= 0.985
 
 
+def test_each_drawn_row_has_its_counts_and_one_more_spread_evenly():
+    """The mean of Dirichlet's law: (n_k + 1/3)/(n + 1) for three states."""
+    counts = counts_of([4, 0, 2], [[0, 0, 0], [0, 3, 0], [1, 0, 1]])
+    drawn = drawn_chains(counts, np.random.default_rng(1), draws=20_000)
+    third = 1 / 3
+    assert drawn.captured.mean(axis=0) == pytest.approx(np.array([4 + third, third, 2 + third]) / 7, abs=0.01)
+    assert drawn.kicked[:, 1].mean(axis=0) == pytest.approx(np.array([third, 3 + third, third]) / 4, abs=0.01)
+    assert (drawn.kicked[:, 0] == [1.0, 0.0, 0.0]).all()
+
+
 def test_what_is_said_of_many_passes():
     counts = counts_of([60, 40, 0], [[0, 0, 0], [10, 90, 0], [0, 0, 0]])
     found = filled(counts, 200, np.random.default_rng(0))
@@ -95,3 +105,9 @@ def test_what_is_said_of_many_passes():
     # the first n after which no more than 5 % are missing
     assert found.passes_to(0.95) == int(np.ceil(np.log(0.05) / np.log(1.0 - 0.4 - 0.06)))
     assert found.stays[1] == pytest.approx(1.0 / 0.06)
+
+
+def test_of_a_state_that_never_comes_no_share_is_filled():
+    found = filled(counts_of([60, 0, 40], [[0, 0, 0], [10, 90, 0], [10, 0, 90]]), 5, np.random.default_rng(0))
+    assert found.last[found.number] == 0.0
+    assert found.passes_to(0.95) is None

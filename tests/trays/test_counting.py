@@ -3,18 +3,20 @@
 import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import limitsets as ls
+from limitsets.engine.depression import Rest
 from limitsets.engine.recording import MARKS
 from limitsets.errors import AnswerError, SceneError
 from limitsets.robust.noise.proportions import binomial_interval
 from limitsets.trays import filmed, tray_design
 from limitsets.trays.counting import count
-from limitsets.trays.histories import Histories, histories
+from limitsets.trays.histories import Histories, _history, histories
 from limitsets.trays.passing import passes_of, random_of
 from tests.trays.scenes import with_tray
 
@@ -98,6 +100,42 @@ def test_misses_and_kicks_that_were_stood_are_counted():
     assert found.to_json()["unfinished"] == 1
 
 
+class Played:
+    """Passes and a plate that give what is written down, and keep what was asked for."""
+
+    def __init__(self, *rests):
+        self.plate, self.rests, self.asked = self, list(rests), []
+
+    def settle(self, pose, motion):
+        self.asked.append((motion, pose))
+        state, side = self.rests.pop(0)
+        return Rest(f"place {len(self.asked)}", state, side, 1.0)
+
+    def kick(self, _):
+        return "kick"
+
+    def arrival(self, _):
+        return "new", "new"
+
+    def again(self, pose, _):
+        return pose, "again"
+
+
+def test_only_what_missed_and_lies_flat_comes_by_again():
+    # misses flat; comes again, misses on no side; a new one is captured; popped out by a kick, a new one misses flat
+    played = Played((0, 2), (0, -1), (3, -1), (0, 1), (0, 1), (0, 1))
+    rows = _history(played, 5, 0, True, [0])
+    assert rows == [[(0, 0), (0, 0), (0, 3), (0, 0), (0, 0)]]
+    assert played.asked == [
+        ("new", "new"),
+        ("again", "place 1"),
+        ("new", "new"),
+        ("kick", "place 3"),
+        ("new", "new"),
+        ("again", "place 5"),
+    ]
+
+
 def test_histories_begin_empty_and_repeat():
     passes = passes_of(with_tray(), None, 8e-3)
     some, more = histories(passes, 3, 8, 5), histories(passes, 5, 8, 5)
@@ -147,6 +185,13 @@ except AnswerError:
 def test_what_cannot_be_is_refused(monkeypatch):
     with pytest.raises(AnswerError, match="drops"):
         ls.tray(with_tray(), drops=0)
+    with pytest.raises(AnswerError, match="drops and kicks"):
+        ls.tray(with_tray(), drops=10, kicks=0)
+    with pytest.raises(AnswerError, match="the seed"):
+        ls.tray(with_tray(), drops=1, seed=-1)
+    hasty = passes_of(with_tray(), None, 8e-3)
+    with pytest.raises(AnswerError, match="the parts at rest, of those that came by, is 0"):
+        count(replace(hasty, plate=replace(hasty.plate, patience=0.1)), 5, 5, 0)
     with pytest.raises(AnswerError, match="passes"):
         ls.tray(with_tray(), passes=0)
     with pytest.raises(AnswerError, match="step"):
@@ -157,6 +202,13 @@ def test_what_cannot_be_is_refused(monkeypatch):
     assert ls.load(narrow).tray.depression_width == 4.0
     with pytest.raises(AnswerError, match="the length of side 2"):
         ls.tray(narrow, side=2)
+    # without a goal a depression may be as deep as the part is high on its highest side; the wanted one may be lower
+    low = with_tray().as_dict()
+    low["tray"]["depression_depth"] = "3.2 in"
+    del low["goal"]
+    with pytest.raises(AnswerError, match="deeper than the part") as caught:
+        ls.tray(low, side=2, drops=1)
+    assert caught.value.key == "tray.depression_depth"
     with pytest.raises(SceneError, match="deeper than the part"):
         tray_design(with_tray(), [3.2], [0.5], drops=1)
     with pytest.raises(AnswerError, match="depths and agitations"):
@@ -197,3 +249,11 @@ def test_a_film_shows_what_the_engine_does():
     # each part is lost, or lies in the depression until it is ejected or the film ends
     ended = [part for _, part, word in kept.marks if word in ("lost", "in the cavity")]
     assert ended == list(range(kept.poses.shape[1]))
+
+
+def test_in_a_film_a_part_comes_by_once_the_last_one_is_gone():
+    kept = filmed(with_tray(agitation="2 in"), 8, seed=3, step=8e-3)
+    gone = [part for _, part, word in kept.marks if word in ("lost", "ejected")]
+    parts = kept.poses.shape[1]
+    assert gone[: parts - 1] == list(range(parts - 1))
+    assert "ejected" in {word for _, _, word in kept.marks}

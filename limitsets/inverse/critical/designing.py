@@ -16,9 +16,12 @@ from limitsets.inverse.critical.seeded import present, with_present
 from limitsets.inverse.critical.solving import REACHED, Solution, continued, restarted, solved, staged
 from limitsets.inverse.critical.trials import Trial, TrialLog
 from limitsets.inverse.critical.unknowns import Bounds, Unknowns, unknowns_of
+from limitsets.progress import shown_in_notebooks
 from limitsets.scene import Scene, load
-from limitsets.scene.quantities import base_unit, find
+from limitsets.scene.quantities import text_at, texts
+from limitsets.scene.spelling import in_unit_of, in_units_of, unit_of
 from limitsets.scene.units import convert, parse
+from limitsets.tables import Column, Table, Tabled
 
 __all__ = ["Design", "design"]
 
@@ -29,7 +32,7 @@ SPREADS = (0.15, 0.3)
 
 
 @dataclass(frozen=True, eq=False)
-class Design:
+class Design(Tabled):
     """A scene with the critical points that were wanted, or as near to them as was found; nothing is proved.
 
     Attributes
@@ -78,12 +81,31 @@ class Design:
         """Give what was varied: value before, value found, unit."""
         found = {}
         for name in self.jacobian.names:
-            unit = base_unit(find(name).dimension, self.start.unit)
-            pair = present(self.start, name), present(self.scene, name)
+            unit = unit_of(self.start, name)
+            pair = tuple(
+                in_unit_of(self.start, name, present(scene, name)) for scene in (self.start, self.scene)
+            )
             if name == "throw.speed" and self.start.gravity is None:
                 pair, unit = (1.0, float(np.sqrt(self.start.kappa / self.scene.kappa))), "of its own value"
-            found[name] = (*pair, unit)
+            found[name] = (pair[0], pair[1], unit)
         return found
+
+    def tables(self) -> tuple[Table, ...]:
+        """Give the tables that show it, the one that is saved as CSV first."""
+        heads = ("quantity", Column("before", show=".9g"), Column("after", show=".9g"), "unit")
+        more = (Column("wanted", show=".9g"), Column("off by", show=".1e"))
+        rows: list[tuple[object, ...]] = [
+            (name, before, after, unit, None, None)
+            for name, (before, after, unit) in self.quantities().items()
+        ]
+        points = zip(
+            self.before.x.tolist(), self.jacobian.x.tolist(), self.targets, self.residual, strict=True
+        )
+        rows += [
+            (f"r_{side} (first critical point of side {side})", before, after, self.start.unit, wanted, miss)
+            for side, (before, after, wanted, miss) in enumerate(points)
+        ]
+        return (Table((*heads, *more), rows, f"{self.scene.name}: {self.message}", "computed, not proved"),)
 
     def to_json(self) -> dict[str, Any]:
         """Give it as plain tables for JSON."""
@@ -101,6 +123,7 @@ class Design:
         )
 
 
+@shown_in_notebooks
 def design(
     scene: Scene | str,
     *,
@@ -159,7 +182,7 @@ def design(
     >>> centre_and_speed = ["part.mass.center.along", "part.mass.center.above", "throw.speed"]
     >>> found = ls.design("paper-initial", critical_points=[10, 10, 20], vary=centre_and_speed)
     >>> found.reached, [round(value[1], 4) for value in found.quantities().values()]
-    (True, [4.2256, 0.7082, 2.758])
+    (True, [4.2256, 0.7082, 158.0245])
     """
     chosen = scene if isinstance(scene, Scene) else load(scene)
     require_minimal(chosen)
@@ -271,7 +294,8 @@ def _answer(search: TrialLog, targets: tuple[float | None, ...], outcome: Soluti
 def _named(found: Scene, start: Scene) -> Scene:
     """Give the scene found a name of its own: files are named after it."""
     name = start.name if start.name.endswith("-design") else f"{start.name}-design"
-    return load(found.as_dict() | {"name": name})
+    changed = [one for one, text in texts(found.text) if text != text_at(start.text, one)]
+    return load(in_units_of(found, start, changed).as_dict() | {"name": name})
 
 
 def _message(search: TrialLog, outcome: Solution, residual: tuple[float | None, ...]) -> str:

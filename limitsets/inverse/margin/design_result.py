@@ -16,12 +16,14 @@ from limitsets.inverse.margin.search import Candidate
 from limitsets.robust.margins.estimate import Estimate
 from limitsets.robust.margins.margin_result import Margin, settled
 from limitsets.scene import Scene, dump
+from limitsets.scene.spelling import in_unit_of, unit_of
+from limitsets.tables import Column, Table, Tabled, joined
 
 __all__ = ["RobustDesign", "both", "save"]
 
 
 @dataclass(frozen=True, eq=False)
-class RobustDesign:
+class RobustDesign(Tabled):
     """A design for a large margin.
 
     Attributes
@@ -86,6 +88,24 @@ class RobustDesign:
         """What is proved of the design over what is refuted of the scene before: so often larger at least."""
         proved, refuted = both(self.margins)[0], both(self.before_margins)[1]
         return None if proved is None or not refuted else proved / refuted
+
+    def tables(self) -> tuple[Table, ...]:
+        """Give the tables that show it, the one that is saved as CSV first."""
+        sides = tuple(
+            f"part.sides[{k}]" for k in range(len(self.scene.sides)) if "sides" in self.scene.text["part"]
+        )
+        rows = [
+            (
+                name,
+                in_unit_of(self.before, name, self.before.value(name)),
+                in_unit_of(self.before, name, self.scene.value(name)),
+                unit_of(self.before, name),
+            )
+            for name in (*sides, *self.varied)
+        ]
+        columns = ("quantity", Column("before", show=".6g"), Column("design", show=".6g"), "unit")
+        found = Table(columns, rows, f"{self.scene.name}: robust design")
+        return found, *((joined(self.margins),) if self.margins else ())
 
     def to_json(self) -> dict[str, Any]:
         """Give it as plain tables for JSON; every number is finite or null."""

@@ -10,7 +10,8 @@ from __future__ import annotations
 import copy
 import math
 import time
-from collections.abc import Mapping, Sequence
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
 from itertools import permutations
 from pathlib import Path
 
@@ -23,13 +24,14 @@ from limitsets.inverse.margin.design_result import RobustDesign
 from limitsets.inverse.margin.feeding import throws_to_feed
 from limitsets.inverse.margin.front import Option, front_of
 from limitsets.inverse.margin.polishing import polished
-from limitsets.inverse.margin.search import POPULATION, Candidate, DesignSearch, Tell, bounds_of
+from limitsets.inverse.margin.search import POPULATION, Candidate, DesignSearch, Tell, bounds_of, said
+from limitsets.progress import shown_in_notebooks
 from limitsets.robust import Margin
-from limitsets.robust.margins.estimate import on_all_corners
+from limitsets.robust.margins.estimate import Estimate, on_all_corners
 from limitsets.robust.margins.joint import joint_margin
 from limitsets.robust.margins.vector import Tolerance
 from limitsets.scene import Scene, load
-from limitsets.scene.quantities import base_unit, find
+from limitsets.scene.spelling import in_units_of
 
 __all__ = ["TOLERANCE", "fed_at", "robust_design"]
 
@@ -111,10 +113,7 @@ def _searched(
 
 def _rounded(scene: Scene, search: DesignSearch) -> Scene:
     """Write what was varied with few decimals."""
-    units = {name: base_unit(find(name).dimension, scene.unit) for name in search.bounds}
-    return scene.with_values(
-        {name: f"{scene.value(name):.{DECIMALS}f} {unit}".rstrip() for name, unit in units.items()}
-    )
+    return in_units_of(scene, search.scene, search.bounds, DECIMALS)
 
 
 def _with_purpose(scene: Scene, x: float, side: int, tolerance: Mapping[str, str], name: str) -> Scene:
@@ -125,6 +124,7 @@ def _with_purpose(scene: Scene, x: float, side: int, tolerance: Mapping[str, str
     return load(tree)
 
 
+@shown_in_notebooks
 def robust_design(
     scene: Scene | str | Path,
     *,
@@ -137,6 +137,7 @@ def robust_design(
     seed: int = 0,
     prove: float = SECONDS,
     progress: Tell | None = None,
+    keep: Callable[[Scene], None] | None = None,
 ) -> RobustDesign:
     """Choose a part, a throw and an arm for which parts are fed in spite of large deviations.
 
@@ -164,6 +165,8 @@ def robust_design(
         Seconds for the proofs of the design, and as many for those of the scene before; 0 for none.
     progress : callable, optional
         Called with what is done, how much of it, and of how much.
+    keep : callable, optional
+        Called with the best design so far, as often as there is a better one: what is left of a search that is ended.
 
     Returns
     -------
@@ -195,12 +198,25 @@ def robust_design(
         DesignSearch(one, vector, on, bounds_of(one, vary), number, everywhere=everywhere)
         for number, one in enumerate(orders_of(start) if orders else [start])
     ]
+    if keep is not None:
+        best_yet = [0.0]
+
+        def better(scene: Scene, found: Estimate) -> None:
+            if found.margin > best_yet[0] and math.isfinite(found.x):
+                best_yet[0] = found.margin
+                keep(_with_purpose(scene, found.x, on, texts, f"{start.name}-robust"))
+
+        for one in searches:
+            one.better = better
     search, population = _searched(searches, evaluations, seed, tell)
     polish = max(evaluations // POLISH, 1)
     best = polished(search, population[:POLISHED], lambda made: _rounded(made, search), polish, tell)
     if best is None:
         raise AnswerError(
-            "the design", "none that feeds", "one at least", "widen the bounds, or look at more designs"
+            "the design",
+            f"none that feeds among {sum(each.evaluations for each in searches)}",
+            "one at least",
+            f"{said(sum((each.ruled_out for each in searches), Counter()))}; widen the bounds, or look at more designs",
         )
     made, found = best
     x = round(found.x, DECIMALS_OF_X)

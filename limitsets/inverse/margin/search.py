@@ -9,6 +9,7 @@ evaluations, never on the clock.
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -25,7 +26,7 @@ from limitsets.robust.margins.vector import Signs, Tolerance
 from limitsets.scene import Scene
 from limitsets.scene.quantities import find
 
-__all__ = ["VARY", "Candidate", "DesignSearch"]
+__all__ = ["VARY", "Candidate", "DesignSearch", "said"]
 
 VARY: dict[str, tuple[str, str]] = {
     "part.mass.center.along": ("0.05", "0.95"),
@@ -40,6 +41,16 @@ VARY: dict[str, tuple[str, str]] = {
 POPULATION, GENERATIONS, MOST_HARD = 24, 4, 24
 # A lead weight is at most this share of the part: the rest is the plate.
 MOST_LEAD = 0.9
+
+# What rules a design out.
+NO_PART = "cannot be built (a side on which the part cannot rest, or no such part)"
+NO_WEIGHT = "need more than one lead weight on a plate, or one of over 90 % of the mass"
+LOST = "lose the part, or never lay it on the wanted side"
+OTHER_SIDE = "let another side get as far out as the wanted one"
+ASSUMPTION = (
+    "break an assumption of the model (another corner lands first, the throw tips the part, or it slips)"
+)
+LEAVES = "lose parts from some starts on the arm"
 
 Tell = Callable[[str, int, int], None]
 Array = NDArray[np.float64]
@@ -96,6 +107,8 @@ class DesignSearch:
     hard: list[Signs] = field(default_factory=list)
     history: list[Candidate] = field(default_factory=list)
     evaluations: int = 0
+    ruled_out: Counter[str] = field(default_factory=Counter)
+    better: Callable[[Scene, Estimate], None] | None = None
 
     def scene_of(self, unknowns: Sequence[float]) -> Scene | None:
         """Give the scene of scaled unknowns; None where there is none."""
@@ -117,6 +130,8 @@ class DesignSearch:
 
         rating, found = self.rated(scene, quickly)
         if scene is not None and found is not None:
+            if self.better is not None:
+                self.better(scene, found)
             self.history.append(Candidate(self._values(scene), found, self.order))
         return rating
 
@@ -126,12 +141,17 @@ class DesignSearch:
         """Rate a scene by an estimate of its margin; with the estimate where it feeds, and breaks no assumption."""
         lacking = -30.0 if scene is None else self.lacking(scene)
         if scene is None or lacking < 0.0:
+            self.ruled_out[NO_PART if scene is None else NO_WEIGHT] += 1
             return lacking, None
         found = estimate(scene)
         if found is None or not found.margin > 0.0:
+            self.ruled_out[LOST if found is None else OTHER_SIDE] += 1
             return (-10.0 if found is None else found.margin), None
         lacking = self.broken(scene, found)
-        return (lacking, None) if lacking < 0.0 else (found.margin, found)
+        if lacking < 0.0:
+            self.ruled_out[LEAVES if validity_slack(scene, found.invariant) >= 0.0 else ASSUMPTION] += 1
+            return lacking, None
+        return found.margin, found
 
     def lacking(self, scene: Scene) -> float:
         """Rate a part that no lead weight makes: -20 or below; 0 where one does."""
@@ -192,6 +212,18 @@ class DesignSearch:
         return population, ratings
 
 
+def said(ruled_out: Mapping[str, int]) -> str:
+    """Say which conditions ruled designs out, the most frequent first.
+
+    Examples
+    --------
+    >>> said({LOST: 2, NO_WEIGHT: 5})[:40]
+    '5 need more than one lead weight on a pl'
+    """
+    rows = sorted(ruled_out.items(), key=lambda row: -row[1])
+    return "; ".join(f"{count} {words}" for words, count in rows) or "no design was ruled out"
+
+
 def _scaled(share: float, lo: float, hi: float) -> float:
     """Between two bounds: evenly in the logarithm where both have a sign, else evenly."""
     if lo * hi > 0.0:
@@ -206,10 +238,18 @@ def bounds_of(
     if isinstance(vary, Mapping):
         return {name: (float(lo), float(hi)) for name, (lo, hi) in vary.items()}
     names = list(VARY) if vary is None else list(vary)
+    if vary is None and "speed" in scene.text["throw"]:  # the throw stays written as it is
+        names[names.index("throw.kappa")] = "throw.speed"
     size = float(scene.sides.length.mean())
     found = {}
     for name in names:
         find(name)
+        if name == "throw.speed" and scene.gravity is not None:
+            slow, fast = (
+                math.sqrt(scene.gravity / (float(text) * size)) for text in reversed(VARY["throw.kappa"])
+            )
+            found[name] = (slow, fast)
+            continue
         if name not in VARY:
             raise AnswerError("the bounds", name, "a lower and an upper one", "give bounds for this quantity")
         lo, hi = (float(text) for text in VARY[name])

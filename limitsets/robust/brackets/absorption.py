@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from limitsets.errors import AnswerError
 from limitsets.interval import guard
+from limitsets.progress import shown_in_notebooks
 from limitsets.proofs.parameters import parameter_box
 from limitsets.robust.brackets.averages import mean_matrix, rounding_of
 from limitsets.robust.brackets.chain import EXITS, Chain, Place, chain_of
@@ -119,6 +120,7 @@ def mean_brackets(chain: Chain, row: Any) -> tuple[float, float]:
     return low, high
 
 
+@shown_in_notebooks
 def absorption_brackets(
     scene: Scene | str,
     scatter: Scattering | None = None,

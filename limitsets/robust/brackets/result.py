@@ -14,6 +14,7 @@ from limitsets.files import as_table, picked
 from limitsets.robust.brackets.chain import Place
 from limitsets.robust.brackets.nodes import Nodes
 from limitsets.robust.noise.scattering import Scattering
+from limitsets.tables import Column, Table, Tabled
 
 if TYPE_CHECKING:
     from limitsets.scene import Scene
@@ -29,7 +30,7 @@ ALLOWANCE, FINER = 1e-6, 2
 
 
 @dataclass(frozen=True, eq=False)
-class AbsorptionBrackets:
+class AbsorptionBrackets(Tabled):
     """Proved brackets of where a noisy chain ends, and when; T is the throw of the first absorption.
 
     Attributes
@@ -87,6 +88,13 @@ class AbsorptionBrackets:
         low, high = self.within[name]
         first, last = np.flatnonzero(high >= share), np.flatnonzero(low >= share)
         return (int(first[0]) if first.size else None), (int(last[0]) if last.size else None)
+
+    def tables(self) -> tuple[Table, ...]:
+        """Give the tables that show it, the one that is saved as CSV first."""
+        last = self.within[ANY].shape[1] - 1
+        rows = [(name, last, (low[-1], high[-1])) for name, (low, high) in self.within.items()]
+        columns = ("ends at", "within throws", Column("probability", show=".6f", ends=True))
+        return (Table(columns, rows, f"{self.scene}: brackets of probabilities", self.how),)
 
     def to_json(self) -> dict[str, Any]:
         """Give the brackets as JSON takes them."""

@@ -18,10 +18,12 @@ from numpy.typing import NDArray
 from limitsets.errors import AnswerError
 from limitsets.files import as_table, picked
 from limitsets.goals import Goal, OrientedBeyond, Reaches
+from limitsets.progress import shown_in_notebooks
 from limitsets.proofs.query import Query
 from limitsets.robust.margins.finding import Margin, margin
 from limitsets.robust.margins.joint import joint_margin
 from limitsets.scene import Scene, load
+from limitsets.tables import Column, Table, Tabled
 
 __all__ = ["MarginsBeyond", "margins_beyond", "places_beyond"]
 
@@ -29,7 +31,7 @@ Progress = Callable[[str, int, int], None]
 
 
 @dataclass(frozen=True, eq=False)
-class MarginsBeyond:
+class MarginsBeyond(Tabled):
     """Brackets of margins at several X.
 
     Attributes
@@ -59,6 +61,21 @@ class MarginsBeyond:
     refuted: NDArray[np.float64]
     margins: tuple[tuple[Margin, ...], ...]
 
+    def tables(self) -> tuple[Table, ...]:
+        """Give the tables that show it, the one that is saved as CSV first."""
+        bounds = [
+            Column(f"{name} {word}", unit, ".6g")
+            for name, unit in zip(self.names, self.units, strict=True)
+            for word in ("proved", "refuted")
+        ]
+        rows = [
+            (x, *(end for pair in zip(low, high, strict=True) for end in pair))
+            for x, low, high in zip(self.x.tolist(), self.proved.tolist(), self.refuted.tolist(), strict=True)
+        ]
+        caption = f"{self.scene.name}: margins of side {self.side} beyond X"
+        columns = (Column("X", self.scene.unit, ".6g"), *bounds)
+        return (Table(columns, rows, caption, "brackets: proved below, refuted above"),)
+
     def to_json(self) -> dict[str, Any]:
         """Give them as a plain table for JSON, without the proofs; null where nothing is refuted."""
         places = picked(self, "side", "x")
@@ -71,6 +88,7 @@ class MarginsBeyond:
         return float(self.x[at]), float(self.proved[at, k])
 
 
+@shown_in_notebooks
 def margins_beyond(
     scene: Scene | str | Path,
     side: int,

@@ -14,6 +14,7 @@ from typing import Any
 
 from limitsets.errors import AnswerError
 from limitsets.goals import Goal, Predicate, unknown_goal
+from limitsets.progress import shown_in_notebooks
 from limitsets.proofs.query import Outcome, Query
 from limitsets.robust.margins.brackets import Bracket, bracket_fixed, bracket_per_throw
 from limitsets.robust.margins.deviations import DeviationScale, deviation_scale, deviation_scales
@@ -48,6 +49,7 @@ def goals_of(scene: Scene, goal: GoalLike | Sequence[GoalLike] | None) -> tuple[
     return tuple(found)
 
 
+@shown_in_notebooks
 def margin(
     scene: Scene | str | Path,
     *quantities: str,

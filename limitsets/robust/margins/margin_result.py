@@ -17,12 +17,13 @@ from limitsets.proofs.proof import Claim, Proof
 from limitsets.proofs.query import Outcome
 from limitsets.proofs.refutation import KINDS, write_refutation
 from limitsets.scene import Scene
+from limitsets.tables import Column, Table, Tabled
 
 __all__ = ["Margin", "goal_table", "settled"]
 
 
 @dataclass(frozen=True, eq=False)
-class Margin:
+class Margin(Tabled):
     """How much one quantity of a scene, or all of its tolerance, may deviate.
 
     Attributes
@@ -80,6 +81,15 @@ class Margin:
     def counterexample(self) -> tuple[State, ...]:
         """The orbit that violates a goal, every state enclosed; empty if there is none."""
         return () if self.against is None else self.against.counterexample
+
+    def tables(self) -> tuple[Table, ...]:
+        """Give the tables that show it, the one that is saved as CSV first."""
+        shown = Column("proved safe up to", show=".6g"), Column("shown to fail from", show=".6g")
+        columns = ("quantity", "reading", *shown, "unit", Column("value", show=".6g"))
+        unit = self.unit or "times the tolerance"
+        row = (self.quantity, self.reading, self.proved, self.refuted, unit, self.nominal)
+        how = "brackets: proved below, refuted above"
+        return (Table(columns, [row], f"{self.scene.name}: margins", how),)
 
     def to_json(self) -> dict[str, Any]:
         """Give it as a plain table for JSON; every number is finite or null."""

@@ -22,7 +22,7 @@ from limitsets.robust.noise.scattering import Scattering, still_map
 if TYPE_CHECKING:
     from limitsets.scene import Scene
 
-__all__ = ["ManyParts", "SampledStatistics", "scattering_map", "throw_many", "uniform_starts"]
+__all__ = ["ManyParts", "SampledStatistics", "require_seed", "scattering_map", "throw_many", "uniform_starts"]
 
 # Throws that are not counted: the part comes onto the limit set first.
 BEFORE = 400
@@ -59,6 +59,12 @@ class SampledStatistics:
     bins: tuple[NDArray[np.float64], ...]
     arrived: NDArray[np.int64]
     parts: int
+
+
+def require_seed(seed: int) -> None:
+    """Refuse a seed that the generators do not take, before anything is thrown."""
+    if not (isinstance(seed, int | np.integer) and 0 <= seed < 2**63):
+        raise AnswerError("the seed", seed, "a whole number from 0", "choose one")
 
 
 def scattering_map(scene: Scene, scatter: Scattering, seed: int = 0) -> Any:

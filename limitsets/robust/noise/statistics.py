@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from limitsets.files import as_table, picked
+from limitsets.progress import shown_in_notebooks
 from limitsets.robust.noise.chain_solution import (
     ChainSolution,
     LevelSensitivity,
@@ -21,6 +22,7 @@ from limitsets.robust.noise.chain_solution import (
 )
 from limitsets.robust.noise.scattering import Scattering, scattering_of
 from limitsets.robust.noise.ulam import STRATA
+from limitsets.tables import Column, Table, Tabled, how_found
 
 if TYPE_CHECKING:
     from limitsets.scene import Scene
@@ -33,7 +35,7 @@ Progress = Callable[[str, int, int], None]
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class NoiseStatistics(ChainSolution):
+class NoiseStatistics(ChainSolution, Tabled):
     """Answers about a noisy scene from the transfer operator; approximations between cells, not proved.
 
     Attributes
@@ -92,6 +94,12 @@ class NoiseStatistics(ChainSolution):
     sensitivity: dict[str, dict[str, LevelSensitivity]]
     how: str = "sampled"
 
+    def tables(self) -> tuple[Table, ...]:
+        """Give the tables that show it, the one that is saved as CSV first."""
+        rows = [(name, value, self.errors.get(name)) for name, value in self.numbers.items()]
+        columns = ("of the noise", Column("value", show=".6g"), Column("error", show=".1e"))
+        return (Table(columns, rows, f"{self.scene}: under noise", how_found(self.how)),)
+
     def to_json(self) -> dict[str, Any]:
         """Give the answers as JSON takes them: null, never nan."""
         return as_table(
@@ -127,6 +135,7 @@ class Levels:
     numbers: dict[str, NDArray[np.float64]]
 
 
+@shown_in_notebooks
 def noise_statistics(
     scene: Scene | str,
     scatter: Scattering | None = None,

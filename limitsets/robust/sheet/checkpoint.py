@@ -54,6 +54,8 @@ class Checkpoint:
         Of the joint margin.
     width : float
         Of the brackets.
+    seconds : float
+        For the proofs of the joint margin and of the curve.
     recheck : bool
         Whether certificates are checked before they get their names.
     """
@@ -66,12 +68,13 @@ class Checkpoint:
         tolerance: Mapping[str, str],
         width: float,
         *,
+        seconds: float,
         recheck: bool = True,
     ) -> None:
         self.folder, self.scene, self.again, self.recheck = folder, scene, 0, recheck
         tables = {word: scene.text[word] for word in THROWN if word in scene.text}
         single = digest_of(tables, [goal_table(goal, scene.unit) for goal in goals], width, recheck)
-        self.digests = {"single": single, "joint": digest_of(single, dict(tolerance))}
+        self.digests = {"single": single, "joint": digest_of(single, dict(tolerance), seconds)}
         # code of the caller's has no digest
         known = folder is not None and not any(isinstance(goal, Predicate) for goal in goals)
         record = self._record() if known else {}

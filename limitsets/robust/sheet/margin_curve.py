@@ -12,10 +12,10 @@ import numpy as np
 from limitsets.robust.margins.beyond import MarginsBeyond, margins_beyond, places_beyond
 from limitsets.scene import Scene
 
-__all__ = ["SECONDS", "curve", "curve_read"]
+__all__ = ["curve", "curve_read"]
 
-# Places; how close their brackets are; seconds for the proof of one joint margin, and after which no place is begun.
-PLACES, COARSE, EACH, SECONDS = 7, 0.1, 15.0, 150.0
+# Places; how close their brackets are; most and least seconds for the proof of one joint margin, and seconds in all.
+PLACES, COARSE, EACH, LEAST, SECONDS = 7, 0.1, 15.0, 1.0, 20.0
 
 
 def curve_read(table: Mapping[str, Any], scene: Scene) -> MarginsBeyond:
@@ -61,7 +61,7 @@ def curve(
     known : mapping or None
         What an earlier run kept.
     seconds : float
-        After which no further place is begun; the middle one always is.
+        Shared by the proofs of all places; after it no further place is begun, but the middle one always is.
     tell, keep : callable
         Called with what is done and its share, and with what is found so far.
 
@@ -86,10 +86,12 @@ def curve(
     for number, x in enumerate(places.tolist()):
         if round(x, 9) in done:
             continue
-        if found is not None and time.perf_counter() - begin > seconds:
+        left = begin + seconds - time.perf_counter()
+        if found is not None and left < 0.0:
             return found, len(places) - found.x.size
+        each = min(EACH, max(left / (len(places) - number), LEAST))
         tell(f"margin beyond x = {x:.4g}", number / PLACES)
-        one = margins_beyond(scene, side, names, x=[x], tolerance=tolerance, width=COARSE, seconds=EACH)
+        one = margins_beyond(scene, side, names, x=[x], tolerance=tolerance, width=COARSE, seconds=each)
         found = _joined(found, one)
         keep(found.to_json())
     assert found is not None

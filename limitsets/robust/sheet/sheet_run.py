@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from limitsets.errors import AnswerError
 from limitsets.goals import Goal, OrientedBeyond, Reaches
+from limitsets.progress import shown_in_notebooks
 from limitsets.proofs.query import Query
 from limitsets.robust.margins.beyond import MarginsBeyond
 from limitsets.robust.margins.deviations import DeviationScale, deviation_scale, deviation_scales
@@ -42,6 +43,9 @@ NO_NOISE = (
 )
 NO_PLACE = "it is asked for goals with an x and a side, oriented_beyond or reaches"
 
+# For the proofs, and of what is left the share for the joint margin.
+SECONDS, FOR_JOINT = 24.0, 0.5
+
 Progress = Callable[[str, int, int], None]
 
 
@@ -56,7 +60,9 @@ class _SheetRun:
         tolerance: dict[str, str],
         checkpoint: Checkpoint,
         progress: Progress,
+        seconds: float,
     ) -> None:
+        self.end = time.perf_counter() + seconds
         self.scene, self.goals, self.todo, self.tolerance = scene, goals, todo, tolerance
         self.checkpoint, self.progress = checkpoint, progress
         self.left_out: dict[str, str] = {}
@@ -72,6 +78,10 @@ class _SheetRun:
         self.tell(words)
         yield
         self.done += 1
+
+    def left(self) -> float:
+        """Seconds that are left for proofs."""
+        return max(self.end - time.perf_counter(), 0.0)
 
     def singles(self, width: float, verdict: str) -> list[Entry]:
         """Find the margins of single quantities."""
@@ -97,11 +107,12 @@ class _SheetRun:
             if entry is not None:
                 return entry
             quiet: dict[str, Any] = {"width": width, "tell": lambda share: self.tell(label, share)}
+            quiet["seconds"] = FOR_JOINT * self.left()
             return self.checkpoint.add(joint_margin(self.scene, self.goals, self.tolerance, **quiet))
 
     def curve(self, side: int) -> MarginsBeyond | None:
         """Find margins against X; None where the part gets farther out on another side."""
-        told: dict[str, Any] = {"tell": self.tell, "keep": self.checkpoint.add_curve}
+        told: dict[str, Any] = {"tell": self.tell, "keep": self.checkpoint.add_curve, "seconds": self.left()}
         with self.step("margins against X"):
             try:
                 found, left = curve(self.scene, side, self.tolerance, self.checkpoint.curve, **told)
@@ -166,6 +177,7 @@ def _todo(scene: Scene, quantities: Sequence[str], reading: str | None) -> list[
     return chosen or list(every)
 
 
+@shown_in_notebooks
 def robustness(
     scene: Scene | str | Path,
     *quantities: str,
@@ -176,6 +188,7 @@ def robustness(
     width: float = 0.01,
     cells: int = CELLS,
     leave_out: Sequence[str] = (),
+    seconds: float = SECONDS,
     folder: str | Path | None = None,
     recheck: bool = True,
     progress: Progress | None = None,
@@ -202,6 +215,9 @@ def robustness(
         Cells per side for the noise.
     leave_out : sequence of str
         Which of "margins", "joint", "curve", "noise" and "audit" not to do.
+    seconds : float
+        Shared by the proof of the joint margin and those of the curve: what they prove by then counts.  The margins of
+        single quantities, the noise and the audit take what they take.
     folder : str or Path, optional
         Margins are written there as they are found, with their certificates, and found again by the next run.
     recheck : bool
@@ -227,6 +243,8 @@ def robustness(
     (True, '%')
     """
     begin = time.perf_counter()
+    if not seconds >= 0.0:
+        raise AnswerError("the seconds", seconds, "0 or more", "allow for some time")
     for part in leave_out:
         if part not in PARTS:
             raise AnswerError("what to leave out", part, ", ".join(PARTS), "correct the word")
@@ -240,9 +258,16 @@ def robustness(
         Tolerance.of(query.scene, vector)  # refuses what the scene does not give
     noise, law = noise_of(given, scatter)
     checkpoint = Checkpoint(
-        None if folder is None else Path(folder), quiet, goals, vector, width, recheck=recheck
+        None if folder is None else Path(folder),
+        quiet,
+        goals,
+        vector,
+        width,
+        seconds=seconds,
+        recheck=recheck,
     )
-    sheet = _SheetRun(quiet, goals, todo, vector, checkpoint, progress or (lambda step, done, of: None))
+    told = progress or (lambda step, done, of: None)
+    sheet = _SheetRun(quiet, goals, todo, vector, checkpoint, told, seconds)
     return _filled(sheet, given, noise, law, width, cells, frozenset(leave_out), begin)
 
 

@@ -13,6 +13,7 @@ from limitsets.robust.margins.margin_texts import void_of
 from limitsets.robust.noise.statistics import Levels, NoiseStatistics
 from limitsets.robust.sheet.entries import Entry, percent_of
 from limitsets.scene import Scene
+from limitsets.tables import Table, Tabled, joined
 
 if TYPE_CHECKING:
     from limitsets.auditing import Audit
@@ -24,7 +25,7 @@ PARTS = ("margins", "joint", "curve", "noise", "audit")
 
 
 @dataclass(frozen=True, eq=False)
-class Robustness:
+class Robustness(Tabled):
     """How far a scene may drift, and what chance does to it.
 
     Attributes
@@ -117,6 +118,16 @@ class Robustness:
             (),
             None,
         )
+
+    def tables(self) -> tuple[Table, ...]:
+        """Give the tables that show it, the one that is saved as CSV first."""
+        margins = joined(self.margins()) if self.entries else Table(("quantity",), (), "No margins")
+        shown = [margins]
+        if self.curve is not None:
+            shown += self.curve.tables()
+        if self.noise is not None:
+            shown += self.noise.tables()
+        return tuple(shown)
 
     def to_json(self) -> dict[str, Any]:
         """Give it as plain tables for JSON: null, never nan."""

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from limitsets.errors import AnswerError
+from limitsets.progress import shown_in_notebooks
 from limitsets.scene import load
 from limitsets.sweep.continuation.events import events_of, numbered
 from limitsets.sweep.continuation.path import Curve, Path, read_path
@@ -22,6 +23,7 @@ __all__ = ["continuation"]
 Progress = Callable[[str, int, int], None]
 
 
+@shown_in_notebooks
 def continuation(
     subject: Any,
     path: Curve,

@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from limitsets.errors import AnswerError
 from limitsets.files import as_table, picked
 from limitsets.sweep.continuation.snapshot import Found
+from limitsets.tables import Column, Table, Tabled
 
 if TYPE_CHECKING:
-    import pandas as pd
+    pass
 
 __all__ = ["Collision", "Continuation", "Event", "State"]
 
@@ -136,7 +136,7 @@ class Event:
 
 
 @dataclass(frozen=True, eq=False)
-class Continuation:
+class Continuation(Tabled):
     """Attractors along a path.
 
     Attributes
@@ -189,32 +189,33 @@ class Continuation:
         ]
         return as_table(**picked(self, "name", "unit", "evaluations"), steps=steps, events=events)
 
-    def to_dataframe(self) -> pd.DataFrame:
-        """Give the bands as a table of pandas: one row per step, attractor and band."""
-        try:
-            import pandas as pd
-        except ModuleNotFoundError:
-            remedy = "pip install 'limitsets[atlas]'"
-            raise AnswerError("the package pandas", "missing", "an installed one", remedy) from None
+    def table(self) -> Table:
+        """Give the bands: one row per step, attractor and band."""
+        values = (*self.values, "attractor", "period", "decided", "side", "band")
         rows = [
-            {
-                "t": t,
-                **{name: each[k] for name, each in self.values.items()},
-                "attractor": number,
-                "period": state.period,
-                "decided": state.decided,
-                "side": side,
-                "band": band,
-                "lo": lo,
-                "hi": hi,
-            }
+            (
+                t,
+                *(each[k] for each in self.values.values()),
+                number,
+                state.period,
+                state.decided,
+                side,
+                band,
+                lo,
+                hi,
+            )
             for k, t in enumerate(self.t.tolist())
             for number, state in self.attractors[k].items()
             for side, parts in state.extents.items()
             for band, (lo, hi) in enumerate(parts)
         ]
-        columns = ["t", *self.values, "attractor", "period", "decided", "side", "band", "lo", "hi"]
-        return pd.DataFrame(rows, columns=columns)
+        return Table(("t", *values, "lo", "hi"), rows, f"{self.name}: bands", "sampled, not proved")
+
+    def tables(self) -> tuple[Table, ...]:
+        """Give the events, and the bands at each step."""
+        rows = [(each.kind, each.t, each.change or None, each.jump) for each in self.events]
+        columns = ("event", Column("t", show=".10g", ends=True), "change", Column("jump", show=".4g"))
+        return Table(columns, rows, f"{self.name}: events", "sampled, not proved"), self.table()
 
 
 def _table(collision: Collision | None) -> dict[str, Any] | None:

@@ -38,6 +38,7 @@ def wheel() -> FullSide:
     return gather_full(with_effects(bare, {"bounce": True}, world), 0)
 
 
+@pytest.mark.sweep
 def test_a_part_without_spin_rises_to_e_squared_of_its_height() -> None:
     part, e, speed = wheel(), 0.8, 3.0
     # standing on the corner under its centre

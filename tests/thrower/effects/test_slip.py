@@ -155,6 +155,7 @@ def test_impacts_are_those_of_the_integrated_law(restitution: float) -> None:
     assert back > 10 or restitution > 0.0
 
 
+@pytest.mark.sweep
 def test_it_is_the_limit_of_friction_that_is_a_smooth_function_of_the_sliding() -> None:
     rng = np.random.default_rng(41)
     for at in meetings(40, 41):

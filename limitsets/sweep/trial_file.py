@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from concurrent.futures import Executor
 from pathlib import Path
 from typing import Any
 
 from limitsets.errors import AnswerError
 from limitsets.files import as_json, as_plain, replaced
+from limitsets.sweep.driving import Progress, Work, drive
+from limitsets.sweep.executors import chosen_pool
 
-__all__ = ["Row", "TrialFile"]
+__all__ = ["Row", "TrialFile", "complete"]
 
 Row = dict[str, Any]
 
@@ -73,6 +76,50 @@ class TrialFile:
     def __iter__(self) -> Iterator[Row]:
         """Give the trials wanted, in the order of their numbers."""
         return (self.rows[number] for number in range(self.trials))
+
+
+def complete(
+    kept: TrialFile,
+    made: Callable[..., list[tuple[int, Row]]],
+    given: tuple[Any, ...],
+    name: str,
+    points: str,
+    *,
+    executor: Executor | None = None,
+    cluster: str | None = None,
+    workers: int | None = None,
+    progress: Progress | None = None,
+) -> None:
+    """Make the trials that are not kept yet: here, or where one of the last arguments says.
+
+    Parameters
+    ----------
+    kept : TrialFile
+        Where they are kept.
+    made : callable
+        Importable by workers: called with `given` and the number of a chunk, it makes the chunk's trials.
+    given : tuple
+        What it is given before the number.
+    name, points : str
+        What is done, and what is counted, in words.
+    executor, cluster, workers, progress
+        As in `limitsets.assemble`.
+    """
+    if len(kept.done) == kept.chunks:
+        return
+    work = Work(
+        kept.chunks,
+        made,
+        given,
+        lambda chunk: len(kept.numbers(chunk)),
+        lambda chunk: f"{points} {kept.numbers(chunk).start} to {kept.numbers(chunk).stop - 1}",
+        f"the {points}",
+        name,
+        points,
+    )
+    here = executor is None and cluster is None and workers is None
+    with chosen_pool(1 if here else kept.chunks, executor, cluster, workers) as pool:
+        drive(work, kept, pool, progress)
 
 
 def _read(path: Path, question: dict[str, Any]) -> dict[int, Row]:

@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from limitsets.animation.turning import Impact, Turning, turned_to_rest
 from limitsets.maps import codes
 from limitsets.plot.poses import angle_on_side, centre_in_flight, outline, turned
+from limitsets.plot.turning import Impact, Turning, turned_to_rest
 
 if TYPE_CHECKING:
     from limitsets.scene import Scene

@@ -1,0 +1,83 @@
+"""`limitsets design --goal`: a scene that meets its own goal, at the X that it asks for."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import typer
+
+from limitsets.cli.arguments import Ends
+from limitsets.cli.output import answer, opened, progress, save_scene, show, show_scene
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from limitsets.inverse.margin.for_goal import GoalDesign
+    from limitsets.scene import Scene
+
+__all__ = ["run_goal"]
+
+
+def run_goal(
+    name: str,
+    vary: Sequence[str],
+    bounds: Mapping[str, Ends],
+    evaluations: int,
+    out: Path | None,
+    form: str,
+    csv: Path | None,
+    *,
+    json: bool,
+) -> int:
+    """Search, prove, write and print; the exit code."""
+    with progress() as tell:
+        from limitsets.inverse.margin.for_goal import design_for_goal, own_bounds
+
+        scene, _ = opened(name, None if out and out.suffix == ".toml" else out)
+        own = own_bounds(scene, list(bounds)) if bounds else {}
+        ends = {one: _ends(scene, one, bounds[one], own[one]) for one in bounds}
+        found = design_for_goal(scene, vary=vary, bounds=ends, evaluations=evaluations, progress=tell)
+        files = [] if out is None else _written(found, out, form)
+    answer(found, json, lambda: _text(found, files), csv=(csv, found.table))
+    return 0 if found.verdict == "proved" else 1
+
+
+def _ends(scene: Scene, name: str, ends: Ends, own: tuple[float, float]) -> tuple[float, float]:
+    """Read bounds; an end that is left out is that of the search's own."""
+    from limitsets.scene.quantities import in_units
+
+    lo, hi = (
+        of if end is None else in_units(scene.unit, name, end, key="--bounds")
+        for end, of in zip(ends, own, strict=True)
+    )
+    return lo, hi
+
+
+def _written(found: GoalDesign, out: Path, form: str) -> list[Path]:
+    """Write the scene, or a folder with the scene, the answer as JSON and the part."""
+    if out.suffix == ".toml":
+        return save_scene(found.scene, out)
+    from limitsets import plot
+    from limitsets.files import as_json
+    from limitsets.report.writing import laid
+    from limitsets.scene import dump
+
+    texts = {f"{found.scene.name}.toml": dump(found.scene), "design.json": as_json(found)}
+    return laid(out, [("part", plot.part(found.scene))], lambda _: texts, form)
+
+
+def _text(found: GoalDesign, files: list[Path]) -> None:
+    show(found.table())
+    typer.echo(found.message[:1].upper() + found.message[1:] + ".")
+    if found.room > 0.0 and found.ruled_out:
+        from limitsets.inverse.margin.search import said
+
+        typer.echo(
+            f"{sum(found.ruled_out.values())} of {found.evaluations} designs were ruled out: {said(found.ruled_out)}"
+        )
+    if found.room > 0.0 and found.verdict != "proved":
+        typer.echo("next: limitsets certify on the scene found says what keeps it from a proof")
+    if files and not found.room > 0.0:
+        typer.echo("the scene written is the best of those, and does not meet the goal")
+    show_scene(found.scene, files)

@@ -1,0 +1,99 @@
+"""What the page says in words: estimates, proofs and margins, as HTML in which nothing from outside is markup."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from html import escape
+from typing import Any
+
+from limitsets.explorer.estimates import CELLS, Estimate
+from limitsets.explorer.knobs import Knob
+from limitsets.explorer.pictures import look_of
+from limitsets.goals import Goal
+from limitsets.plot.style import interval_text
+from limitsets.report.goals import goal_sentence
+
+__all__ = ["KEY", "error_line", "estimate_words", "proof_words"]
+
+KEY = (
+    '<p class="how">Bars: limit sets. Strips: where starts lead, hatched unless to limit set 0. Strokes r: critical '
+    "points. Dotted: the goal. Triangle: the part; click a lane to throw from there.</p>"
+)
+
+VERDICTS = {
+    "proved": "proved",
+    "proved-on-cells": "proved for some starts only",
+    "refuted": "not proved: an orbit refutes it",
+    "undecided": "not proved",
+}
+
+
+def error_line(error: object) -> str:
+    """Say what is wrong, in one line that a screen reader speaks at once."""
+    return f'<p role="alert" class="wrong">{escape(str(error))}</p>' if error else '<p role="alert"></p>'
+
+
+def estimate_words(found: Estimate, goal: Goal | None, unit: str) -> str:
+    """Say what is estimated."""
+    rows = []
+    for k, (extents, order) in enumerate(zip(found.sets, found.orders, strict=True)):
+        places = "; ".join(
+            f"side {side}: {escape(interval_text(parts)).replace(chr(10), ', ')}"
+            for side, parts in sorted(extents.items())
+        )
+        visits = "the order of sides changes" if order is None else f"sides {'-'.join(map(str, order))}"
+        rows.append((f"limit set {k}", f"{places} {unit}; {visits}"))
+    if not found.sets:
+        rows.append(("limit set", "none: no start was found to stay"))
+    shares = "; ".join(f"{look_of(label)[2]} {100 * share:.3g} %" for label, share in found.shares)
+    rows.append(("starts", shares))
+    points = ", ".join(f"r{side}{chr(39) * number} = {x:.4f}" for side, number, x in found.critical)
+    if points:
+        rows.append(("critical points", f"{points} {unit}"))
+    if goal is not None:
+        rows.append((f"goal: {escape(goal_sentence(goal, unit))}", _goal_words(found, unit)))
+    how = f"from {CELLS} cells a side" + (", ends from the compiled loop of the atlas" if found.sharp else "")
+    return _table("Estimated (follows the sliders, proves nothing)", rows, how)
+
+
+def _goal_words(found: Estimate, unit: str) -> str:
+    words = {True: "holds", False: "does not hold", None: "not decided"}[found.holds]
+    if found.vacuous:
+        words = "holds, but no part gets there"
+    return words + ("" if found.threshold is None else f"; threshold x = {found.threshold:.4f} {unit}")
+
+
+def proof_words(lines: Sequence[Mapping[str, Any]], knobs: Sequence[Knob], state: str) -> str:
+    """Say what is proved."""
+    names = {knob.name: knob.words for knob in knobs}
+    rows = []
+    for line in lines:
+        if "claim" in line:
+            starts = line.get("starts")
+            of = f", for {escape(str(starts).replace('-', ' '))} start" if isinstance(starts, str) else ""
+            reason = f" ({escape(str(line['reason']))})" if line.get("reason") else ""
+            verdict = str(line["verdict"])
+            proved = verdict == "proved"
+            sign = "&#10003;" if proved else "&#10007;"
+            rows.append(
+                (escape(str(line["claim"])), f"{sign} <b>{VERDICTS[verdict]}</b>{of if proved else reason}")
+            )
+        elif "margin" in line and "proved" in line:
+            limit = "" if line["refuted"] is None else f"; refuted at {escape(str(line['refuted']))}"
+            held = line["proved"]
+            rows.append(
+                (
+                    f"margin of {names.get(str(line['margin']), '')}",
+                    f"proved up to &plusmn; {escape(str(held))}{limit}",
+                )
+            )
+        elif "error" in line and "margin" not in line:
+            rows.append(("no answer", escape(str(line["error"]))))
+    return _table("Proved (once the sliders rest)", rows, state)
+
+
+def _table(title: str, rows: Sequence[tuple[str, str]], foot: str) -> str:
+    body = "".join(f'<tr><th scope="row">{head}</th><td>{words}</td></tr>' for head, words in rows)
+    return (
+        f'<h2>{title}</h2><table class="said">{body}</table><p class="how" role="status">{escape(foot)}</p>'
+    )

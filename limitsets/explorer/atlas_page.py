@@ -1,0 +1,213 @@
+"""A small atlas beside the scene: computed when it is asked for, or one that was stored; a click opens its feeder."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from html import escape
+from typing import Any
+
+import numpy as np
+import panel as pn
+from bokeh.events import Tap
+from bokeh.models import ColumnDataSource, HoverTool, Range1d
+from bokeh.plotting import figure
+from scipy.ndimage import distance_transform_edt
+
+from limitsets.explorer.background import Background
+from limitsets.explorer.knobs import Knob
+from limitsets.explorer.look import SAID, SLIDER
+from limitsets.explorer.pictures import pattern
+from limitsets.plot.atlas_frame import edges
+from limitsets.scene import Scene, dump
+from limitsets.scene.units import written
+
+__all__ = ["AtlasPage"]
+
+POINTS = 33
+"""Along each axis of an atlas that is computed for the page."""
+
+
+class AtlasPage:
+    """The atlas of one visitor.
+
+    Parameters
+    ----------
+    opened : callable
+        Told the quantities at a point that was clicked, with their units.
+    say : callable
+        Told what is wrong.
+    table : dict, optional
+        A stored one, as `limitsets.explorer.work.table_of` gives it.
+    """
+
+    def __init__(
+        self,
+        opened: Callable[[dict[str, str]], None],
+        say: Callable[[object], None],
+        table: dict[str, Any] | None,
+    ) -> None:
+        self._opened, self._say, self._asked = opened, say, Background()
+        self._table: dict[str, Any] | None = None
+        self._scene: Scene | None = None
+        self._knobs: tuple[Knob, ...] = ()
+        look: dict[str, Any] = {"stylesheets": [SLIDER]}
+        self._x = pn.widgets.Select(label="across", width=190, **look)
+        self._y = pn.widgets.Select(label="up", width=190, **look)
+        self._go = pn.widgets.Button(label=f"Compute {POINTS} x {POINTS} points", align="end", **look)
+        self._go.on_click(lambda _: self._compute())
+        self._words = pn.pane.HTML("", stylesheets=[SAID], sizing_mode="stretch_width")
+        self._boxes = ColumnDataSource({name: [] for name in (*BOX, "face", "hatch", "words")})
+        self._numbers = ColumnDataSource({"x": [], "y": [], "words": []})
+        self._here = ColumnDataSource({"x": [], "y": []})
+        self._picture = self._drawn()
+        self._pane = pn.pane.Bokeh(self._picture, visible=False, sizing_mode="stretch_width")
+        self.column = pn.Card(
+            pn.FlexBox(self._x, self._y, self._go), self._pane, self._words,
+            title="Atlas: where the topology changes; click a point to open that feeder",
+            collapsed=table is None, sizing_mode="stretch_width",
+        )  # fmt: skip
+        if table is not None:
+            self._show(table)
+
+    def _drawn(self) -> Any:
+        made = figure(
+            name="atlas",
+            height=400,
+            toolbar_location=None,
+            tools="",
+            sizing_mode="stretch_width",
+            x_range=Range1d(0, 1),
+            y_range=Range1d(0, 1),
+        )
+        made.xgrid.visible = made.ygrid.visible = False
+        boxes = made.quad(
+            **{name: name for name in BOX}, source=self._boxes, fill_color="face", line_color="face", line_width=0.6,
+            hatch_pattern="hatch", hatch_alpha=0.5, hatch_scale=6, hatch_weight=0.7,
+        )  # fmt: skip
+        made.text(
+            "x", "y", "words", source=self._numbers, text_align="center", text_baseline="middle", text_font_size="12px",
+            background_fill_color="white", background_fill_alpha=0.9, padding=2,
+        )  # fmt: skip
+        made.scatter(
+            "x",
+            "y",
+            source=self._here,
+            marker="circle_cross",
+            size=16,
+            fill_color="white",
+            line_color="#222222",
+            line_width=2,
+        )
+        made.add_tools(HoverTool(renderers=[boxes], tooltips="@words"))
+        made.on_event(Tap, lambda event: self._clicked(event.x, event.y))
+        return made
+
+    def follow(self, scene: Scene, knobs: tuple[Knob, ...]) -> None:
+        """Know which scene is shown."""
+        self._scene, self._knobs = scene, knobs
+        names = {knob.title: knob.name for knob in knobs}
+        if self._x.options != names:
+            self._x.options, self._y.options = names, names
+            chosen = [name for name in ("throw.speed", "throw.kappa") if name in names.values()]
+            self._x.value, self._y.value = chosen[0], "arm.surface_height"
+        self._mark()
+
+    def _compute(self) -> None:
+        if self._scene is None or self._x.value == self._y.value:
+            self._say(
+                "the two quantities of the atlas are the same; allowed: two different ones; choose another"
+            )
+            return
+        self._say("")
+        lines = {}
+        for word, name in (("x", self._x.value), ("y", self._y.value)):
+            knob = next(each for each in self._knobs if each.name == name)
+            lines[word] = f"{name}={written(knob.lo, knob.unit)}:{written(knob.hi, knob.unit)}:{POINTS}"
+        self._words.object = '<p role="status">the atlas is being computed</p>'
+        self._asked.ask({"what": "atlas", "scene": dump(self._scene), **lines})
+
+    def tell(self) -> None:
+        """Show what has been answered."""
+        for line in self._asked.answers():
+            if "error" in line:
+                self._words.object = ""
+                self._say(line["error"])
+            elif "axes" in line:
+                self._show(line)
+
+    def _show(self, table: dict[str, Any]) -> None:
+        self._table = table
+        (x, y), numbers = table["axes"], np.array(table["numbers"])
+        across, up = (edges(np.array(axis["values"])) for axis in (x, y))
+        looks = {each["number"]: each for each in table["classes"]}
+        shown = np.argwhere(np.isin(numbers, list(looks)))
+        i, j = shown.T
+        kinds = [looks[int(each)] for each in numbers[i, j]]
+        self._boxes.data = {
+            "left": across[j], "right": across[j + 1], "bottom": up[i], "top": up[i + 1],
+            "face": [_colour(each["facecolor"]) for each in kinds],
+            "hatch": [pattern(each["hatch"]) for each in kinds],
+            "words": [each["words"] for each in kinds],
+        }  # fmt: skip
+        marks = [(k + 1, numbers == each["number"]) for k, each in enumerate(table["classes"])]
+        places = [(k, *_middle(where)) for k, where in marks if where.any()]
+        self._numbers.data = {
+            "x": [x["values"][column] for _, _, column in places],
+            "y": [y["values"][row] for _, row, _ in places],
+            "words": [str(k) for k, _, _ in places],
+        }
+        for ends, ranges in ((across, self._picture.x_range), (up, self._picture.y_range)):
+            ranges.start, ranges.end = float(ends[0]), float(ends[-1])
+        self._picture.xaxis.axis_label, self._picture.yaxis.axis_label = (
+            f"{a['name']} [{a['unit']}]" for a in (x, y)
+        )
+        self._pane.visible = True
+        rows = "".join(
+            f'<tr><td><span class="swatch" style="background:{_colour(each["facecolor"])}"></span>{k + 1}</td>'
+            f"<td>{escape(each['words'])}</td><td>{100 * each['share']:.3g} %</td></tr>"
+            for k, each in enumerate(table["classes"][:12])
+        )
+        self._words.object = f'<table class="said">{rows}</table><p class="how">estimated, not proved</p>'
+        self._mark()
+
+    def _mark(self) -> None:
+        """Show where the scene on the page is, if the atlas knows of such a place."""
+        if self._table is None or self._scene is None:
+            return
+        values = {knob.name: knob for knob in self._knobs}
+        names = [axis["name"] for axis in self._table["axes"]]
+        if all(
+            name in values and values[name].unit == axis["unit"]
+            for name, axis in zip(names, self._table["axes"], strict=True)
+        ):
+            x, y = (values[name].value for name in names)
+            self._here.data = {"x": [x], "y": [y]}
+
+    def _clicked(self, x: float, y: float) -> None:
+        if self._table is None:
+            return
+        values = {}
+        for axis, at in zip(self._table["axes"], (x, y), strict=True):
+            values_of = np.array(axis["values"])
+            nearest = float(values_of[np.abs(values_of - at).argmin()])
+            values[axis["name"]] = written(nearest, axis["unit"])
+        self._opened(values)
+
+    def close(self) -> None:
+        """End what is still being computed."""
+        self._asked.stop()
+
+
+BOX = ("left", "right", "bottom", "top")
+
+
+def _middle(where: Any) -> tuple[int, int]:
+    """Give the point of a region that is farthest from its edge."""
+    room = distance_transform_edt(np.pad(where, 1))[1:-1, 1:-1]
+    row, column = np.unravel_index(int(room.argmax()), room.shape)
+    return int(row), int(column)
+
+
+def _colour(face: Any) -> str:
+    """Give a face of the figures as the web writes it."""
+    return face if isinstance(face, str) else "#" + "".join(f"{round(255 * each):02x}" for each in face)

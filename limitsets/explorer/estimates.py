@@ -1,0 +1,199 @@
+"""What follows the sliders: attractors, basins, critical points and the goal's threshold, in some 10 ms.
+
+Cells find what attracts and from where; the compiled loop of the atlas then finds the ends of each attractor to the
+last digits, where it can decide them.  Both are estimates: no rounding is enclosed, and images of cells are sampled.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from limitsets.cells import Domain, grid
+from limitsets.graph import transitions
+from limitsets.maps import critical_points, has_slope, kind_of, orbit
+from limitsets.maps.stacks import stacked
+from limitsets.scene import Scene
+from limitsets.sets import Attractor, Basins, attractors, basins
+from limitsets.topology import topologies
+from limitsets.topology.records import DECIDED
+
+__all__ = ["CELLS", "Estimate", "estimate", "estimate_of_map", "points_of_map"]
+
+CELLS = 2048
+"""Cells per side."""
+
+# Of the orbits on which jogs are counted, and of the samples among which branches change.
+THROWS, SAMPLES = 2000, 512
+# Points of a map in the plane, from so many starts; what an orbit runs through first is left out.
+POINTS, STARTS, SKIP = 12_000, 8, 500
+
+Extents = dict[int, list[tuple[float, float]]]
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """What is estimated of one map of one dimension.
+
+    Attributes
+    ----------
+    lo, hi : tuple of float
+        Where a part can rest on each side [length].
+    sets : tuple of dict
+        Per attractor its intervals by side.
+    sharp : bool
+        Whether the outermost ends are those of the compiled loop; otherwise they are edges of cells.
+    orders : tuple
+        Per attractor the flip order, None where it changes.
+    shares : tuple of (int, float)
+        Of the starts, those of each label that occurs: a number of an attractor, or a code of an exit.
+    basins : tuple of (int, float, float, int)
+        Side, ends, label.
+    critical : tuple of (int, int, float)
+        Side, number on the side, x.
+    holds : bool or None
+        Whether the goal does; None where that is not decided, or there is no goal.
+    vacuous : bool
+        Whether it holds because nothing gets there.
+    threshold : float or None
+        Where the goal begins or ceases to hold.
+    """
+
+    lo: tuple[float, ...]
+    hi: tuple[float, ...]
+    sets: tuple[Extents, ...]
+    sharp: bool
+    orders: tuple[tuple[int, ...] | None, ...]
+    shares: tuple[tuple[int, float], ...]
+    basins: tuple[tuple[int, float, float, int], ...]
+    critical: tuple[tuple[int, int, float], ...]
+    holds: bool | None = None
+    vacuous: bool = False
+    threshold: float | None = None
+
+
+def estimate(scene: Scene) -> Estimate:
+    """Estimate where the throws of a scene lead.
+
+    Examples
+    --------
+    >>> import limitsets as ls
+    >>> found = estimate(ls.load("paper-designed"))
+    >>> found.holds, round(found.threshold, 4)
+    (True, 19.7527)
+    """
+    return _estimated(scene.map, scene.domain, scene)
+
+
+def estimate_of_map(params: Any, domain: Domain) -> Estimate:
+    """Estimate the same of any map of one dimension.
+
+    Examples
+    --------
+    >>> from limitsets import maps
+    >>> from limitsets.cells import as_domain
+    >>> found = estimate_of_map(maps.Logistic(3.9), as_domain([(0, 1)]))
+    >>> [round(x, 4) for x in found.sets[0][0][0]]
+    [0.0951, 0.975]
+    """
+    return _estimated(params, domain, None)
+
+
+def _estimated(params: Any, domain: Domain, scene: Scene | None) -> Estimate:
+    graph = transitions(params, grid(domain, cells=CELLS))
+    found = attractors(graph, throws=THROWS)
+    split = basins(graph, found)
+    ends = _ends(params, domain, len(found))
+    sets = tuple(_sharpened(each, ends) for each in found)
+    goal: dict[str, Any] = {}
+    if scene is not None and scene.goal is not None:
+        from limitsets.analysis.goal import goal_outcome
+
+        outcome = goal_outcome(scene.goal, graph, found, split, sets)
+        goal = {"holds": outcome.holds, "vacuous": outcome.vacuous, "threshold": outcome.threshold}
+    labels, counts = np.unique(split.labels, return_inverse=True)
+    weight = np.bincount(counts, weights=graph.grid.measure) / graph.grid.measure.sum()
+    return Estimate(
+        tuple(domain.lo[:, 0].tolist()),
+        tuple(domain.hi[:, 0].tolist()),
+        sets,
+        ends is not None,
+        tuple(each.flip_order for each in found),
+        tuple(zip(labels.tolist(), weight.tolist(), strict=True)),
+        tuple(_runs(split)),
+        tuple(
+            (side, number, point.x)
+            for side, points in critical_points(params, domain, samples=SAMPLES).items()
+            for number, point in enumerate(points)
+        ),
+        **goal,
+    )
+
+
+def _ends(params: Any, domain: Domain, count: int) -> tuple[npt.NDArray[np.float64], ...] | None:
+    """Least and largest x per attractor and side; None where the compiled loop does not decide, or counts others."""
+    if not has_slope(params) or not count:
+        return None
+    anchor = None if domain.anchor is None else domain.anchor[None]
+    found = topologies(stacked([params]), domain.lo[:, 0][None], domain.hi[:, 0][None], anchor)
+    if found.undecided[0] != DECIDED or found.attractors[0] != count:
+        return None
+    return found.lowest[0, :count], found.reach[0, :count]
+
+
+def _sharpened(attractor: Attractor, ends: tuple[npt.NDArray[np.float64], ...] | None) -> Extents:
+    """Move the outermost ends of an attractor's cells to its own ends, where these lie in them."""
+    found = {side: list(parts) for side, parts in attractor.extents.items()}
+    if ends is None:
+        return found
+    for lowest, reach in zip(*ends, strict=True):
+        sides = [int(side) for side in np.flatnonzero(np.isfinite(lowest))]
+        if sides == sorted(found) and all(
+            found[side][0][0] <= reach[side] and lowest[side] <= found[side][-1][1] for side in sides
+        ):
+            for side in sides:
+                found[side][0] = float(lowest[side]), found[side][0][1]
+                found[side][-1] = found[side][-1][0], float(reach[side])
+            return found
+    return found
+
+
+def _runs(split: Basins) -> list[tuple[int, float, float, int]]:
+    """Join cells of one label that lie side by side."""
+    found = []
+    for side in range(split.grid.sides):
+        edges, labels = split.grid.edges[side][0], split.labels[split.grid.of_side(side)]
+        border = np.concatenate([[0], np.flatnonzero(np.diff(labels)) + 1, [labels.size]])
+        for first, last in pairwise(border.tolist()):
+            found.append((side, float(edges[first]), float(edges[last]), int(labels[first])))
+    return found
+
+
+def points_of_map(params: Any, domain: Domain) -> npt.NDArray[np.float64]:
+    """Sample the attractors of a map of two or three dimensions by orbits from a few starts; shape (n, dimension).
+
+    Orbits that leave or are no numbers any more are left out: no points where all of them do.
+
+    Examples
+    --------
+    >>> from limitsets import maps
+    >>> from limitsets.cells import as_domain
+    >>> points_of_map(maps.Henon(), as_domain(maps.domain_of(maps.Henon()))).shape[1]
+    2
+    """
+    share = np.array([0.5 + 0.5 * math.cos(2.4 * k) * math.sqrt((k + 0.5) / STARTS) for k in range(STARTS)])
+    other = np.roll(share, 3)
+    found = []
+    for side in range(domain.sides):
+        lo, hi = domain.lo[side], domain.hi[side]
+        for k in range(STARTS):
+            at = np.array([share[k], other[k], share[k]])[: domain.dimension]
+            path = orbit(params, lo + at * (hi - lo), side, SKIP + POINTS // STARTS)
+            if path.stopped is None and bool(np.isfinite(path.x).all()):
+                found.append(path.x[SKIP:])
+    return np.concatenate(found) if found else np.empty((0, kind_of(params).dimension))

@@ -1,0 +1,268 @@
+"""The page of a scene: one visitor's sliders, pictures and answers, and what happens when they are touched.
+
+Everything that moves is done by `beat`, some thirty times a second: slider events only say that something has changed,
+so that a hand that is faster than the computation leaves no queue behind.
+"""
+
+from __future__ import annotations
+
+import io
+import time
+from typing import Any
+
+import panel as pn
+from bokeh.events import Pan, PanEnd, PanStart, Tap
+
+from limitsets.animation.cutting import Pace
+from limitsets.animation.film import Film
+from limitsets.animation.lanes import require_start
+from limitsets.animation.thrown_scenes import film_of_throws
+from limitsets.errors import LimitsetsError
+from limitsets.explorer.answers import KEY, error_line, estimate_words, proof_words
+from limitsets.explorer.atlas_page import AtlasPage
+from limitsets.explorer.background import Background
+from limitsets.explorer.estimates import estimate
+from limitsets.explorer.knobs import centre_at, knobs_of, scene_with
+from limitsets.explorer.lanes import LanesPicture
+from limitsets.explorer.look import SAID, SLIDER
+from limitsets.explorer.opening import Opening
+from limitsets.explorer.outside import within_reach
+from limitsets.explorer.pictures import ArmPicture, PartPicture
+from limitsets.explorer.sliders import Sliders
+from limitsets.scene import Scene, dump
+
+__all__ = ["ScenePage"]
+
+RESTS = 0.6
+"""Seconds after which a slider that is not moved rests."""
+
+WORDS = 0.25
+"""Seconds between two changes of the text, which the browser sets anew at a cost of several pictures."""
+
+THROWS, FPS, SLOW = 6, 20.0, 2.0
+BEING = "being computed"
+SAVE: dict[str, Any] = {"stylesheets": [SLIDER], "sizing_mode": "stretch_width"}
+
+
+class ScenePage:
+    """What one visitor sees of a scene.
+
+    Parameters
+    ----------
+    scene : Scene
+        Where it begins.
+    atlas : dict, optional
+        Of a stored atlas, as `limitsets.explorer.work.table_of` gives it.
+    """
+
+    def __init__(self, scene: Scene, atlas: dict[str, Any] | None = None) -> None:
+        self._first = within_reach(scene)
+        self._proofs = Background()
+        self._lines: list[dict[str, Any]] = []
+        self._film: Film | None = None
+        self._began = 0.0
+        self._wrote, self._told = -1.0, True
+        self._holding = False
+        self.part, self.arm, self.lanes = PartPicture(), ArmPicture(), LanesPicture()
+        self.sliders = Sliders(self._moved, self.say)
+        self.opening = Opening(self.open, self._draw, self.say)
+        self.atlas = AtlasPage(self._at_point, self.say, atlas)
+        self._error = pn.pane.HTML(error_line(""), stylesheets=[SAID], sizing_mode="stretch_width")
+        self._title = pn.pane.HTML("", stylesheets=[SAID], sizing_mode="stretch_width")
+        self._estimated = pn.pane.HTML("", stylesheets=[SAID], sizing_mode="stretch_width")
+        self._proved = pn.pane.HTML("", stylesheets=[SAID], sizing_mode="stretch_width")
+        self._x = pn.widgets.FloatInput(label="start x", value=0.0, width=110, stylesheets=[SLIDER])
+        self._side = pn.widgets.Select(label="side", options=[0], width=80, stylesheets=[SLIDER])
+        self._toml = pn.widgets.FileDownload(
+            callback=lambda: io.StringIO(dump(self.scene)),
+            filename="scene.toml",
+            label="Save the scene (TOML)",
+            **SAVE,
+        )
+        self.open(scene)
+        self.beat()
+        self.part.figure.on_event(Tap, lambda event: self.opening.corner(event.x, event.y))
+        self.lanes.figure.on_event(Tap, lambda event: self.throw(event.x, round(-event.y)))
+        for event in (PanStart, Pan, PanEnd):
+            self.part.figure.on_event(event, self._dragged)
+        self.layout = self._laid_out()
+
+    # ------------------------------------------------------------ what is shown
+
+    def _laid_out(self) -> pn.viewable.Viewable:
+        wide: dict[str, Any] = {"sizing_mode": "stretch_width"}
+        throw = pn.widgets.Button(label="Throw", color="primary", width=80, align="end", stylesheets=[SLIDER])
+        throw.on_click(lambda _: self.throw(self._x.value, self._side.value))
+        reset = pn.widgets.Button(label="Back to the first scene", stylesheets=[SLIDER])
+        reset.on_click(lambda _: self.open(self._first))
+        svg = pn.widgets.FileDownload(
+            callback=self._svg, filename="limit-set.svg", label="Save the figure (SVG)", **SAVE
+        )
+
+        def part(*shown: Any, room: str) -> pn.Column:
+            return pn.Column(*shown, styles={"flex": room, "min-width": "0"}, sizing_mode="stretch_width")
+
+        key = pn.pane.HTML(KEY, stylesheets=[SAID], sizing_mode="stretch_width")
+        start = pn.Row(self._x, self._side, throw)
+        return pn.Column(
+            self._title,
+            self._error,
+            pn.FlexBox(
+                part(self.sliders.column, start, room="1 1 300px"),
+                part(self.lanes.figure, key, room="2 1 340px"),
+                **wide,
+            ),
+            pn.FlexBox(
+                part(self.arm.figure, room="2 1 330px"),
+                part(self.part.figure, room="1 1 220px"),
+                part(reset, self._toml, svg, self.opening.column, room="1 1 300px"),
+                **wide,
+            ),
+            pn.FlexBox(part(self._estimated, room="1 1 330px"), part(self._proved, room="1 1 330px"), **wide),
+            self.atlas.column,
+            **wide,
+        )
+
+    def say(self, error: object = "") -> None:
+        """Show one line of what is wrong, or take it away."""
+        words = error_line(error)
+        if self._error.object != words:
+            self._error.object = words
+
+    # ------------------------------------------------------------ what happens
+
+    def open(self, scene: Scene) -> None:
+        """Begin with a scene."""
+        self.base, self.scene = scene, scene
+        self.sliders.open(knobs_of(scene))
+        self.opening.show(scene)
+        self._side.options = list(range(len(scene.sides)))
+        self.start: tuple[float, int] | None = None
+        self._refit = True
+        self._moved()
+
+    def _moved(self) -> None:
+        """Remember that something has changed; `beat` draws it."""
+        self._dirty, self._asked, self._last, self._film = True, False, time.monotonic(), None
+
+    def beat(self) -> None:
+        """Do what is due: draw what has changed, show the next frame of a film, ask for proofs, tell their answers."""
+        if self._dirty:
+            self._dirty = False
+            try:
+                self._redraw(scene_with(self.base, self.sliders.knobs, self.sliders.values))
+            except LimitsetsError as error:
+                self.say(error)
+        else:
+            if not self._asked and time.monotonic() - self._last > RESTS:
+                self._ask()
+            if self._film is not None:
+                number = min(int((time.monotonic() - self._began) * FPS), self._film.frames - 1)
+                self._show(self._film, number)
+        if not self._told and time.monotonic() - self._wrote > WORDS:
+            self._told, self._wrote = True, time.monotonic()
+            self.sliders.tell()
+            self._estimated.object = estimate_words(self._found, self.scene.goal, self.scene.unit)
+        self._tell(self._proofs.answers())
+        self.atlas.tell()
+
+    def _redraw(self, scene: Scene) -> None:
+        found = estimate(scene)
+        self.scene = scene
+        self.say()
+        if self._refit:
+            self.lanes.frame(found, scene.unit)
+            self._title.object = (
+                f"<h1>limitsets: {scene.name}</h1>"  # a name of letters, digits, dots and dashes
+            )
+            self._refit = False
+        if not self._startable(scene):
+            side, parts = (
+                next(iter(found.sets[0].items())) if found.sets else (0, [(found.lo[0], found.hi[0])])
+            )
+            self.start = 0.5 * sum(parts[0]), side
+            self._x.value, self._side.value = round(self.start[0], 3), side
+        assert self.start is not None  # just chosen
+        self.part.show(scene)
+        self.arm.rest(scene, *self.start)
+        self.lanes.mark(*self.start)
+        self.lanes.show(found, scene)
+        self._found, self._told = found, False
+        if self._lines or not self._proved.object:
+            self._proofs.stop()
+            self._lines = []
+            self._proved.object = proof_words([], (), "waits until the sliders rest")
+
+    def _startable(self, scene: Scene) -> bool:
+        try:
+            return self.start is not None and require_start(scene, self.start) is not None
+        except LimitsetsError:
+            return False
+
+    def _ask(self) -> None:
+        self._asked, self._lines = True, []
+        self.opening.show(self.scene)
+        self._toml.filename = f"{self.scene.name}.toml"
+        self.atlas.follow(self.scene, knobs_of(self.scene))
+        self._proved.object = proof_words([], (), BEING)
+        names = [knob.name for knob in self.sliders.knobs]
+        self._proofs.ask({"what": "proof", "scene": dump(self.scene), "margins": names})
+
+    def _tell(self, lines: list[dict[str, Any]]) -> None:
+        if lines:
+            self._lines += lines
+            state = "" if "done" in self._lines[-1] else BEING
+            self._proved.object = proof_words(self._lines, self.sliders.knobs, state)
+
+    def throw(self, x: float, side: int) -> None:
+        """Show throws from a start."""
+        try:
+            self.start = require_start(self.scene, (float(x), int(side)))
+            clock = "1/w" if self.scene.gravity is None else "s"
+            self._film = film_of_throws(self.scene, self.start, THROWS, Pace(FPS, SLOW, clock))
+        except (LimitsetsError, TypeError) as error:  # TypeError: an empty field
+            self.say(error)
+            return
+        self.say()
+        self._x.value, self._side.value = round(float(x), 3), int(side)
+        self._began = time.monotonic()
+        self.arm.begin(self._film)
+
+    def _show(self, film: Film, number: int) -> None:
+        self.arm.frame(film, number)
+        self.lanes.mark(*film.position[number].tolist())
+        if number == film.frames - 1:
+            self._film = None
+
+    def _dragged(self, event: Any) -> None:
+        """Move the centre of mass with a hand that began on its mark."""
+        if isinstance(event, PanStart):
+            self._holding = self.sliders.has_centre and self.part.is_at_mark(event.x, event.y)
+        elif isinstance(event, PanEnd):
+            self._holding = False
+        elif self._holding:
+            self.sliders.put(centre_at(self.scene, event.x, event.y))
+
+    def _draw(self, corners: list[tuple[float, float]], drawing: bool) -> None:
+        self.part.sketch(corners)
+        self.part.figure.title.text = "click the corners in turn" if drawing else "the part; drag the cross"
+
+    def _at_point(self, values: dict[str, str]) -> None:
+        """Open the feeder at a point of the atlas."""
+        try:
+            self.open(self.base.with_values(values))
+        except LimitsetsError as error:
+            self.say(error)
+
+    def _svg(self) -> io.BytesIO:
+        from limitsets.plot import limit_set
+
+        found, written = estimate(self.scene), io.BytesIO()
+        limit_set(self.scene, found.sets).savefig(written, format="svg")
+        written.seek(0)
+        return written
+
+    def close(self) -> None:
+        """End what is still being computed."""
+        self._proofs.stop()
+        self.atlas.close()

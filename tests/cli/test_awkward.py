@@ -1,0 +1,275 @@
+"""What a fresh user stumbled over at the command line: widths, cut summaries, lost reports, wrong places, seeds."""
+
+import json
+import re
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+import limitsets as ls
+from limitsets.cli.output import table
+from limitsets.errors import SceneError
+from limitsets.report.robust_pages import robustness_page
+from tests.cli.command import run
+from tests.inverse.test_goal_design import LEAD
+
+SCATTER = {"world": {"scatter": {"speed": "1 %"}}, "effects": {"spread": "bounded"}}
+
+
+def own(**tables):
+    return {**ls.load("paper-designed").as_dict(), **tables}
+
+
+@pytest.mark.sweep
+def test_an_audit_is_as_wide_as_the_terminal_says(capfd, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "80")
+    code, out, _ = run(capfd, "audit", "paper-designed")
+    assert code == 0
+    assert max(map(len, out.splitlines()[:-4])) <= 80  # below the table there are sentences
+    assert "no sliding in" in out
+
+
+def test_where_nothing_says_how_wide_no_cell_is_broken(capfd, monkeypatch):
+    monkeypatch.delenv("COLUMNS", raising=False)
+    table(["head"], [["a b " * 40]])
+    assert ("a b " * 40).strip() in capfd.readouterr().out
+
+
+def test_summaries_of_the_help_are_whole(capfd, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "80")
+    _, out, _ = run(capfd, "--help")
+    assert "..." not in out.partition("Commands:")[2]
+    joined = " ".join(out.split())
+    assert (
+        "Find limit sets, basins and critical points, and write report.md, analysis.json and figures."
+        in joined
+    )
+    assert "Check a certificate by other code and in other arithmetic" in joined
+
+
+@pytest.mark.parametrize("x", ["-5", "-0.1", "-20 cm"])
+def test_no_part_rests_before_the_joint(capfd, x):
+    code, out, err = run(capfd, "throw", "paper-designed", f"--x={x}", "--side", "2")
+    assert (code, out) == (2, "")
+    assert "from 0 to 28 in" in err
+
+
+def places(capfd, scene, *words):
+    code, out, _ = run(capfd, "throw", scene, "--x", "12", "--side", "2", "--count", "5", "--json", *words)
+    assert code == 0
+    return [row["x"] for row in json.loads(out)]
+
+
+def test_throws_that_scatter_have_a_seed(capfd, tmp_path):
+    file = tmp_path / "scatter.toml"
+    ls.dump(ls.load(own(**SCATTER)), file)
+    plain = places(capfd, str(file))
+    assert places(capfd, str(file), "--seed", "0") == plain
+    first = places(capfd, str(file), "--seed", "7")
+    assert first == places(capfd, str(file), "--seed", "7")
+    assert first != plain
+    assert places(capfd, "paper-designed", "--seed", "7") == places(capfd, "paper-designed")
+    with pytest.raises(SceneError, match="the seed"):
+        ls.load(own()).map_of_seed(-1)
+
+
+@pytest.mark.parametrize("ask", [ls.analyse, ls.margin, ls.load])
+def test_a_map_in_the_place_of_a_scene_is_named(ask):
+    """It was "a list of 2": Henon's map has two parameters."""
+    with pytest.raises(SceneError, match=r"a map, Henon.*ls\.certify\(map, grid\)"):
+        ask(ls.maps.Henon())
+
+
+def test_a_report_of_another_scene_is_not_replaced_without_a_word(capfd):
+    words = ("--cells", "64", "-o", "reports")
+    _, _, err = run(capfd, "analyse", "paper-designed", *words)
+    assert "replaced" not in err
+    _, _, err = run(capfd, "analyse", "paper-designed", *words)
+    assert "replaced" not in err
+    _, _, err = run(capfd, "analyse", "paper-initial", *words)
+    assert "reports holds the report of another scene, paper-designed: it is replaced" in err
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no locks of this kind there")
+def test_two_runs_at_once_do_not_write_into_one_folder(capfd, tmp_path):
+    """The first holds the folder as long as it runs, however it ends."""
+    code = "import sys, time, pathlib; from limitsets.cli.claims import claim; claim(pathlib.Path('shared'));"
+    code += "print('held', flush=True); time.sleep(60)"
+    with subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True) as other:
+        assert other.stdout.readline() == "held\n"
+        status, _, err = run(capfd, "analyse", "paper-designed", "--cells", "64", "-o", "shared")
+        assert status == 2
+        assert "another run is writing there" in err
+        assert not Path("shared").exists()
+        assert run(capfd, "analyse", "paper-designed", "--cells", "64", "-o", "mine")[0] == 0
+        other.kill()
+    time.sleep(0.1)
+    assert run(capfd, "analyse", "paper-designed", "--cells", "64", "-o", "shared")[0] == 0
+
+
+def test_one_word_for_one_thing(capfd):
+    """The report's page and the picture of the basins beside it: both call it limit set."""
+    found = ls.analyse("paper-designed", 256)
+    texts = [
+        text.get_text() for text in ls.plot.basins(found.scene, found.basins, found).legends[0].get_texts()
+    ]
+    assert any(text.startswith("to limit set 0") for text in texts)
+    assert not any("attractor" in text for text in texts)
+
+
+# ---------------------------------------------------------------- what comes next, and how long it takes
+
+
+def test_a_goal_that_fails_names_the_next_command(capfd):
+    _, out, _ = run(capfd, "analyse", "paper-initial", "--cells", "1024", "-o", "found")
+    assert "next: limitsets design paper-initial --goal" in out
+    assert "limitsets design paper-initial --goal" in Path("found/report.md").read_text()
+    _, out, _ = run(capfd, "analyse", "paper-designed", "--cells", "1024", "-o", "held")
+    assert "next: limitsets certify paper-designed" in out
+    _, out, _ = run(capfd, "margin", "paper-initial")
+    assert "next: limitsets design paper-initial --goal" in out
+
+
+def test_a_goal_that_is_not_proved_names_the_certificate(capfd):
+    """From the arm's end parts leave: no orbit refutes the goal of the limit set, and not every start is proved."""
+    ls.dump(ls.load(LEAD), "lead.toml")
+    code, out, _ = run(capfd, "margin", "lead.toml", "throw.speed", "arm.surface_height")
+    assert code == 1
+    assert "2 margins, all of them 0: the goal is not proved of the scene as it is" in out
+    assert "next: limitsets certify lead.toml" in out
+
+
+@pytest.mark.sweep
+def test_throws_outside_the_model_are_named_on_the_terminal(capfd):
+    """Only the report said it: far out on sides 2 and 3 the vertex of the model is not the lowest."""
+    chamfered = {
+        "name": "chamfered",
+        "part": {
+            "vertices": [[f"{x} mm", f"{y} mm"] for x, y in ((0, 0), (80, 0), (80, 44), (74, 50), (0, 50))],
+            "mass": {
+                "plate_density": "11.775 kg/m^2",
+                "points": [{"x": "65 mm", "y": "10 mm", "mass": "40 g"}],
+            },
+        },
+        "arm": {"surface_height": "-10 mm", "length": "400 mm"},
+        "throw": {"speed": "200 deg/s"},
+        "gravity": {"tilt": "30 deg"},
+    }
+    ls.dump(ls.load(chamfered), "chamfered.toml")
+    _, out, _ = run(capfd, "analyse", "chamfered.toml", "--cells", "1024", "-o", "found")
+    assert "careful: of some throws of the limit set from side 2, 3 another vertex lands first" in out
+    _, out, _ = run(capfd, "analyse", "paper-designed", "--cells", "1024", "-o", "found")
+    assert "careful" not in out
+
+
+def test_the_next_command_is_one_that_can_be_pasted(capfd):
+    """A file with a blank in its name, and a goal that no design is made for."""
+    ls.dump(ls.load(own(name="two words", goal={"flip_order": [0, 2, 1]})), "two words.toml")
+    _, out, _ = run(capfd, "analyse", "two words.toml", "--cells", "1024", "-o", "found")
+    assert "next: limitsets audit 'two words.toml'" in out
+
+
+def test_margins_that_are_all_nothing_are_one_line(capfd):
+    """18 rows of zeros were printed."""
+    code, out, _ = run(capfd, "margin", "paper-initial")
+    assert code == 1
+    assert len(out.splitlines()) == 3
+    assert "11 margins, all of them 0: the goal fails in the scene as it is" in out
+
+
+def test_design_for_the_goal(capfd):
+    code, out, _ = run(
+        capfd, "design", "paper-designed", "--goal", "--vary", "throw.kappa", "--evaluations", "10"
+    )
+    assert code == 0
+    assert "The goal holds at X = 20 in" in out
+    assert "(proved)" in out
+    words = ("--bounds", "throw.kappa=33 in:33.5 in", "--evaluations", "10", "-o", "found", "--json")
+    code, out, _ = run(capfd, "design", "paper-initial", "--goal", *words)
+    assert code == 1
+    record = json.loads(out)
+    assert record["message"].startswith(
+        "no design that meets the goal at X = 20 in among 10: 10 let another side get"
+    )
+    assert {path.name for path in Path("found").iterdir()} == {
+        "paper-initial-design.toml",
+        "design.json",
+        "part.png",
+    }
+    assert ls.load("found/paper-initial-design.toml").goal == ls.load("paper-initial").goal
+    assert run(capfd, "design", "paper-designed", "--goal", "--robust")[0] == 2
+
+
+@pytest.mark.sweep
+def test_a_robust_design_that_was_ended_is_on_disk(capfd, monkeypatch):
+    from limitsets.inverse.margin import for_margin
+
+    monkeypatch.setattr(for_margin, "polished", lambda *_: (_ for _ in ()).throw(KeyboardInterrupt))
+    words = (
+        "--robust",
+        "--evaluations",
+        "4",
+        "--vary",
+        "part.mass.center.along",
+        "--seconds",
+        "0",
+        "-o",
+        "found",
+    )
+    ls.dump(ls.load(own(tolerance={"throw.speed": "1 %"})), "given.toml")
+    assert run(capfd, "design", "given.toml", *words)[0] == 130
+    (left,) = Path("found").iterdir()
+    assert left.name == "paper-designed-so-far.toml"
+    assert ls.analyse(left, 1024).goal.holds
+
+
+RATED = {"throw_rate": "2 Hz", "scatter": {"speed": "0.5 %"}}
+
+
+@pytest.mark.sweep
+def test_times_are_told_in_seconds_and_parts_per_minute(capfd):
+    """At two throws a second n throws take n / 2 s, and 120 / n parts come in a minute."""
+    cavity = {"position": "20 in", "width": "8 in", "depth": "1 in", "angle": "20 deg"}
+    ls.dump(ls.load(own(world=RATED, cavity=cavity)), "rated.toml")
+    code, out, _ = run(capfd, "feed", "rated.toml", "--no-proof", "--trials", "100")
+    assert code == 0
+    mean = float(re.search(r"throws until a part is fed: ([\d.]+) in the mean", out)[1])
+    seconds = float(re.search(r"in the mean \(([\d.]+) s\)", out)[1])
+    assert seconds == pytest.approx(mean / 2.0, abs=0.06)
+
+
+@pytest.mark.sweep
+def test_the_sheet_tells_them_too(tmp_path):
+    found = ls.robustness(ls.load(own(world=RATED)), cells=128, leave_out=["margins", "curve", "audit"])
+    text = robustness_page(found, {})
+    row = next(line for line in text.splitlines() if line.startswith("| throws until they do, mean"))
+    mean = found.noise.numbers["mean throws"]
+    seconds, parts = re.search(r"\(([\d.]+) s, ([\d.]+) parts per minute\)", row).groups()
+    assert float(seconds) == pytest.approx(mean / 2.0, rel=5e-3)
+    assert float(parts) == pytest.approx(120.0 / mean, rel=5e-3)
+    plain = ls.robustness(
+        ls.load(own(world={"scatter": {"speed": "0.5 %"}})),
+        cells=128,
+        leave_out=["margins", "curve", "audit"],
+    )
+    assert "parts per minute" not in robustness_page(plain, {})
+
+
+def test_a_speed_in_a_wrong_unit_is_asked_about(capfd, tmp_path):
+    own = tmp_path / "own.toml"
+    ls.dump(ls.load("paper-designed").with_values({"throw.speed": "150 rad/s"}), own)
+    code, out, _ = run(capfd, "analyse", str(own), "--cells", "256", "-o", str(tmp_path / "found"))
+    assert code == 0
+    assert "has the speed the right unit?" in out
+
+
+def test_a_goal_that_fails_comes_with_the_x_from_which_it_holds(capfd, tmp_path):
+    own = tmp_path / "own.toml"
+    slow = ls.load("paper-designed").with_values({"throw.speed": "150 deg/s"})
+    ls.dump(slow, own)
+    farthest = max(hi for side in (0, 1) for _, hi in ls.analyse(slow, 1024).extents[0][side])
+    _, out, _ = run(capfd, "analyse", str(own), "--cells", "1024", "-o", str(tmp_path / "found"))
+    assert f"The sentence is true from x = {farthest:.3f} in on." in out

@@ -1,0 +1,212 @@
+"""A scene to start from, all that is wrong with a scene at once, and what is installed."""
+
+import csv
+import json
+import re
+import sys
+import tomllib
+from pathlib import Path
+
+import pytest
+
+import limitsets as ls
+from limitsets.errors import SceneError
+from limitsets.scene.checking import problems
+from limitsets.scene.schema import Table, scene_table
+from limitsets.scene.starting import starting_text
+from limitsets.scene.validation import refusals
+from tests.cli.command import run
+
+PAGE = (Path(__file__).resolve().parents[2] / "docs" / "json.md").read_text(encoding="utf-8")
+SWITCH = re.compile(r'^# (?=\[|[a-z_]+ = |"[a-z.]+" = )', re.M)
+
+
+def documented(section):
+    """Keys in the first column of a section's table."""
+    text = PAGE.split(f"## {section}\n", 1)[1].split("\n## ", 1)[0]
+    cells = re.findall(r"^\| (`[^|]*`) \|", text, re.M)
+    return {name for cell in cells for name in re.findall(r"`(\w+)`", cell)}
+
+
+def keys_of(table, path=()):
+    """Every key of a table of the schema, with those of the tables in it."""
+    for name, field in table.model_fields.items():
+        yield (*path, name)
+        inner = list(models(field.annotation))
+        for each in inner:
+            yield from keys_of(each, (*path, name))
+
+
+def models(annotation):
+    if isinstance(annotation, type) and issubclass(annotation, Table):
+        yield annotation
+    for part in getattr(annotation, "__args__", ()):
+        yield from models(part)
+
+
+def test_the_new_scene_loads_and_is_the_designed_feeder(capfd, tmp_path):
+    code, out, _ = run(capfd, "new", "my part.toml")
+    assert (code, out.splitlines()[0]) == (0, "scene: my part.toml")
+    found = ls.load("my part.toml")
+    assert found.as_dict() == ls.load("paper-designed").as_dict() | {"name": "my part"}
+    before = Path("my part.toml").read_bytes()
+    code, out, err = run(capfd, "new", "my part.toml")
+    assert (code, out, len(err.splitlines())) == (2, "", 1)
+    assert Path("my part.toml").read_bytes() == before
+    assert [path.name for path in tmp_path.iterdir()] == ["my part.toml"]
+
+
+@pytest.mark.parametrize("name", ["mine.txt", "no folder/mine.toml", "mine"])
+def test_a_name_that_cannot_be(name, capfd, tmp_path):
+    code, _, err = run(capfd, "new", name)
+    assert (code, len(err.splitlines())) == (2, 1)
+    assert not list(tmp_path.iterdir())
+
+
+def test_every_key_of_the_schema_stands_in_it_with_its_words_and_an_example_that_fits():
+    text = starting_text("all", "all.toml")
+    tree = tomllib.loads(SWITCH.sub("", text))
+    assert refusals(tree, None)[1] == []  # contradictions, as sides beside vertices, are looked at later
+    table = scene_table(with_effects=True)
+    for path in keys_of(table):
+        assert re.search(rf"\b{path[-1]}\b", text), path
+    for path in keys_of(table):
+        if len(path) == 2:
+            assert path[1] in tree[path[0]], path
+
+
+def test_every_key_of_the_schema_says_what_it_means():
+    table = scene_table(with_effects=True)
+    bare = []
+
+    def look(table, path):
+        for name, field in table.model_fields.items():
+            inner = list(models(field.annotation))
+            if not field.description and not (inner and len(path) < 2 and inner[0].__doc__):
+                bare.append((*path, name))
+            for each in inner:
+                look(each, (*path, name))
+
+    look(table, ())
+    assert bare == []
+
+
+WRONG = """
+[part]
+sides = ["5.75 in", "3.6 in", "6.75 in"]
+[part.mass]
+center = { side = 2, along = "4.2 kg", above = "0.7 in" }
+radius_of_gyration = 1.25
+[arm]
+surface_height = "-0.2 in"
+lenght = "28 in"
+[throw]
+kappa = "25 in"
+[goal]
+oriented_beyond = { x = "20 in", side = "two" }
+"""
+
+
+def test_all_errors_of_a_file_are_told_at_once(capfd):
+    Path("wrong.toml").write_text(WRONG, encoding="utf-8")
+    code, out, err = run(capfd, "check", "wrong.toml")
+    assert (code, err) == (2, "")
+    told = out.splitlines()
+    keys = [
+        "arm.lenght",
+        "part.mass.center.along",
+        "part.mass.radius_of_gyration",
+        "goal.oriented_beyond.side",
+    ]
+    for key in [*keys, "arm.length"]:
+        assert sum(line.startswith(f"wrong.toml: {key}: ") for line in told) == 1, key
+    assert told[-1] == "wrong.toml: 5 things are wrong"
+    code, out, _ = run(capfd, "check", "wrong.toml", "--json", "--csv", "wrong.csv")
+    records = json.loads(out)
+    assert code == 2
+    assert {record["key"] for record in records} == {*keys, "arm.length"}
+    assert all(set(record) == documented("check") for record in records)
+    rows = list(csv.DictReader(Path("wrong.csv").read_text(encoding="utf-8").splitlines()))
+    assert [row["key"] for row in rows] == [record["key"] for record in records]
+
+
+def test_contradictions_are_told_table_by_table():
+    tree = ls.load("paper-designed").as_dict()
+    tree["goal"] = {"oriented_beyond": {"x": "200 in", "side": 2}}
+    tree["cavity"] = {"position": "90 in", "width": "8 in", "depth": "1 in", "angle": "30 deg"}
+    tree["tolerance"] = {"throw.sped": "1 %"}
+    assert [error.key.partition(".")[0] for error in problems(tree)] == ["goal", "cavity", "tolerance"]
+    assert problems("paper-designed") == ()
+
+
+def test_a_cavity_is_not_blamed_for_a_goal_that_is_wrong():
+    tree = ls.load("paper-designed").as_dict()
+    tree["goal"] = {"oriented_beyond": {"x": "200 in", "side": 2}}
+    tree["cavity"] = {"position": "20 in", "width": "8 in", "depth": "1 in", "angle": "30 deg"}
+    assert [error.key for error in problems(tree)] == ["goal.oriented_beyond.x"]
+
+
+@pytest.mark.parametrize("text", ["a = = 1", "", '[part]\nsides = "no"'])
+def test_the_first_error_of_load_is_among_them(text, tmp_path):
+    file = tmp_path / "scene.toml"
+    file.write_text(text, encoding="utf-8")
+    with pytest.raises(SceneError) as caught:
+        ls.load(file)
+    assert str(caught.value) in {str(error) for error in problems(file)}
+
+
+def test_a_scene_that_is_right(capfd):
+    assert run(capfd, "check", "paper-designed")[:2] == (0, "paper-designed: nothing is wrong\n")
+    assert json.loads(run(capfd, "check", "paper-designed", "--json")[1]) == []
+
+
+def test_the_doctor_says_what_is_there(capfd, monkeypatch, tmp_path):
+    code, out, _ = run(capfd, "doctor", "--json", "--csv", "packages.csv")
+    record = json.loads(out)
+    assert code == 0
+    assert set(record) == documented("doctor")
+    assert record["limitsets"] == ls.__version__
+    assert {"numba", "typer"} <= {each["package"] for each in record["packages"] if each["extra"] is None}
+    assert {each["extra"] for each in record["packages"]} >= {"atlas", "engine", "animate", "cluster"}
+    assert Path(record["cache"]["folder"]).is_dir()
+    rows = list(csv.DictReader((tmp_path / "packages.csv").read_text(encoding="utf-8").splitlines()))
+    assert [row["package"] for row in rows] == [each["package"] for each in record["packages"]]
+
+
+def test_the_doctor_names_the_line_that_installs_an_extra(capfd, monkeypatch):
+    import importlib.metadata
+
+    from limitsets.cli import doctor
+
+    def version(name):
+        if name == "pymunk":
+            raise importlib.metadata.PackageNotFoundError(name)
+        return "1.0"
+
+    monkeypatch.setattr(doctor, "version", version)
+    code, out, _ = run(capfd, "doctor")
+    assert code == 0
+    assert "extra engine is missing: pip install 'limitsets[engine]'" in out
+
+
+def test_the_doctor_works_where_packages_are_lost(capfd, monkeypatch):
+    monkeypatch.setitem(sys.modules, "limitsets.jit.cache", None)
+    monkeypatch.setattr(
+        "limitsets.cli.doctor.requires", lambda name: ["numba>=0.68", "no-such-package-of-ours>=1"]
+    )
+    code, out, _ = run(capfd, "doctor")
+    assert code == 1
+    assert "missing, and needed by every command: pip install no-such-package-of-ours" in out
+    assert "compiled code is not kept: " in out
+
+
+def test_the_doctor_clears_the_compiled_code(capfd, monkeypatch, tmp_path):
+    folder = tmp_path / "cache" / "one version"
+    folder.mkdir(parents=True)
+    (folder / "code").write_bytes(b"x" * 1000)
+    monkeypatch.setattr("limitsets.jit.cache.FOLDER", folder)
+    assert json.loads(run(capfd, "doctor", "--json")[1])["cache"]["bytes"] == 1000
+    assert folder.is_dir()
+    record = json.loads(run(capfd, "doctor", "--json", "--clear")[1])["cache"]
+    assert (record["bytes"], record["versions"], record["cleared"]) == (1000, 1, True)
+    assert not folder.exists()

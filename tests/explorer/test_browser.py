@@ -1,0 +1,185 @@
+"""The page in headless Chromium: what a visitor sees and touches, and what two of them do to each other."""
+
+import re
+import socket
+from pathlib import Path
+from urllib.parse import urlsplit
+
+import pytest
+from playwright.sync_api import expect
+
+import limitsets as ls
+from tests.explorer.served import Visitor, browser, served
+
+pytestmark = pytest.mark.sweep
+
+SPEED = 2  # the third slider
+
+
+@pytest.fixture(scope="module")
+def address():
+    with served() as found:
+        yield found
+
+
+@pytest.fixture(scope="module")
+def chromium():
+    with browser() as started:
+        yield started
+
+
+@pytest.fixture
+def visitor(chromium, address):
+    one = Visitor(chromium, address)
+    yield one
+    assert one.complaints == []
+    host = urlsplit(address).netloc
+    assert [url for url in one.asked if urlsplit(url).netloc not in (host, "")] == []  # nothing from outside
+    one.page.context.close()
+
+
+def test_a_slider_moves_the_picture(visitor):
+    sets, points = visitor.columns("limit sets"), visitor.columns("critical points")
+    visitor.slide(SPEED, 40)
+    assert visitor.changed("limit sets", sets)["right"] != sets["right"]
+    assert visitor.changed("critical points", points)["x"] != points["x"]
+
+
+def test_arrow_keys_move_a_slider_that_has_the_focus(visitor):
+    sets = visitor.columns("limit sets")
+    handle = visitor.page.locator(".noUi-handle").nth(SPEED)
+    handle.focus()
+    visitor.page.keyboard.press("ArrowRight")  # of the keyboard's focus browsers draw the outline
+    style = handle.evaluate(
+        "each => { const look = getComputedStyle(each); return [look.outlineStyle, look.outlineWidth]; }"
+    )
+    assert style[0] != "none"
+    assert float(style[1].removesuffix("px")) >= 2  # WCAG 2.4.13 asks for 2
+    visitor.changed("limit sets", sets)
+
+
+def test_a_bad_value_is_said_and_the_picture_stays(visitor):
+    sets = visitor.columns("limit sets")
+    field = visitor.page.get_by_label("speed, typed")
+    field.fill("very fast")
+    field.press("Enter")
+    wrong = visitor.page.locator(".wrong")
+    wrong.wait_for()
+    assert "very fast" in wrong.inner_text()
+    assert visitor.columns("limit sets") == sets
+    field.fill("150 deg/s")
+    field.press("Enter")
+    visitor.changed("limit sets", sets)
+    wrong.wait_for(state="detached")
+
+
+def test_a_click_in_a_lane_throws_from_there(visitor):
+    part = visitor.columns("part")
+    visitor.page.mouse.click(*visitor.at("lanes", 21.0, -2.0))
+    visitor.changed("part", part)
+    visitor.page.wait_for_function(
+        "() => Bokeh.documents[0].get_model_by_name('the arm').title.text.startsWith('Throw ')"
+    )
+
+
+def test_the_centre_of_mass_can_be_dragged(visitor):
+    mark, points = visitor.columns("centre of mass"), visitor.columns("critical points")
+    x, y = mark["x"][0], mark["y"][0]
+    visitor.drag(visitor.at("the part", x, y), visitor.at("the part", x + 0.1, y + 0.1))
+    visitor.changed("critical points", points)
+    assert visitor.columns("centre of mass")["x"][0] == pytest.approx(x + 0.1, abs=0.05)
+
+
+def test_a_part_is_drawn_by_clicking_its_corners(visitor):
+    basins = visitor.settled("basins")
+    visitor.page.get_by_role("button", name="Draw a part").click()
+    field = visitor.page.get_by_label("corners x,y")
+    for count, corner in enumerate(((0.5, 0.2), (5.0, 0.2), (5.0, 2.5), (0.5, 2.5)), start=1):
+        visitor.page.mouse.click(*visitor.at("the part", *corner))
+        expect(field).to_have_value(re.compile(rf"(\S+ ?){{{count}}}"))
+        visitor.page.wait_for_timeout(400)  # two clicks at once are a double click
+    visitor.page.get_by_role("button", name="Done").click()
+    bottoms = visitor.changed("basins", basins)["bottom"]
+    assert min(bottoms) == pytest.approx(-3.3)  # of side 3: there are four
+
+
+def test_what_is_saved_is_what_is_shown(visitor, tmp_path):
+    sets = visitor.columns("limit sets")
+    field = visitor.page.get_by_label("height of the surface, typed")
+    field.fill("-0.3 in")
+    field.press("Enter")
+    visitor.changed("limit sets", sets)
+    with visitor.page.expect_download() as download:
+        visitor.page.get_by_text("Save the scene (TOML)").click()
+    download.value.save_as(tmp_path / "saved.toml")
+    assert ls.load(tmp_path / "saved.toml").surface_height == -0.3
+
+
+def test_two_visitors_at_once_do_not_disturb_each_other(chromium, address, visitor):
+    other = Visitor(chromium, address)
+    sets = other.columns("limit sets")
+    visitor.slide(SPEED, 60)
+    visitor.changed("limit sets", sets)
+    mine = visitor.settled("limit sets")
+    assert other.columns("limit sets") == sets
+    other.slide(SPEED, -60)
+    other.changed("limit sets", sets)
+    assert other.settled("limit sets") != mine
+    assert visitor.columns("limit sets") == mine
+    assert other.complaints == []
+    other.page.context.close()
+
+
+def test_a_hostile_scene_does_nothing(visitor, tmp_path):
+    sets = visitor.columns("limit sets")
+    visitor.page.get_by_role("button", name=re.compile("Scene as text")).click()
+    text = visitor.page.get_by_label("the scene as text")
+    for hostile in (
+        "/etc/passwd",
+        "name = '<img src=x onerror=document.title=1>'\n[part]\nfile = '/etc/passwd'",
+    ):
+        text.fill(hostile)
+        visitor.page.get_by_role("button", name="Use this text").click()
+        wrong = visitor.page.locator(".wrong")
+        wrong.wait_for()
+        assert "root:" not in wrong.inner_text()
+        assert visitor.page.title() != "1"
+    assert visitor.columns("limit sets") == sets
+
+
+def test_a_phone_shows_it_in_one_column(chromium, address):
+    phone = {"viewport": {"width": 390, "height": 844}, "is_mobile": True, "has_touch": True}
+    one = Visitor(chromium, address, **phone)
+    assert one.page.evaluate("document.documentElement.scrollWidth") == 390
+    assert one.complaints == []
+    one.page.context.close()
+
+
+def test_it_listens_on_this_machine_alone(address):
+    port = urlsplit(address).port
+    assert urlsplit(address).hostname == "127.0.0.1"
+    rows = [row.split() for row in Path("/proc/net/tcp").read_text(encoding="ascii").splitlines()[1:]]
+    places = [row[1].split(":") for row in rows if row[3] == "0A"]  # those that listen
+    assert {host for host, at in places if int(at, 16) == port} == {"0100007F"}  # 127.0.0.1
+
+
+def test_a_page_of_elsewhere_gets_no_connection(address):
+    port = urlsplit(address).port
+    with socket.create_connection(("127.0.0.1", port), 10) as line:
+        line.sendall(
+            b"GET /ws HTTP/1.1\r\nHost: 127.0.0.1\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
+            b"Origin: http://elsewhere.example\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n"
+            b"Sec-WebSocket-Version: 13\r\n\r\n"
+        )
+        assert b"403" in line.recv(200)
+
+
+def test_a_click_in_the_atlas_opens_that_feeder(visitor):
+    sets = visitor.columns("limit sets")
+    visitor.page.get_by_role("button", name=re.compile("Atlas")).click()
+    visitor.page.get_by_role("button", name=re.compile("Compute")).click()
+    visitor.page.get_by_text("estimated, not proved").wait_for(timeout=300_000)
+    visitor.page.wait_for_timeout(1000)
+    visitor.page.mouse.click(*visitor.at("atlas", 150.0, -0.4))
+    visitor.changed("limit sets", sets)
+    assert visitor.page.get_by_label("speed, typed").input_value().endswith("deg/s")

@@ -1,0 +1,158 @@
+"""What follows the sliders, without a page: expected values are the paper's, geometry's, or those of proofs."""
+
+import itertools
+import math
+
+import numpy as np
+import pytest
+
+import limitsets as ls
+from limitsets.cells import as_domain
+from limitsets.errors import LimitsetsError, SceneError
+from limitsets.explorer.estimates import estimate, estimate_of_map, points_of_map
+from limitsets.explorer.knobs import centre_at, knobs_of, knobs_of_map, map_with, scene_with
+from limitsets.explorer.outside import MOST_BYTES, MOST_SIDES, scene_from, with_outline
+
+PAPER = ls.load("paper-designed")
+
+
+def test_critical_points_are_those_that_the_paper_designed():
+    assert [round(x, 4) for _, _, x in estimate(PAPER).critical] == [10.0, 10.0, 20.0]
+
+
+def test_the_ends_are_those_that_end_points_are_proved_for():
+    found = estimate(PAPER)
+    limit = ls.limit_set(ls.transitions(PAPER.map, ls.grid(PAPER.domain, cells=4096)))
+    assert found.sharp
+    for side, parts in limit.extents.items():
+        assert np.allclose(found.sets[0][side], parts, rtol=0, atol=1e-7)
+    assert found.threshold == pytest.approx(
+        limit.extents[0][0][1], abs=1e-7
+    )  # side 0 reaches farthest, but for side 2
+
+
+def test_shares_of_the_starts_are_all_of_them():
+    found = estimate(ls.load("paper-initial"))
+    assert sum(share for _, share in found.shares) == pytest.approx(1.0)
+    for side, lo, hi in zip(range(3), found.lo, found.hi, strict=True):
+        runs = [run for run in found.basins if run[0] == side]
+        assert (runs[0][1], runs[-1][2]) == pytest.approx((lo, hi))
+        assert all(before[2] == after[1] for before, after in itertools.pairwise(runs))
+
+
+def test_a_knob_that_is_not_moved_leaves_the_scene_as_it_is_written():
+    knobs = knobs_of(PAPER)
+    assert scene_with(PAPER, knobs, {knob.name: knob.value for knob in knobs}) == PAPER
+
+
+def test_twice_the_gravity_at_the_same_speed_doubles_kappa():
+    steep = scene_with(PAPER, knobs_of(PAPER), {"gravity.tilt": 90.0})
+    assert steep.kappa == pytest.approx(2 * PAPER.kappa, rel=1e-5)  # sin 90 deg over sin 30 deg
+    assert math.degrees(steep.value("throw.speed")) == pytest.approx(math.degrees(PAPER.value("throw.speed")))
+
+
+def test_the_middle_of_the_part_is_where_it_is_dragged():
+    moved = scene_with(PAPER, knobs_of(PAPER), centre_at(PAPER, 2.0, 1.5))
+    assert moved.centre == pytest.approx((2.0, 1.5))
+
+
+def test_a_plate_with_lead_has_sliders_of_the_lead():
+    tree = PAPER.as_dict()
+    tree["part"]["mass"] = {
+        "plate_density": "8 kg/m^2",
+        "points": [{"x": "1 in", "y": "0.5 in", "mass": "50 g"}],
+    }
+    names = [knob.name for knob in knobs_of(ls.load(tree))]
+    assert names[:2] == ["part.mass.points[0].x", "part.mass.points[0].y"]
+
+
+def test_typed_values_are_read_with_their_units():
+    speed = next(knob for knob in knobs_of(PAPER) if knob.name == "throw.speed")
+    assert speed.read("1 rad/s") == pytest.approx(180 / math.pi)
+    assert speed.read("150") == 150.0
+    for wrong in ("fast", "3 kg", "nan", "1e999", ""):
+        with pytest.raises(LimitsetsError):
+            speed.read(wrong)
+
+
+def test_a_drawn_rectangle_balances_in_its_middle_whichever_way_it_is_drawn():
+    corners = [(1.0, 1.0), (7.0, 1.0), (7.0, 4.0), (1.0, 4.0)]
+    for drawn in (corners, corners[::-1]):
+        scene = with_outline(PAPER, drawn)
+        assert scene.centre == pytest.approx((4.0, 2.5))
+        assert scene.radius_of_gyration == pytest.approx(math.sqrt((36 + 9) / 12))
+        assert scene.goal == PAPER.goal
+
+
+def test_a_goal_of_a_side_that_is_not_drawn_is_left_out():
+    tree = PAPER.as_dict() | {"goal": {"oriented_beyond": {"x": "20 in", "side": 3}}}
+    tree["part"] = {
+        "vertices": [["0 in", "0 in"], ["4 in", "0 in"], ["4 in", "3 in"], ["0 in", "3 in"]],
+        "mass": {
+            "center": {"side": 0, "along": "2 in", "above": "1.5 in"},
+            "radius_of_gyration": "1.4 in",
+        },
+    }
+    assert with_outline(ls.load(tree), [(0, 0), (6, 0), (2, 3)]).goal is None
+
+
+@pytest.mark.parametrize(
+    "corners", [[], [(0, 0), (1, 0)], [(0, 0), (4, 0), (1, 1), (0, 4)], [(0, 0), (1, 1), (2, 2)]]
+)
+def test_what_is_no_part_is_refused(corners):
+    with pytest.raises(SceneError):
+        with_outline(PAPER, corners)
+
+
+def test_the_name_of_a_file_is_not_looked_up(tmp_path):
+    file = tmp_path / "mine.toml"
+    ls.dump(PAPER, file)
+    for text in (str(file), "paper-designed", "/etc/passwd", f"file://{file}"):
+        with pytest.raises(SceneError):
+            scene_from(text)
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        'atlas = "/etc/passwd"',
+        'csv = "../secret.csv"',
+        'file = "/etc/passwd"',
+        'name = "<script>alert(1)</script>"',
+        "name = \"__import__('os').system('true')\"",
+        '"!!python/object/apply:os.system" = "true"',
+    ],
+)
+def test_a_scene_that_names_a_file_or_holds_code_is_refused(line):
+    with pytest.raises(SceneError):
+        scene_from(line + "\n" + ls.dump(PAPER).split("\n", 1)[1])
+
+
+def test_what_is_too_large_is_refused():
+    with pytest.raises(SceneError, match="size of the scene"):
+        scene_from("#" * MOST_BYTES + "\n")
+    turns = [2 * math.pi * k / (MOST_SIDES + 1) for k in range(MOST_SIDES + 1)]
+    with pytest.raises(SceneError, match="number of sides"):
+        with_outline(PAPER, [(3 * math.cos(turn), 3 * math.sin(turn)) for turn in turns])
+
+
+def test_the_logistic_band_is_its_critical_orbit():
+    found = estimate_of_map(ls.maps.Logistic(3.9), as_domain([(0, 1)]))
+    top = 3.9 / 4  # the image of 1/2
+    assert found.sets[0][0] == [pytest.approx((3.9 * top * (1 - top), top), abs=1e-6)]
+
+
+def test_points_of_henon_lie_on_a_cycle_where_one_attracts():
+    one = ls.maps.Henon(0.3, 0.3)
+    x = ((0.3 - 1) + math.sqrt(0.49 + 4 * 0.3)) / (2 * 0.3)  # Henon's fixed point
+    points = points_of_map(one, as_domain(ls.maps.domain_of(one)))
+    assert len(points) > 1000
+    assert np.allclose(points, (x, 0.3 * x), atol=1e-9)
+
+
+def test_the_numbers_of_a_map_are_its_knobs():
+    knobs = knobs_of_map(ls.maps.Henon())
+    assert {knob.name: knob.value for knob in knobs} == {"a": 1.4, "b": 0.3}
+    assert map_with(ls.maps.Henon(), {"a": 1.2}) == ls.maps.Henon(1.2, 0.3)
+    with pytest.raises(LimitsetsError):
+        knobs[0].read("much")

@@ -1,0 +1,231 @@
+"""The page without a browser: what a visitor does, and what is shown then."""
+
+import json
+import math
+import subprocess
+import sys
+import time
+
+import pytest
+from bokeh.events import Pan, PanEnd, PanStart
+
+import limitsets as ls
+from limitsets.errors import AnswerError, LimitsetsError, SceneError
+from tests.maps_of_tests import TwoState
+
+
+@pytest.fixture
+def page():
+    made = ls.explore("paper-designed").page()
+    yield made
+    made.close()
+
+
+def sets_of(page):
+    return list(page.lanes._sets.data["right"])
+
+
+def test_a_slider_moves_the_picture_and_the_threshold(page):
+    before, threshold = sets_of(page), page._found.threshold
+    page.sliders.put({"throw.speed": 150.0})
+    page.beat()
+    assert sets_of(page) != before
+    assert page._found.threshold != threshold
+    assert page.scene.kappa == pytest.approx(28.166, abs=1e-3)  # gravity over the speed squared
+    assert "Estimated" in page._estimated.object
+
+
+@pytest.mark.parametrize(
+    "values", [{"part.mass.center.above": 50.0}, {"throw.speed": 0.0}, {"gravity.tilt": 400.0}]
+)
+def test_a_bad_value_is_one_line_and_the_last_good_picture_stays(page, values):
+    before = sets_of(page)
+    page.sliders.put(values)
+    page.beat()
+    assert page._error.object.count('role="alert" class="wrong"') == 1
+    assert "\n" not in page._error.object
+    assert sets_of(page) == before
+    page.sliders.put({knob.name: knob.value for knob in page.sliders.knobs})
+    page.beat()
+    assert "wrong" not in page._error.object
+
+
+def test_what_is_typed_moves_the_slider(page):
+    page.sliders._fields["throw.speed"].value = "2.7 rad/s"
+    page.beat()
+    assert page.scene.value("throw.speed") == pytest.approx(2.7)
+    page.sliders._fields["throw.speed"].value = "fast"
+    assert "wrong" in page._error.object
+    assert page.scene.value("throw.speed") == pytest.approx(2.7)
+
+
+def test_the_mark_in_the_part_moves_the_centre_of_mass(page):
+    figure, (x, y) = page.part.figure, page.scene.centre
+    page._dragged(PanStart(figure, x=x + 3.0, y=y))  # beside the mark
+    page._dragged(Pan(figure, x=2.0, y=1.5))
+    page.beat()
+    assert page.scene.centre == (x, y)
+    page._dragged(PanStart(figure, x=x, y=y))
+    page._dragged(Pan(figure, x=2.0, y=1.5))
+    page.beat()
+    assert page.scene.centre == pytest.approx((2.0, 1.5))
+    page._dragged(Pan(figure, x=-9.0, y=1.5))  # out of the part: the mark stays
+    page.beat()
+    assert "wrong" in page._error.object
+    assert page.part.centre.data["x"] == [pytest.approx(2.0)]
+    page._dragged(PanEnd(figure))
+    page._dragged(Pan(figure, x=2.5, y=1.5))
+    page.beat()
+    assert page.part.centre.data["x"] == [pytest.approx(2.0)]
+
+
+def test_corners_that_are_clicked_become_a_part(page):
+    page.opening._draw.value = True
+    for x, y in ((0.0, 0.0), (6.0, 0.0), (6.0, 3.0), (0.0, 3.0)):
+        page.opening.corner(x, y)
+    assert page.part.corners.data["x"] == [0.0, 6.0, 6.0, 0.0, 0.0]
+    page.opening._draw.value = False
+    page.beat()
+    assert page.scene.centre == pytest.approx((3.0, 1.5))
+    assert len(page.lanes._basins.data["left"]) >= 4
+    page.opening._draw.value = True
+    for x, y in ((0.0, 0.0), (4.0, 0.0), (1.0, 1.0), (0.0, 4.0)):  # it turns inward
+        page.opening.corner(x, y)
+    page.opening._draw.value = False
+    assert "wrong" in page._error.object
+    assert page.scene.centre == pytest.approx((3.0, 1.5))
+
+
+def test_throws_are_shown_from_a_start_and_end_where_the_map_says(page):
+    page.throw(21.0, 2)
+    film = page._film
+    assert film.rests[0].side == 0
+    assert film.rests[0].x == pytest.approx(float(ls.orbit(page.scene.map, 21.0, 2, 1).x[1]))
+    page._began -= 1000.0
+    page.beat()
+    assert page._film is None
+    last = film.rests[-1]
+    assert page.lanes._start.data["x"] == [pytest.approx(last.x)]
+    page.throw(-5.0, 0)
+    assert "wrong" in page._error.object
+
+
+def test_a_scene_from_outside_is_opened_and_a_path_is_not(page, tmp_path):
+    other = ls.load("paper-initial")
+    page.opening._read(ls.dump(other))
+    page.beat()
+    assert page.scene == other
+    ls.dump(ls.load("paper-triangle"), tmp_path / "mine.toml")
+    page.opening._read(str(tmp_path / "mine.toml"))
+    page.beat()
+    assert "wrong" in page._error.object
+    assert page.scene == other
+    page.opening._sent(b"\xff\xfe\x00 = not a scene")
+    assert "wrong" in page._error.object
+
+
+def test_what_is_wrong_is_text_and_no_markup(page):
+    page.opening._read("name = '<img src=x onerror=alert(1)>'\n")
+    assert "<img" not in page._error.object
+    assert "&lt;img" in page._error.object
+
+
+def test_two_pages_do_not_know_of_each_other():
+    explorer = ls.explore("paper-designed")
+    one, other = explorer.page(), explorer.page()
+    before = sets_of(other)
+    one.sliders.put({"throw.speed": 150.0})
+    one.beat()
+    other.beat()
+    assert sets_of(other) == before
+    assert other.scene == ls.load("paper-designed")
+    one.close()
+    other.close()
+
+
+def test_what_is_saved_is_the_scene_that_is_shown(page):
+    page.sliders.put({"arm.surface_height": -0.25})
+    page.beat()
+    saved = page._toml.callback().read()
+    assert ls.load(saved) == page.scene
+    assert page.scene.surface_height == -0.25
+    assert page._svg().read(200).startswith(b"<?xml")
+
+
+@pytest.mark.sweep
+def test_proofs_come_once_the_sliders_rest(page):
+    deadline = time.monotonic() + 300
+    while "<b>proved</b>" not in page._proved.object and time.monotonic() < deadline:
+        page.beat()
+        time.sleep(0.02)
+    assert "proved" in page._proved.object
+    page.sliders.put({"throw.speed": 150.0})
+    page.beat()
+    assert "<b>proved</b>" not in page._proved.object  # what was proved was said of another scene
+
+
+def test_a_map_of_two_dimensions_is_its_points_and_a_bad_parameter_a_line():
+    page = ls.explore(ls.maps.Henon()).page()
+    before = len(page.points._points.data["x"])
+    assert before > 1000
+    page.sliders.put({"a": 5.0})  # all of it leaves
+    page.beat()
+    assert len(page.points._points.data["x"]) == 0
+    page.sliders._typed(page.sliders.knobs[0], "much")
+    assert "wrong" in page._error.object
+
+
+def test_a_map_of_one_dimension_has_lanes():
+    page = ls.explore(ls.maps.Logistic(3.9)).page()
+    assert page.lanes._sets.data["right"] == [pytest.approx(0.975)]
+
+
+def test_what_cannot_be_explored_is_refused():
+    class Alien(tuple):
+        __slots__ = ()
+
+    with pytest.raises(LimitsetsError):
+        ls.explore(Alien())
+    with pytest.raises(AnswerError):
+        ls.explore("paper-designed", domain=[(0, 1)])
+    with pytest.raises(AnswerError, match=r"the domain of TwoState .*pass domain=\[\(lo, hi\)"):
+        ls.explore(TwoState())
+    with pytest.raises(SceneError):
+        ls.explore("no-such-scene")
+    with pytest.raises(LimitsetsError, match="a folder that limitsets atlas wrote"):
+        ls.explore("paper-designed", atlas="/nowhere")
+
+
+@pytest.mark.sweep
+def test_a_stored_atlas_is_shown_and_a_point_of_it_opened(tmp_path):
+    axes = "throw.speed=150 deg/s:160 deg/s:3", "arm.surface_height=-0.4 in:-0.2 in:3"
+    ls.atlas("paper-designed", *axes, store=tmp_path / "a.zarr")
+    page = ls.explore("paper-designed", atlas=tmp_path / "a.zarr").page()
+    assert len(page.atlas._boxes.data["left"]) == 9
+    page.atlas._clicked(151.0, -0.29)
+    page.beat()
+    assert math.degrees(page.scene.value("throw.speed")) == pytest.approx(150.0)
+    assert page.scene.surface_height == pytest.approx(-0.3)
+    page.close()
+
+
+def test_any_other_address_needs_the_names_of_who_may_come():
+    with pytest.raises(LimitsetsError, match="allowed origins"):
+        ls.explore(ls.maps.Henon()).show(address="0.0.0.0", show=False)
+
+
+def test_without_the_extra_one_line_names_it():
+    script = (
+        "import sys; sys.modules['panel'] = None; from limitsets.__main__ import main; sys.argv[1:] = ['explore'];"
+        "sys.exit(main())"
+    )
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=False)
+    assert done.returncode == 2
+    assert "pip install 'limitsets[explore]'" in done.stderr
+    assert len(done.stderr.strip().splitlines()) == 1
+
+
+def test_neither_the_package_nor_analyse_loads_panel():
+    script = "import sys, json, limitsets, limitsets.cli.app; print(json.dumps(sorted(sys.modules)))"
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    assert not {"panel", "bokeh"} & set(json.loads(done.stdout))
