@@ -14,7 +14,7 @@ from limitsets.cli.output import table
 from limitsets.errors import SceneError
 from limitsets.report.robust_pages import robustness_page
 from tests.cli.command import run
-from tests.inverse.test_goal_design import LEAD
+from tests.lead_quad import LEAD_QUAD
 
 SCATTER = {"world": {"scatter": {"speed": "1 %"}}, "effects": {"spread": "bounded"}}
 
@@ -135,7 +135,7 @@ def test_a_goal_that_fails_names_the_next_command(capfd):
 
 def test_a_goal_that_is_not_proved_names_the_certificate(capfd):
     """From the arm's end parts leave: no orbit refutes the goal of the limit set, and not every start is proved."""
-    ls.dump(ls.load(LEAD), "lead.toml")
+    ls.dump(ls.load(LEAD_QUAD), "lead.toml")
     code, out, _ = run(capfd, "margin", "lead.toml", "throw.speed", "arm.surface_height")
     assert code == 1
     assert "2 margins, all of them 0: the goal is not proved of the scene as it is" in out
