@@ -9,6 +9,7 @@ from typing import Any
 
 import panel as pn
 from jinja2 import Template
+from panel.io.callbacks import PeriodicCallback
 
 from limitsets.cells import as_domain
 from limitsets.errors import AnswerError, LimitsetsError, MapError
@@ -65,7 +66,8 @@ class Explorer(pn.viewable.Viewer):  # type: ignore[misc]  # panel is not follow
         document = pn.state.curdoc
         if document is not None and document.session_context is not None:
             document.template = Template(PAGE)
-            pn.state.add_periodic_callback(page.beat, BEAT)
+            # in the background: nobody is told that the server is busy, at each beat
+            PeriodicCallback(callback=page.beat, period=BEAT, background=True).start()
             pn.state.on_session_destroyed(lambda _: page.close())
         elif _in_a_loop():  # a notebook
             pn.state.add_periodic_callback(lambda: _pushed(page), BEAT)

@@ -7,10 +7,10 @@ import sys
 import time
 
 import pytest
-from bokeh.events import Pan, PanEnd, PanStart
 
 import limitsets as ls
 from limitsets.errors import AnswerError, LimitsetsError, SceneError
+from limitsets.explorer.canvas import Canvas
 from tests.maps_of_tests import TwoState
 
 
@@ -60,21 +60,21 @@ def test_what_is_typed_moves_the_slider(page):
 
 
 def test_the_mark_in_the_part_moves_the_centre_of_mass(page):
-    figure, (x, y) = page.part.figure, page.scene.centre
-    page._dragged(PanStart(figure, x=x + 3.0, y=y))  # beside the mark
-    page._dragged(Pan(figure, x=2.0, y=1.5))
+    hand, (x, y) = page.part.canvas._handle_msg, page.scene.centre
+    hand({"what": "grasp", "x": x + 3.0, "y": y})  # beside the mark
+    hand({"what": "drag", "x": 2.0, "y": 1.5})
     page.beat()
     assert page.scene.centre == (x, y)
-    page._dragged(PanStart(figure, x=x, y=y))
-    page._dragged(Pan(figure, x=2.0, y=1.5))
+    hand({"what": "grasp", "x": x, "y": y})
+    hand({"what": "drag", "x": 2.0, "y": 1.5})
     page.beat()
     assert page.scene.centre == pytest.approx((2.0, 1.5))
-    page._dragged(Pan(figure, x=-9.0, y=1.5))  # out of the part: the mark stays
+    hand({"what": "drag", "x": -9.0, "y": 1.5})  # out of the part: the mark stays
     page.beat()
     assert "wrong" in page._error.object
     assert page.part.centre.data["x"] == [pytest.approx(2.0)]
-    page._dragged(PanEnd(figure))
-    page._dragged(Pan(figure, x=2.5, y=1.5))
+    hand({"what": "release", "x": 2.0, "y": 1.5})
+    hand({"what": "drag", "x": 2.5, "y": 1.5})
     page.beat()
     assert page.part.centre.data["x"] == [pytest.approx(2.0)]
 
