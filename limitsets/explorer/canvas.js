@@ -1,5 +1,5 @@
 // Draws what a `Canvas` of canvas.py lists, layer upon layer, once a frame of the screen at most.  Scripts of a reader, and
-// tests, find on the canvas itself what it shows (`shown`) and where (`frame`).
+// tests, find on the canvas itself what it shows (`shown`) and where (`frame`, and the `boxes` of words).
 const FACE = 'system-ui, -apple-system, "Segoe UI", "DejaVu Sans", sans-serif'
 const INK = "#222222", TILE = 8, NEAR = 24, MOVED = 4
 
@@ -47,13 +47,13 @@ export function render({ model, el }) {
   }
   const kinds = {
     bars: ({ left, right, bottom, top, face, hatch, line }) => {
-      pen.strokeStyle = line
       pen.lineWidth = 1
       left.forEach((x, k) => {
         const box = [across(x), down(top[k]), Math.max(across(right[k]) - across(x), 1), down(bottom[k]) - down(top[k])]
         pen.fillStyle = face[k]
         pen.fillRect(...box)
         if (hatch[k] !== " ") { pen.fillStyle = hatched(hatch[k]); pen.fillRect(...box) }
+        pen.strokeStyle = line || face[k]
         pen.strokeRect(...box)
       })
     },
@@ -180,6 +180,7 @@ export function render({ model, el }) {
     Object.assign(pen, { fillStyle: INK, font: `600 13px ${FACE}`, textAlign: "left", textBaseline: "middle" })
     pen.fillText(heading, view.across ? view.margins[0] : 4, 9)
     for (const layer of layers) kinds[layer.kind](layer)
+    canvas.boxes = boxes
   }
   const ask = () => { if (!due) { due = true; requestAnimationFrame(paint) } }
   const read = () => {
@@ -223,6 +224,25 @@ export function render({ model, el }) {
     pressed = null
   })
   canvas.addEventListener("pointercancel", () => { if (pressed && moved) tell("release", pressed); pressed = null })
+  // Words of the bar below a mouse that rests.
+  canvas.addEventListener("pointermove", (event) => {
+    const bars = canvas.shown.layers.find((layer) => layer.kind === "bars" && layer.words)
+    if (!bars || !canvas.frame || pressed) return
+    const { x, y } = at(event)
+    const k = bars.left.findIndex((left, i) => left <= x && x < bars.right[i] && bars.bottom[i] <= y && y < bars.top[i])
+    canvas.title = bars.words[k] || ""
+  })
+  if (canvas.shown.view.keys) {
+    const steps = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] }
+    canvas.tabIndex = 0
+    canvas.addEventListener("keydown", (event) => {
+      const step = steps[event.key]
+      if (step) tell("step", { x: step[0], y: step[1] })
+      else if (event.key === "Enter") tell("enter", { x: 0, y: 0 })
+      else return
+      event.preventDefault()
+    })
+  }
   // A finger on what can be dragged does not scroll the page.
   canvas.addEventListener("touchstart", (event) => {
     if (!canvas.frame) return

@@ -1,7 +1,7 @@
 """What this package draws in the browser by itself: pictures on a canvas, sliders, and lines of text.
 
-A Bokeh figure spends some 20 ms of the browser on a picture of the lanes, and its slider, which rebuilds itself at every
-move, 14 ms on a move: too much for 20 pictures a second on two cores.  These spend 2 ms and 5 ms.
+A figure of Bokeh costs the browser some 20 ms for a picture of the lanes, and its slider, which rebuilds itself at
+every move, 14 ms for a move: too much for 20 pictures a second on two cores.  These cost 2 ms and 5 ms.
 """
 
 from __future__ import annotations
@@ -9,12 +9,11 @@ from __future__ import annotations
 import base64
 import json
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-import panel as pn
 import param
 from panel.custom import JSComponent
 
@@ -31,9 +30,9 @@ class Hand(NamedTuple):
     Attributes
     ----------
     what : str
-        "tap", or of a drag "grasp", "drag", "release".
+        "tap", of a drag "grasp", "drag", "release", of keys "step" and "enter".
     x, y : float
-        Where, in the picture's coordinates.
+        Where, in the picture's coordinates; of a step whether to the right and up (1) or back (-1).
     """
 
     what: str
@@ -56,7 +55,9 @@ class Layer:
         The same for all its shapes.
     """
 
-    def __init__(self, kind: str, called: str = "", *, columns: Iterable[str] = ("x", "y"), **look: Any) -> None:
+    def __init__(
+        self, kind: str, called: str = "", *, columns: Iterable[str] = ("x", "y"), **look: Any
+    ) -> None:
         self.kind, self.called, self.look = kind, called, look
         self.data: dict[str, Any] = {name: [] for name in columns}
 
@@ -76,7 +77,8 @@ class Canvas(JSComponent):  # type: ignore[misc]  # panel is not followed
         Told what a `Hand` does.
     **view
         How it is laid out: `margins` [pixel] to the left, right, top and bottom; `equal` for one scale on both axes;
-        `across` and `up`, names of the axes where they are drawn; `lanes`, words instead of numbers on the other axis.
+        `across` and `up`, names of the axes where they are drawn; `lanes`, words instead of numbers on the other axis;
+        `keys` where arrow keys and Enter are told.
     """
 
     called = param.String()
@@ -84,11 +86,19 @@ class Canvas(JSComponent):  # type: ignore[misc]  # panel is not followed
     _esm = PACE + (HERE / "canvas.js").read_text(encoding="utf-8")
 
     def __init__(
-        self, called: str, layers: list[Layer], height: int, touched: Callable[[Hand], None] | None = None, **view: Any
+        self,
+        called: str,
+        layers: list[Layer],
+        height: int,
+        touched: Callable[[Hand], None] | None = None,
+        *,
+        stylesheets: Sequence[str] = (),
+        **view: Any,
     ) -> None:
         self.layers, self.heading, self._touched = layers, "", touched
         self.view: dict[str, Any] = {"x": [0.0, 1.0], "y": [0.0, 1.0], **view}
-        super().__init__(called=called, drawn=self._written(), height=height, sizing_mode="stretch_width")
+        options = {"height": height, "sizing_mode": "stretch_width", "stylesheets": list(stylesheets)}
+        super().__init__(called=called, drawn=self._written(), **options)
 
     def send(self) -> None:
         """Show what has changed, if anything has: one message."""
@@ -96,7 +106,8 @@ class Canvas(JSComponent):  # type: ignore[misc]  # panel is not followed
 
     def _written(self) -> str:
         layers = [
-            {"kind": each.kind, "called": each.called, **each.look, **self._columns(each)} for each in self.layers
+            {"kind": each.kind, "called": each.called, **each.look, **self._columns(each)}
+            for each in self.layers
         ]
         return json.dumps({"view": self.view, "heading": self.heading, "layers": layers})
 
@@ -114,9 +125,11 @@ class Canvas(JSComponent):  # type: ignore[misc]  # panel is not followed
         """Take what the browser says, which may be anything."""
         if self._touched is None or not isinstance(data, dict):
             return
-        what, x, y = data.get("what"), data.get("x"), data.get("y")
-        if isinstance(what, str) and all(isinstance(each, float | int) and math.isfinite(each) for each in (x, y)):
-            self._touched(Hand(what, float(x), float(y)))
+        what, at = data.get("what"), [data.get(axis, math.nan) for axis in "xy"]
+        if isinstance(what, str) and all(
+            isinstance(each, float | int) and math.isfinite(each) for each in at
+        ):
+            self._touched(Hand(what, *at))
 
 
 class Bar(JSComponent):  # type: ignore[misc]  # panel is not followed

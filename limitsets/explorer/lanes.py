@@ -39,11 +39,10 @@ class LanesPicture:
         self._threshold = Layer(
             "marks", "threshold", shape="diamond", size=13, line="#ffffff", width=1, fill=style.GOAL
         )
-        self._start = Layer("marks", "start", shape="triangle", size=14, line="#ffffff", width=1, fill=style.FLIP)
+        part: dict[str, Any] = {"shape": "triangle", "size": 14, "line": "#ffffff", "width": 1}
+        self._start = Layer("marks", "start", fill=style.FLIP, **part)
         self._points, self._limit, self._asked = (
-            Layer(
-                "words", columns=("x", "y", "words", "align"), colour=colour, size=11, plate=True, apart=True, **look
-            )
+            Layer("words", columns=WRITTEN, colour=colour, size=11, plate=True, apart=True, **look)
             for colour, look in (
                 (style.INK, {"baseline": "top"}),
                 (style.GOAL, {"shift": -9}),
@@ -80,7 +79,8 @@ class LanesPicture:
         marks = [(x, -side - 0.3, -side + 0.3) for side, _, x in found.critical]
         self._critical.data = _columns(marks, "x", "y0", "y1")
         names = [
-            (x, -side - 0.3, f"r{side}{chr(39) * number} {x:.2f}", "center") for side, number, x in found.critical
+            (x, -side - 0.3, f"r{side}{chr(39) * number} {x:.2f}", "center")
+            for side, number, x in found.critical
         ]
         self._points.data = _columns(names, *WRITTEN)
         goal = None if scene is None else scene.goal
@@ -91,7 +91,8 @@ class LanesPicture:
         ends = [(x, y) for x, *_ in asked for y in (0.15 - len(found.lo), 0.55)]
         self._goal.data, self._asked.data = _columns(ends, "x", "y"), _columns(asked, *WRITTEN)
         low = 0.28 - len(found.lo)
-        limits = [] if found.threshold is None else [(found.threshold, low, f"threshold {found.threshold:.3f}", "right")]
+        at = [] if found.threshold is None else [found.threshold]
+        limits = [(x, low, f"threshold {x:.3f}", "right") for x in at]
         self._threshold.data = self._limit.data = _columns(limits, *WRITTEN)
         self.canvas.heading = "estimate: limit sets, basins, critical points"
 
@@ -106,7 +107,16 @@ class PointsPicture:
     def __init__(self, lo: Sequence[float], hi: Sequence[float]) -> None:
         self._points = Layer("dots", "points", colour=style.JOG)
         self.canvas = Canvas("map", [self._points], 460, margins=MARGINS, across="x_0", up="x_1")
-        self.canvas.view |= {"x": [lo[0], hi[0]], "y": [lo[1], hi[1]]}
+        self._ends = np.array([lo[:2], hi[:2]])
+        self.canvas.view |= dict(zip("xy", self._ends.T.tolist(), strict=True))
+
+    def frame(self, points: Array) -> None:
+        """Choose what is in sight: points and as much around them, within where the map is looked at."""
+        if len(points):
+            lo, hi = points[:, :2].min(axis=0), points[:, :2].max(axis=0)
+            room = 0.5 * np.maximum(hi - lo, 0.1 * (self._ends[1] - self._ends[0]))
+            ends = np.clip([lo - room, hi + room], *self._ends)
+            self.canvas.view |= dict(zip("xy", ends.T.tolist(), strict=True))
 
     def show(self, points: Array) -> None:
         """Draw them."""

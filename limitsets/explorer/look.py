@@ -25,8 +25,8 @@ p { margin: 0.2rem 0; font-size: 0.9rem; line-height: 1.35; }
 """
 
 SLIDER = """
-input:focus-visible, button:focus-visible, select:focus-visible, a:focus-visible,
+input:focus-visible, button:focus-visible, select:focus-visible, a:focus-visible, canvas:focus-visible,
 textarea:focus-visible { outline: 3px solid #0072B2; outline-offset: 1px; }
-label, .bk-slider-title { font-size: 0.85rem; font-family: system-ui, -apple-system, "Segoe UI", "DejaVu Sans", sans-serif; }
+label { font-size: 0.85rem; font-family: system-ui, -apple-system, "Segoe UI", "DejaVu Sans", sans-serif; }
 input[type=range] { display: block; width: 100%; height: 24px; margin: 0; accent-color: #0072B2; touch-action: pan-y; }
 """

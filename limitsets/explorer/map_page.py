@@ -79,7 +79,11 @@ class MapPage:
             params = map_with(self._params, self.sliders.values)
             if self.lanes is None:
                 assert self.points is not None  # it is one of the two
-                self.points.show(points_of_map(params, self._domain))
+                points = points_of_map(params, self._domain)
+                if self._refit:
+                    self.points.frame(points)
+                    self._refit = False
+                self.points.show(points)
             else:
                 found = estimate_of_map(params, self._domain)
                 if self._refit:

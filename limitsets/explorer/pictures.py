@@ -63,7 +63,14 @@ class PartPicture:
     def __init__(self, touched: Callable[[Hand], None]) -> None:
         self._outline = Layer("path", "outline", line=style.INK, width=1.5, fill=PART)
         self._labels = _words(size=13)
-        cross = {"shape": "cross", "size": 22, "line": style.INK, "width": 2, "fill": "#ffffff", "grip": True}
+        cross: dict[str, Any] = {
+            "shape": "cross",
+            "size": 22,
+            "line": style.INK,
+            "width": 2,
+            "fill": "#ffffff",
+            "grip": True,
+        }
         self.centre = Layer("marks", "centre of mass", **cross)
         self.corners = Layer("path", "corners", line=style.FLIP, width=2, dash=[6, 4])
         self._dots = Layer("marks", shape="circle", size=10, line=style.FLIP, width=1, fill="#ffffff")

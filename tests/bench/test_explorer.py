@@ -54,7 +54,7 @@ def test_the_picture_follows_the_slider(case):
             found = frames_a_second(address, "limit sets", "lanes", 2)
     else:
         with running("-c", HENON) as address:
-            # about a lower value than the first: beyond a = 1.43 all orbits leave, and one picture without points is no other
+            # to values below the first: beyond a = 1.43 all orbits leave, and pictures without points are the same
             found = frames_a_second(address, "points", "map", 0, back=1.0)
     load = os.getloadavg()[0]
     print(f"{case}: {found:.1f} frames a second (load of the machine {load:.1f}, {os.cpu_count()} cores)")

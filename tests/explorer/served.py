@@ -79,7 +79,9 @@ class Visitor:
 
     def columns(self, name: str) -> dict[str, list[Any]]:
         """Give what a picture shows, by the name of its layer."""
-        script = """(all, name) => all.flatMap((canvas) => canvas.shown.layers).find((layer) => layer.called === name)"""
+        script = (
+            "(all, name) => all.flatMap((each) => each.shown.layers).find((each) => each.called === name)"
+        )
         found: dict[str, Any] = self.page.locator("canvas[data-name]").evaluate_all(script, name)
         return {key: value for key, value in found.items() if isinstance(value, list)}
 

@@ -179,5 +179,9 @@ def test_a_click_in_the_atlas_opens_that_feeder(visitor):
     visitor.page.get_by_text("estimated, not proved").wait_for(timeout=300_000)
     visitor.page.wait_for_timeout(1000)
     visitor.page.mouse.click(*visitor.at("atlas", 150.0, -0.4))
-    visitor.changed("limit sets", sets)
+    sets = visitor.changed("limit sets", sets)
     assert visitor.page.get_by_label("speed, typed").input_value().endswith("deg/s")
+    visitor.canvas("atlas").focus()
+    for key in ("ArrowRight", "ArrowUp", "Enter"):
+        visitor.page.keyboard.press(key)
+    visitor.changed("limit sets", sets)

@@ -10,7 +10,6 @@ import pytest
 
 import limitsets as ls
 from limitsets.errors import AnswerError, LimitsetsError, SceneError
-from limitsets.explorer.canvas import Canvas
 from tests.maps_of_tests import TwoState
 
 
@@ -202,10 +201,16 @@ def test_a_stored_atlas_is_shown_and_a_point_of_it_opened(tmp_path):
     ls.atlas("paper-designed", *axes, store=tmp_path / "a.zarr")
     page = ls.explore("paper-designed", atlas=tmp_path / "a.zarr").page()
     assert len(page.atlas._boxes.data["left"]) == 9
-    page.atlas._clicked(151.0, -0.29)
+    page.atlas._canvas._handle_msg({"what": "tap", "x": 151.0, "y": -0.29})
     page.beat()
     assert math.degrees(page.scene.value("throw.speed")) == pytest.approx(150.0)
     assert page.scene.surface_height == pytest.approx(-0.3)
+    steps = ("step", 1.0, 0.0), ("step", 1.0, 1.0), ("step", 1.0, 0.0), ("enter", 0.0, 0.0)  # to the corner
+    for what, x, y in steps:
+        page.atlas._canvas._handle_msg({"what": what, "x": x, "y": y})
+    page.beat()
+    assert math.degrees(page.scene.value("throw.speed")) == pytest.approx(160.0)
+    assert page.scene.surface_height == pytest.approx(-0.2)
     page.close()
 
 
