@@ -188,7 +188,7 @@ export function render({ model, el }) {
     canvas.setAttribute("aria-label", canvas.shown.heading)
     ask()
   }
-  model.on("drawn", read)
+  model.on("drawn", () => { read(); document.dispatchEvent(new Event(CAME)) })
   read()
   const watch = new ResizeObserver(ask)
   watch.observe(canvas)
@@ -201,7 +201,7 @@ export function render({ model, el }) {
     return { x: f.x0 + ((h - f.left) / f.width) * (f.x1 - f.x0), y: f.y1 - ((v - f.top) / f.height) * (f.y1 - f.y0), h, v }
   }
   const tell = (what, { x, y }) => model.send_msg({ what, x, y })
-  const drag = paced((where) => { if (pressed) tell("drag", where) })
+  const drag = paced(model, (where) => { if (pressed) tell("drag", where) })
   let pressed = null, moved = false
   canvas.addEventListener("pointerdown", (event) => {
     if (!event.isPrimary || !canvas.frame) return

@@ -17,7 +17,7 @@ from limitsets.animation.film import Film
 from limitsets.animation.lanes import require_start
 from limitsets.animation.thrown_scenes import film_of_throws
 from limitsets.errors import LimitsetsError
-from limitsets.explorer.answers import KEY, error_line, estimate_words, proof_words
+from limitsets.explorer.answers import KEY, careful_line, error_line, estimate_words, proof_words
 from limitsets.explorer.atlas_page import AtlasPage
 from limitsets.explorer.background import Background
 from limitsets.explorer.canvas import Hand, Words
@@ -40,7 +40,7 @@ WORDS = 0.25
 """Seconds between two changes of the text, which the browser sets anew at a cost of several pictures."""
 
 THROWS, FPS, SLOW = 6, 20.0, 2.0
-BEING = "being computed"
+BEING = "being computed; the first proof on a machine also compiles, for a minute or more"
 SAVE: dict[str, Any] = {"stylesheets": [SLIDER], "sizing_mode": "stretch_width"}
 
 
@@ -69,7 +69,9 @@ class ScenePage:
         self.opening = Opening(self.open, self._draw, self.say)
         self.atlas = AtlasPage(self._at_point, self.say, atlas)
         self._error = Words(error_line(""), stylesheets=[SAID])
-        self._title, self._estimated, self._proved = (Words(stylesheets=[SAID]) for _ in range(3))
+        self._title, self._careful, self._estimated, self._proved = (
+            Words(stylesheets=[SAID]) for _ in range(4)
+        )
         self._x = pn.widgets.FloatInput(label="start x", value=0.0, width=110, stylesheets=[SLIDER])
         self._side = pn.widgets.Select(label="side", options=[0], width=80, stylesheets=[SLIDER])
         self._toml = pn.widgets.FileDownload(
@@ -104,7 +106,7 @@ class ScenePage:
             self._error,
             pn.FlexBox(
                 part(self.sliders.column, start, room="1 1 300px"),
-                part(self.lanes.canvas, key, room="2 1 340px"),
+                part(self.lanes.canvas, self._careful, key, room="2 1 340px"),
                 **wide,
             ),
             pn.FlexBox(
@@ -155,6 +157,7 @@ class ScenePage:
         if not self._told and time.monotonic() - self._wrote > WORDS:
             self._told, self._wrote = True, time.monotonic()
             self.sliders.tell()
+            self._careful.object = careful_line(self._found)
             self._estimated.object = estimate_words(self._found, self.scene.goal, self.scene.unit)
         for picture in (self.lanes, self.part, self.arm):
             picture.canvas.send()
@@ -228,6 +231,12 @@ class ScenePage:
         self.lanes.mark(*film.position[number].tolist())
         if number == film.frames - 1:
             self._film = None
+            last = film.rests[-1]
+            if film.position[number].tolist() == [
+                last.x,
+                last.side,
+            ]:  # it has not left: the arm is near again
+                self.arm.rest(self.scene, last.x, last.side)
 
     def _on_lanes(self, hand: Hand) -> None:
         if hand.what == "tap":

@@ -74,7 +74,26 @@ class PartPicture:
         self.centre = Layer("marks", "centre of mass", **cross)
         self.corners = Layer("path", "corners", line=style.FLIP, width=2, dash=[6, 4])
         self._dots = Layer("marks", shape="circle", size=10, line=style.FLIP, width=1, fill="#ffffff")
-        layers = [self._outline, self._labels, self.centre, self.corners, self._dots]
+        added: dict[str, Any] = {"line": style.INK, "width": 1, "fill": style.FLIP}
+        self._masses = Layer("marks", "added masses", shape="diamond", size=14, **added)
+        self._heavy = Layer(
+            "words",
+            columns=("x", "y", "words"),
+            align="left",
+            colour=style.FLIP,
+            size=12,
+            shift=10,
+            plate=True,
+        )
+        layers = [
+            self._outline,
+            self._labels,
+            self._masses,
+            self._heavy,
+            self.centre,
+            self.corners,
+            self._dots,
+        ]
         self.canvas = Canvas("the part", layers, 250, touched, margins=BARE, equal=True)
         self.canvas.heading = "the part; drag the cross"
 
@@ -90,6 +109,11 @@ class PartPicture:
             "words": [each.word for each in labels],
         }
         self.centre.data = {"x": [cx], "y": [cy]}
+        points = scene.text["part"]["mass"].get("points", ())
+        places = [[scene.value(f"part.mass.points[{k}].{axis}") for k in range(len(points))] for axis in "xy"]
+        x, y = places
+        self._masses.data = {"x": x, "y": y}
+        self._heavy.data = {"x": x, "y": y, "words": [str(point["mass"]) for point in points]}
         _see(self.canvas, scene.vertices)
 
     def is_at_mark(self, x: float, y: float) -> bool:

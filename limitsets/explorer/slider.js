@@ -9,7 +9,7 @@ export function render({ model, el }) {
     Object.assign(bar, { min: model.start, max: model.end, step: model.step })
     bar.value = model.value
   }
-  const send = paced((value) => { model.value = value })
+  const send = paced(model, (value) => { model.value = value })
   bar.addEventListener("input", () => send(Number(bar.value)))
   model.on(["start", "end", "step", "label"], fit)
   model.on("value", () => { if (Number(bar.value) !== model.value) bar.value = model.value })

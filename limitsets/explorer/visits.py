@@ -19,9 +19,13 @@ from limitsets.explorer.outside import within_reach
 from limitsets.explorer.page import ScenePage
 from limitsets.explorer.serving import serve
 from limitsets.maps import coerce, domain_of
+from limitsets.progress import Progress, bar
 from limitsets.scene import Scene, load
 
 __all__ = ["Explorer", "stored_atlas"]
+
+COMPILING = "compiling, once: the throw, images of cells, attractors"
+"""Short enough for the bar of a narrow terminal."""
 
 BEAT = 30
 """Milliseconds from one beat to the next."""
@@ -40,7 +44,7 @@ class Explorer(pn.viewable.Viewer):  # type: ignore[misc]  # panel is not follow
 
     def __init__(self, page: Callable[[], ScenePage | MapPage], title: str) -> None:
         super().__init__()
-        self.page, self.title = page, title
+        self.page, self.title, self._prepared = page, title, False
 
     @classmethod
     def of_scene(cls, scene: Scene, atlas: Path | None) -> Explorer:
@@ -73,8 +77,17 @@ class Explorer(pn.viewable.Viewer):  # type: ignore[misc]  # panel is not follow
             pn.state.add_periodic_callback(lambda: _pushed(page), BEAT)
         return page.layout
 
+    def prepare(self, progress: Progress) -> None:
+        """Make one page, so that what is not compiled yet is compiled before a visitor waits for it."""
+        progress(COMPILING, 0, 1)
+        self.page().close()
+        self._prepared = True
+
     def show(self, **options: Any) -> None:
         """Serve it until Ctrl-C; options of `limitsets.explorer.serving.serve`: port, address, origins, show."""
+        if not self._prepared:
+            with bar() as progress:
+                self.prepare(progress)
         serve(self.__panel__, self.title, **options)
 
 

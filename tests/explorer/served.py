@@ -37,6 +37,7 @@ def running(*arguments: str) -> Iterator[str]:
             said = process.stdout.readline()
             found = re.search(r"http://\S+", said)
             assert found, said
+            assert said.startswith(("explorer: ", "http")), said  # no other line before it
             yield found[0]
         finally:
             process.send_signal(signal.SIGINT)

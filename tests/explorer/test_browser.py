@@ -2,6 +2,7 @@
 
 import re
 import socket
+from itertools import combinations
 from pathlib import Path
 from urllib.parse import urlsplit
 
@@ -43,6 +44,19 @@ def test_a_slider_moves_the_picture(visitor):
     visitor.slide(SPEED, 40)
     assert visitor.changed("limit sets", sets)["right"] != sets["right"]
     assert visitor.changed("critical points", points)["x"] != points["x"]
+
+
+def test_the_picture_is_of_where_the_slider_rests(visitor):
+    (x, y), mouse = visitor.handle(SPEED), visitor.page.mouse
+    mouse.move(x, y)
+    mouse.down()
+    for step in range(60):  # faster than values are sent
+        mouse.move(x + step, y)
+    mouse.up()
+    rests = float(visitor.page.locator("input[type=range]").nth(SPEED).input_value())
+    field = visitor.page.get_by_label("speed, typed")
+    expect(field).to_have_value(re.compile(r"^1[6-9]\d"))
+    expect(field).to_have_value(f"{rests:.6g} deg/s")
 
 
 def test_arrow_keys_move_a_slider_that_has_the_focus(visitor):
@@ -149,6 +163,12 @@ def test_a_phone_shows_it_in_one_column(chromium, address):
     phone = {"viewport": {"width": 390, "height": 844}, "is_mobile": True, "has_touch": True}
     one = Visitor(chromium, address, **phone)
     assert one.page.evaluate("document.documentElement.scrollWidth") == 390
+    boxes = one.canvas("lanes").evaluate("canvas => canvas.boxes")
+    assert len(boxes) == 5  # three critical points, the threshold, the goal
+    assert all(box["h"] >= 0 and box["h"] + box["wide"] <= 390 for box in boxes)
+    for first, second in combinations(boxes, 2):
+        beside = first["h"] + first["wide"] <= second["h"] or second["h"] + second["wide"] <= first["h"]
+        assert beside or abs(first["v"] - second["v"]) >= first["high"]
     assert one.complaints == []
     one.page.context.close()
 

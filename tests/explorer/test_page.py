@@ -12,6 +12,18 @@ import limitsets as ls
 from limitsets.errors import AnswerError, LimitsetsError, SceneError
 from tests.maps_of_tests import TwoState
 
+LEAD = """
+name = "lead"
+[part]
+vertices = [["0 mm", "0 mm"], ["30 mm", "0 mm"], ["0 mm", "20 mm"]]
+mass = { plate_density = "3 kg/m^2", points = [{ x = "20 mm", y = "4 mm", mass = "8 g" }] }
+[arm]
+length = "150 mm"
+surface_height = "-1 mm"
+[throw]
+kappa = "90 mm"
+"""
+
 
 @pytest.fixture
 def page():
@@ -107,6 +119,47 @@ def test_throws_are_shown_from_a_start_and_end_where_the_map_says(page):
     assert page.lanes._start.data["x"] == [pytest.approx(last.x)]
     page.throw(-5.0, 0)
     assert "wrong" in page._error.object
+
+
+def test_the_arm_is_near_again_after_a_film(page):
+    near = dict(page.arm.canvas.view)
+    page.throw(21.0, 2)
+    assert page.arm.canvas.view["y"][1] > near["y"][1]  # the flight is in sight
+    page._began -= 1000.0
+    page.beat()
+    assert page.arm.canvas.view == near
+
+
+def test_added_masses_are_drawn_where_they_are(page):
+    page.open(ls.load(LEAD))
+    page.beat()
+    masses, words = page.part._masses.data, page.part._heavy.data["words"]
+    assert (masses["x"], masses["y"], words) == ([20.0], [4.0], ["8 g"])
+    page.sliders.put({"part.mass.points[0].x": 10.0})
+    page.beat()
+    assert page.part._masses.data["x"] == [10.0]
+
+
+def test_throws_outside_the_model_are_said(page):
+    assert page._careful.object == ""
+    page._wrote = -1.0  # text is written a few times a second
+    page.sliders.put({"throw.speed": 5.0})  # no start lands within a full turn
+    page.beat()
+    assert "careful: from 100 % of the starts" in page._careful.object
+
+
+def test_what_a_browser_sends_as_a_place_may_be_anything(page):
+    for sent in (
+        None,
+        "tap",
+        {},
+        {"what": "tap", "x": "1", "y": 2},
+        {"what": "tap", "x": 1.0, "y": math.inf},
+    ):
+        page.lanes.canvas._handle_msg(sent)
+    assert page._film is None
+    page.lanes.canvas._handle_msg({"what": "tap", "x": 21.0, "y": -2.0})
+    assert page._film is not None
 
 
 def test_a_scene_from_outside_is_opened_and_a_path_is_not(page, tmp_path):
