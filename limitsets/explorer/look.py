@@ -7,7 +7,7 @@ __all__ = ["PAGE", "SAID", "SLIDER"]
 # Panel's own page, told that a phone is narrow; `base` is what Panel gives.
 PAGE = """{% extends base %}{% block preamble %}
 <meta name="viewport" content="width=device-width, initial-scale=1">
-<style>body { margin: 0; color: #222; } body > div { padding: 4px; }</style>
+<style>body { padding: 0 10px 10px !important; box-sizing: border-box; color: #222; }</style>
 {% endblock %}"""
 
 SAID = """

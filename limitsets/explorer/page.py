@@ -255,7 +255,9 @@ class ScenePage:
 
     def _draw(self, corners: list[tuple[float, float]], drawing: bool) -> None:
         self.part.sketch(corners)
-        self.part.canvas.heading = "click the corners in turn" if drawing else "the part; drag the cross"
+        self.part.show(self.scene)
+        if drawing:
+            self.part.canvas.heading = "click the corners in turn"
 
     def _at_point(self, values: dict[str, str]) -> None:
         """Open the feeder at a point of the atlas."""

@@ -85,17 +85,9 @@ class PartPicture:
             shift=10,
             plate=True,
         )
-        layers = [
-            self._outline,
-            self._labels,
-            self._masses,
-            self._heavy,
-            self.centre,
-            self.corners,
-            self._dots,
-        ]
+        shapes = [self._outline, self._labels, self.centre, self._masses, self._heavy]
+        layers = [*shapes, self.corners, self._dots]
         self.canvas = Canvas("the part", layers, 250, touched, margins=BARE, equal=True)
-        self.canvas.heading = "the part; drag the cross"
 
     def show(self, scene: Scene) -> None:
         """Draw a scene's part."""
@@ -112,6 +104,7 @@ class PartPicture:
         points = scene.text["part"]["mass"].get("points", ())
         places = [[scene.value(f"part.mass.points[{k}].{axis}") for k in range(len(points))] for axis in "xy"]
         x, y = places
+        self.canvas.heading = "the part; sliders move its masses" if x else "the part; drag the cross"
         self._masses.data = {"x": x, "y": y}
         self._heavy.data = {"x": x, "y": y, "words": [str(point["mass"]) for point in points]}
         _see(self.canvas, scene.vertices)

@@ -74,7 +74,7 @@ class Explorer(pn.viewable.Viewer):  # type: ignore[misc]  # panel is not follow
             PeriodicCallback(callback=page.beat, period=BEAT, background=True).start()
             pn.state.on_session_destroyed(lambda _: page.close())
         elif _in_a_loop():  # a notebook
-            pn.state.add_periodic_callback(lambda: _pushed(page), BEAT)
+            pn.state.add_periodic_callback(page.beat, BEAT)
         return page.layout
 
     def prepare(self, progress: Progress) -> None:
@@ -97,12 +97,6 @@ def _in_a_loop() -> bool:
     except RuntimeError:
         return False
     return True
-
-
-def _pushed(page: ScenePage | MapPage) -> None:
-    """Beat, and send a notebook what has changed: there Bokeh's figures do not do so by themselves."""
-    page.beat()
-    pn.io.push_notebook(page.layout)
 
 
 def stored_atlas(store: Path) -> tuple[Scene, dict[str, Any]]:

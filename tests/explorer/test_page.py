@@ -143,7 +143,7 @@ def test_added_masses_are_drawn_where_they_are(page):
 def test_throws_outside_the_model_are_said(page):
     assert page._careful.object == ""
     page._wrote = -1.0  # text is written a few times a second
-    page.sliders.put({"throw.speed": 5.0})  # no start lands within a full turn
+    page.sliders.put({"throw.speed": 3000.0})  # no start lands within a full turn
     page.beat()
     assert "careful: from 100 % of the starts" in page._careful.object
 
