@@ -178,7 +178,8 @@ export function render({ model, el }) {
     boxes = []
     if (view.across) axes(view)
     Object.assign(pen, { fillStyle: INK, font: `600 13px ${FACE}`, textAlign: "left", textBaseline: "middle" })
-    pen.fillText(heading, view.across ? view.margins[0] : 4, 9)
+    const begins = Math.min(view.across ? view.margins[0] : 4, wide - pen.measureText(heading).width - 4)
+    pen.fillText(heading, Math.max(begins, 4), 9, wide - 8)
     for (const layer of layers) kinds[layer.kind](layer)
     canvas.boxes = boxes
   }

@@ -173,6 +173,21 @@ def test_a_phone_shows_it_in_one_column(chromium, address):
     one.page.context.close()
 
 
+def test_a_finger_drags_the_centre_of_mass_and_does_not_scroll(chromium, address):
+    phone = {"viewport": {"width": 390, "height": 844}, "is_mobile": True, "has_touch": True}
+    one = Visitor(chromium, address, **phone)
+    mark = one.columns("centre of mass")
+    x, y = one.at("the part", mark["x"][0], mark["y"][0])
+    scrolled, finger = one.page.evaluate("scrollY"), one.page.context.new_cdp_session(one.page)
+    for kind, far in (("touchStart", 0), *(("touchMove", 3 * k) for k in range(1, 9)), ("touchEnd", None)):
+        points = [] if far is None else [{"x": x, "y": y - far}]
+        finger.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": points})
+    one.changed("centre of mass", mark)
+    assert one.settled("centre of mass")["y"][0] > mark["y"][0]
+    assert one.page.evaluate("scrollY") == scrolled
+    one.page.context.close()
+
+
 def test_it_listens_on_this_machine_alone(address):
     port = urlsplit(address).port
     assert urlsplit(address).hostname == "127.0.0.1"
