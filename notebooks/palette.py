@@ -16,7 +16,9 @@ from PIL import Image
 def pictures(notebook: nbformat.NotebookNode) -> Iterator[nbformat.NotebookNode]:
     """Find the outputs with a picture."""
     for cell in notebook.cells:
-        yield from (output.data for output in cell.get("outputs", []) if "image/png" in output.get("data", {}))
+        yield from (
+            output.data for output in cell.get("outputs", []) if "image/png" in output.get("data", {})
+        )
 
 
 def smaller(png: str) -> str:

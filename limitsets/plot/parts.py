@@ -75,7 +75,15 @@ def part(scene: Scene) -> Figure:
     _centre(axes, scene, size)
     masses = _masses(scene)
     _added(axes, scene, masses)
-    style.note(axes, "\N{LEFTWARDS ARROW} to the joint", (ends[0], 0.0), (6, 8), ha="left", fontsize=style.SMALL, gid="joint")
+    style.note(
+        axes,
+        "\N{LEFTWARDS ARROW} to the joint",
+        (ends[0], 0.0),
+        (6, 8),
+        ha="left",
+        fontsize=style.SMALL,
+        gid="joint",
+    )
     axes.set_axis_off()
     style.title(figure, f"{scene.name}: the part, lying on side 0")
     style.legend(figure, _legend(masses, resting), 3)

@@ -1,7 +1,8 @@
 """Public names: each says what it takes and gives, with shapes, what it raises, and has an example that runs.
 
-The examples are run by pytest (``--doctest-modules``), those of figures by the page of the gallery as well.  The kernels of
-`interval` on pairs of numbers are one sentence each: the room's docstring is their contract, `Interval` has the examples.
+The examples are run by pytest (``--doctest-modules``), those of figures by the page of the gallery as well.  The
+kernels of `interval` on pairs of numbers are one sentence each: the room's docstring is their contract, `Interval` has
+the examples.
 """
 
 import inspect
@@ -51,7 +52,9 @@ def section(thing, title):
 
 def entries(thing, *titles):
     """What sections describe, by name: what stands behind the colon."""
-    lines = [line for title in titles for line in section(thing, title) or () if line and not line[0].isspace()]
+    lines = [
+        line for title in titles for line in section(thing, title) or () if line and not line[0].isspace()
+    ]
     named = (line.partition(" : ") for line in lines)
     return {name.strip().lstrip("*"): kind for names, _, kind in named for name in names.split(",")}
 
@@ -88,7 +91,9 @@ def test_functions_have_an_example(name):
 @pytest.mark.parametrize("name", sorted(CLASSES))
 def test_classes_describe_their_fields(name):
     thing = CLASSES[name]
-    own = [each.name for each in fields(thing)] if is_dataclass(thing) else list(getattr(thing, "_fields", ()))
+    own = (
+        [each.name for each in fields(thing)] if is_dataclass(thing) else list(getattr(thing, "_fields", ()))
+    )
     told = set().union(*(entries(each, "Attributes", "Parameters") for each in thing.__mro__))
     assert not {each for each in own if not each.startswith("_")} - told
 
