@@ -4,7 +4,8 @@ document.addEventListener("DOMContentLoaded", () => {
     const text = each.textContent.trim().replace(/^\\[[(]|\\[\])]$/g, "");
     katex.render(text, each, { displayMode: each.tagName === "DIV", output: "mathml" });
     mend(each);
-    if (each.getBoundingClientRect().right > document.documentElement.clientWidth) each.classList.add("wide");
+    const right = each.getBoundingClientRect().right;
+    if (!each.closest("table") && right > document.documentElement.clientWidth) each.classList.add("wide");
   }
 });
 

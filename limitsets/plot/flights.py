@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import textwrap
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -169,10 +168,18 @@ def _landing(axes: Axes, scene: Scene, throw: Throw, moves: Motion, rolled: list
 
 
 def _head(axes: Axes, text: str) -> None:
-    """Write a title, in lines as wide as the panel where panels stand beside each other."""
+    """Write a title, in lines of phrases as wide as the panel where panels stand beside each other."""
     if axes.get_subplotspec().get_gridspec().ncols > 1:  # type: ignore[union-attr]  # of a grid
         wide = min(WIDEST, TALLEST * float(np.ptp(axes.get_xlim()) / np.ptp(axes.get_ylim())))
-        text = "\n".join(textwrap.wrap(text, int(LETTERS * wide)))
+        first, *phrases = text.split(", ")
+        lines = [first]
+        for phrase in phrases:
+            if len(f"{lines[-1]}, {phrase}") <= LETTERS * wide:
+                lines[-1] += f", {phrase}"
+            else:
+                lines[-1] += ","
+                lines.append(phrase)
+        text = "\n".join(lines)
     axes.set_title(text, fontsize=style.TEXT, loc="left")
 
 
