@@ -114,7 +114,7 @@ def effects_figure(panels: Mapping[str, list[Cost]], unit: str = "in") -> Figure
         axes.set_xlabel("seconds of a throw, relative to the bare map")
         axes.axhspan(NOTHING / 3, 3 * NOTHING, color="0.92")
         axes.annotate(
-            "no difference but rounding", (0.97, 0.03), xycoords="axes fraction", color="0.35", ha="right"
+            "no difference but rounding", (0.97, 0.08), xycoords="axes fraction", color="0.35", ha="right"
         )
         axes.grid(alpha=0.25)
         axes.legend(loc="upper left", bbox_to_anchor=(0.0, -0.16), ncols=1, frameon=False, fontsize=9)
