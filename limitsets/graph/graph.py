@@ -48,6 +48,8 @@ class TransitionGraph(Tabled):
         Share of the sampled states that the map's fast kernel could not vouch for.
     upper : NamedTuple or None
         The upper corner, where the images are those of a box of parameters with the lower corner `map`.
+    graph : dict
+        Attributes of the graph, for networkx.
     """
 
     map: Any
@@ -56,7 +58,7 @@ class TransitionGraph(Tabled):
     method: str
     second_pass: float = 0.0
     upper: Any = None
-    graph: dict[str, Any] = field(default_factory=dict)  # networkx: attributes of the graph
+    graph: dict[str, Any] = field(default_factory=dict)
 
     __networkx_backend__ = "limitsets"
 
