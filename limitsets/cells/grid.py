@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from limitsets.cells.domain import Domain, as_domain
-from limitsets.errors import GridError
+from limitsets.errors import GridError, shown
 
 __all__ = ["Grid", "grid"]
 
@@ -245,8 +245,8 @@ def grid(
     region = as_domain(domain)
     counts = _counts(cells, depth, region.dimension)
     words = ("uniform", "graded")
-    if grading is not None and grading not in words:
-        raise GridError("the grading", grading, " or ".join(words), "correct the word")
+    if grading is not None and not (isinstance(grading, str) and grading in words):
+        raise GridError("the grading", shown(grading), " or ".join(words), "correct the word")
     if grading == "graded" and region.anchor is None:
         raise GridError(
             "the grading", grading, "uniform, for a domain without anchor", "give the domain an anchor"

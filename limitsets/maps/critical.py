@@ -13,7 +13,8 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import ArrayLike
 
-from limitsets.errors import AnswerError
+from limitsets.arguments import arguments_checked
+from limitsets.errors import AnswerError, shown
 from limitsets.jit import kernel
 from limitsets.maps.bisection import Array, Codes, hidden, inserted, located, sign_code
 from limitsets.maps.contract import kind_of, require_sides
@@ -25,6 +26,7 @@ __all__ = [
     "branches_of_side",
     "critical_points",
     "margins",
+    "require_domain",
     "require_one_dimension",
 ]
 
@@ -42,6 +44,16 @@ class Sides(Protocol):
     def anchor(self) -> Array | None: ...
     @property
     def sides(self) -> int: ...
+
+
+def require_domain(params: Any, domain: Any, samples: int) -> None:
+    """Refuse a map of more dimensions, where branches have no order, a domain that is none, and too few samples."""
+    require_one_dimension(params)
+    if not all(hasattr(domain, name) for name in ("lo", "hi", "anchor", "sides")):
+        remedy = "pass scene.domain, or limitsets.grid([(0.0, 1.0)]).domain"
+        raise AnswerError("the domain", shown(domain), "a Domain", remedy)
+    if samples < 2:
+        raise AnswerError("the number of samples", samples, "an integer from 2", f"pass samples={SAMPLES}")
 
 
 class CriticalPoint(NamedTuple):
@@ -126,6 +138,7 @@ def require_one_dimension(params: Any) -> None:
         )
 
 
+@arguments_checked
 def critical_points(
     params: Any, domain: Sides, *, samples: int = SAMPLES
 ) -> dict[int, tuple[CriticalPoint, ...]]:
@@ -149,7 +162,7 @@ def critical_points(
     Raises
     ------
     AnswerError
-        For a map of two or three dimensions.
+        For a map of two or three dimensions, no domain, or fewer than 2 samples.
 
     Notes
     -----
@@ -162,7 +175,7 @@ def critical_points(
     >>> [round(point.x, 5) for points in ls.critical_points(scene.map, scene.domain).values() for point in points]
     [10.0, 10.0, 20.0]
     """
-    require_one_dimension(params)
+    require_domain(params, domain, samples)
     names = kind_of(params).branches
     found: dict[int, tuple[CriticalPoint, ...]] = {}
     for side in range(domain.sides):

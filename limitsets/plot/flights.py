@@ -9,6 +9,7 @@ import numpy as np
 from matplotlib.patches import Patch, Polygon
 from numpy.typing import NDArray
 
+from limitsets.arguments import arguments_checked
 from limitsets.errors import AnswerError
 from limitsets.maps import codes
 from limitsets.plot import style
@@ -36,6 +37,7 @@ VERTEX: dict[str, Any] = {"color": LANDED, "marker": "v", "ls": ""}
 CENTRE: dict[str, Any] = {"marker": "o", "ms": 4, "mfc": "white", "mec": style.INK}
 
 
+@arguments_checked
 def flight(scene: Scene, x: float, side: int) -> Figure:
     r"""Draw one throw: above the flight up to the impact, below the way from there to rest.
 

@@ -8,6 +8,7 @@ import numpy as np
 from matplotlib.patches import Polygon
 from numpy.typing import NDArray
 
+from limitsets.arguments import arguments_checked
 from limitsets.geometry import side_ends
 from limitsets.plot import style
 from limitsets.plot.poses import angle_on_side, outline, turned
@@ -32,6 +33,7 @@ TIPS: dict[str, Any] = {"color": style.FLIP, "lw": 3.0, "ls": (0, (1.5, 1))}
 CLEAR = 4
 
 
+@arguments_checked
 def part(scene: Scene) -> Figure:
     """Draw the part as it lies on side 0 on the arm, its sides numbered in the order in which it flips.
 

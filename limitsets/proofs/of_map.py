@@ -26,6 +26,7 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from limitsets.arguments import arguments_checked
 from limitsets.cells import CellSet, Grid
 from limitsets.errors import AnswerError
 from limitsets.graph import TransitionGraph, transitions
@@ -356,9 +357,10 @@ CLAIMS_OF_MAP = (*PROVERS, "cycles")
 """What can be claimed of any map."""
 
 
+@arguments_checked
 def certify_map(
     map: Any,  # noqa: A002  # the field's word
-    grid: Grid,
+    grid: Grid | None = None,
     claims: Sequence[str] | None = None,
     *,
     upper: Any = None,
@@ -392,6 +394,9 @@ def certify_map(
     for claim in wanted:
         if claim not in CLAIMS_OF_MAP:
             raise AnswerError("the claim about a map", claim, ", ".join(CLAIMS_OF_MAP), "correct the word")
+    if grid is None:
+        way = "limitsets.certify(map, limitsets.grid([(lo, hi)], cells=1024))"
+        raise AnswerError("the grid", None, "the cells to prove the claims on", f"pass {way}")
     guard()
     lower = coerce(map)
     upper = lower if upper is None else coerce(upper)

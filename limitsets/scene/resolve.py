@@ -6,9 +6,9 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 
-from limitsets.errors import GeometryError, SceneError
+from limitsets.errors import GeometryError, SceneError, shown
 from limitsets.scene.quantities import base_unit
-from limitsets.scene.units import convert, parse, shown
+from limitsets.scene.units import convert, parse
 
 __all__ = ["LEAST", "Resolver"]
 

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from limitsets.arguments import arguments_checked
 from limitsets.cells import CellSet
 from limitsets.errors import AnswerError
 from limitsets.graph import TransitionGraph
@@ -132,6 +133,7 @@ def _attractor(graph: TransitionGraph, cells: CellSet, throws: int) -> Attractor
     )
 
 
+@arguments_checked
 def attractors(graph: TransitionGraph, throws: int = 200_000) -> tuple[Attractor, ...]:
     """Attracting components: those from which no path leads elsewhere.
 
@@ -161,9 +163,6 @@ def attractors(graph: TransitionGraph, throws: int = 200_000) -> tuple[Attractor
     >>> found[0].flip_order, found[0].jogs_per_visit[2]
     ((0, 1, 2), (3, 11))
     """
-    if not isinstance(graph, TransitionGraph):
-        given, way = type(graph).__name__, "limitsets.transitions(scene.map, limitsets.grid(scene.domain))"
-        raise AnswerError("the graph", given, "what limitsets.transitions gives", f"pass {way}")
     if throws < 1:
         raise AnswerError("the number of throws", throws, "an integer from 1", "pass throws=200_000")
     sets = graph.recurrent_components()

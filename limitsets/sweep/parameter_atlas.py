@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from limitsets.arguments import arguments_checked
 from limitsets.cells import as_domain
 from limitsets.errors import LimitsetsError
 from limitsets.files import as_plain
@@ -202,6 +203,7 @@ def _table(variable: xr.DataArray) -> dict[str, Any]:
 
 
 @shown_in_notebooks
+@arguments_checked
 def atlas(
     subject: Any,
     x: str | Axis,
@@ -321,7 +323,7 @@ def plan_of(
 ) -> Plan:
     """Make the plan of an atlas, and refuse one that cannot be carried out (`atlas`)."""
     chosen = _subject(subject, domain)
-    axes = tuple(axis_of(each, chosen.unit_of) for each in (y, x) if each is not None)
+    axes = tuple(axis_of(each, chosen.unit_of) for each in ((x,) if y is None else (y, x)))
     name = named(TOPOLOGY if task is None else task)
     resolved(name)
     shape = tuple(axis.values.size for axis in axes)

@@ -155,6 +155,7 @@ register(
     scattered=_scattered,
     branches=BRANCHES,
     exits=EXITS,
+    largest=lambda params: params.arm_length,
 )
 register(
     FullSide,

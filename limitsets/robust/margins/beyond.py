@@ -134,7 +134,7 @@ def margins_beyond(
     >>> margins_beyond("paper-designed", 2, x=[20.0]).proved[:, 0].round(1).tolist()
     [0.7]
     """
-    loaded = scene if isinstance(scene, Scene) else load(scene)
+    loaded = load(scene)
     at = np.sort(np.asarray(places_beyond(loaded, side, places) if x is None else x, dtype=float))
     rows: list[tuple[Margin, ...]] = []
     for number, place in enumerate(at.tolist()):
