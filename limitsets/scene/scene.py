@@ -31,6 +31,9 @@ __all__ = ["Scene", "resting_places"]
 # below this share of the way from a_i to the arm's end the number of throws needed to get away is unbounded
 _NEAREST = 1e-6
 
+# Turns of a part thrown from the arm's end, R/(pi kappa), beyond which a bare number for the speed is not believed.
+_MOST_TURNS = 100
+
 
 def resting_places(a: Any, arm_length: Any) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
     """Return the least and the largest x at which a part can rest on sides with these a."""
@@ -277,7 +280,8 @@ class Scene(Tabled):
         ----------
         values : mapping of str to float or str
             By name of the quantity, text with a unit (``"150 deg/s"``), or numbers in the scene's units: lengths in
-            `unit`, but angles in rad and speeds in rad/s.
+            `unit`, but angles in rad and speeds in rad/s.  A bare speed at which a part thrown from the arm's end
+            would turn more than 100 times is refused: it is meant in deg/s; as text it is taken.
 
         Returns
         -------
@@ -296,7 +300,20 @@ class Scene(Tabled):
         """
         from limitsets.scene.quantities import replaced
 
-        return Scene.of(replaced(self.text, self.unit, self.file, values), self.file)
+        made = Scene.of(replaced(self.text, self.unit, self.file, values), self.file)
+        speed = values.get("throw.speed")
+        turns = made.arm_length / (math.pi * made.kappa)
+        if isinstance(speed, str | None) or turns <= _MOST_TURNS:
+            return made
+        # a number of deg/s, most often: no throw from the outer half of the arm lands within a turn
+        raise SceneError(
+            "this angular speed",
+            f"{float(speed):g} rad/s",
+            f"a speed whose throws land: a part thrown from the arm's end would turn {turns:.0f} times",
+            f'a bare number is read in rad/s: write "{float(speed):g} deg/s", or the text "{float(speed):g} rad/s"',
+            key="throw.speed",
+            file=self.file,
+        )
 
     def as_dict(self) -> dict[str, Any]:
         """Give the scene as it was written, as plain tables and lists that `limitsets.load` reads again."""
