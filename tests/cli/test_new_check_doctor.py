@@ -210,3 +210,16 @@ def test_the_doctor_clears_the_compiled_code(capfd, monkeypatch, tmp_path):
     record = json.loads(run(capfd, "doctor", "--json", "--clear")[1])["cache"]
     assert (record["bytes"], record["versions"], record["cleared"]) == (1000, 1, True)
     assert not folder.exists()
+
+
+def test_all_contradictions_of_one_table_are_told():
+    tree = ls.load("paper-designed").as_dict()
+    tree["goal"] = {"oriented_beyond": {"x": "99 in", "side": 7}}
+    tree["tolerance"] = {"throw.speed": "200 %", "arm.length": "-1 in", "gravity.tilt": "1 deg"}
+    tree["world"] = {"stroke": "-30 deg", "throw_rate": "-2 Hz"}
+    keys = ["world.stroke", "world.throw_rate", "goal.oriented_beyond.x", "goal.oriented_beyond.side"]
+    assert {error.key for error in problems(tree)} == {
+        *keys,
+        'tolerance."throw.speed"',
+        'tolerance."arm.length"',
+    }
