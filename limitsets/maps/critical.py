@@ -32,6 +32,9 @@ __all__ = [
 
 SAMPLES = 4096
 
+# The smallest number of full precision: what is nearer to 0 is 0 to people.
+TINY = float(np.finfo(np.float64).tiny)
+
 
 class Sides(Protocol):
     """What is asked of a domain: a box of x for each side (`limitsets.cells.Domain`)."""
@@ -62,7 +65,8 @@ class CriticalPoint(NamedTuple):
     Attributes
     ----------
     x : float
-        The first floating-point number on the branch after the change; the one below it is still on the other.
+        The first floating-point number on the branch after the change; the one below it is still on the other.  0 for
+        a change just above 0, where that number would be 5e-324.
     kind : str
         Both branches by name: ``"jog->flip"``.
     before, after : int
@@ -183,6 +187,7 @@ def critical_points(
         changes = np.flatnonzero((code[1:] != code[:-1]) & (code[1:] >= 0) & (code[:-1] >= 0))
         rows = zip(x[changes + 1].tolist(), code[changes].tolist(), code[changes + 1].tolist(), strict=True)
         found[side] = tuple(
-            CriticalPoint(at, f"{names[before]}->{names[after]}", before, after) for at, before, after in rows
+            CriticalPoint(at if abs(at) >= TINY else 0.0, f"{names[before]}->{names[after]}", before, after)
+            for at, before, after in rows
         )
     return found

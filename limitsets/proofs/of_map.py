@@ -21,7 +21,7 @@ from dataclasses import dataclass, replace
 from functools import reduce
 from itertools import product
 from operator import add, mul
-from typing import Any, TypeAlias
+from typing import Any, NoReturn, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -125,6 +125,21 @@ class ProofOfMap(Tabled):
         """The cells all of whose points are proved to enter the attracting cells."""
         destination = self.graph.condensation().destination
         return CellSet(self.graph.grid, destination >= 0)
+
+    def save(self, path: object = None, **_: object) -> NoReturn:
+        """Refuse: there are certificates of scenes alone (`Proof.save`).
+
+        Raises
+        ------
+        AnswerError
+            Always.
+        """
+        raise AnswerError(
+            "the certificate",
+            f"of the map {type(self.map).__name__}",
+            "one of a scene: nothing rechecks other maps",
+            "keep .to_csv(file) or .to_json(), and the lines that call limitsets.certify",
+        )
 
     def tables(self) -> tuple[Table, ...]:
         """Give the tables that show it, the one that is saved as CSV first."""

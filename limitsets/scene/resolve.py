@@ -50,10 +50,15 @@ class Resolver:
 
     @contextmanager
     def at(self, key: str) -> Iterator[None]:
-        """Give errors of the geometry their place."""
+        """Give errors of the geometry their place and their unit."""
         try:
             yield
         except GeometryError as error:
             raise GeometryError(
-                error.thing, error.value, error.allowed, error.remedy, key=key, file=self.file
+                error.thing,
+                error.value,
+                error.allowed,
+                error.remedy.replace("[length]", self.unit),
+                key=key,
+                file=self.file,
             ) from None

@@ -5,7 +5,7 @@ from __future__ import annotations
 import copy
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, cast
 
@@ -41,7 +41,7 @@ def resting_places(a: Any, arm_length: Any) -> tuple[npt.NDArray[np.float64], np
     return a + _NEAREST * (hi - a), hi
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Scene(Tabled):
     """A part, an arm, a throw and what is asked of them.  Build it with `limitsets.load`.
 
@@ -109,7 +109,7 @@ class Scene(Tabled):
     tolerance: Mapping[str, Deviation]
     feedback: Feedback | None
     file: str | None
-    text: Mapping[str, Any] = field(repr=False)
+    text: Mapping[str, Any]
 
     @classmethod
     def of(cls, structure: object, file: str | None) -> Scene:
@@ -127,6 +127,14 @@ class Scene(Tabled):
     def __eq__(self, other: object) -> bool:
         """Two scenes are equal that are written in the same words, wherever they were read."""
         return self.text == other.text if isinstance(other, Scene) else NotImplemented
+
+    def __repr__(self) -> str:
+        """Name it, with its sizes; `print` shows its tables."""
+        arm, kappa = f"arm {self.arm_length:g} {self.unit}", f"kappa {self.kappa:g} {self.unit}"
+        return f"Scene({self.name!r}, {len(self.sides)} sides, {arm}, {kappa})"
+
+    def __str__(self) -> str:
+        return "\n\n".join(table.text() for table in self.tables())
 
     def __hash__(self) -> int:
         return hash((self.name, self.unit, self.kappa, self.arm_length))

@@ -103,7 +103,8 @@ class Atlas(Tabled):
             counts = [(word, int((values == code).sum())) for word, code in codes]
             return name, ", ".join(f"{count} {word}" for word, count in counts if count), ""
         good = values[np.isfinite(values) if values.dtype.kind == "f" else values >= 0]
-        said = f"{good.min():.9g} to {good.max():.9g}" if good.size else "none"
+        ends = [f"{end:.9g}" for end in dict.fromkeys((good.min(), good.max()))] if good.size else []
+        said = "none" if not ends or (name == "period" and ends == ["0"]) else " to ".join(ends)
         return name, said, attributes.get("units", "")
 
     def to_json(self) -> dict[str, Any]:
