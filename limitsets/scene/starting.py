@@ -52,7 +52,7 @@ def starting_text(name: str, file: str, unit: str = "in") -> str:
     from limitsets.scene.schema import scene_table
 
     given = load(LIKE).as_dict() | {"name": name}
-    lines = []
+    lines: list[str] = []
     for key, field in scene_table(with_effects=True).model_fields.items():
         inner = _model(field.annotation)
         if inner is not None:

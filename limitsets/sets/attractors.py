@@ -84,7 +84,7 @@ class Attractor(Tabled):
         }
         names = [f"x[{axis}]" for axis in range(self.cells.grid.dimension)] if plane else ["x"]
         spans = [Column(name, show=".6g", ends=True) for name in names]
-        columns = ("side", *spans, Column("jogs per visit", ends=True))
+        columns: tuple[Column | str, ...] = ("side", *spans, Column("jogs per visit", ends=True))
         return Table(columns, rows, "Attractor", BY_CELLS), facts("Its orbit", of, "sampled, not proved")
 
 
