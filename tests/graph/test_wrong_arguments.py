@@ -7,6 +7,7 @@ import pytest
 
 import limitsets as ls
 from limitsets.errors import AnswerError, GridError, LimitsetsError, MapError
+from limitsets.graph import memory
 from tests.maps_of_tests import Contraction
 
 SCENE = ls.load("paper-designed")
@@ -240,3 +241,13 @@ def test_every_public_function_holds_its_arguments_against_its_annotations():
             codes.add(function.__code__.co_name)
             function = getattr(function, "__wrapped__", None)
         assert codes & checked or name in ("grid", "load"), name
+
+
+def test_a_large_graph_is_told_of_before_it_is_built(monkeypatch, capsys):
+    cover = ls.grid([(0.0, 1.0)] * 3, cells=512)
+    monkeypatch.setattr(memory, "_free_bytes", lambda: 10**12)
+    memory.require_memory(cover, "corners-padded", 16)
+    said = capsys.readouterr().err
+    assert "limitsets: the graph of 134217728 cells takes about 21 GB and" in said  # 155 bytes a cell
+    memory.require_memory(ls.grid([(0.0, 1.0)] * 3, cells=64), "corners-padded", 16)
+    assert capsys.readouterr().err == ""
