@@ -12,7 +12,8 @@ import numbers
 import os
 from collections.abc import Callable, Mapping, Sequence
 from functools import wraps
-from typing import Any, NamedTuple, ParamSpec, TypeVar
+from itertools import chain, zip_longest
+from typing import Any, NamedTuple, NoReturn, ParamSpec, TypeVar
 
 from limitsets.errors import AnswerError, shown
 
@@ -164,34 +165,31 @@ def arguments_checked(function: Callable[P, R]) -> Callable[P, R]:
     Traceback (most recent call last):
     limitsets.errors.AnswerError: the argument count of twice is 'many'; allowed: a whole number; pass count=3
     """
-    signature = inspect.signature(function)
+    parameters = inspect.signature(function).parameters
     kinds = {
         name: kind
-        for name, each in signature.parameters.items()
+        for name, each in parameters.items()
         if isinstance(each.annotation, str) and (kind := _asked_of(each.annotation)) is not None
     }
+    named = [name for name, each in parameters.items() if each.kind is each.POSITIONAL_OR_KEYWORD]
+    rest = next((name for name, each in parameters.items() if each.kind is each.VAR_POSITIONAL), "")
+
+    def refuse(name: str, value: object, kind: _Kind) -> NoReturn:
+        usual = parameters[name].default
+        remedy = f"help({function.__name__}) says more"
+        if kind.call:
+            remedy = f"pass {kind.call}"
+        elif isinstance(usual, int | str) or _is_number(usual):
+            remedy = f"pass {name}={usual!r}"
+        raise AnswerError(f"the argument {name} of {function.__name__}", shown(value), kind.words, remedy)
 
     @wraps(function)
     def checked(*args: P.args, **kwargs: P.kwargs) -> R:
-        try:
-            given = signature.bind(*args, **kwargs).arguments
-        except TypeError:  # an argument too many or too few: Python says so of the function itself
-            return function(*args, **kwargs)
-        for name, value in given.items():
+        # one too many or too few Python refuses itself, by the function's name
+        for name, value in chain(zip_longest(named[: len(args)], args, fillvalue=rest), kwargs.items()):
             kind = kinds.get(name)
-            several = signature.parameters[name].kind is inspect.Parameter.VAR_POSITIONAL
-            if kind is None or (all(map(kind.fits, value)) if several else kind.fits(value)):
-                continue
-            usual = signature.parameters[name].default
-            known = usual is not inspect.Parameter.empty and usual is not None and usual == usual
-            remedy = (
-                f"pass {kind.call}"
-                if kind.call
-                else f"pass {name}={usual!r}"
-                if known
-                else f"help({function.__name__}) says more"
-            )
-            raise AnswerError(f"the argument {name} of {function.__name__}", shown(value), kind.words, remedy)
+            if kind is not None and not kind.fits(value):
+                refuse(name, value, kind)
         return function(*args, **kwargs)
 
     return checked
