@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from limitsets.cli.output import Csv, Form, Format, Json, Scene, answer, opened, option, progress, show
+from limitsets.cli.output import Csv, Form, Format, Json, Scene, answer, opened, option, progress, table
 
 if TYPE_CHECKING:
     from limitsets.analysis import Analysis, Plan
@@ -63,7 +63,7 @@ def _announce(plan: Plan) -> None:
 def _text(analysis: Analysis, page: Path) -> None:
     from limitsets.report.goals import after_undecided, next_command, verdict_of, void_of
     from limitsets.report.pages import other_vertex_in_limit_sets
-    from limitsets.report.tables import percent
+    from limitsets.report.tables import count, intervals, percent
 
     unit = analysis.scene.unit
     if not analysis.attractors:
@@ -76,10 +76,13 @@ def _text(analysis: Analysis, page: Path) -> None:
                 "outside the model: a throw after which the part has not landed within a full turn. "
                 f"Almost all starts are; kappa is {kappa}: has the speed the right unit?"
             )
-    for k, share in enumerate(analysis.basins.attractors):
-        typer.echo(f"limit set {k}: from {percent(share)} of all starts")
-    if analysis.attractors:
-        show(analysis.table())
+    for k, (attractor, extents) in enumerate(zip(analysis.attractors, analysis.extents, strict=True)):
+        typer.echo(f"limit set {k}: from {percent(analysis.basins.attractors[k])} of all starts")
+        rows = [
+            [side, intervals(parts), count(*attractor.jogs_per_visit.get(side, (0, 0)))]
+            for side, parts in extents.items()
+        ]
+        table(["side", f"x [{unit}]", "jogs per visit"], rows)
     broken = ", ".join(str(side) for side in sorted(other_vertex_in_limit_sets(analysis)))
     if broken:
         typer.echo(
