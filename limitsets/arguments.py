@@ -101,7 +101,11 @@ def _kind_of(node: ast.expr) -> _Kind | None:
         if one is None or two is None:
             return None
         words = f"{one.words} or {two.words}"
-        return _Kind(lambda value: one.fits(value) or two.fits(value), words, one.call or two.call)
+        return _Kind(
+            lambda value: one.fits(value) or two.fits(value),
+            words,
+            " or ".join(filter(None, (one.call, two.call))),
+        )
     if isinstance(node, ast.Subscript):
         return _kind_of_many(node)
     name = node.attr if isinstance(node, ast.Attribute) else ast.unparse(node)
