@@ -67,8 +67,6 @@ class MapKind:
         Names and codes of the ways out, in the order of the sinks of a graph; "undefined" is the last.
     has_image_on, has_image_box, has_margin, has_displacement : bool
         Which of the optional kernels exist.
-    largest : callable or None
-        Of the parameters: the largest x at which a state can be, where there is one.
     """
 
     name: str
@@ -79,7 +77,6 @@ class MapKind:
     has_image_box: bool
     has_margin: bool
     has_displacement: bool
-    largest: Callable[[Any], float] | None = None
 
 
 _KINDS: dict[type, MapKind] = {}
@@ -101,7 +98,6 @@ def register(
     dimension: int = 1,
     branches: tuple[str, ...] = ("map",),
     exits: dict[str, int] | None = None,
-    largest: Callable[[Any], float] | None = None,
 ) -> type:
     """Make a class of parameters a map, at the speed of the built-in ones.
 
@@ -123,8 +119,6 @@ def register(
         Names of the branches.
     exits : dict, optional
         Names and codes of the ways out; default ``{"outside": -2}``.  ``{"undefined": -5}`` is put behind them.
-    largest : callable, optional
-        Of the parameters: the largest x from which an orbit may start; default none.  A plain function, not a kernel.
 
     Returns
     -------
@@ -207,7 +201,6 @@ def register(
         boxes,
         margin is not None,
         displacement is not None,
-        largest,
     )
     return cls
 

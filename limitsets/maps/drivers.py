@@ -6,7 +6,6 @@ than one dimension travel as a tuple of arrays, one per coordinate.
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -262,11 +261,6 @@ def start_of(params: Any, x: Any, side: int) -> tuple[float, ...]:
     if start.shape != (kind.dimension,) or not np.isfinite(start).all():
         remedy = "give x as a number, in the map's own unit" if isinstance(x, str) else "give one state"
         raise MapError("the start x", shown(x), numbers, remedy)
-    most = math.inf if kind.largest is None else kind.largest(params)
-    if start[0] > most:
-        raise MapError(
-            "the start x", float(start[0]), f"{numbers}, at most {most:.9g}", "start where a part can rest"
-        )
     require_sides(params, side, side)
     return tuple(float(v) for v in start)
 
@@ -280,7 +274,7 @@ def orbit(params: Any, x: Any, side: int, count: int) -> Orbit:
     params : NamedTuple
         A map.
     x : float or sequence of float
-        Start.
+        Start; the formulas of a map know no domain, so that of the throw it may lie beyond the arm's end.
     side : int
         Side of the start.
     count : int
@@ -294,7 +288,7 @@ def orbit(params: Any, x: Any, side: int, count: int) -> Orbit:
     Raises
     ------
     MapError
-        For a start that is no state of the map: of the throw, an x beyond the arm's end.
+        For a start that is no state of the map.
 
     Examples
     --------

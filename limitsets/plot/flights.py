@@ -68,6 +68,9 @@ def flight(scene: Scene, x: float, side: int) -> Figure:
     >>> figure.axes[1].get_title(loc="left").replace("\n", " ")
     'After the impact: a flip, 21.00 to 16.55 in, onto side 0'
     """
+    if x > scene.arm_length:
+        allowed = f"at most {scene.arm_length:.9g} {scene.unit}, the end of the arm"
+        raise AnswerError("the start x", x, allowed, "start where a part can rest")
     throws = throws_of(scene, trace(scene.map, x, side, 1))
     if not throws:
         least = float(scene.sides.a[side])

@@ -155,7 +155,6 @@ register(
     scattered=_scattered,
     branches=BRANCHES,
     exits=EXITS,
-    largest=lambda params: params.arm_length,
 )
 register(
     FullSide,

@@ -158,7 +158,6 @@ register(
     displacement=_displacement,
     branches=("jog", "flip"),
     exits=EXITS,
-    largest=lambda params: params.arm_length,
 )
 fallback_box.on(SideBox, side_fallback_box)
 image_box.on(SideBox, side_image_box)
