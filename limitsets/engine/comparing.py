@@ -37,7 +37,7 @@ class Comparison:
         Vertex that met the arm first in the engine.
     left : ndarray of int, shape (n,)
         Left bottom vertex before the throw, the one that the minimal model lets land.
-    residual, reverses, rocks : ndarray
+    residual, reverses, rocks : ndarray, shape (n,)
         What was seen of unilateral contact (`Landing`).
     """
 

@@ -86,7 +86,26 @@ def seat_of(scene: Scene, side: int, below: Sequence[Points] = ()) -> Points:
 
 @arguments_checked
 def off_seat(corners: Sequence[tuple[float, float]], seat: Points) -> float:
-    """Give by how much the corner that is farthest from its seat is off [length]."""
+    """Give by how much the corner that is farthest from its seat is off.
+
+    Parameters
+    ----------
+    corners : sequence of (float, float)
+        Corners of the part [length].
+    seat : ndarray, shape (n, 2)
+        Where they should be [length].
+
+    Returns
+    -------
+    float
+        The largest distance [length].
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> off_seat([(0.0, 0.0), (1.0, 0.0)], np.array([[0.0, 0.0], [1.0, 0.5]]))
+    0.5
+    """
     return float(np.hypot(*(np.asarray(corners) - seat).T).max())
 
 

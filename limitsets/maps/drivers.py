@@ -212,7 +212,34 @@ def images(params: Any, x: ArrayLike, side: int) -> Images:
 def images_on(
     params: Any, x: ArrayLike, side: int, branch: int
 ) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    """Images of many states on one side if they all took one branch: ``(x', side')``."""
+    """Find images of many states on one side if they all took one branch.
+
+    Parameters
+    ----------
+    params : NamedTuple
+        The map.
+    x : array_like, shape (m,) or (m, dimension)
+        The states.
+    side : int
+        Their side.
+    branch : int
+        The branch.
+
+    Returns
+    -------
+    ndarray, shape (m,) or (m, dimension)
+        The images.
+    ndarray of int, shape (m,)
+        Their sides.
+
+    Examples
+    --------
+    >>> import limitsets as ls
+    >>> scene = ls.load("paper-designed")
+    >>> x, side = ls.maps.images_on(scene.map, [21.0], 2, ls.maps.FLIP)
+    >>> x.round(2), side
+    (array([16.55]), array([0]))
+    """
     xs = columns(x, kind_of(params).dimension)
     require_sides(params, side, side)
     after = tuple(np.empty(xs[0].size) for _ in xs)
@@ -338,6 +365,30 @@ def advance(
 
     Where the parameters scatter, the starts are numbered on from `first`, and what they draw depends on nothing else:
     the same starts in several batches, or threads, do the same.
+
+    Parameters
+    ----------
+    params : NamedTuple
+        The map.
+    x : array_like, shape (m,) or (m, dimension)
+        The starts.
+    side : array_like of int, shape (m,)
+        Their sides; or one for all.
+    count : int
+        Number of steps.
+    first : int
+        Number of the first start.
+
+    Returns
+    -------
+    ndarray, shape (m,) or (m, dimension)
+        The states at the end.
+    ndarray of int, shape (m,)
+        Their sides.
+    ndarray of int, shape (m,)
+        Codes of the last steps.
+    ndarray of int, shape (m,)
+        Number of steps before an exit.
 
     Examples
     --------

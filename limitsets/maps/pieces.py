@@ -25,7 +25,15 @@ JUMP = 2.0**-18
 
 
 class TurningPoint(NamedTuple):
-    """A point inside a branch where its slope changes sign: `x`, and the branch."""
+    """A point inside a branch where its slope changes sign.
+
+    Attributes
+    ----------
+    x : float
+        The point.
+    branch : int
+        The branch.
+    """
 
     x: float
     branch: int
@@ -161,7 +169,21 @@ def monotone_pieces(params: Any, domain: Sides, *, samples: int = SAMPLES) -> di
 def turning_points(
     params: Any, domain: Sides, *, samples: int = SAMPLES
 ) -> dict[int, tuple[TurningPoint, ...]]:
-    """Find every x at which the slope of the branch in force changes sign; arguments as for `monotone_pieces`.
+    """Find every x at which the slope of the branch in force changes sign.
+
+    Parameters
+    ----------
+    params : NamedTuple
+        A map in one dimension.
+    domain : Sides
+        Where to look, as for `monotone_pieces`.
+    samples : int
+        Number of samples on each side.
+
+    Returns
+    -------
+    dict of int to tuple of TurningPoint
+        By side, ascending.
 
     Examples
     --------

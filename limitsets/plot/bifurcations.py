@@ -171,5 +171,9 @@ def _legend(found: Continuation, kinds: set[str]) -> list[Any]:
         handles.append(Patch(facecolor=face, edgecolor=style.INK, lw=0.5, label=f"attractor {number}"))
     if any(points for each in found.critical for points in each.values()):
         handles.append(style.key("critical point", **CRITICAL))
-    handles += [style.key(kind, mfc="none", **MARK, **look) for kind, look in EVENTS.items() if kind in kinds]
+    handles += [
+        style.key(f"event: {kind}", mfc="none", **MARK, **look)
+        for kind, look in EVENTS.items()
+        if kind in kinds
+    ]
     return handles

@@ -159,7 +159,7 @@ def _throws(axes: Axes, found: Feeding) -> None:
     axes.set_title(f"fates (dots: {trials.fate.size} trials)", loc="left", fontsize=style.TEXT)
     axes.set_xlabel("throws", fontsize=style.SMALL)
     axes.set_ylabel("share of random starts", fontsize=style.SMALL)
-    axes.legend(fontsize=style.SMALL, frameon=False, loc="center right")
+    axes.legend(fontsize=style.SMALL, frameon=False)
     style.open_frame(axes)
 
 

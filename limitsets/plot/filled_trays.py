@@ -92,7 +92,7 @@ def _poses(axes: Axes, found: TrayFill) -> None:
         look = {"fc": "#9BD1B8", "ec": style.GOAL} if good else {"fc": "none", "ec": style.FLIP}
         pose = counts.poses[state]
         axes.add_patch(Polygon(_placed(found, pose) + at, closed=True, lw=1.3, **look))
-        for k, (x, y) in enumerate(_placed(found, pose, 0.72) + at):
+        for k, (x, y) in enumerate(_placed(found, pose, 0.55) + at):
             axes.text(x, y, f"P{k}", fontsize=6.5, ha="center", va="center", color=style.FAINT)
         words = f"{_short(counts.states[state])}{': right' if good else ''}"
         axes.text(at[0] - edge, at[1] - plate.depth - 0.1 * tall, words, fontsize=style.SMALL, va="top")

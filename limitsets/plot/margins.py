@@ -153,6 +153,11 @@ def tolerance_box(margin: Margin) -> Figure:
     margin : Margin
         Of "joint".
 
+    Returns
+    -------
+    matplotlib.figure.Figure
+        A bar for each quantity, as far as it is proved, in the box that is refuted.
+
     Raises
     ------
     AnswerError

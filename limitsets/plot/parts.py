@@ -79,7 +79,15 @@ def part(scene: Scene) -> Figure:
     _centre(axes, scene, size)
     masses = _masses(scene)
     _added(axes, scene, masses)
-    style.note(axes, "to the joint", (ends[0], 0.0), (6, 8), ha="left", fontsize=style.SMALL, gid="joint")
+    style.note(
+        axes,
+        "\N{LEFTWARDS ARROW} to the joint",
+        (ends[0], 0.0),
+        (6, 8),
+        ha="left",
+        fontsize=style.SMALL,
+        gid="joint",
+    )
     axes.set_axis_off()
     style.title(figure, f"{scene.name}: the part, lying on side 0")
     style.legend(figure, _legend(masses, resting), 3)
@@ -176,7 +184,6 @@ def _centre(axes: Axes, scene: Scene, size: float) -> None:
     words = f"a = {a:.4g} {scene.unit}, d = {d:.4g} {scene.unit}"
     style.note(axes, words, (max(a, 0.0), low), (6, 0), va="center", color=style.JOG, gid="measure")
     axes.plot(a, d, zorder=5, gid="centre of mass", **CENTRE)
-    axes.plot(a, d, zorder=5, marker="+", ms=9, color=style.INK, ls="")
 
 
 def _masses(scene: Scene) -> list[tuple[Array, str]]:

@@ -30,7 +30,15 @@ CONFIDENCE = 0.95
 
 @dataclass(frozen=True)
 class Share:
-    """A share of the starts: the best number, of the decided ones within the bracket, and its bracket."""
+    """A share of the starts.
+
+    Attributes
+    ----------
+    share : float
+        The best number: that of the decided starts.
+    lo, hi : float
+        Its bracket.
+    """
 
     share: float
     lo: float

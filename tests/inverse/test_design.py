@@ -68,7 +68,8 @@ def test_the_pairs_of_the_paper(name, known, counted, tmp_path):
     assert again.value(SPEED) > start.value(SPEED)
     assert again.name == f"{name}-design"
     assert found.path[0] == start
-    assert found.path[-1].kappa == again.kappa
+    assert found.path[-1] is found.scene
+    assert found.scene.kappa == again.kappa
     assert found.residual == pytest.approx((0.0, 0.0, 0.0), abs=1e-9)
     assert found.condition == pytest.approx(6.9 if again.flip == "energy" else 7.1, abs=0.06)
 

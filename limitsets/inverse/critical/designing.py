@@ -277,7 +277,7 @@ def _answer(search: TrialLog, targets: tuple[float | None, ...], outcome: Soluti
         for target, x in zip(targets, after.x.tolist(), strict=True)
     )
     found = _named(after.scene, search.scene) if outcome.trial is not None else search.scene
-    scenes = [trial.found.scene for trial in outcome.path]
+    scenes = [found if trial is outcome.trial else trial.found.scene for trial in outcome.path]
     return Design(
         scene=found,
         start=search.scene,
