@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from limitsets.arguments import arguments_checked
 from limitsets.engine.throwing import throw
 from limitsets.errors import AnswerError
 from limitsets.maps import OUTSIDE_MODEL, images
@@ -83,6 +84,7 @@ SEEN: dict[str, Any] = {
 }
 
 
+@arguments_checked
 def compare(scene: Scene, x: ArrayLike, side: ArrayLike, **how: Any) -> Comparison:
     """Throw parts by the scene's map, with the effects it has, and in the engine.
 

@@ -11,10 +11,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from limitsets.arguments import arguments_checked
 from limitsets.errors import AnswerError
 from limitsets.maps.bisection import Array, Flags, bisected, hidden, inserted, located, sign_code
 from limitsets.maps.contract import has_slope, kind_of
-from limitsets.maps.critical import SAMPLES, Sides, branches_of_side, require_one_dimension
+from limitsets.maps.critical import SAMPLES, Sides, branches_of_side, require_domain
 from limitsets.maps.forced import along
 
 __all__ = ["Piece", "TurningPoint", "monotone_pieces", "turning_points"]
@@ -124,6 +125,7 @@ def _pieces_of_side(params: Any, domain: Sides, side: int, samples: int) -> tupl
     return tuple(pieces)
 
 
+@arguments_checked
 def monotone_pieces(params: Any, domain: Sides, *, samples: int = SAMPLES) -> dict[int, tuple[Piece, ...]]:
     """Cut a domain into pieces on which a map stays on one branch and is monotone.
 
@@ -154,7 +156,7 @@ def monotone_pieces(params: Any, domain: Sides, *, samples: int = SAMPLES) -> di
     >>> [(piece.below, piece.above) for piece in pieces[0]]
     [('domain', 'critical'), ('critical', 'domain')]
     """
-    require_one_dimension(params)
+    require_domain(params, domain, samples)
     if not has_slope(params):
         name = kind_of(params).name
         raise AnswerError(
@@ -163,6 +165,7 @@ def monotone_pieces(params: Any, domain: Sides, *, samples: int = SAMPLES) -> di
     return {side: _pieces_of_side(params, domain, side, samples) for side in range(domain.sides)}
 
 
+@arguments_checked
 def turning_points(
     params: Any, domain: Sides, *, samples: int = SAMPLES
 ) -> dict[int, tuple[TurningPoint, ...]]:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.patches import Patch, Polygon
 
+from limitsets.arguments import arguments_checked
 from limitsets.assembly.assembly_run import OF, OUTCOMES, PAPER
 from limitsets.assembly.counting import rate_of
 from limitsets.plot import style
@@ -35,6 +36,7 @@ PARTS = (("#9CC7E4", style.JOG), ("#F3C9A8", style.FLIP))  # face, edge
 GHOSTS = 3  # poses on the way to rest
 
 
+@arguments_checked
 def assembly(found: Assembly) -> Figure:
     """Draw what became of pairs of parts.
 

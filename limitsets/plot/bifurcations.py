@@ -10,6 +10,7 @@ import numpy as np
 from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.patches import Patch
 
+from limitsets.arguments import arguments_checked
 from limitsets.errors import AnswerError
 from limitsets.plot import style
 from limitsets.scene.quantities import NAMES, base_unit
@@ -38,6 +39,7 @@ EVENTS: dict[str, dict[str, Any]] = {
 MARK: dict[str, Any] = {"ls": "", "ms": 5.5, "mew": 1.2}
 
 
+@arguments_checked
 def bifurcation(found: Continuation, by: str | None = None) -> Figure:
     """Draw where the attractors lie on each side, against one parameter of the path.
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.patches import Polygon
 
+from limitsets.arguments import arguments_checked
 from limitsets.plot import style
 from limitsets.plot.poses import about_centre, turned
 from limitsets.robust.noise.proportions import binomial_interval
@@ -27,6 +28,7 @@ __all__ = ["tray", "tray_design"]
 MARKS = 9
 
 
+@arguments_checked
 def tray(found: TrayFill) -> Figure:
     """Draw how a tray's depressions fill.
 
@@ -238,6 +240,7 @@ def _marked(axes: Axes, cells: NDArray[np.bool_]) -> list[Patch]:
     return [axes.add_patch(Polygon(corner + place, fc=style.FLIP, ec="white", lw=0.5)) for place in places]
 
 
+@arguments_checked
 def tray_design(found: TrayDesign) -> Figure:
     """Draw how a tray fills by depth and agitation.
 

@@ -9,6 +9,7 @@ import numpy as np
 from matplotlib.patches import Patch, Polygon
 from numpy.typing import NDArray
 
+from limitsets.arguments import arguments_checked
 from limitsets.errors import AnswerError
 from limitsets.maps import codes
 from limitsets.plot import style
@@ -37,6 +38,7 @@ VERTEX: dict[str, Any] = {"color": LANDED, "marker": "v", "ls": ""}
 CENTRE: dict[str, Any] = {"marker": "o", "ms": 4, "mfc": "white", "mec": style.INK}
 
 
+@arguments_checked
 def flight(scene: Scene, x: float, side: int) -> Figure:
     r"""Draw one throw: above the flight up to the impact, below the way from there to rest.
 
@@ -67,6 +69,9 @@ def flight(scene: Scene, x: float, side: int) -> Figure:
     >>> figure.axes[1].get_title(loc="left").replace("\n", " ")
     'After the impact: a flip, 21.00 to 16.55 in, onto side 0'
     """
+    if x > scene.arm_length:
+        allowed = f"at most {scene.arm_length:.9g} {scene.unit}, the end of the arm"
+        raise AnswerError("the start x", x, allowed, "start where a part can rest")
     throws = throws_of(scene, trace(scene.map, x, side, 1))
     if not throws:
         least = float(scene.sides.a[side])

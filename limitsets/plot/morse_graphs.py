@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import networkx as nx
 from matplotlib.patches import FancyArrowPatch
 
+from limitsets.arguments import arguments_checked
 from limitsets.graph import TransitionGraph, morse_graph
 from limitsets.plot import style
 
@@ -22,6 +23,7 @@ MOST = 12
 Place = tuple[float, float]
 
 
+@arguments_checked
 def morse(graph: nx.DiGraph[int] | TransitionGraph, name: str = "", unit: str = "") -> Figure:
     """Draw recurrent components and the order among them.
 

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from limitsets.arguments import arguments_checked
 from limitsets.cells import CellSet
 from limitsets.errors import AnswerError
 from limitsets.files import as_table, picked
@@ -85,6 +86,7 @@ class BasinStability(Tabled):
         return as_table(**picked(self, "how", "attractors", "exits", "undecided", "starts"))
 
 
+@arguments_checked
 def basin_stability(
     graph: TransitionGraph,
     found: tuple[Attractor, ...],

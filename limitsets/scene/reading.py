@@ -10,9 +10,8 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
-from limitsets.errors import SceneError
+from limitsets.errors import SceneError, shown
 from limitsets.scene.scene import Scene
-from limitsets.scene.units import shown
 
 __all__ = ["can_name", "load", "scenes", "structure_of"]
 
@@ -42,14 +41,15 @@ def scenes() -> list[str]:
     )
 
 
-def load(source: str | Path | Mapping[str, Any]) -> Scene:
+def load(source: str | Path | Mapping[str, Any] | Scene) -> Scene:
     """Read a scene.
 
     Parameters
     ----------
-    source : str, Path or mapping
+    source : str, Path, mapping or Scene
         The name of a built-in scene, the path of a TOML file, TOML text (any string with a line break in it), or the
         structure of a scene such as `Scene.as_dict` gives.  A built-in name goes before a file of the same name.
+        A scene that is loaded is given back.
 
     Returns
     -------
@@ -67,7 +67,7 @@ def load(source: str | Path | Mapping[str, Any]) -> Scene:
     >>> scene.kappa, scene.unit
     (25.3778518, 'in')
     """
-    return Scene.of(*structure_of(source))
+    return source if isinstance(source, Scene) else Scene.of(*structure_of(source))
 
 
 def structure_of(source: str | Path | Mapping[str, Any]) -> tuple[dict[str, Any], str | None]:

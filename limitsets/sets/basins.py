@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from limitsets.arguments import arguments_checked
 from limitsets.cells import Grid
 from limitsets.errors import AnswerError
 from limitsets.graph import TransitionGraph
@@ -58,6 +59,7 @@ class Basins(Tabled):
         return (Table(("where paths end", Column("share", show=".6f")), rows, "Basins", BY_CELLS),)
 
 
+@arguments_checked
 def basins(graph: TransitionGraph, found: tuple[Attractor, ...]) -> Basins:
     """Label every cell with what all its paths end in.
 

@@ -227,7 +227,7 @@ def test_an_open_speed():
         ({"critical_points": [None] * 3}, AnswerError, "not all free"),
         ({"critical_points": [10, 10, 30]}, AnswerError, "up to 28 in"),
         ({"critical_points": [10, 10, "20 deg"]}, SceneError, "unit of angle"),
-        ({"critical_points": [10, 10, float("nan")]}, AnswerError, "a place on the arm"),
+        ({"critical_points": [10, 10, float("nan")]}, AnswerError, "argument critical_points"),
         ({"vary": []}, AnswerError, "one or more"),
         ({"vary": [ALONG, ALONG]}, AnswerError, "each once"),
         ({"vary": ["part.mass.centre.along"]}, SceneError, "did you mean"),

@@ -11,6 +11,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from limitsets.arguments import arguments_checked
 from limitsets.errors import AnswerError
 from limitsets.goals import Goal, OrientedBeyond, Predicate, Reaches
 from limitsets.progress import shown_in_notebooks
@@ -211,6 +212,7 @@ def _todo(scene: Scene, quantities: Sequence[str], reading: str | None) -> list[
 
 
 @shown_in_notebooks
+@arguments_checked
 def robustness(
     scene: Scene | str | Path,
     *quantities: str,
@@ -284,7 +286,7 @@ def robustness(
     for part in leave_out:
         if part not in PARTS:
             raise AnswerError("what to leave out", part, ", ".join(PARTS), "correct the word")
-    given = scene if isinstance(scene, Scene) else load(scene)
+    given = load(scene)
     goals, quiet = _goals(given, goal), still(given)
     query = Query.of(quiet, goals)
     query.box(None, {})  # refuses a scene of which nothing can be proved
