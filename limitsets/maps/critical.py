@@ -96,11 +96,19 @@ def margins(params: Any, x: ArrayLike, side: int) -> Array:
     >>> margins(ls.load("paper-designed").map, [19.0, 21.0], 2) > 0  # r_2 = 20
     array([False,  True])
     """
+    return _margins_of(params, side)(np.asarray(x, dtype=np.float64))
+
+
+def _margins_of(params: Any, side: int) -> Callable[[Array], Array]:
+    """Margins of one side, which is held against the map once for all."""
     require_sides(params, side, side)
-    starts = np.ascontiguousarray(x, dtype=np.float64)
-    out = np.empty(starts.size)
-    _margins(params, side, starts, out)
-    return out
+
+    def found(x: Array) -> Array:
+        out = np.empty(x.size)
+        _margins(params, side, np.ascontiguousarray(x), out)
+        return out
+
+    return found
 
 
 def _sampled(domain: Sides, side: int, count: int) -> Array:
@@ -117,7 +125,8 @@ def _sampled(domain: Sides, side: int, count: int) -> Array:
 def _code_of(params: Any, side: int) -> Callable[[Array], Codes]:
     """Branch in force at x, a negative number where there is none."""
     if kind_of(params).has_margin:
-        return lambda x: sign_code(margins(params, x, side))
+        found = _margins_of(params, side)
+        return lambda x: sign_code(found(x))
     return lambda x: images(params, x, side).code
 
 
@@ -126,7 +135,7 @@ def branches_of_side(params: Any, domain: Sides, side: int, samples: int) -> tup
     x, code = located(_code_of(params, side), _sampled(domain, side, samples))
     if not kind_of(params).has_margin:
         return x, code
-    x = inserted(x, hidden(lambda at: margins(params, at, side), x))
+    x = inserted(x, hidden(_margins_of(params, side), x))
     return located(_code_of(params, side), x)
 
 
