@@ -54,6 +54,6 @@ class Resolver:
         try:
             yield
         except GeometryError as error:
-            raise GeometryError(
+            raise type(error)(
                 error.thing, error.value, error.allowed, error.remedy, key=key, file=self.file
             ) from None
