@@ -49,7 +49,11 @@ class EffectChoice:
         if not self.tipping:
             return ""
         sides = " and ".join(str(side) for side in np.flatnonzero(~self.scene.sides.rests))
-        return f"switched on {' and '.join(self.tipping)}: the part cannot rest on side {sides}, and tips on from there"
+        lines = " and ".join(f"{effect} = true" for effect in self.tipping)
+        return (
+            f"switched on {' and '.join(self.tipping)}: the part cannot rest on side {sides}, and tips on from there; "
+            f"other commands ask for {lines} in [effects]"
+        )
 
     def to_json(self) -> dict[str, Any]:
         """Give it as plain tables for JSON."""

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from limitsets.cells import CellSet
+from limitsets.errors import AnswerError
 from limitsets.graph.condensation import attracting_of
 from limitsets.proofs.basin import ROUNDING, Basin, basin
 from limitsets.proofs.cover import Cover
@@ -95,7 +96,18 @@ def attraction(found: Cover) -> Attraction:
     -------
     Attraction
         With the reason where it is not proved.
+
+    Raises
+    ------
+    AnswerError
+        For a part with a side on which it cannot rest.
     """
+    sides = found.grid.domain.inhabited
+    if not sides.all():
+        where = f"one that cannot rest on side {' and '.join(map(str, np.flatnonzero(~sides)))}"
+        raise AnswerError(
+            "the part of a proof", where, "one that rests on each of its sides", "ask limitsets analyse, which samples"
+        )
     graph = found.graph
     parts, sets = graph.components(), graph.recurrent_components()
     good = attracting_of(graph.ranges, parts, sets)  # a survey's order is quadratic in their number

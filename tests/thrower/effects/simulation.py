@@ -334,7 +334,8 @@ class Simulation:
         reach = self.body.reach(y[2])
         left, right = sorted((corner, other), key=lambda k: reach[k, 0])
         if not reach[left, 0] < 0.0 < reach[right, 0]:
-            return True  # nothing holds it there
+            self.modes.append("tips")  # nothing holds it there
+            return True
         lift = min(self.lift(reach, left, left - 1, 1.0), self.lift(reach, right, right + 1, -1.0))
         turning = self.body.rho**2 * after[5] ** 2 + after[4] ** 2
         return bool(turning + after[3] ** 2 > 2 * self.kappa * lift and turning > 2e-12 * self.kappa * lift)
