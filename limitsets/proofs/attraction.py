@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from limitsets.cells import CellSet
-from limitsets.errors import AnswerError
 from limitsets.graph.condensation import attracting_of
 from limitsets.proofs.basin import ROUNDING, Basin, basin
 from limitsets.proofs.cover import Cover
@@ -72,7 +71,7 @@ class Attraction:
     def shares(self) -> dict[str, float]:
         """Shares of the arm where only the starts in the attracting cells are claimed."""
         lo, hi = self.cover.box.bare
-        total = float((hi.arm_length - lo.a).sum())
+        total = float((hi.arm_length - lo.a)[self.cover.box.rests].sum())
         inside = sum(high - low for parts in self.cells.extents().values() for low, high in parts) / total
         share = max(0.0, inside - ROUNDING)
         others = self.basin.leaves + self.basin.creeps
@@ -96,18 +95,7 @@ def attraction(found: Cover) -> Attraction:
     -------
     Attraction
         With the reason where it is not proved.
-
-    Raises
-    ------
-    AnswerError
-        For a part with a side on which it cannot rest.
     """
-    sides = found.grid.domain.inhabited
-    if not sides.all():
-        where = f"one that cannot rest on side {' and '.join(map(str, np.flatnonzero(~sides)))}"
-        raise AnswerError(
-            "the part of a proof", where, "one that rests on each of its sides", "ask limitsets analyse, which samples"
-        )
     graph = found.graph
     parts, sets = graph.components(), graph.recurrent_components()
     good = attracting_of(graph.ranges, parts, sets)  # a survey's order is quadratic in their number
@@ -134,7 +122,7 @@ def _verdict(
     if lost.any():
         return False, f"nothing is proved of the image of {found.place(int(np.flatnonzero(lost)[0]))}"
     if found.box.landing > 0.0:
-        return False, f"near the joint: {joint[0].reason}"
+        return False, f"near the joint: {next(near.reason for near in joint if not near.empty)}"
     leaving = np.flatnonzero(found.graph.ranges.exits)
     if leaving.size:
         return False, f"the image of {found.place(int(leaving[0]))} may leave the cells"
@@ -155,6 +143,8 @@ def near_section(found: Attraction) -> dict[str, dict[str, Any]]:
     """Write what a recheck needs of the starts below the cells: by side the factor, the bracket of a fixed point."""
     section: dict[str, dict[str, Any]] = {}
     for side, near in enumerate(found.joint):
+        if near.empty:
+            continue
         section[str(side)] = {"q": near.q.hex()}
         if near.fixed_point is not None:
             section[str(side)]["fixed_point"] = [end.hex() for end in near.fixed_point]

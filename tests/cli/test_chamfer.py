@@ -1,0 +1,89 @@
+"""A part that cannot rest on one of its sides: `analyse` alone switches landing and roll on; with them all commands go."""
+
+import json
+
+import pytest
+
+import limitsets as ls
+from tests.cli.command import run
+from tests.scene.test_chamfer import BOTH, chamfered
+
+FIRST = "switched on landing and roll: the part cannot rest on side 3, and tips on from there; other commands ask for"
+
+
+def written(name, **tables):
+    """Write a scene's file; the effects by hand, for what cannot be loaded cannot be dumped."""
+    whole = ls.load(chamfered(**{"effects": BOTH, **tables}))
+    ls.dump(whole, name)
+    with open(name, encoding="utf-8") as file:
+        text = file.read()
+    return text
+
+
+def without_lines(name):
+    text = written(name)
+    kept = [line for line in text.splitlines() if line not in ("[effects]", "landing = true", "roll = true")]
+    with open(name, "w", encoding="utf-8") as file:
+        file.write("\n".join(kept) + "\n")
+
+
+def test_analyse_says_in_its_first_line_what_it_switched_on(capfd):
+    without_lines("chamfered.toml")
+    code, out, _ = run(capfd, "analyse", "chamfered.toml", "--cells", "512", "-o", "found")
+    assert code == 0
+    assert out.splitlines()[0] == f"{FIRST} landing = true and roll = true in [effects]"
+    with open("found/report.md", encoding="utf-8") as file:
+        page = file.read()
+    assert "**Switched on landing and roll: the part cannot rest on side 3" in page.split("\n\n")[1]
+    with open("found/analysis.json", encoding="utf-8") as file:
+        record = json.load(file)
+    assert record["scene"]["effects"] == BOTH
+    assert record["effects"]["tipping"] == ["landing", "roll"]
+    assert "3" not in record["attractors"][0]["extents"]
+    assert record["attractors"][0]["flip_order"] == [0, 1, 2, 4]
+    assert sum(record["basins"]["attractors"]) == pytest.approx(1.0)
+    assert ls.load(record["scene"]).sides.rests.tolist() == [True, True, True, False, True]
+
+
+def test_with_the_lines_nothing_is_switched_on_and_nothing_said(capfd):
+    written("chamfered.toml")
+    code, out, err = run(capfd, "analyse", "chamfered.toml", "--cells", "512", "-o", "found", "--json")
+    assert code == 0
+    assert "switched on" not in err
+    assert json.loads(out)["effects"]["tipping"] == []
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("certify", "chamfered.toml"),
+        ("throw", "chamfered.toml", "--x", "20", "--side", "0"),
+        ("plot", "chamfered.toml", "part"),
+        ("audit", "chamfered.toml"),
+        ("margin", "chamfered.toml"),
+    ],
+)
+def test_all_others_name_the_lines(words, capfd):
+    without_lines("chamfered.toml")
+    code, out, err = run(capfd, *words)
+    assert (code, out) == (2, "")
+    assert "the part cannot rest on side 3" in err
+    assert "add landing = true and roll = true to [effects]" in err
+
+
+@pytest.mark.sweep
+def test_with_the_lines_all_of_them_go(capfd):
+    written("chamfered.toml", goal={"stays_on_arm": True})
+    for kind in ("part", "limit-set", "map", "basins", "morse", "flight"):
+        assert run(capfd, "plot", "chamfered.toml", kind, "-o", f"{kind}.png")[0] == 0
+    code, out, _ = run(capfd, "throw", "chamfered.toml", "--x", "20", "--side", "0", "--count", "50", "--json")
+    sides = {row["side"] for row in json.loads(out)}
+    assert code == 0
+    assert sides == {0, 1, 2, 4}
+    code, out, _ = run(capfd, "audit", "chamfered.toml", "--json")
+    assert code == 0
+    assert 3 not in {row["side"] for row in json.loads(out)}
+    assert all("3" not in row["ranges"] for row in json.loads(out))
+    code, _, err = run(capfd, "throw", "chamfered.toml", "--x", "20", "--side", "3")
+    assert code == 2
+    assert "tips over on side 3" in err
