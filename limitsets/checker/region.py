@@ -12,7 +12,7 @@ from flint import arb
 
 from .balls import PRECISION, Array, Pair, UnprovedError, prove
 from .cells import check_cell, check_components, check_structure, tasks_of
-from .end_points import Throws
+from .end_points import Throws, halved_box
 from .file import Cells
 from .goals import check_goal, goal_of_scene
 from .refutations import State, breaks
@@ -255,15 +255,15 @@ def check_chain(scene: Scene, goal: dict[str, Any] | None, claimed: Claimed) -> 
 
 
 def decided_on(throws: Throws, side: int, branch: int, lo: float, hi: float) -> bool:
-    """Whether the decision is proved on an interval, cut into pieces where need be."""
-    stack, cut = [(lo, hi)], 0
+    """Whether the decision is proved on an interval, cut into pieces in x and in kappa where need be."""
+    stack, cut = [(arb(lo), arb(hi), throws.scene.k_lo, throws.scene.k_hi)], 0
     while stack:
-        a, b = stack.pop()
+        piece = stack.pop()
         cut += 1
-        if throws.box(side, arb(a), arb(b), throws.scene.k_lo, throws.scene.k_hi).decision == branch:
+        if throws.box(side, *piece).decision == branch:
             continue
-        middle = 0.5 * (a + b)
-        if cut > MOST_CUT or not a < middle < b:
+        halves = halved_box(*piece)
+        if cut > MOST_CUT or not halves:
             return False
-        stack += [(a, middle), (middle, b)]
+        stack += halves
     return True

@@ -353,6 +353,16 @@ FORGERIES = {
 }  # fmt: skip
 
 
+@pytest.mark.sweep
+def test_an_orbit_close_to_a_switch_is_confirmed_by_halves_in_kappa(tmp_path):
+    """The decision on one interval of this cell needs pieces of kappa as well: pieces of x alone do not prove it."""
+    speed = evenly("throw.speed", "150 deg/s", "151 deg/s", 1)
+    height = evenly("arm.surface_height", "-0.375 in", "-0.34375 in", 1)
+    found = certified("paper-designed", speed, height, depth=0)
+    assert found.shares()["refuted"] == 1.0
+    found.save(tmp_path / "cell.zip")
+
+
 @pytest.mark.parametrize("name", FORGERIES)
 def test_a_spoiled_certificate_is_refused(files, tmp_path, name):
     f = opened(files["plane"]).copy()
