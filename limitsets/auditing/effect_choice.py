@@ -10,7 +10,6 @@ import numpy as np
 
 from limitsets.auditing.findings import Finding, audit
 from limitsets.files import as_table, picked
-
 from limitsets.scene.facts import NOT_TIPPING
 
 if TYPE_CHECKING:
@@ -57,7 +56,9 @@ class EffectChoice:
 
     def to_json(self) -> dict[str, Any]:
         """Give it as plain tables for JSON."""
-        return as_table(simulated=self.scene.effects.on(), **picked(self, "switched_on", "left_out", "tipping"))
+        return as_table(
+            simulated=self.scene.effects.on(), **picked(self, "switched_on", "left_out", "tipping")
+        )
 
 
 def _hindrance(scene: Scene, finding: Finding, others: tuple[str, ...]) -> str:

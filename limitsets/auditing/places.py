@@ -92,7 +92,9 @@ def _limit_sets(scene: Scene, box: ParameterBox) -> tuple[list[CellSet], Cells, 
     from limitsets.sets import attractors
 
     covered = cover(box, CELLS)
-    domain = {side: (edges[:-1], edges[1:]) for side, (edges,) in enumerate(covered.grid.edges) if edges.size > 1}
+    domain = {
+        side: (edges[:-1], edges[1:]) for side, (edges,) in enumerate(covered.grid.edges) if edges.size > 1
+    }
     if not scene.effects.on():
         found = attraction(covered)
         sets = [CellSet(covered.grid, found.component == k) for k in range(int(found.component.max()) + 1)]

@@ -19,14 +19,15 @@ class Domain:
     Attributes
     ----------
     lo, hi : ndarray, shape (n_sides, dimension)
-        Corners of the boxes.  A side without states, such as a chamfer on which a part cannot rest, has ``lo == hi``.
+        Corners of the boxes.  A side without states has ``lo == hi``: a chamfer on which a part cannot rest.
     anchor : ndarray, shape (n_sides,), or None
         In one dimension: a point below `lo` towards which graded cells shrink (the throw: R = a_i).
 
     Raises
     ------
     GridError
-        For shapes that do not fit, boxes that end before they begin, no side with states, numbers that are not finite, or an anchor inside a box.
+        For shapes that do not fit, boxes that end before they begin, no side with states, numbers that are not finite,
+        or an anchor inside a box.
 
     Examples
     --------
@@ -74,7 +75,8 @@ class Domain:
     @property
     def inhabited(self) -> NDArray[np.bool_]:
         """Which sides have states, shape (n_sides,)."""
-        return (self.lo < self.hi).all(axis=1)
+        some: NDArray[np.bool_] = np.logical_and.reduce(self.lo < self.hi, axis=1)
+        return some
 
     @property
     def dimension(self) -> int:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from limitsets.graph.target import Target, place
 from limitsets.jit import kernel
 
-__all__ = ["TargetBoxes", "no_boxes", "leaving", "merged", "placed"]
+__all__ = ["TargetBoxes", "leaving", "merged", "no_boxes", "placed"]
 
 
 @dataclass(frozen=True, eq=False)

@@ -224,7 +224,9 @@ class Proof(Tabled):
         starts = [[float(edges[0]) for (edges,) in found.cover.grid.edges] for found in self.attractions]
         rests = self.scene.sides.rests
         return {
-            "beyond": {str(side): max(each) for side, each in enumerate(zip(*starts, strict=True)) if rests[side]},
+            "beyond": {
+                str(side): max(each) for side, each in enumerate(zip(*starts, strict=True)) if rests[side]
+            },
             "throws": max(found.max_rank for found in self.attractions),
             "near_joint": min(near.q for found in self.attractions for near in found.joint),
         }

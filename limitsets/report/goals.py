@@ -60,7 +60,9 @@ def next_command(analysis: Analysis) -> str:
     assert outcome is not None
     if analysis.choice.tipping:  # which no other command switches on
         lines = " and ".join(f"{effect} = true" for effect in analysis.choice.tipping)
-        return f"write {lines} under [effects] of {source}; limitsets check {source} says whether it is in order"
+        return (
+            f"write {lines} under [effects] of {source}; limitsets check {source} says whether it is in order"
+        )
     if outcome.holds and not outcome.vacuous:
         return f"limitsets certify {source} (a proof), limitsets margin {source} (how much each quantity may deviate)"
     if outcome.holds is None:

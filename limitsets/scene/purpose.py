@@ -29,7 +29,9 @@ def resolve_goal(table: GoalTable, rests: list[bool], arm_length: float, resolve
             raise resolver.refusal(key, "the side", value, allowed, "name a side of this part")
         if not rests[value]:
             allowed = ", ".join(str(each) for each, good in enumerate(rests) if good)
-            raise resolver.refusal(key, "the side", value, allowed, "the part cannot rest on it; name another")
+            raise resolver.refusal(
+                key, "the side", value, allowed, "the part cannot rest on it; name another"
+            )
         return value
 
     def position(text: str, key: str) -> float:

@@ -1,6 +1,7 @@
-"""A part that cannot rest on one of its sides: `analyse` alone switches landing and roll on; with them all commands go."""
+"""A part that cannot rest on a side: `analyse` alone switches landing and roll on; with them all commands go."""
 
 import json
+from pathlib import Path
 
 import pytest
 
@@ -11,32 +12,27 @@ from tests.scene.test_chamfer import BOTH, chamfered
 FIRST = "switched on landing and roll: the part cannot rest on side 3, and tips on from there; other commands ask for"
 
 
-def written(name, **tables):
-    """Write a scene's file; the effects by hand, for what cannot be loaded cannot be dumped."""
-    whole = ls.load(chamfered(**{"effects": BOTH, **tables}))
-    ls.dump(whole, name)
-    with open(name, encoding="utf-8") as file:
-        text = file.read()
-    return text
+def written(**tables):
+    """Write a scene's file, and return its text."""
+    ls.dump(ls.load(chamfered(**{"effects": BOTH, **tables})), "chamfered.toml")
+    return Path("chamfered.toml").read_text(encoding="utf-8")
 
 
-def without_lines(name):
-    text = written(name)
-    kept = [line for line in text.splitlines() if line not in ("[effects]", "landing = true", "roll = true")]
-    with open(name, "w", encoding="utf-8") as file:
-        file.write("\n".join(kept) + "\n")
+def without_lines():
+    """Write it without the effects; what cannot be loaded cannot be dumped."""
+    lines = ("[effects]", "landing = true", "roll = true")
+    kept = [line for line in written().splitlines() if line not in lines]
+    Path("chamfered.toml").write_text("\n".join(kept) + "\n", encoding="utf-8")
 
 
 def test_analyse_says_in_its_first_line_what_it_switched_on(capfd):
-    without_lines("chamfered.toml")
+    without_lines()
     code, out, _ = run(capfd, "analyse", "chamfered.toml", "--cells", "512", "-o", "found")
     assert code == 0
     assert out.splitlines()[0] == f"{FIRST} landing = true and roll = true in [effects]"
-    with open("found/report.md", encoding="utf-8") as file:
-        page = file.read()
+    page = Path("found/report.md").read_text(encoding="utf-8")
     assert "**Switched on landing and roll: the part cannot rest on side 3" in page.split("\n\n")[1]
-    with open("found/analysis.json", encoding="utf-8") as file:
-        record = json.load(file)
+    record = json.loads(Path("found/analysis.json").read_text(encoding="utf-8"))
     assert record["scene"]["effects"] == BOTH
     assert record["effects"]["tipping"] == ["landing", "roll"]
     assert "3" not in record["attractors"][0]["extents"]
@@ -46,7 +42,7 @@ def test_analyse_says_in_its_first_line_what_it_switched_on(capfd):
 
 
 def test_with_the_lines_nothing_is_switched_on_and_nothing_said(capfd):
-    written("chamfered.toml")
+    written()
     code, out, err = run(capfd, "analyse", "chamfered.toml", "--cells", "512", "-o", "found", "--json")
     assert code == 0
     assert "switched on" not in err
@@ -64,7 +60,7 @@ def test_with_the_lines_nothing_is_switched_on_and_nothing_said(capfd):
     ],
 )
 def test_all_others_name_the_lines(words, capfd):
-    without_lines("chamfered.toml")
+    without_lines()
     code, out, err = run(capfd, *words)
     assert (code, out) == (2, "")
     assert "the part cannot rest on side 3" in err
@@ -73,10 +69,12 @@ def test_all_others_name_the_lines(words, capfd):
 
 @pytest.mark.sweep
 def test_with_the_lines_all_of_them_go(capfd):
-    written("chamfered.toml", goal={"stays_on_arm": True})
+    written(goal={"stays_on_arm": True})
     for kind in ("part", "limit-set", "map", "basins", "morse", "flight"):
         assert run(capfd, "plot", "chamfered.toml", kind, "-o", f"{kind}.png")[0] == 0
-    code, out, _ = run(capfd, "throw", "chamfered.toml", "--x", "20", "--side", "0", "--count", "50", "--json")
+    code, out, _ = run(
+        capfd, "throw", "chamfered.toml", "--x", "20", "--side", "0", "--count", "50", "--json"
+    )
     sides = {row["side"] for row in json.loads(out)}
     assert code == 0
     assert sides == {0, 1, 2, 4}

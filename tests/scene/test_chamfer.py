@@ -61,7 +61,11 @@ def test_with_the_lines_it_loads_and_has_no_states_on_the_chamfer() -> None:
     ("tables", "key", "words"),
     [
         ({"model": {"flip": "energy"}}, "model.flip", "signed"),
-        ({"effects": BOTH | {"drive": True}, "world": {"stroke": "5 deg"}}, "effects.drive", "cannot rest on side 3"),
+        (
+            {"effects": BOTH | {"drive": True}, "world": {"stroke": "5 deg"}},
+            "effects.drive",
+            "cannot rest on side 3",
+        ),
         ({"goal": {"oriented_beyond": {"x": "10 cm", "side": 3}}}, "goal.oriented_beyond.side", "0, 1, 2, 4"),
         ({"goal": {"flip_order": [0, 3]}}, "goal.flip_order[1]", "cannot rest on it"),
         (

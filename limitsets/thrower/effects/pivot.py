@@ -134,7 +134,9 @@ def _holds(pivot: Any, part: FullSide, mu: float, hit: Contact, slid: bool) -> t
 
 
 @kernel
-def turned_down(pivot: Any, slip: Any, roll: Any, part: FullSide, struck: Contact) -> tuple[Contact, Face, int]:
+def turned_down(
+    pivot: Any, slip: Any, roll: Any, part: FullSide, struck: Contact
+) -> tuple[Contact, Face, int]:
     """Turn the part about its vertex until a side comes down (DOWN), the vertex lets go (OFF), or it is LOST."""
     hit, ends = struck, OFF if struck.lift > 0.0 else ON
     if pivot is None and slip is None:

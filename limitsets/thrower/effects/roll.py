@@ -7,7 +7,8 @@ Coming down on a side about one of its ends, the part strikes the arm with the o
 a stop where the bracket is negative.  What is then left of the energy may lift it over k', or only rock it up and down
 again; each impact keeps a part of the energy smaller than one, and the part rests when it can be lifted over neither
 end.  On a side beside which its centre of mass stands, a chamfer, it never rests: it tips over the end that is nearer,
-at the latest after it has rocked on the other one, and no throw begins there.  Oracle: Housner's rocking block, whose rates are as 1 - (3/2) sin^2 alpha.  Source: docs/model.md, effects.
+at the latest after it has rocked on the other one, and no throw begins there.
+Oracle: Housner's rocking block, whose rates are as 1 - (3/2) sin^2 alpha.  Source: docs/model.md, effects.
 """
 
 from __future__ import annotations
