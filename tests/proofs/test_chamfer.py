@@ -18,7 +18,7 @@ def test_a_box_in_which_it_may_rest_is_refused() -> None:
     assert parameter_box(scene).rests.tolist() == scene.sides.rests.tolist()
     tree = scene.as_dict()
     tree["part"]["vertices"][2][1] = ["3.0 cm", "3.8 cm"]
-    with pytest.raises(AnswerError, match="side 3.*tips over the same end"):
+    with pytest.raises(AnswerError, match=r"side 3.*tips over the same end"):
         parameter_box(scene, tree=tree)
 
 
