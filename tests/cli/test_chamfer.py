@@ -72,6 +72,8 @@ def test_with_the_lines_all_of_them_go(capfd):
     written(goal={"stays_on_arm": True})
     for kind in ("part", "limit-set", "map", "basins", "morse", "flight"):
         assert run(capfd, "plot", "chamfered.toml", kind, "-o", f"{kind}.png")[0] == 0
+    titles = [axes.get_title() for axes in ls.plot.map(ls.load("chamfered.toml")).axes]
+    assert titles[3] == "on side 3: no part rests there"
     code, out, _ = run(
         capfd, "throw", "chamfered.toml", "--x", "20", "--side", "0", "--count", "50", "--json"
     )
