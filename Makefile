@@ -60,6 +60,7 @@ studies: .venv/dev.stamp  ## run every study again, writing its figures and numb
 
 notebooks: .venv/dev.stamp  ## run every notebook again, in place
 	set -e; for notebook in notebooks/*.ipynb; do .venv/bin/jupyter-execute --inplace $$notebook; done
+	$(PY) notebooks/palette.py notebooks/*.ipynb
 
 check: lint types contracts test-all docs  ## all that has to pass
 

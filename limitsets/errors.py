@@ -7,6 +7,9 @@ an undecided cell) are values of the answers, never exceptions.
 
 from __future__ import annotations
 
+import math
+import numbers
+
 __all__ = [
     "AnswerError",
     "DataError",
@@ -16,6 +19,9 @@ __all__ = [
     "MapError",
     "SceneError",
 ]
+
+# Letters of a text that an error shows.
+LONGEST = 64
 
 
 class LimitsetsError(Exception):
@@ -104,3 +110,22 @@ class AnswerError(LimitsetsError):
 
 class DataError(LimitsetsError):
     """A file of measurements that cannot be what it says; the key names row and column."""
+
+
+def shown(value: object) -> object:
+    """Shorten a value for an error: what a scene holds may be a million characters long."""
+    if isinstance(value, str):
+        return value if len(value) <= LONGEST else value[:LONGEST] + "..."
+    if isinstance(value, int) and not isinstance(value, bool) and value.bit_length() > 64:
+        return f"an integer of {value.bit_length()} bits"
+    if value is None or isinstance(value, bool | int):
+        return value
+    if isinstance(value, float):
+        return value if math.isfinite(value) else f"{value}"
+    if isinstance(value, dict):
+        return "a table"
+    if isinstance(value, numbers.Integral):
+        return int(value)
+    if isinstance(value, list | tuple) and not hasattr(value, "_fields"):
+        return f"a list of {len(value)}"
+    return f"a {type(value).__name__}"

@@ -22,6 +22,9 @@ R = TypeVar("R")
 # What takes longer than this says what it is doing [s].
 PATIENCE = 2.0
 
+# Bars on a terminal: of the step on its way, and of those before it.
+BARS = 4
+
 # A notebook's bar is painted again after this at the earliest [s].
 PAINTED = 0.2
 
@@ -143,13 +146,26 @@ def _on_terminal() -> Iterator[Progress]:
         TimeElapsedColumn(),
     )
     with Progress(*columns, console=Console(stderr=True), transient=True) as shown:
-        task = shown.add_task("reading", total=1, number=1)
+        tasks, so_far = [shown.add_task("reading", total=1, number=1)], 0.0
 
         def tell(step: str, done: int, of: int) -> None:
+            nonlocal so_far
             note = " (a first run compiles: up to half a minute)" if step == "transitions" else ""
             number, total = _number(done, of), max(of, 1)
+            share = min(done / total, 1.0)
+            if share < so_far:  # a step that counts anew has a bar of its own, under those that are over
+                ended = shown.tasks[-1].total
+                shown.update(tasks[-1], completed=ended, number=int(ended or 1))
+                shown.stop_task(tasks[-1])
+                tasks.append(shown.add_task("", total=total, number=number))
+                shown.update(tasks[-BARS - 1], visible=False) if len(tasks) > BARS else None
+            so_far = share
             shown.update(
-                task, description=plain(step) + note, completed=min(done, total), total=total, number=number
+                tasks[-1],
+                description=plain(step) + note,
+                completed=min(done, total),
+                total=total,
+                number=number,
             )
 
         yield tell

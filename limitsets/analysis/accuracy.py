@@ -188,7 +188,7 @@ def _trial(scene: Scene, cells: int, throws: int) -> _Trial:
 
     stops = [time.perf_counter()]
     graph = transitions(scene.map, grid(scene.domain, cells=cells))
-    graph.condensation()
+    _ = graph.condensation().attracting
     stops.append(time.perf_counter())
     found = attractors(graph, throws)
     stops.append(time.perf_counter())
@@ -206,7 +206,7 @@ def _seconds_of_graph(scene: Scene, cells: int) -> float:
     best = math.inf
     for _ in range(TIMES):
         begin = time.perf_counter()
-        transitions(scene.map, grid(scene.domain, cells=MANY)).condensation()
+        _ = transitions(scene.map, grid(scene.domain, cells=MANY)).condensation().attracting
         best = min(best, time.perf_counter() - begin)
     return float(best * (cells / MANY) ** EXPONENT_OF_SECONDS)
 

@@ -23,6 +23,7 @@ from limitsets.analysis.flags import other_vertex_first
 from limitsets.analysis.goal import GoalOutcome, goal_outcome
 from limitsets.analysis.starts import Starts, against_starts
 from limitsets.analysis.verifying import verified
+from limitsets.arguments import arguments_checked
 from limitsets.errors import AnswerError
 from limitsets.files import as_table, picked
 from limitsets.progress import shown_in_notebooks
@@ -274,6 +275,7 @@ class _Steps:
 
 
 @shown_in_notebooks
+@arguments_checked
 def analyse(
     scene: str | Path | Mapping[str, Any] | Scene,
     cells: int | None = None,
@@ -331,7 +333,7 @@ def analyse(
     from limitsets.auditing import choose_effects
     from limitsets.graph import morse_graph
     from limitsets.maps import critical_points
-    from limitsets.scene import Scene, load_to_analyse
+    from limitsets.scene import load_to_analyse
     from limitsets.sets import cycles as cycles_of
     from limitsets.sets import spurious
 
@@ -342,7 +344,7 @@ def analyse(
     asked_error = None if error is None else require_error(error)
     steps = _Steps(10 + (cycles > 0) + 2 * (asked_error is not None), progress)
     with steps.step("scene"):
-        read, tipping = (scene, ()) if isinstance(scene, Scene) else load_to_analyse(scene)
+        read, tipping = load_to_analyse(scene)
         choice = replace(choose_effects(read), tipping=tipping)
         chosen = choice.scene
     plan = None

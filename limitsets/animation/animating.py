@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from limitsets.animation.cutting import Asked
+from limitsets.arguments import arguments_checked
 from limitsets.errors import AnswerError
 from limitsets.files import replaced
 from limitsets.progress import shown_in_notebooks
@@ -89,6 +90,7 @@ def film_of(
 
 
 @shown_in_notebooks
+@arguments_checked
 def animate(
     scene: Any,
     file: str | Path,

@@ -11,6 +11,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from limitsets.arguments import arguments_checked
 from limitsets.assembly.counting import Joint, Overlaps, Rate, joint_of, overlaps_of, rate_of
 from limitsets.assembly.pairing import Pair, Start, pair_of, require_apart, seats_of
 from limitsets.assembly.passing import pass_through
@@ -234,6 +235,7 @@ class Assembly(Tabled):
 
 
 @shown_in_notebooks
+@arguments_checked
 def assemble(
     scene: Scene | str | Path | Mapping[str, Any],
     scene2: Scene | str | Path | Mapping[str, Any],

@@ -79,7 +79,7 @@ def pair_of(
     AnswerError
         Scenes that differ in arm, throw, noise or cavity, that have none, or with effects or noise that are not thrown.
     """
-    one, two = (each if isinstance(each, Scene) else load(each) for each in (scene, scene2))
+    one, two = (load(each) for each in (scene, scene2))
     for name in SHARED:
         values = getattr(one, name), getattr(two, name)
         if values[0] != values[1]:

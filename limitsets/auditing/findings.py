@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from limitsets.arguments import arguments_checked
 from limitsets.auditing.assumptions import ASSUMPTIONS, Assumption
 from limitsets.auditing.judging import Row, all_hold, enclosed_at
 from limitsets.auditing.places import Places, Sample, places
@@ -240,6 +241,7 @@ def _findings(
     return tuple(findings)
 
 
+@arguments_checked
 def audit(scene: str | Path | Mapping[str, Any] | Scene) -> Audit:
     """Find out which of the effects that the minimal model leaves out a scene calls for.
 
@@ -271,9 +273,9 @@ def audit(scene: str | Path | Mapping[str, Any] | Scene) -> Audit:
     [('release', 'proved'), ('landing', 'proved'), ('slip', 'proved'), ('arm', 'proved')]
     """
     from limitsets.proofs.parameters import parameter_box
-    from limitsets.scene import Scene, load
+    from limitsets.scene import load
 
-    chosen = scene if isinstance(scene, Scene) else load(scene)
+    chosen = load(scene)
     # what the minimal model assumes is asked of its throws, whichever effects are on
     without = {} if chosen.sides.rests.all() else dict.fromkeys(TIPPING, True)
     box = parameter_box(load({**chosen.as_dict(), "effects": without}))

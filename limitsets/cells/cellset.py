@@ -151,6 +151,38 @@ class CellSet:
                 found[side] = [(float(edges[a]), float(edges[b])) for a, b in border.reshape(-1, 2)]
         return found
 
+    def pieces(self) -> dict[int, list[tuple[tuple[float, float], ...]]]:
+        """Per side the boxes that hold its connected pieces, a pair (lo, hi) for each axis.
+
+        Returns
+        -------
+        dict of int to list of tuple of (lo, hi)
+            In the order of the first cell of each piece; cells that share a corner are connected.  A side without
+            cells is left out.
+
+        Examples
+        --------
+        >>> import limitsets as ls
+        >>> CellSet.of(ls.grid([(0.0, 1.0), (0.0, 4.0)], cells=4), [0, 5, 15]).pieces()
+        {0: [((0.0, 0.5), (0.0, 2.0)), ((0.75, 1.0), (3.0, 4.0))]}
+        """
+        from scipy import ndimage
+
+        found: dict[int, list[tuple[tuple[float, float], ...]]] = {}
+        for side, axes in enumerate(self.grid.edges):
+            block = self.mask[self.grid.of_side(side)].reshape(tuple(self.grid.shape[side]))
+            labels, _ = ndimage.label(block, np.ones((3,) * self.grid.dimension))
+            boxes = [
+                tuple(
+                    (float(edges[part.start]), float(edges[part.stop]))
+                    for edges, part in zip(axes, piece, strict=True)
+                )
+                for piece in ndimage.find_objects(labels)
+            ]
+            if boxes:
+                found[side] = boxes
+        return found
+
     def refined(self, fine: Grid) -> CellSet:
         """Return the cells of a refinement (`Grid.refine`) that lie in this set."""
         mask = np.zeros(fine.n_cells, dtype=bool)

@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from limitsets.cells.domain import Domain, as_domain
-from limitsets.errors import GridError
+from limitsets.errors import GridError, shown
+from limitsets.tables import Column, Table, Tabled
 
 __all__ = ["Grid", "grid"]
 
@@ -24,8 +25,8 @@ EQUAL_BEYOND = 0.25
 MOST_CELLS = 2**31 - 16
 
 
-@dataclass(frozen=True, eq=False)
-class Grid:
+@dataclass(frozen=True, eq=False, repr=False)
+class Grid(Tabled):
     """A grid of closed cells on each side.
 
     Attributes
@@ -66,6 +67,16 @@ class Grid:
 
     def __repr__(self) -> str:
         return f"Grid({self.n_cells} cells: {', '.join('x'.join(map(str, n)) for n in self.shape.tolist())})"
+
+    def tables(self) -> tuple[Table, ...]:
+        """Give the tables that show it, the one that is saved as CSV first."""
+        rows = [
+            (side, axis, edges.size - 1, (edges[0], edges[-1]), (np.diff(edges).min(), np.diff(edges).max()))
+            for side, axes in enumerate(self.edges)
+            for axis, edges in enumerate(axes)
+        ]
+        spans = (Column("x", show=".6g", ends=True), Column("width of a cell", show=".3g", ends=True))
+        return (Table(("side", "axis", "cells", *spans), rows, f"Grid of {self.n_cells} cells"),)
 
     @property
     def sides(self) -> int:
@@ -248,8 +259,8 @@ def grid(
     region = as_domain(domain)
     counts = _counts(cells, depth, region.dimension)
     words = ("uniform", "graded")
-    if grading is not None and grading not in words:
-        raise GridError("the grading", grading, " or ".join(words), "correct the word")
+    if grading is not None and not (isinstance(grading, str) and grading in words):
+        raise GridError("the grading", shown(grading), " or ".join(words), "correct the word")
     if grading == "graded" and region.anchor is None:
         raise GridError(
             "the grading", grading, "uniform, for a domain without anchor", "give the domain an anchor"

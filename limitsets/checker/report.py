@@ -55,10 +55,38 @@ EXITS = {"proved": 0, "proved-on-cells": 1, "refuted": 1, "failed": 1, "bad file
 
 @dataclass
 class Report:
-    """The verdict on a certificate: `claims` has (claim, a word of `WORDS`, reason); `starts` are those of the goal.
+    """The verdict on a certificate.
 
-    `share` of the arm has the starts for which the goal is proved, `explained` the starts that are proved to be lost or
-    to creep to the joint: both are lower bounds.  `open` is an upper bound of the rest.
+    Attributes
+    ----------
+    verdict : str
+        "proved", "proved-on-cells", "refuted", "failed" or "bad file".
+    claims : list of tuple
+        (claim, a word of `WORDS`, reason).
+    starts : str, dict or None
+        Those of the goal, as the certificate has them.
+    share : float or None
+        Share of the arm with the starts for which the goal is proved: a lower bound.
+    explained : float or None
+        Share of the arm with the starts that are proved to be lost or to creep to the joint: a lower bound.
+    open : float or None
+        Share of the arm with the other starts: an upper bound.
+    fed : dict of str to float, or None
+        Of the claim `feeds`: shares of the arm for whose starts each part is proved.
+    area : dict of str to float, or None
+        Of a plane: the shares that are proved, refuted and undecided.
+    statement : list of str
+        What is proved, in sentences.
+    parameters : dict of str to str
+        Quantities of the scenes.
+    relied_on : list of str
+        What the verdict relies on.
+    reason : str
+        Why the certificate fails, empty where it does not.
+    seconds : float
+        Time of the recheck.
+    cells, boxes : int
+        Number of cells, and of boxes of parameters.
     """
 
     verdict: str = "failed"
@@ -67,8 +95,8 @@ class Report:
     share: float | None = None
     explained: float | None = None
     open: float | None = None
-    fed: dict[str, float] | None = None  # of feeds: shares of the arm for whose starts each part is proved
-    area: dict[str, float] | None = None  # of a plane: the shares that are proved, refuted and undecided
+    fed: dict[str, float] | None = None
+    area: dict[str, float] | None = None
     statement: list[str] = field(default_factory=list)
     parameters: dict[str, str] = field(default_factory=dict)
     relied_on: list[str] = field(default_factory=list)

@@ -65,7 +65,7 @@ def _announce(plan: Plan) -> None:
 
 
 def _text(analysis: Analysis, page: Path) -> None:
-    from limitsets.report.goals import next_command, verdict_of, void_of
+    from limitsets.report.goals import after_undecided, next_command, verdict_of, void_of
     from limitsets.report.pages import other_vertex_in_limit_sets
     from limitsets.report.tables import count, intervals, percent
 
@@ -97,6 +97,9 @@ def _text(analysis: Analysis, page: Path) -> None:
         )
     for text in analysis.advice:
         typer.echo(f"not settled: {text}")
+    undecided, finer = analysis.basins.undecided_between, after_undecided(analysis)
+    if finer and analysis.attractors:
+        typer.echo(f"undecided: {percent(undecided)} of all starts; next: {finer}")
     if analysis.goal is not None:
         void = void_of(analysis.goal, unit)
         typer.echo(

@@ -8,7 +8,20 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from limitsets.cli.output import Csv, Form, Format, Json, Scene, answer, opened, option, progress, saved, show
+from limitsets.cli.output import (
+    Csv,
+    Form,
+    Format,
+    Json,
+    Scene,
+    answer,
+    opened,
+    option,
+    processes,
+    progress,
+    saved,
+    show,
+)
 
 if TYPE_CHECKING:
     from limitsets.sweep import Atlas
@@ -87,10 +100,7 @@ def atlas(
 
 def _certified(found: Atlas, file: Path, workers: int | None, tell: Progress) -> dict[str, float]:
     """Prove the cells on processes, and write the certificate; shares of the window by what is proved."""
-    from concurrent.futures import ProcessPoolExecutor
-    from multiprocessing import get_context
-
-    with ProcessPoolExecutor(workers, get_context("spawn")) as pool:
+    with processes(workers) as pool:
         regions = found.certify(executor=pool, progress=tell)
     tell("certificate", 0, 1)
     regions.save(file, workers=workers)

@@ -79,6 +79,8 @@ def certify(
 
 
 def _text(proof: Proof, file: Path | None, kept: str, seconds: float | None) -> None:
+    from limitsets.report.goals import after_unproved
+
     cells = sum(found.cover.grid.n_cells for found in proof.attractions)
     typer.echo(f"{proof.scene.name}: {cells} cells, {proof.seconds:.2g} s")
     for name, (lo, hi) in proof.spans.items():
@@ -107,6 +109,9 @@ def _text(proof: Proof, file: Path | None, kept: str, seconds: float | None) -> 
         left = "" if proof.proved else ", of what is proved only"
         done = "not rechecked" if seconds is None else f"rechecked in {seconds:.2g} s"
         typer.echo(f"certificate: {file}{left}, {done} (check it: limitsets recheck {file})")
+
+    if not proof.proved:
+        typer.echo(f"next: {after_unproved(proof)}")
 
 
 def _short(text: str) -> str:

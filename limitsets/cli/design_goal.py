@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from shlex import quote
 from typing import TYPE_CHECKING
 
 import typer
@@ -77,7 +78,10 @@ def _text(found: GoalDesign, files: list[Path]) -> None:
             f"{sum(found.ruled_out.values())} of {found.evaluations} designs were ruled out: {said(found.ruled_out)}"
         )
     if found.room > 0.0 and found.verdict != "proved":
-        typer.echo("next: limitsets certify on the scene found says what keeps it from a proof")
+        file = next((str(path) for path in files if path.suffix == ".toml"), None)
+        save = "" if file else "add -o design.toml to this command, then "
+        command = f"limitsets certify {quote(file or 'design.toml')}"
+        typer.echo(f"next: {save}{command} (what keeps the design from a proof)")
     if files and not found.room > 0.0:
         typer.echo("the scene written is the best of those, and does not meet the goal")
     show_scene(found.scene, files)

@@ -36,11 +36,9 @@ def explore(
     from limitsets.explorer.visits import stored_atlas
 
     with progress() as tell:
-        # once, before the first visitor comes
-        tell("preparing the page; what is not compiled yet is compiled, for half a minute or more", 0, 1)
         chosen = scene if scene is not None else FIRST if atlas is None else stored_atlas(atlas)[0]
         explorer = open_page(chosen, atlas=atlas)
-        explorer.page().close()
+        explorer.prepare(tell)
     explorer.show(
         address=address,
         port=port,

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from limitsets.cli.output import Json, answer
+from limitsets.cli.output import Json, answer, option
 
 __all__ = ["new"]
 
@@ -16,12 +16,13 @@ def new(
     file: Annotated[
         Path, typer.Argument(metavar="FILE.toml", help="The file to write; it must not be there.")
     ],
+    unit: Annotated[str, option("--unit", "UNIT", "Of its lengths: mm, cm, m, in, ...")] = "in",
     json: Json = False,
 ) -> None:
     """Write a scene to start from: every key that a scene may have, with what it means."""
     from limitsets.scene.starting import new_scene
 
-    written = new_scene(file)
+    written = new_scene(file, unit)
 
     def text() -> None:
         typer.echo(f"scene: {written}")

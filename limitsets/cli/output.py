@@ -22,6 +22,8 @@ from limitsets.progress import bar
 from limitsets.tables import aligned
 
 if TYPE_CHECKING:
+    from concurrent.futures import Executor
+
     from limitsets.scene import Scene as SceneOf
     from limitsets.tables import Table
 
@@ -36,6 +38,7 @@ __all__ = [
     "answer",
     "opened",
     "option",
+    "processes",
     "progress",
     "save_scene",
     "saved",
@@ -242,6 +245,24 @@ class _Interrupts:
     def check(self) -> None:
         if self.pressed:
             raise KeyboardInterrupt
+
+
+@contextmanager
+def processes(workers: int | None) -> Iterator[Executor | None]:
+    """Start processes as tasks come, one a core by default; None where a single one is enough."""
+    from concurrent.futures import ProcessPoolExecutor
+    from multiprocessing import get_context
+
+    count = workers or os.cpu_count() or 1
+    if count == 1:
+        yield None
+        return
+    quiet = (signal.SIGINT, signal.SIG_IGN)  # a terminal sends Ctrl-C to them, too
+    pool = ProcessPoolExecutor(count, get_context("spawn"), signal.signal, quiet)
+    try:
+        yield pool
+    finally:
+        pool.shutdown(cancel_futures=True)
 
 
 @contextmanager

@@ -61,20 +61,33 @@ def plot(
     with progress() as tell:
         from limitsets.report.writing import DPI
 
-        name, drawn = _part(scene) if kind is Picture.PART else _figure(scene, kind, cells, x, side, tell)
+        wrong: LimitsetsError | None = None
+        if kind is Picture.PART:
+            name, drawn, wrong = _part(scene)
+        else:
+            name, drawn = _figure(scene, kind, cells, x, side, tell)
         file = out if out is not None else Path(f"{name}-{kind}.{form or Form.PNG}")
         with saved(file) as draft:
             drawn.savefig(draft, dpi=DPI)
     answer({"figure": str(file)}, json, lambda: typer.echo(f"figure: {file}"))
+    if wrong is not None:
+        raise wrong
 
 
-def _part(scene: str) -> tuple[str, Figure]:
-    """Draw what needs no analysis."""
-    from limitsets.plot.parts import part
+def _part(scene: str) -> tuple[str, Figure, LimitsetsError | None]:
+    """Draw what needs no analysis; of a part that is refused what can be read of it, and the error."""
+    from limitsets.plot.parts import part, refused_part
     from limitsets.scene import load
+    from limitsets.scene.sketch import sketch
 
-    chosen = load(scene)
-    return chosen.name, part(chosen)
+    try:
+        chosen = load(scene)
+    except LimitsetsError as error:
+        found = sketch(scene)
+        if found is None:
+            raise
+        return found.name, refused_part(found, str(error)), error
+    return chosen.name, part(chosen), None
 
 
 def _figure(

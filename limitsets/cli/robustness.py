@@ -18,6 +18,7 @@ from limitsets.cli.output import (
     answer,
     opened,
     option,
+    processes,
     progress,
     table,
 )
@@ -53,7 +54,10 @@ def robustness(
     ] = 1024,
     seconds: Annotated[
         float, option("--seconds", "S", "For the proofs of the joint margin and of the curve.", min=0.0)
-    ] = 24.0,
+    ] = 12.0,
+    workers: Annotated[
+        int | None, option("--workers", "N", "Processes that search for margins; default: one a core.", min=1)
+    ] = None,
     without: Annotated[Words, option("--without", "PART", HELP_WITHOUT)] = None,
     out: Annotated[
         Path | None, option("--out -o", "DIR", "Folder of the report, ./NAME-robustness by default.")
@@ -67,7 +71,7 @@ def robustness(
 
     Exit 1 where the goal is not proved of the scene as it is.
     """
-    with progress() as tell:
+    with progress() as tell, processes(workers) as pool:
         chosen, folder = opened(scene, out, "robustness")
         from limitsets.report.robust_files import write_robustness
         from limitsets.robust.sheet.noise_input import scattering_from
@@ -87,6 +91,7 @@ def robustness(
             seconds=seconds,
             folder=folder,
             recheck=not no_recheck,
+            executor=pool,
             progress=tell,
         )
         tell("files", len(found.entries), len(found.entries) + 1)

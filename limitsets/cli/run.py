@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import contextlib
+import difflib
 import gc
 import io
 import os
+import re
 import sys
 from collections.abc import Sequence
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -95,7 +98,35 @@ def _run(arguments: Sequence[str] | None) -> int:
         raise KeyboardInterrupt from None
     except refused as error:
         hint = "" if not isinstance(error, usage_error) else "; limitsets --help lists what there is"
-        return _end(f"{error.format_message().rstrip('.')}{hint}", BAD_INPUT)
+        return _end(f"{_plain(error.format_message().rstrip('.'), words)}{hint}", BAD_INPUT)
     if code == INTERRUPTED:  # typer's word for Ctrl-C
         raise KeyboardInterrupt
     return code if isinstance(code, int) else 0
+
+
+def _plain(message: str, words: Sequence[str]) -> str:
+    """Say what the parser says in the words of this package, with the value that was given and the nearest right one.
+
+    Examples
+    --------
+    >>> words = ["--side", "two"]
+    >>> _plain("Invalid value for '--side': Input should be a valid integer, unable to parse string", words)
+    "Invalid value for '--side': 'two' is not a whole number"
+    """
+    kinds = {"integer": "a whole number", "number": "a number", "boolean": "true or false"}
+    about, colon, reason = message.partition(": ")
+    if found := re.match(r"Input should be a valid (integer|number|boolean)", reason):
+        name = next(iter(re.findall(r"'(--?[\w-]+)'", about)), "")
+        given = next((after for word, after in pairwise(words) if word == name), "")
+        return f"{about}{colon}{repr(given) + ' is not' if given else 'it is not'} {kinds[found[1]]}"
+    reason = reason.removeprefix("Value error, ")
+    if found := re.match(r"'([^']*)' is not one of (.*)", reason):
+        (near,) = difflib.get_close_matches(found[1], re.findall(r"'([^']*)'", found[2]), n=1, cutoff=0.0)
+        return f"{about}{colon}{reason}; did you mean {near!r}?"
+    value_set = next((word for word in words if re.fullmatch(r"[a-z][\w.\[\]]*=[^=]+", word)), None)
+    if value_set and about.startswith(("Got unexpected extra argument", "No such option")):
+        name, _, value = value_set.partition("=")
+        value = f"{value} UNIT" if value.replace(".", "", 1).isdigit() else value
+        way = f"write it into the scene's file, or in Python scene.with_values({{{name!r}: {value!r}}})"
+        return f"{message}; a command takes the quantities of a scene as they stand: {way}"
+    return message

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from limitsets.arguments import arguments_checked
 from limitsets.engine.throwing import throw
 from limitsets.errors import AnswerError
 from limitsets.maps import OUTSIDE_MODEL, images
@@ -36,7 +37,7 @@ class Comparison:
         Vertex that met the arm first in the engine.
     left : ndarray of int, shape (n,)
         Left bottom vertex before the throw, the one that the minimal model lets land.
-    residual, reverses, rocks : ndarray
+    residual, reverses, rocks : ndarray, shape (n,)
         What was seen of unilateral contact (`Landing`).
     """
 
@@ -83,6 +84,7 @@ SEEN: dict[str, Any] = {
 }
 
 
+@arguments_checked
 def compare(scene: Scene, x: ArrayLike, side: ArrayLike, **how: Any) -> Comparison:
     """Throw parts by the scene's map, with the effects it has, and in the engine.
 

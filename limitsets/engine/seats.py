@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from limitsets.arguments import arguments_checked
 from limitsets.errors import AnswerError
 from limitsets.geometry import side_ends
 
@@ -25,6 +26,7 @@ studies/sizes.toml, 0.1 of 9.3 in.  A part farther off keeps the next one from f
 Points = NDArray[np.float64]
 
 
+@arguments_checked
 def seat_of(scene: Scene, side: int, below: Sequence[Points] = ()) -> Points:
     """Give the corners of a part seated in its scene's cavity.
 
@@ -82,8 +84,28 @@ def seat_of(scene: Scene, side: int, below: Sequence[Points] = ()) -> Points:
     return seated
 
 
+@arguments_checked
 def off_seat(corners: Sequence[tuple[float, float]], seat: Points) -> float:
-    """Give by how much the corner that is farthest from its seat is off [length]."""
+    """Give by how much the corner that is farthest from its seat is off.
+
+    Parameters
+    ----------
+    corners : sequence of (float, float)
+        Corners of the part [length].
+    seat : ndarray, shape (n, 2)
+        Where they should be [length].
+
+    Returns
+    -------
+    float
+        The largest distance [length].
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> off_seat([(0.0, 0.0), (1.0, 0.0)], np.array([[0.0, 0.0], [1.0, 0.5]]))
+    0.5
+    """
     return float(np.hypot(*(np.asarray(corners) - seat).T).max())
 
 

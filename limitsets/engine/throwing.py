@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from limitsets.arguments import arguments_checked
 from limitsets.engine.flying import fly
 from limitsets.engine.hinged import turn_and_roll, turn_on_hinge
 from limitsets.engine.settling import Seen, settle
@@ -59,6 +60,7 @@ class EngineThrow:
     rocks: bool = False
 
 
+@arguments_checked
 def throw(
     scene: Scene,
     x: float,

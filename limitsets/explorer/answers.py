@@ -10,10 +10,11 @@ from limitsets.explorer.estimates import CELLS, Estimate
 from limitsets.explorer.knobs import Knob
 from limitsets.explorer.pictures import look_of
 from limitsets.goals import Goal
+from limitsets.maps import codes
 from limitsets.plot.style import interval_text
 from limitsets.report.goals import goal_sentence
 
-__all__ = ["KEY", "error_line", "estimate_words", "proof_words"]
+__all__ = ["KEY", "careful_line", "error_line", "estimate_words", "proof_words"]
 
 KEY = (
     '<p class="how">Bars: limit sets. Strips: where starts lead, hatched unless to limit set 0. Strokes r: critical '
@@ -31,6 +32,17 @@ VERDICTS = {
 def error_line(error: object) -> str:
     """Say what is wrong, in one line that a screen reader speaks at once."""
     return f'<p role="alert" class="wrong">{escape(str(error))}</p>' if error else '<p role="alert"></p>'
+
+
+def careful_line(found: Estimate) -> str:
+    """Say from how many starts a throw is outside the model, if from any."""
+    share = dict(found.shares).get(codes.OUTSIDE_MODEL, 0.0)
+    if not share:
+        return ""
+    return (
+        f'<p class="wrong">careful: from {100 * share:.3g} % of the starts the part comes to a throw that is outside '
+        "the model: it has not landed within a full turn</p>"
+    )
 
 
 def estimate_words(found: Estimate, goal: Goal | None, unit: str) -> str:

@@ -8,15 +8,14 @@ from typing import Any
 
 import numpy as np
 import panel as pn
-from bokeh.events import Tap
-from bokeh.models import ColumnDataSource, HoverTool, Range1d
-from bokeh.plotting import figure
 from scipy.ndimage import distance_transform_edt
 
 from limitsets.explorer.background import Background
+from limitsets.explorer.canvas import Canvas, Hand, Layer, Words
 from limitsets.explorer.knobs import Knob
 from limitsets.explorer.look import SAID, SLIDER
 from limitsets.explorer.pictures import pattern
+from limitsets.plot import style
 from limitsets.plot.atlas_frame import edges
 from limitsets.scene import Scene, dump
 from limitsets.scene.units import written
@@ -55,52 +54,26 @@ class AtlasPage:
         self._y = pn.widgets.Select(label="up", width=190, **look)
         self._go = pn.widgets.Button(label=f"Compute {POINTS} x {POINTS} points", align="end", **look)
         self._go.on_click(lambda _: self._compute())
-        self._words = pn.pane.HTML("", stylesheets=[SAID], sizing_mode="stretch_width")
-        self._boxes = ColumnDataSource({name: [] for name in (*BOX, "face", "hatch", "words")})
-        self._numbers = ColumnDataSource({"x": [], "y": [], "words": []})
-        self._here = ColumnDataSource({"x": [], "y": []})
-        self._picture = self._drawn()
-        self._pane = pn.pane.Bokeh(self._picture, visible=False, sizing_mode="stretch_width")
+        self._words = Words(stylesheets=[SAID])
+        self._boxes = Layer("bars", "classes", columns=(*BOX, "face", "hatch", "words"))
+        words: dict[str, Any] = {"columns": ("x", "y", "words"), "align": "center", "size": 12, "plate": True}
+        self._numbers = Layer("words", "numbers", colour=style.INK, **words)
+        mark: dict[str, Any] = {"size": 16, "fill": "#ffffff", "line": style.INK, "width": 2}
+        self._here = Layer("marks", "here", shape="cross", **mark)
+        self._chosen = Layer(
+            "marks", "chosen", shape="square", **mark | {"fill": "#ffffff00", "line": style.FLIP}
+        )
+        layers = [self._boxes, self._numbers, self._here, self._chosen]
+        view = {"margins": MARGINS, "across": " ", "up": "", "keys": True}
+        self._canvas = Canvas("atlas", layers, 400, self._touched, stylesheets=[SLIDER], **view)
+        self._canvas.visible = False
         self.column = pn.Card(
-            pn.FlexBox(self._x, self._y, self._go), self._pane, self._words,
+            pn.FlexBox(self._x, self._y, self._go), self._canvas, self._words,
             title="Atlas: where the topology changes; click a point to open that feeder",
             collapsed=table is None, sizing_mode="stretch_width",
         )  # fmt: skip
         if table is not None:
             self._show(table)
-
-    def _drawn(self) -> Any:
-        made = figure(
-            name="atlas",
-            height=400,
-            toolbar_location=None,
-            tools="",
-            sizing_mode="stretch_width",
-            x_range=Range1d(0, 1),
-            y_range=Range1d(0, 1),
-        )
-        made.xgrid.visible = made.ygrid.visible = False
-        boxes = made.quad(
-            **{name: name for name in BOX}, source=self._boxes, fill_color="face", line_color="face", line_width=0.6,
-            hatch_pattern="hatch", hatch_alpha=0.5, hatch_scale=6, hatch_weight=0.7,
-        )  # fmt: skip
-        made.text(
-            "x", "y", "words", source=self._numbers, text_align="center", text_baseline="middle", text_font_size="12px",
-            background_fill_color="white", background_fill_alpha=0.9, padding=2,
-        )  # fmt: skip
-        made.scatter(
-            "x",
-            "y",
-            source=self._here,
-            marker="circle_cross",
-            size=16,
-            fill_color="white",
-            line_color="#222222",
-            line_width=2,
-        )
-        made.add_tools(HoverTool(renderers=[boxes], tooltips="@words"))
-        made.on_event(Tap, lambda event: self._clicked(event.x, event.y))
-        return made
 
     def follow(self, scene: Scene, knobs: tuple[Knob, ...]) -> None:
         """Know which scene is shown."""
@@ -144,7 +117,8 @@ class AtlasPage:
         i, j = shown.T
         kinds = [looks[int(each)] for each in numbers[i, j]]
         self._boxes.data = {
-            "left": across[j], "right": across[j + 1], "bottom": up[i], "top": up[i + 1],
+            "left": across[j].tolist(), "right": across[j + 1].tolist(),
+            "bottom": up[i].tolist(), "top": up[i + 1].tolist(),
             "face": [_colour(each["facecolor"]) for each in kinds],
             "hatch": [pattern(each["hatch"]) for each in kinds],
             "words": [each["words"] for each in kinds],
@@ -156,19 +130,20 @@ class AtlasPage:
             "y": [y["values"][row] for _, row, _ in places],
             "words": [str(k) for k, _, _ in places],
         }
-        for ends, ranges in ((across, self._picture.x_range), (up, self._picture.y_range)):
-            ranges.start, ranges.end = float(ends[0]), float(ends[-1])
-        self._picture.xaxis.axis_label, self._picture.yaxis.axis_label = (
-            f"{a['name']} [{a['unit']}]" for a in (x, y)
-        )
-        self._pane.visible = True
+        names = (f"{axis['name']} [{axis['unit']}]" for axis in (x, y))
+        view = {"x": [float(across[0]), float(across[-1])], "y": [float(up[0]), float(up[-1])]}
+        self._canvas.view |= {**view, **dict(zip(("across", "up"), names, strict=True))}
+        self._canvas.heading = "atlas: arrow keys choose a point, Enter opens it"
+        self._canvas.visible = True
         rows = "".join(
             f'<tr><td><span class="swatch" style="background:{_colour(each["facecolor"])}"></span>{k + 1}</td>'
             f"<td>{escape(each['words'])}</td><td>{100 * each['share']:.3g} %</td></tr>"
             for k, each in enumerate(table["classes"][:12])
         )
         self._words.object = f'<table class="said">{rows}</table><p class="how">estimated, not proved</p>'
+        self._chosen.data = {"x": [], "y": []}
         self._mark()
+        self._canvas.send()
 
     def _mark(self) -> None:
         """Show where the scene on the page is, if the atlas knows of such a place."""
@@ -182,16 +157,32 @@ class AtlasPage:
         ):
             x, y = (values[name].value for name in names)
             self._here.data = {"x": [x], "y": [y]}
+        self._canvas.send()
 
-    def _clicked(self, x: float, y: float) -> None:
+    def _touched(self, hand: Hand) -> None:
+        """Open the point that is tapped; keys say steps from point to point instead of a place."""
         if self._table is None:
             return
-        values = {}
-        for axis, at in zip(self._table["axes"], (x, y), strict=True):
-            values_of = np.array(axis["values"])
-            nearest = float(values_of[np.abs(values_of - at).argmin()])
-            values[axis["name"]] = written(nearest, axis["unit"])
-        self._opened(values)
+        axes = [np.array(axis["values"]) for axis in self._table["axes"]]
+        at = [layer.data[axis][0] for layer in (self._chosen, self._here) if layer.data["x"] for axis in "xy"]
+        if hand.what == "tap":
+            at = [hand.x, hand.y]
+        elif not at:  # the scene on the page is not in this atlas
+            at = [float(values.mean()) for values in axes]
+        numbers = [int(np.abs(values - each).argmin()) for values, each in zip(axes, at, strict=False)]
+        if hand.what == "step":
+            numbers = [
+                min(max(number + int(by), 0), values.size - 1)
+                for number, by, values in zip(numbers, (hand.x, hand.y), axes, strict=True)
+            ]
+        x, y = (float(values[number]) for values, number in zip(axes, numbers, strict=True))
+        if hand.what == "step":
+            self._chosen.data = {"x": [x], "y": [y]}
+            self._canvas.send()
+        elif hand.what in ("tap", "enter"):
+            self._chosen.data = {"x": [], "y": []}
+            places = zip(self._table["axes"], (x, y), strict=True)
+            self._opened({axis["name"]: written(value, axis["unit"]) for axis, value in places})
 
     def close(self) -> None:
         """End what is still being computed."""
@@ -199,6 +190,7 @@ class AtlasPage:
 
 
 BOX = ("left", "right", "bottom", "top")
+MARGINS = (64, 12, 40, 38)
 
 
 def _middle(where: Any) -> tuple[int, int]:

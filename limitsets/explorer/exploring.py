@@ -5,8 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from limitsets.arguments import arguments_checked
 from limitsets.errors import AnswerError, LimitsetsError
-from limitsets.scene import Scene, load
+from limitsets.scene import load
 
 if TYPE_CHECKING:
     from limitsets.explorer.visits import Explorer
@@ -31,6 +32,7 @@ def required() -> None:
             ) from None
 
 
+@arguments_checked
 def explore(
     scene: Any = "paper-designed", *, domain: Any = None, atlas: str | Path | None = None
 ) -> Explorer:
@@ -79,5 +81,5 @@ def explore(
         return Explorer.of_map(scene, domain)
     if domain is not None:
         raise AnswerError("the domain", "given", "none beside a scene", "a scene has one: leave it out")
-    loaded = scene if isinstance(scene, Scene) else load(scene)
+    loaded = load(scene)
     return Explorer.of_scene(loaded, None if atlas is None else Path(atlas))

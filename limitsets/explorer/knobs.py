@@ -8,12 +8,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from limitsets.errors import LimitsetsError
+from limitsets.errors import LimitsetsError, shown
 from limitsets.geometry import side_ends
 from limitsets.geometry.polygon import above_side
 from limitsets.scene import Scene
 from limitsets.scene.quantities import STANDARD_GRAVITY, find, text_at
-from limitsets.scene.units import convert, parse, shown, written
+from limitsets.scene.units import convert, parse, written
 
 __all__ = ["Knob", "centre_at", "knobs_of", "knobs_of_map", "map_with", "scene_with", "texts_of"]
 

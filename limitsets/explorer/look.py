@@ -7,7 +7,7 @@ __all__ = ["PAGE", "SAID", "SLIDER"]
 # Panel's own page, told that a phone is narrow; `base` is what Panel gives.
 PAGE = """{% extends base %}{% block preamble %}
 <meta name="viewport" content="width=device-width, initial-scale=1">
-<style>body { margin: 0; color: #222; } body > div { padding: 4px; }</style>
+<style>body { padding: 0 10px 10px !important; box-sizing: border-box; color: #222; }</style>
 {% endblock %}"""
 
 SAID = """
@@ -25,7 +25,8 @@ p { margin: 0.2rem 0; font-size: 0.9rem; line-height: 1.35; }
 """
 
 SLIDER = """
-.noUi-handle:focus-visible, input:focus-visible, button:focus-visible, select:focus-visible, a:focus-visible,
+input:focus-visible, button:focus-visible, select:focus-visible, a:focus-visible, canvas:focus-visible,
 textarea:focus-visible { outline: 3px solid #0072B2; outline-offset: 1px; }
-label, .bk-slider-title { font-size: 0.85rem; }
+label { font-size: 0.85rem; font-family: system-ui, -apple-system, "Segoe UI", "DejaVu Sans", sans-serif; }
+input[type=range] { display: block; width: 100%; height: 24px; margin: 0; accent-color: #0072B2; touch-action: pan-y; }
 """

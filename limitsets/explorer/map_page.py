@@ -10,6 +10,7 @@ import panel as pn
 from limitsets.cells import Domain
 from limitsets.errors import LimitsetsError
 from limitsets.explorer.answers import error_line, estimate_words
+from limitsets.explorer.canvas import Words
 from limitsets.explorer.estimates import Estimate, estimate_of_map, points_of_map
 from limitsets.explorer.knobs import knobs_of_map, map_with
 from limitsets.explorer.lanes import LanesPicture, PointsPicture
@@ -36,21 +37,21 @@ class MapPage:
     def __init__(self, params: Any, domain: Domain) -> None:
         self._params, self._domain, self._dirty = params, domain, True
         wide: dict[str, Any] = {"sizing_mode": "stretch_width"}
-        self._error = pn.pane.HTML(error_line(""), stylesheets=[SAID], **wide)
-        self._said = pn.pane.HTML("", stylesheets=[SAID], **wide)
+        self._error, self._said = Words(error_line(""), stylesheets=[SAID]), Words(stylesheets=[SAID])
         self.sliders = Sliders(self._moved, self.say)
         self.sliders.open(knobs_of_map(params))
         self.lanes = LanesPicture() if domain.dimension == 1 else None
         self.points = None if self.lanes else PointsPicture(domain.lo[0].tolist(), domain.hi[0].tolist())
         shown = self.lanes or self.points
         assert shown is not None  # it is one of the two
+        self._shown = shown
         self._refit, self._told, self._wrote = True, False, -1.0
         self._found: Estimate | None = None
         self.beat()
-        title = pn.pane.HTML(f"<h1>limitsets: {type(params).__name__}</h1>", stylesheets=[SAID], **wide)
+        title = Words(f"<h1>limitsets: {type(params).__name__}</h1>", stylesheets=[SAID])
         controls = pn.Column(self.sliders.column, styles={"flex": "1 1 300px", "min-width": "0"}, **wide)
         pictures = pn.Column(
-            pn.pane.Bokeh(shown.figure, **wide),
+            self._shown.canvas,
             self._said,
             styles={"flex": "3 1 330px", "min-width": "0"},
             **wide,
@@ -59,9 +60,7 @@ class MapPage:
 
     def say(self, error: object = "") -> None:
         """Show one line of what is wrong, or take it away."""
-        words = error_line(error)
-        if self._error.object != words:
-            self._error.object = words
+        self._error.object = error_line(error)
 
     def _moved(self) -> None:
         self._dirty = True
@@ -80,7 +79,11 @@ class MapPage:
             params = map_with(self._params, self.sliders.values)
             if self.lanes is None:
                 assert self.points is not None  # it is one of the two
-                self.points.show(points_of_map(params, self._domain))
+                points = points_of_map(params, self._domain)
+                if self._refit:
+                    self.points.frame(points)
+                    self._refit = False
+                self.points.show(points)
             else:
                 found = estimate_of_map(params, self._domain)
                 if self._refit:
@@ -92,6 +95,7 @@ class MapPage:
             self.say(error)
         else:
             self.say()
+        self._shown.canvas.send()
 
     def close(self) -> None:
         """Nothing is being computed."""

@@ -11,16 +11,16 @@ import time
 from typing import Any
 
 import panel as pn
-from bokeh.events import Pan, PanEnd, PanStart, Tap
 
 from limitsets.animation.cutting import Pace
 from limitsets.animation.film import Film
 from limitsets.animation.lanes import require_start
 from limitsets.animation.thrown_scenes import film_of_throws
 from limitsets.errors import LimitsetsError
-from limitsets.explorer.answers import KEY, error_line, estimate_words, proof_words
+from limitsets.explorer.answers import KEY, careful_line, error_line, estimate_words, proof_words
 from limitsets.explorer.atlas_page import AtlasPage
 from limitsets.explorer.background import Background
+from limitsets.explorer.canvas import Hand, Words
 from limitsets.explorer.estimates import estimate
 from limitsets.explorer.knobs import centre_at, knobs_of, scene_with
 from limitsets.explorer.lanes import LanesPicture
@@ -40,7 +40,7 @@ WORDS = 0.25
 """Seconds between two changes of the text, which the browser sets anew at a cost of several pictures."""
 
 THROWS, FPS, SLOW = 6, 20.0, 2.0
-BEING = "being computed"
+BEING = "being computed; the first proof on a machine also compiles, for a minute or more"
 SAVE: dict[str, Any] = {"stylesheets": [SLIDER], "sizing_mode": "stretch_width"}
 
 
@@ -63,14 +63,15 @@ class ScenePage:
         self._began = 0.0
         self._wrote, self._told = -1.0, True
         self._holding = False
-        self.part, self.arm, self.lanes = PartPicture(), ArmPicture(), LanesPicture()
+        self.part, self.arm = PartPicture(self._on_part), ArmPicture()
+        self.lanes = LanesPicture(self._on_lanes)
         self.sliders = Sliders(self._moved, self.say)
         self.opening = Opening(self.open, self._draw, self.say)
         self.atlas = AtlasPage(self._at_point, self.say, atlas)
-        self._error = pn.pane.HTML(error_line(""), stylesheets=[SAID], sizing_mode="stretch_width")
-        self._title = pn.pane.HTML("", stylesheets=[SAID], sizing_mode="stretch_width")
-        self._estimated = pn.pane.HTML("", stylesheets=[SAID], sizing_mode="stretch_width")
-        self._proved = pn.pane.HTML("", stylesheets=[SAID], sizing_mode="stretch_width")
+        self._error = Words(error_line(""), stylesheets=[SAID])
+        self._title, self._careful, self._estimated, self._proved = (
+            Words(stylesheets=[SAID]) for _ in range(4)
+        )
         self._x = pn.widgets.FloatInput(label="start x", value=0.0, width=110, stylesheets=[SLIDER])
         self._side = pn.widgets.Select(label="side", options=[0], width=80, stylesheets=[SLIDER])
         self._toml = pn.widgets.FileDownload(
@@ -81,10 +82,6 @@ class ScenePage:
         )
         self.open(scene)
         self.beat()
-        self.part.figure.on_event(Tap, lambda event: self.opening.corner(event.x, event.y))
-        self.lanes.figure.on_event(Tap, lambda event: self.throw(event.x, round(-event.y)))
-        for event in (PanStart, Pan, PanEnd):
-            self.part.figure.on_event(event, self._dragged)
         self.layout = self._laid_out()
 
     # ------------------------------------------------------------ what is shown
@@ -102,19 +99,19 @@ class ScenePage:
         def part(*shown: Any, room: str) -> pn.Column:
             return pn.Column(*shown, styles={"flex": room, "min-width": "0"}, sizing_mode="stretch_width")
 
-        key = pn.pane.HTML(KEY, stylesheets=[SAID], sizing_mode="stretch_width")
+        key = Words(KEY, stylesheets=[SAID])
         start = pn.Row(self._x, self._side, throw)
         return pn.Column(
             self._title,
             self._error,
             pn.FlexBox(
                 part(self.sliders.column, start, room="1 1 300px"),
-                part(self.lanes.figure, key, room="2 1 340px"),
+                part(self.lanes.canvas, self._careful, key, room="2 1 340px"),
                 **wide,
             ),
             pn.FlexBox(
-                part(self.arm.figure, room="2 1 330px"),
-                part(self.part.figure, room="1 1 220px"),
+                part(self.arm.canvas, room="2 1 330px"),
+                part(self.part.canvas, room="1 1 220px"),
                 part(reset, self._toml, svg, self.opening.column, room="1 1 300px"),
                 **wide,
             ),
@@ -125,9 +122,7 @@ class ScenePage:
 
     def say(self, error: object = "") -> None:
         """Show one line of what is wrong, or take it away."""
-        words = error_line(error)
-        if self._error.object != words:
-            self._error.object = words
+        self._error.object = error_line(error)
 
     # ------------------------------------------------------------ what happens
 
@@ -162,7 +157,10 @@ class ScenePage:
         if not self._told and time.monotonic() - self._wrote > WORDS:
             self._told, self._wrote = True, time.monotonic()
             self.sliders.tell()
+            self._careful.object = careful_line(self._found)
             self._estimated.object = estimate_words(self._found, self.scene.goal, self.scene.unit)
+        for picture in (self.lanes, self.part, self.arm):
+            picture.canvas.send()
         self._tell(self._proofs.answers())
         self.atlas.tell()
 
@@ -233,19 +231,33 @@ class ScenePage:
         self.lanes.mark(*film.position[number].tolist())
         if number == film.frames - 1:
             self._film = None
+            last = film.rests[-1]
+            if film.position[number].tolist() == [
+                last.x,
+                last.side,
+            ]:  # it has not left: the arm is near again
+                self.arm.rest(self.scene, last.x, last.side)
 
-    def _dragged(self, event: Any) -> None:
-        """Move the centre of mass with a hand that began on its mark."""
-        if isinstance(event, PanStart):
-            self._holding = self.sliders.has_centre and self.part.is_at_mark(event.x, event.y)
-        elif isinstance(event, PanEnd):
+    def _on_lanes(self, hand: Hand) -> None:
+        if hand.what == "tap":
+            self.throw(hand.x, round(-hand.y))
+
+    def _on_part(self, hand: Hand) -> None:
+        """Move the centre of mass with a hand that began on its mark; a tap is a corner, while a part is drawn."""
+        if hand.what == "tap":
+            self.opening.corner(hand.x, hand.y)
+        elif hand.what == "grasp":
+            self._holding = self.sliders.has_centre and self.part.is_at_mark(hand.x, hand.y)
+        elif hand.what == "release":
             self._holding = False
         elif self._holding:
-            self.sliders.put(centre_at(self.scene, event.x, event.y))
+            self.sliders.put(centre_at(self.scene, hand.x, hand.y))
 
     def _draw(self, corners: list[tuple[float, float]], drawing: bool) -> None:
         self.part.sketch(corners)
-        self.part.figure.title.text = "click the corners in turn" if drawing else "the part; drag the cross"
+        self.part.show(self.scene)
+        if drawing:
+            self.part.canvas.heading = "click the corners in turn"
 
     def _at_point(self, values: dict[str, str]) -> None:
         """Open the feeder at a point of the atlas."""

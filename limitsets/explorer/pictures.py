@@ -1,22 +1,21 @@
-"""The pictures of the page, as Bokeh figures: what changes in them is data, so that a slider moves them fast."""
+"""The pictures of the part and of the arm."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from bokeh.models import ColumnDataSource
-from bokeh.plotting import figure
 
 from limitsets.animation.cutting import labels_of
 from limitsets.animation.film import Film
+from limitsets.explorer.canvas import Canvas, Hand, Layer
 from limitsets.plot import basin, style
 from limitsets.plot.poses import angle_on_side, turned
 from limitsets.scene import Scene
 
-__all__ = ["ArmPicture", "PartPicture", "bare_figure", "look_of", "pattern", "put", "source_of"]
+__all__ = ["ArmPicture", "PartPicture", "look_of", "pattern"]
 
 Array = npt.NDArray[np.float64]
 
@@ -39,86 +38,76 @@ def look_of(label: int) -> tuple[str, str, str]:
     return basin.ATTRACTORS[number], pattern(basin.HATCHES[number]), f"to limit set {label}"
 
 
-def bare_figure(called: str, **options: Any) -> Any:
-    """Make a figure without tools: a finger that scrolls the page must not move the picture."""
-    made = figure(
-        name=called, toolbar_location=None, tools="", sizing_mode="stretch_width", min_border=4, **options
-    )
-    made.xgrid.visible = made.ygrid.visible = False
-    made.outline_line_color = None
-    return made
+BARE = (6, 6, 24, 6)
+"""Margins of a picture without axes [pixel]."""
+
+PAD = 0.08
+"""Room around what has to be in sight, of its size."""
 
 
-def source_of(*names: str, called: str | None = None) -> ColumnDataSource:
-    """Make an empty source; scripts of a reader, and tests, find it in the page by what it is called."""
-    return ColumnDataSource({name: [] for name in names}, name=called)
+def _see(canvas: Canvas, corners: Array) -> None:
+    """Keep corners in sight."""
+    lo, hi = corners.min(axis=0), corners.max(axis=0)
+    room = PAD * (hi - lo)
+    canvas.view["x"], canvas.view["y"] = np.stack([lo - room, hi + room]).T.tolist()
 
 
-def put(source: ColumnDataSource, columns: dict[str, list[Any]]) -> None:
-    """Give a source its columns; what is there already is not sent to the browser again."""
-    if any(source.data[name] != column for name, column in columns.items()):
-        source.data = columns
-
-
-def _scaled(called: str, title: str) -> tuple[Any, ColumnDataSource]:
-    """Make a figure with one scale for both axes on any screen, and the source of what has to be in sight."""
-    made = bare_figure(called, height=250, match_aspect=True, title=title)
-    sight = source_of("x", "y")
-    box = made.scatter("x", "y", source=sight, alpha=0.0)
-    for axes in (made.x_range, made.y_range):
-        axes.renderers, axes.range_padding = [box], 0.08
-    made.xaxis.visible = made.yaxis.visible = False
-    return made, sight
-
-
-def _see(sight: ColumnDataSource, corners: Array) -> None:
-    """Keep corners in sight; the same ones are not sent again."""
-    x, y = np.stack([corners.min(axis=0), corners.max(axis=0)]).T.tolist()
-    if sight.data["x"] != x or sight.data["y"] != y:
-        sight.data = {"x": x, "y": y}
+def _words(colour: str = style.INK, size: int = 12, **look: Any) -> Layer:
+    chosen = {"align": "center", "colour": colour, "size": size, **look}
+    return Layer("words", columns=("x", "y", "words"), **chosen)
 
 
 class PartPicture:
     """The part by itself: outline, numbers of its sides, centre of mass; and corners that are being drawn."""
 
-    def __init__(self) -> None:
-        self.figure, self._sight = _scaled("the part", "the part; drag the cross")
-        self._outline, self._labels = source_of("x", "y"), source_of("x", "y", "words")
-        self.centre, self.corners = source_of("x", "y", called="centre of mass"), source_of("x", "y")
-        self.figure.patch(
-            "x", "y", source=self._outline, fill_color=PART, line_color=style.INK, line_width=1.5
-        )
-        self.figure.text(
-            "x",
-            "y",
+    def __init__(self, touched: Callable[[Hand], None]) -> None:
+        self._outline = Layer("path", "outline", line=style.INK, width=1.5, fill=PART)
+        self._labels = _words(size=13)
+        cross: dict[str, Any] = {
+            "shape": "cross",
+            "size": 22,
+            "line": style.INK,
+            "width": 2,
+            "fill": "#ffffff",
+            "grip": True,
+        }
+        self.centre = Layer("marks", "centre of mass", **cross)
+        self.corners = Layer("path", "corners", line=style.FLIP, width=2, dash=[6, 4])
+        self._dots = Layer("marks", shape="circle", size=10, line=style.FLIP, width=1, fill="#ffffff")
+        added: dict[str, Any] = {"line": style.INK, "width": 1, "fill": style.FLIP}
+        self._masses = Layer("marks", "added masses", shape="diamond", size=14, **added)
+        self._heavy = Layer(
             "words",
-            source=self._labels,
-            text_align="center",
-            text_baseline="middle",
-            text_font_size="13px",
+            columns=("x", "y", "words"),
+            align="left",
+            colour=style.FLIP,
+            size=12,
+            shift=10,
+            plate=True,
         )
-        cross: Any = {"marker": "circle_cross", "size": 22, "line_color": style.INK, "line_width": 2.0}
-        self.figure.scatter("x", "y", source=self.centre, fill_color="white", **cross)
-        dots = {"line_dash": "dashed", "line_color": style.FLIP, "line_width": 2}
-        self.figure.line("x", "y", source=self.corners, **dots)
-        self.figure.scatter("x", "y", source=self.corners, size=10, fill_color="white", line_color=style.FLIP)
+        shapes = [self._outline, self._labels, self.centre, self._masses, self._heavy]
+        layers = [*shapes, self.corners, self._dots]
+        self.canvas = Canvas("the part", layers, 250, touched, margins=BARE, equal=True)
 
     def show(self, scene: Scene) -> None:
         """Draw a scene's part."""
         x, y = scene.vertices.T.tolist()
-        put(self._outline, {"x": x, "y": y})
+        self._outline.data = {"x": x, "y": y}
         labels = labels_of(scene)
-        cx, cy = scene.centre
-        put(
-            self._labels,
-            {
-                "x": [each.x + cx for each in labels],
-                "y": [each.y + cy for each in labels],
-                "words": [each.word for each in labels],
-            },
-        )
-        put(self.centre, {"x": [float(cx)], "y": [float(cy)]})
-        _see(self._sight, scene.vertices)
+        cx, cy = (float(each) for each in scene.centre)
+        self._labels.data = {
+            "x": [each.x + cx for each in labels],
+            "y": [each.y + cy for each in labels],
+            "words": [each.word for each in labels],
+        }
+        self.centre.data = {"x": [cx], "y": [cy]}
+        points = scene.text["part"]["mass"].get("points", ())
+        places = [[scene.value(f"part.mass.points[{k}].{axis}") for k in range(len(points))] for axis in "xy"]
+        x, y = places
+        self.canvas.heading = "the part; sliders move its masses" if x else "the part; drag the cross"
+        self._masses.data = {"x": x, "y": y}
+        self._heavy.data = {"x": x, "y": y, "words": [str(point["mass"]) for point in points]}
+        _see(self.canvas, scene.vertices)
 
     def is_at_mark(self, x: float, y: float) -> bool:
         """Whether a place is as near to the mark as a finger can tell: an eighth of the part's size."""
@@ -129,33 +118,21 @@ class PartPicture:
     def sketch(self, corners: Sequence[tuple[float, float]]) -> None:
         """Show corners that are being drawn, closed once there are three."""
         closed = [*corners, *corners[:1]] if len(corners) > 2 else list(corners)
-        put(self.corners, {"x": [x for x, _ in closed], "y": [y for _, y in closed]})
+        self.corners.data = self._dots.data = {"x": [x for x, _ in closed], "y": [y for _, y in closed]}
 
 
 class ArmPicture:
     """The arm and the part on it, at rest or in a film."""
 
     def __init__(self) -> None:
-        self.figure, self._sight = _scaled("the arm", "")
-        self._arm, self._part, self._trail = (
-            source_of("x", "y", called=each) for each in ("arm", "part", "path")
-        )
-        self._words = source_of("x", "y", "words")
-        self.figure.patch("x", "y", source=self._arm, fill_color=ARM, line_color=style.INK)
-        self.figure.line("x", "y", source=self._trail, line_color=TRAIL, line_dash="dotted", line_width=2)
-        self.figure.patch("x", "y", source=self._part, fill_color=PART, line_color=style.INK, line_width=1.5)
-        self.figure.text(
-            "x",
-            "y",
-            "words",
-            source=self._words,
-            text_align="center",
-            text_baseline="middle",
-            text_font_size="12px",
-        )
-        self.figure.scatter(
-            [0], [0], size=9, fill_color="white", line_color=style.INK, line_width=2
-        )  # the joint
+        self._arm = Layer("path", "arm", line=style.INK, width=1, fill=ARM)
+        self._trail = Layer("path", "path", line=TRAIL, width=2, dash=[2, 3])
+        self._part = Layer("path", "part", line=style.INK, width=1.5, fill=PART)
+        self._labels = _words()
+        joint = Layer("marks", "joint", shape="circle", size=9, line=style.INK, width=2, fill="#ffffff")
+        joint.data = {"x": [0.0], "y": [0.0]}
+        layers = [self._arm, self._trail, self._part, self._labels, joint]
+        self.canvas = Canvas("the arm", layers, 250, margins=BARE, equal=True)
 
     def rest(self, scene: Scene, x: float, side: int) -> None:
         """Draw the part at rest."""
@@ -166,10 +143,10 @@ class ArmPicture:
         labels = [(each.x, each.y, each.word) for each in labels_of(scene)]
         self._place(turned(about, angle) + at, at, angle, labels)
         self._level(height, end, 0.0)
-        put(self._trail, {"x": [], "y": []})
+        self._trail.data = {"x": [], "y": []}
         tall = float(np.ptp(about, axis=0).max())
-        _see(self._sight, np.array([[0.0, height - THICK * end], [end, max(height, 0.0) + 1.2 * tall]]))
-        self.figure.title.text = f"the arm, {end:g} {scene.unit}; x = {x:.2f} on side {side}"
+        _see(self.canvas, np.array([[0.0, height - THICK * end], [end, max(height, 0.0) + 1.2 * tall]]))
+        self.canvas.heading = f"the arm, {end:g} {scene.unit}; x = {x:.2f} on side {side}"
 
     def begin(self, film: Film) -> None:
         """Choose what is in sight for a whole film."""
@@ -182,7 +159,7 @@ class ArmPicture:
             (0.0, film.surface[0]),
             (film.surface[1], 0.0),
         ]
-        _see(self._sight, np.array(corners))
+        _see(self.canvas, np.array(corners))
 
     def frame(self, film: Film, number: int) -> None:
         """Draw a frame of a film."""
@@ -193,24 +170,21 @@ class ArmPicture:
         self._level(*film.surface, float(film.arm[number]))
         first, last = film.trail[number].tolist()
         path = film.poses[first : last + 1, 0, :2].T.tolist() if last > first else ([], [])
-        put(self._trail, {"x": path[0], "y": path[1]})
-        self.figure.title.text = film.captions[film.caption[number]]
+        self._trail.data = {"x": path[0], "y": path[1]}
+        self.canvas.heading = film.captions[film.caption[number]]
 
     def _place(self, corners: Array, at: Array, angle: float, labels: list[tuple[float, float, str]]) -> None:
         x, y = corners.T.tolist()
-        put(self._part, {"x": x, "y": y})
+        self._part.data = {"x": x, "y": y}
         words = turned(np.array([[px, py] for px, py, _ in labels]), angle) + at
-        put(
-            self._words,
-            {
-                "x": words[:, 0].tolist(),
-                "y": words[:, 1].tolist(),
-                "words": [w for *_, w in labels],
-            },
-        )
+        self._labels.data = {
+            "x": words[:, 0].tolist(),
+            "y": words[:, 1].tolist(),
+            "words": [w for *_, w in labels],
+        }
 
     def _level(self, height: float, end: float, angle: float) -> None:
         thick = THICK * end
         corners = np.array([[0.0, height], [end, height], [end, height - thick], [0.0, height - thick]])
         x, y = turned(corners, angle).T.tolist()
-        put(self._arm, {"x": x, "y": y})
+        self._arm.data = {"x": x, "y": y}

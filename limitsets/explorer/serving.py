@@ -74,6 +74,7 @@ def serve(
         show=False,
         start=False,
         title=f"limitsets: {title}",
+        verbose=False,  # `ready` says where it listens
         websocket_max_message_size=MOST_SENT,
     )
     logging.getLogger("bokeh").setLevel(logging.ERROR)  # a visitor who leaves is no warning

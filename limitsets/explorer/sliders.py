@@ -8,6 +8,7 @@ from typing import Any
 import panel as pn
 
 from limitsets.errors import LimitsetsError
+from limitsets.explorer.canvas import Bar
 from limitsets.explorer.knobs import Knob
 from limitsets.explorer.look import SLIDER
 
@@ -49,9 +50,9 @@ class Sliders:
         self.knobs, self.values = knobs, {knob.name: knob.value for knob in knobs}
         self._bars, self._fields, rows = {}, {}, []
         for knob in knobs:
-            bar = pn.widgets.FloatSlider(
-                label=knob.title, start=knob.lo, end=knob.hi, step=knob.step, value=knob.value, format="0[.]000",
-                stylesheets=[SLIDER], styles={"flex": "1 1 150px"}, sizing_mode="stretch_width", show_value=False,
+            bar = Bar(
+                label=knob.title, start=knob.lo, end=knob.hi, step=knob.step, value=knob.value,
+                stylesheets=[SLIDER], styles={"flex": "1 1 150px"}, sizing_mode="stretch_width",
             )  # fmt: skip
             field = pn.widgets.TextInput(
                 label=f"{knob.words}, typed",

@@ -9,6 +9,7 @@ from typing import Any
 
 import panel as pn
 from jinja2 import Template
+from panel.io.callbacks import PeriodicCallback
 
 from limitsets.cells import as_domain
 from limitsets.errors import AnswerError, LimitsetsError, MapError
@@ -18,9 +19,13 @@ from limitsets.explorer.outside import within_reach
 from limitsets.explorer.page import ScenePage
 from limitsets.explorer.serving import serve
 from limitsets.maps import coerce, domain_of
+from limitsets.progress import Progress, bar
 from limitsets.scene import Scene, load
 
 __all__ = ["Explorer", "stored_atlas"]
+
+COMPILING = "compiling, once: the throw, images of cells, attractors"
+"""Short enough for the bar of a narrow terminal."""
 
 BEAT = 30
 """Milliseconds from one beat to the next."""
@@ -39,7 +44,7 @@ class Explorer(pn.viewable.Viewer):  # type: ignore[misc]  # panel is not follow
 
     def __init__(self, page: Callable[[], ScenePage | MapPage], title: str) -> None:
         super().__init__()
-        self.page, self.title = page, title
+        self.page, self.title, self._prepared = page, title, False
 
     @classmethod
     def of_scene(cls, scene: Scene, atlas: Path | None) -> Explorer:
@@ -65,14 +70,24 @@ class Explorer(pn.viewable.Viewer):  # type: ignore[misc]  # panel is not follow
         document = pn.state.curdoc
         if document is not None and document.session_context is not None:
             document.template = Template(PAGE)
-            pn.state.add_periodic_callback(page.beat, BEAT)
+            # in the background: nobody is told that the server is busy, at each beat
+            PeriodicCallback(callback=page.beat, period=BEAT, background=True).start()
             pn.state.on_session_destroyed(lambda _: page.close())
         elif _in_a_loop():  # a notebook
-            pn.state.add_periodic_callback(lambda: _pushed(page), BEAT)
+            pn.state.add_periodic_callback(page.beat, BEAT)
         return page.layout
+
+    def prepare(self, progress: Progress) -> None:
+        """Make one page, so that what is not compiled yet is compiled before a visitor waits for it."""
+        progress(COMPILING, 0, 1)
+        self.page().close()
+        self._prepared = True
 
     def show(self, **options: Any) -> None:
         """Serve it until Ctrl-C; options of `limitsets.explorer.serving.serve`: port, address, origins, show."""
+        if not self._prepared:
+            with bar() as progress:
+                self.prepare(progress)
         serve(self.__panel__, self.title, **options)
 
 
@@ -82,12 +97,6 @@ def _in_a_loop() -> bool:
     except RuntimeError:
         return False
     return True
-
-
-def _pushed(page: ScenePage | MapPage) -> None:
-    """Beat, and send a notebook what has changed: there Bokeh's figures do not do so by themselves."""
-    page.beat()
-    pn.io.push_notebook(page.layout)
 
 
 def stored_atlas(store: Path) -> tuple[Scene, dict[str, Any]]:

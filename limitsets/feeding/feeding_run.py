@@ -8,6 +8,7 @@ from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
+from limitsets.arguments import arguments_checked
 from limitsets.errors import AnswerError
 from limitsets.feeding.bracketing import fate_brackets
 from limitsets.feeding.crowd import BATCHES, CrowdTrials, run_crowd
@@ -222,6 +223,7 @@ class Feeding(Tabled):
 
 
 @shown_in_notebooks
+@arguments_checked
 def feed(
     scene: Scene | str | Path | Mapping[str, Any],
     scatter: Scattering | None = None,
@@ -298,7 +300,7 @@ def feed(
     >>> found.trials.counts["right"]
     1000
     """
-    read = scene if isinstance(scene, Scene) else load(scene)
+    read = load(scene)
     end = arm_end_of(read, side, starts)
     if trials < 1:
         raise AnswerError("the trials", trials, "1 or more", "throw some parts")

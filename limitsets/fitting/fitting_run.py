@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from limitsets.arguments import arguments_checked
 from limitsets.errors import AnswerError, DataError
 from limitsets.fitting.fit_result import Fit, Fitted, Scatter, fitted_scene
 from limitsets.fitting.further import Question, further_throws
@@ -42,6 +43,7 @@ Progress = Callable[[str, int, int], None]
 
 
 @shown_in_notebooks
+@arguments_checked
 def fit(
     scene: Scene | str | Path,
     throws: Throws | str | Path,
@@ -88,7 +90,7 @@ def fit(
     True
     """
     begin = time.perf_counter()
-    chosen = scene if isinstance(scene, Scene) else load(scene)
+    chosen = load(scene)
     if chosen.effects.on():
         raise AnswerError(
             "the scene's effects", ", ".join(chosen.effects.on()), "the minimal model", "leave [effects] out"

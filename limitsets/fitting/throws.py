@@ -12,9 +12,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from limitsets.errors import DataError, SceneError
+from limitsets.errors import DataError, SceneError, shown
 from limitsets.scene import Scene
-from limitsets.scene.units import UNITS, convert, parse, shown
+from limitsets.scene.units import UNITS, convert, parse
 
 __all__ = ["Throws", "length_of", "read_throws"]
 

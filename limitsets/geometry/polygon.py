@@ -314,5 +314,5 @@ def require_inside(vertices: npt.NDArray[np.float64], point: Sequence[float], th
             thing,
             f"({point[0]:.9g}, {point[1]:.9g})",
             "a point of the part",
-            f"it lies outside, {-height:.6g} beyond side {side}",
+            f"it lies outside, {-height:.6g} [length] beyond side {side}",
         )

@@ -60,15 +60,15 @@ class RestingSides:
 
     Parameters
     ----------
-    a : ndarray
+    a : ndarray, shape (n,)
         Distance along the side from its left vertex to the foot of the centre of mass [length].
-    d : ndarray
+    d : ndarray, shape (n,)
         Height of the centre of mass above the side [length].
-    length : ndarray
+    length : ndarray, shape (n,)
         Length of the side [length].
-    right : ndarray
+    right : ndarray, shape (n,)
         ``length - a`` [length].
-    corner : ndarray
+    corner : ndarray, shape (n,)
         Exterior angle at the left vertex: by so much the part turns in a flip [rad].
     """
 

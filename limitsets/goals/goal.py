@@ -58,7 +58,19 @@ class Verdict(NamedTuple):
 
 
 class Found(NamedTuple):
-    """What an analysis found, of which a goal is asked; as in `limitsets.goals.evaluate`."""
+    """What an analysis found, of which a goal is asked; as in `limitsets.goals.evaluate`.
+
+    Attributes
+    ----------
+    extents : mapping of int to sequence of (float, float)
+        Intervals of the limit set by side [length].
+    flip_order : sequence of int, or None
+        Order of the sides, None where there is none.
+    fractions : sequence of float
+        Shares of the starts that come to each attractor.
+    leaving : float
+        Share of the starts that leave the arm.
+    """
 
     extents: Extents
     flip_order: Sequence[int] | None = None

@@ -1,9 +1,10 @@
-"""The condensation: order of the recurrent components and destinations of all cells, in one sweep over the graph."""
+"""The condensation: order of the recurrent components and destinations of all cells, by sweeps over the graph."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -15,7 +16,7 @@ from limitsets.graph.ranges import RUN, Ranges, box_rows, boxes_of, row_start
 from limitsets.jit import kernel
 from limitsets.maps import codes
 
-__all__ = ["Condensation", "attracting_of", "condense"]
+__all__ = ["Condensation", "attracting_of"]
 
 # Components per sweep; the other bits of a 64-bit mark are for the ways out.
 SETS_PER_SWEEP = 56
@@ -23,26 +24,103 @@ SETS_PER_SWEEP = 56
 
 @dataclass(frozen=True, eq=False)
 class Condensation:
-    """Order of the recurrent components and destinations of the cells.
+    """Order of the recurrent components and destinations of the cells, each found when it is first asked for.
 
     Attributes
     ----------
-    order : ndarray of bool, shape (k, k)
-        ``order[i, j]``: from recurrent component i cells lead to j (each to itself).
-    exits : ndarray of bool, shape (k, n_exits)
-        Which ways out it can reach.
-    attracting : ndarray of bool, shape (k,)
-        It leads nowhere else.
-    destination : ndarray of int32, shape (n_cells,)
-        What every path from the cell ends in: attractor number (0 for the first attracting component) or the code
-        of an exit; `UNDECIDED` (-4) where paths end in different places, or may stay in a recurrent component that
-        is not attracting.
+    ranges : Ranges
+        The graph.
+    components : Components
+        Its strong components.
+    ways_out : dict of str to int
+        Names and codes of the ways out.
+    sets : sequence of ndarray
+        Cells of each of the k recurrent components.
     """
 
-    order: NDArray[np.bool_]
-    exits: NDArray[np.bool_]
-    attracting: NDArray[np.bool_]
-    destination: NDArray[np.int32]
+    ranges: Ranges
+    components: Components
+    ways_out: dict[str, int]
+    sets: Sequence[NDArray[np.int32]]
+
+    @cached_property
+    def attracting(self) -> NDArray[np.bool_]:
+        """Whether each recurrent component leads nowhere else, shape (k,)."""
+        return attracting_of(self.ranges, self.components, self.sets)
+
+    @property
+    def order(self) -> NDArray[np.bool_]:
+        """``order[i, j]``: from recurrent component i cells lead to j (each to itself); shape (k, k)."""
+        return self._reached[:, : len(self.sets)]
+
+    @property
+    def exits(self) -> NDArray[np.bool_]:
+        """Which ways out each recurrent component can reach, shape (k, n_exits)."""
+        return self._reached[:, len(self.sets) :]
+
+    @cached_property
+    def destination(self) -> NDArray[np.int32]:
+        """What every path from the cell ends in, shape (n_cells,).
+
+        Attractor number (0 for the first attracting component) or the code of an exit; `UNDECIDED` (-4) where paths
+        end in different places, or may stay in a recurrent component that is not attracting.
+        """
+        return self.destinations(np.zeros(len(self.sets), dtype=bool))
+
+    def destinations(self, passing: NDArray[np.bool_]) -> NDArray[np.int32]:
+        """Find the destinations where some components, of k, are known to hold no orbit for ever."""
+        attracting = self.attracting
+        # An orbit may stay in a set that is not closed: where one can be reached, nothing is said.
+        code = np.where(attracting, np.cumsum(attracting) - 1, codes.UNDECIDED).tolist()
+        names = {k: code[k] for k in np.flatnonzero(attracting | ~passing).tolist()}
+        if len(self.sets) <= SETS_PER_SWEEP:
+            return self._ended(self._marks, names, len(self.sets), None)
+        ends = [(self.sets[k], code[k]) for k in np.flatnonzero(attracting).tolist()]
+        lasting = [self.sets[k] for k, number in names.items() if number == codes.UNDECIDED]
+        if lasting:
+            ends.append((np.concatenate(lasting), codes.UNDECIDED))
+        destination: NDArray[np.int32] | None = None
+        for begin in range(0, max(len(ends), 1), SETS_PER_SWEEP):
+            chunk = ends[begin : begin + SETS_PER_SWEEP]
+            marks = self._swept([cells for cells, _ in chunk])
+            named = {bit: number for bit, (_, number) in enumerate(chunk)}
+            destination = self._ended(marks, named, len(chunk), destination)
+        assert destination is not None  # the loop runs once at least
+        return destination
+
+    def _swept(self, sets: Sequence[NDArray[np.int32]]) -> NDArray[Any]:
+        """Mark each cell with a bit for each set, and above these for each way out, that it can reach."""
+        kind: Any = np.uint8 if len(sets) + len(self.ways_out) <= 8 else np.uint64
+        marks: Any = self.ranges.exits.astype(kind) << kind(len(sets))
+        for bit, cells in enumerate(sets):
+            marks[cells] |= kind(1 << bit)
+        return reach(self.ranges, self.components, marks)
+
+    @cached_property
+    def _marks(self) -> NDArray[Any]:
+        """The marks of all sets: one sweep is enough for them, and serves order and destinations alike."""
+        return self._swept(self.sets)
+
+    def _ended(
+        self, marks: NDArray[Any], names: dict[int, int], first_exit: int, so_far: NDArray[np.int32] | None
+    ) -> NDArray[np.int32]:
+        exits = {first_exit + e: code for e, code in enumerate(self.ways_out.values())}
+        return _destinations(marks, names | exits, so_far)
+
+    @cached_property
+    def _reached(self) -> NDArray[np.bool_]:
+        """Which components, and after them which ways out, each component can reach."""
+        k, ways_out = len(self.sets), len(self.ways_out)
+        reached = np.zeros((k, k + ways_out), dtype=bool)
+        one_of_each = np.array([cells[0] for cells in self.sets], dtype=np.int64)
+        for begin in range(0, k, SETS_PER_SWEEP):
+            chunk = self.sets[begin : begin + SETS_PER_SWEEP]
+            marks = self._marks if k <= SETS_PER_SWEEP else self._swept(chunk)
+            bits = np.arange(len(chunk) + ways_out, dtype=np.uint64)
+            seen = (marks[one_of_each].astype(np.uint64)[:, None] >> bits & np.uint64(1)).astype(bool)
+            reached[:, begin : begin + len(chunk)] = seen[:, : len(chunk)]
+            reached[:, k:] = seen[:, len(chunk) :]
+        return reached
 
 
 @kernel(entry=True, counting=False)
@@ -91,60 +169,3 @@ def attracting_of(r: Ranges, components: Components, sets: Sequence[NDArray[np.i
     """Whether each recurrent component is attracting: no edge and no way out leads from it; of any number of them."""
     leads_out = segment_tree.leaves if segment_tree.is_wide(r) else _leaves
     return np.array([not leads_out(r, components.label, cells) for cells in sets], dtype=bool)
-
-
-def condense(
-    r: Ranges,
-    components: Components,
-    exits: dict[str, int],
-    sets: Sequence[NDArray[np.int32]],
-    passing: NDArray[np.bool_] | None = None,
-) -> Condensation:
-    """Sweep the graph, up to 56 recurrent components at a time.
-
-    Parameters
-    ----------
-    r : Ranges
-        The graph.
-    components : Components
-        Its strong components.
-    exits : dict of str to int
-        Names and codes of the ways out.
-    sets : sequence of ndarray
-        Cells of each recurrent component.
-    passing : ndarray of bool, shape (k,), optional
-        Components known to hold no orbit for ever; none.
-
-    Returns
-    -------
-    Condensation
-        Order, attracting components, destinations.
-    """
-    k = len(sets)
-    attracting = attracting_of(r, components, sets)
-    number = np.cumsum(attracting) - 1
-    order, out = np.zeros((k, k), dtype=bool), np.zeros((k, len(exits)), dtype=bool)
-    destination: NDArray[np.int32] | None = None
-    one_of_each = np.array([cells[0] for cells in sets], dtype=np.int64)
-    for begin in range(0, max(k, 1), SETS_PER_SWEEP):
-        chunk = sets[begin : begin + SETS_PER_SWEEP]
-        bits = len(chunk) + len(exits)
-        kind: Any = np.uint8 if bits <= 8 else np.uint64
-        marks: Any = r.exits.astype(kind) << kind(len(chunk))
-        for b, cells in enumerate(chunk):
-            marks[cells] |= kind(1 << b)
-        marks = reach(r, components, marks)
-        seen = marks[one_of_each].astype(np.uint64)
-        names = {len(chunk) + e: code for e, code in enumerate(exits.values())}
-        for b in range(len(chunk)):
-            order[:, begin + b] = seen >> np.uint64(b) & np.uint64(1)
-            # An orbit may stay in a set that is not closed: where one can be reached, nothing is said.
-            if attracting[begin + b]:
-                names[b] = int(number[begin + b])
-            elif passing is None or not passing[begin + b]:
-                names[b] = codes.UNDECIDED
-        for e in range(len(exits)):
-            out[:, e] = seen >> np.uint64(len(chunk) + e) & np.uint64(1)
-        destination = _destinations(marks, names, destination)
-    assert destination is not None  # the loop runs once at least
-    return Condensation(order, out, attracting, destination)

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from limitsets.cells import CellSet, Grid
 from limitsets.errors import AnswerError
 from limitsets.graph.components import Components, strong_components
-from limitsets.graph.condensation import Condensation, condense
+from limitsets.graph.condensation import Condensation
 from limitsets.graph.ranges import Ranges, count_edges, expand
 from limitsets.maps import kind_of
 from limitsets.tables import Table, Tabled, facts
@@ -48,6 +48,8 @@ class TransitionGraph(Tabled):
         Share of the sampled states that the map's fast kernel could not vouch for.
     upper : NamedTuple or None
         The upper corner, where the images are those of a box of parameters with the lower corner `map`.
+    graph : dict
+        Attributes of the graph, for networkx.
     """
 
     map: Any
@@ -56,7 +58,7 @@ class TransitionGraph(Tabled):
     method: str
     second_pass: float = 0.0
     upper: Any = None
-    graph: dict[str, Any] = field(default_factory=dict)  # networkx: attributes of the graph
+    graph: dict[str, Any] = field(default_factory=dict)
 
     __networkx_backend__ = "limitsets"
 
@@ -145,15 +147,19 @@ class TransitionGraph(Tabled):
         """Strongly connected components of the cells, as labels."""
         return self._components
 
-    def recurrent_components(self) -> list[NDArray[np.int32]]:
-        """Cells of each recurrent component, ascending in topological number: attracting ones come early."""
+    @cached_property
+    def _recurrent_components(self) -> list[NDArray[np.int32]]:
         parts = self.components()
         ends = np.concatenate([[0], np.cumsum(parts.size)])
         return [np.sort(parts.order[ends[c] : ends[c + 1]]) for c in np.flatnonzero(parts.recurrent)]
 
+    def recurrent_components(self) -> list[NDArray[np.int32]]:
+        """Cells of each recurrent component, ascending in topological number: attracting ones come early."""
+        return list(self._recurrent_components)
+
     @cached_property
     def _condensation(self) -> Condensation:
-        return condense(self.ranges, self.components(), self.exits, self.recurrent_components())
+        return Condensation(self.ranges, self.components(), self.exits, self.recurrent_components())
 
     def condensation(self) -> Condensation:
         """Order of the recurrent components, and where each cell leads."""

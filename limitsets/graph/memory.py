@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import sys
 from pathlib import Path
 
 from limitsets.cells import Grid
@@ -16,6 +17,10 @@ BYTES_SAMPLED = (104, 95, 155)
 
 # Below this the system is not asked, which takes longer than a small graph.
 SMALL = 64 * 2**20
+
+# Above this a graph is told of before it is built, on stderr; and the seconds a cell takes,
+# as measured on maps in two and three dimensions.
+TOLD, SECONDS = 4 * 10**9, 2.5e-7
 
 # cgroup versions 2 and 1: limit, and what is in use.
 LIMITS = (
@@ -44,13 +49,16 @@ def _free_bytes() -> int | None:
 
 
 def require_memory(grid: Grid, method: str, samples: int) -> None:
-    """Refuse a grid whose graph takes more memory than there is."""
+    """Refuse a grid whose graph takes more memory than there is, and say what one takes that is large."""
     per_cell = BYTES.get(method, BYTES_SAMPLED)[grid.dimension - 1] * (samples if method == "random" else 1)
     wanted = per_cell * grid.n_cells
     if wanted <= SMALL:
         return
     free = _free_bytes()
     if free is None or wanted <= free:
+        if wanted > TOLD:
+            words = f"takes about {wanted / 1e9:.0f} GB and {SECONDS * grid.n_cells:.0f} s on one core"
+            print(f"limitsets: the graph of {grid.n_cells} cells {words}", file=sys.stderr, flush=True)
         return
     share = (free / wanted) ** (1.0 / grid.dimension)
     fits = " by ".join(str(max(int(share * n), 1)) for n in grid.shape.max(axis=0).tolist())

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from limitsets.arguments import arguments_checked
 from limitsets.cells import CellSet
 from limitsets.graph.graph import TransitionGraph
 
@@ -15,6 +16,7 @@ if TYPE_CHECKING:
 __all__ = ["morse_graph"]
 
 
+@arguments_checked
 def morse_graph(graph: TransitionGraph) -> nx.DiGraph[int]:
     """Recurrent components as nodes, an edge where one leads to another with none in between.
 

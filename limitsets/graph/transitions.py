@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from limitsets.arguments import arguments_checked
 from limitsets.cells import Grid
 from limitsets.errors import AnswerError
 from limitsets.graph.agreement import require_agreement
@@ -21,6 +22,7 @@ from limitsets.maps.contract import require_sides
 __all__ = ["transitions"]
 
 
+@arguments_checked
 def transitions(map: Any, grid: Grid, method: str | None = None, **options: Any) -> TransitionGraph:  # noqa: A002  # `map` is the word of the field and of the other calls
     """Who can go where in one step.
 
@@ -59,11 +61,6 @@ def transitions(map: Any, grid: Grid, method: str | None = None, **options: Any)
     5
     """
     kind = kind_of(map)
-    if not isinstance(grid, Grid):
-        given = type(grid).__name__
-        raise AnswerError(
-            "the grid", given, "what limitsets.grid gives", "pass limitsets.grid(scene.domain, cells=1024)"
-        )
     if kind.dimension != grid.dimension:
         raise AnswerError(
             "the dimension of the grid",

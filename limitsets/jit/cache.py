@@ -44,6 +44,7 @@ PACKAGE = Path(__file__).resolve().parents[1]
 # Rooms without kernels: editing a picture must not throw away every compiled loop.  An import contract keeps
 # them from importing this file.
 KERNEL_FREE = {
+    "arguments.py",
     "progress.py",
     "tables.py",
     "checker",

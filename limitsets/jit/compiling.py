@@ -94,10 +94,31 @@ _KERNEL = re.compile(
     r"\b(image|image_on|image_box|on_side|on_side_box|fallback_box|margin|displacement|scattered)\("
 )
 
+# Where an array or a list stands for a state: the kernel gave it as its new x.
+_NO_STATE = re.compile(r"(?:>>> float\(|>>> setitem\(.*, |Cannot unify )(array|list|reflected list)\(")
+
+_OPERATION = re.compile(r">>> (add|sub|mul|truediv|pow|neg)\((.*)\)$")
+_SIGNS = {"add": " + ", "sub": " - ", "mul": " * ", "truediv": " / ", "pow": " ** ", "neg": "-"}
+
 NUMBERS_DO = (
     "+ - * /, whole powers, abs, min and max of two, and of math or numpy sqrt exp log sin cos tan tanh atan2 floor; "
     "no comparison"
 )
+
+
+def _in_words(name: str, types: str) -> str:
+    """Write an operation on numba's types as people read it.
+
+    Examples
+    --------
+    >>> _in_words("mul", "UniTuple(float64 x 2), float64")
+    'a tuple of 2 numbers * a number'
+    """
+    words = re.sub(r"UniTuple\(\w+ x (\d+)\)", r"a tuple of \1 numbers", types)
+    words = re.sub(r"array\([^)]*\)", "an array", words)
+    words = re.sub(r"\b(?:Literal\[int\]\([^)]*\)|(?:float|int)64)", "a number", words)
+    sign = _SIGNS[name]
+    return words.replace(", ", sign) if name != "neg" else sign + words
 
 
 def _explained(error: Exception, cls: type) -> MapError:
@@ -122,6 +143,20 @@ def _explained(error: Exception, cls: type) -> MapError:
             linecache.getline(file, number).strip(),
             f"for boxes: {NUMBERS_DO}",
             "register image_on for each branch, with margin; or an image_box",
+        )
+    if any(_NO_STATE.search(line) for line in lines):
+        return MapError(
+            f"the new x that the kernel image of {cls.__name__} gives",
+            "an array or a list",
+            "a number; in two and three dimensions a tuple of numbers",
+            "return (y, z), side, code in place of np.array([y, z]), side, code",
+        )
+    if found := next((found for line in lines if (found := _OPERATION.match(line))), None):
+        return MapError(
+            f"an operation of {kernel}",
+            _in_words(*found.groups()),
+            "one of numbers",
+            (f"take the entries of a tuple one by one, as params.c[0] * x; {where}"),
         )
     if field := re.match(r"Unknown attribute '(\w+)' of type", cause):
         fields = ", ".join(getattr(cls, "_fields", ()))

@@ -251,7 +251,29 @@ def require_codes(params: Any, code: NDArray[np.int64]) -> None:
 
 
 def kind_of(params: Any) -> MapKind:
-    """Return what is known of a map; raises MapError where its class was never registered."""
+    """Return what is known of a map.
+
+    Parameters
+    ----------
+    params : NamedTuple
+        The map's parameters, of a registered class.
+
+    Returns
+    -------
+    MapKind
+        Its dimension, branches and exits, and what its class was registered with.
+
+    Raises
+    ------
+    MapError
+        Its class was never registered.
+
+    Examples
+    --------
+    >>> from limitsets import maps
+    >>> maps.kind_of(maps.Henon(1.4, 0.3)).dimension
+    2
+    """
     kind = _KINDS.get(type(params))
     if kind is None:
         raise MapError(
@@ -269,7 +291,24 @@ _SLOPES: dict[type, bool] = {}
 
 
 def has_slope(params: Any) -> bool:
-    """Whether slopes of a map are known: it has `image_on`, or a smooth `image` of one branch that can be derived."""
+    """Whether slopes of a map are known: it has `image_on`, or a smooth `image` of one branch that can be derived.
+
+    Parameters
+    ----------
+    params : NamedTuple
+        The map's parameters, of a registered class.
+
+    Returns
+    -------
+    bool
+        True where `limitsets.maps` can give slopes.
+
+    Examples
+    --------
+    >>> from limitsets import maps
+    >>> maps.has_slope(maps.Logistic(3.2))
+    True
+    """
     kind, cls = kind_of(params), type(params)
     if kind.has_image_on or len(kind.branches) > 1:
         return kind.has_image_on
@@ -312,6 +351,21 @@ def coerce(params: Any) -> Any:
 
     Integers become floats and arrays become C-contiguous, writeable float64: any other form is another type to
     numba, and would compile everything once more.
+
+    Parameters
+    ----------
+    params : NamedTuple, number, array or None
+        The parameters, or one of them.
+
+    Returns
+    -------
+    NamedTuple, float, ndarray or None
+        The same values in that form.
+
+    Raises
+    ------
+    MapError
+        A parameter is none of these.
 
     Examples
     --------

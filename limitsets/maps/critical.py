@@ -13,7 +13,8 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import ArrayLike
 
-from limitsets.errors import AnswerError
+from limitsets.arguments import arguments_checked
+from limitsets.errors import AnswerError, shown
 from limitsets.jit import kernel
 from limitsets.maps.bisection import Array, Codes, hidden, inserted, located, sign_code
 from limitsets.maps.contract import kind_of, require_sides
@@ -25,10 +26,14 @@ __all__ = [
     "branches_of_side",
     "critical_points",
     "margins",
+    "require_domain",
     "require_one_dimension",
 ]
 
 SAMPLES = 4096
+
+# The smallest number of full precision: what is nearer to 0 is 0 to people.
+TINY = float(np.finfo(np.float64).tiny)
 
 
 class Sides(Protocol):
@@ -44,13 +49,24 @@ class Sides(Protocol):
     def sides(self) -> int: ...
 
 
+def require_domain(params: Any, domain: Any, samples: int) -> None:
+    """Refuse a map of more dimensions, where branches have no order, a domain that is none, and too few samples."""
+    require_one_dimension(params)
+    if not all(hasattr(domain, name) for name in ("lo", "hi", "anchor", "sides")):
+        remedy = "pass scene.domain, or limitsets.grid([(0.0, 1.0)]).domain"
+        raise AnswerError("the domain", shown(domain), "a Domain", remedy)
+    if samples < 2:
+        raise AnswerError("the number of samples", samples, "an integer from 2", f"pass samples={SAMPLES}")
+
+
 class CriticalPoint(NamedTuple):
     """A change of branch.
 
     Attributes
     ----------
     x : float
-        The first floating-point number on the branch after the change; the one below it is still on the other.
+        The first floating-point number on the branch after the change; the one below it is still on the other.  0 for
+        a change just above 0, where that number would be 5e-324.
     kind : str
         Both branches by name: ``"jog->flip"``.
     before, after : int
@@ -128,6 +144,7 @@ def require_one_dimension(params: Any) -> None:
         )
 
 
+@arguments_checked
 def critical_points(
     params: Any, domain: Sides, *, samples: int = SAMPLES
 ) -> dict[int, tuple[CriticalPoint, ...]]:
@@ -151,7 +168,7 @@ def critical_points(
     Raises
     ------
     AnswerError
-        For a map of two or three dimensions.
+        For a map of two or three dimensions, no domain, or fewer than 2 samples.
 
     Notes
     -----
@@ -164,7 +181,7 @@ def critical_points(
     >>> [round(point.x, 5) for points in ls.critical_points(scene.map, scene.domain).values() for point in points]
     [10.0, 10.0, 20.0]
     """
-    require_one_dimension(params)
+    require_domain(params, domain, samples)
     names = kind_of(params).branches
     found: dict[int, tuple[CriticalPoint, ...]] = {}
     for side in range(domain.sides):
@@ -172,6 +189,7 @@ def critical_points(
         changes = np.flatnonzero((code[1:] != code[:-1]) & (code[1:] >= 0) & (code[:-1] >= 0))
         rows = zip(x[changes + 1].tolist(), code[changes].tolist(), code[changes + 1].tolist(), strict=True)
         found[side] = tuple(
-            CriticalPoint(at, f"{names[before]}->{names[after]}", before, after) for at, before, after in rows
+            CriticalPoint(at if abs(at) >= TINY else 0.0, f"{names[before]}->{names[after]}", before, after)
+            for at, before, after in rows
         )
     return found

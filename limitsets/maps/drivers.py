@@ -12,11 +12,22 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from limitsets.errors import MapError
+from limitsets.arguments import arguments_checked
+from limitsets.errors import MapError, shown
 from limitsets.jit import kernel
 from limitsets.maps import codes
 from limitsets.maps.contract import kind_of, require_codes, require_sides
-from limitsets.maps.kernels import displacement, fallback, image, image_on, on_side, pick, put, scattered
+from limitsets.maps.kernels import (
+    displacement,
+    entries_of,
+    fallback,
+    image,
+    image_on,
+    on_side,
+    pick,
+    put,
+    scattered,
+)
 from limitsets.tables import Table, Tabled
 
 __all__ = [
@@ -37,6 +48,9 @@ __all__ = [
 @kernel
 def judged(x: Any, code: Any) -> Any:
     """Code of a step to x: `UNDEFINED` where a coordinate is nan, for no comparison with it is true."""
+    float(
+        entries_of(x)[0]
+    )  # of an array or a list this does not compile, and a comparison would fail as it runs
     return codes.UNDEFINED if (x != x) & (code != codes.UNSETTLED) else code
 
 
@@ -156,6 +170,7 @@ class Images:
     second_pass: float
 
 
+@arguments_checked
 def images(params: Any, x: ArrayLike, side: int) -> Images:
     """Images of many states on one side.
 
@@ -193,10 +208,38 @@ def images(params: Any, x: ArrayLike, side: int) -> Images:
     return Images(rows(after), side_after, code, again / max(count, 1))
 
 
+@arguments_checked
 def images_on(
     params: Any, x: ArrayLike, side: int, branch: int
 ) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    """Images of many states on one side if they all took one branch: ``(x', side')``."""
+    """Find images of many states on one side if they all took one branch.
+
+    Parameters
+    ----------
+    params : NamedTuple
+        The map.
+    x : array_like, shape (m,) or (m, dimension)
+        The states.
+    side : int
+        Their side.
+    branch : int
+        The branch.
+
+    Returns
+    -------
+    ndarray, shape (m,) or (m, dimension)
+        The images.
+    ndarray of int, shape (m,)
+        Their sides.
+
+    Examples
+    --------
+    >>> import limitsets as ls
+    >>> scene = ls.load("paper-designed")
+    >>> x, side = ls.maps.images_on(scene.map, [21.0], 2, ls.maps.FLIP)
+    >>> x.round(2), side
+    (array([16.55]), array([0]))
+    """
     xs = columns(x, kind_of(params).dimension)
     require_sides(params, side, side)
     after = tuple(np.empty(xs[0].size) for _ in xs)
@@ -237,13 +280,19 @@ class Orbit(Tabled):
 def start_of(params: Any, x: Any, side: int) -> tuple[float, ...]:
     """Check one start of a map; its coordinates, or MapError."""
     kind = kind_of(params)
-    start = np.atleast_1d(np.asarray(x, dtype=np.float64))
+    try:
+        start = np.atleast_1d(np.asarray(x, dtype=np.float64))
+    except (TypeError, ValueError):  # a text, a list of lists, ...
+        start = np.empty(0)
+    numbers = "a finite number" if kind.dimension == 1 else f"{kind.dimension} finite numbers"
     if start.shape != (kind.dimension,) or not np.isfinite(start).all():
-        raise MapError("the start", x, f"{kind.dimension} finite numbers", "give one state")
+        remedy = "give x as a number, in the map's own unit" if isinstance(x, str) else "give one state"
+        raise MapError("the start x", shown(x), numbers, remedy)
     require_sides(params, side, side)
     return tuple(float(v) for v in start)
 
 
+@arguments_checked
 def orbit(params: Any, x: Any, side: int, count: int) -> Orbit:
     """Follow one start for `count` steps, or until it leaves or stalls.
 
@@ -252,7 +301,7 @@ def orbit(params: Any, x: Any, side: int, count: int) -> Orbit:
     params : NamedTuple
         A map.
     x : float or sequence of float
-        Start.
+        Start; the formulas of a map know no domain, so that of the throw it may lie beyond the arm's end.
     side : int
         Side of the start.
     count : int
@@ -306,6 +355,7 @@ def as_orbit(params: Any, xs: Any, sides: Any, code: Any, made: int) -> Orbit:
     return Orbit(rows(tuple(values[: made + 1] for values in xs)), sides[: made + 1], code[:made], stopped)
 
 
+@arguments_checked
 def advance(
     params: Any, x: ArrayLike, side: ArrayLike, count: int, *, first: int = 0
 ) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
@@ -315,6 +365,30 @@ def advance(
 
     Where the parameters scatter, the starts are numbered on from `first`, and what they draw depends on nothing else:
     the same starts in several batches, or threads, do the same.
+
+    Parameters
+    ----------
+    params : NamedTuple
+        The map.
+    x : array_like, shape (m,) or (m, dimension)
+        The starts.
+    side : array_like of int, shape (m,)
+        Their sides; or one for all.
+    count : int
+        Number of steps.
+    first : int
+        Number of the first start.
+
+    Returns
+    -------
+    ndarray, shape (m,) or (m, dimension)
+        The states at the end.
+    ndarray of int, shape (m,)
+        Their sides.
+    ndarray of int, shape (m,)
+        Codes of the last steps.
+    ndarray of int, shape (m,)
+        Number of steps before an exit.
 
     Examples
     --------

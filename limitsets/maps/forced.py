@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from limitsets.arguments import arguments_checked
 from limitsets.jit import kernel, row_of
 from limitsets.maps.contract import require_sides
 from limitsets.maps.kernels import image_on, margin
@@ -33,6 +34,7 @@ def _along(params: Any, x: Any, sides: Any, branches: Any, after: Any, side_afte
         slope[k] = product
 
 
+@arguments_checked
 def along(
     params: Any, x: ArrayLike, side: ArrayLike, branches: ArrayLike
 ) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.float64]]:

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from limitsets.arguments import arguments_checked
 from limitsets.errors import MapError
 from limitsets.jit import generic, kernel
 from limitsets.maps.contract import has_slope, kind_of
@@ -107,6 +108,7 @@ class Lyapunov:
     stopped: str | None
 
 
+@arguments_checked
 def lyapunov(params: Any, x: Any, side: int, count: int, skip: int = 1000) -> Lyapunov:
     """Largest Lyapunov exponent along one orbit.
 

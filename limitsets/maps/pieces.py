@@ -11,10 +11,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from limitsets.arguments import arguments_checked
 from limitsets.errors import AnswerError
 from limitsets.maps.bisection import Array, Flags, bisected, hidden, inserted, located, sign_code
 from limitsets.maps.contract import has_slope, kind_of
-from limitsets.maps.critical import SAMPLES, Sides, branches_of_side, require_one_dimension
+from limitsets.maps.critical import SAMPLES, Sides, branches_of_side, require_domain
 from limitsets.maps.forced import along
 
 __all__ = ["Piece", "TurningPoint", "monotone_pieces", "turning_points"]
@@ -24,7 +25,15 @@ JUMP = 2.0**-18
 
 
 class TurningPoint(NamedTuple):
-    """A point inside a branch where its slope changes sign: `x`, and the branch."""
+    """A point inside a branch where its slope changes sign.
+
+    Attributes
+    ----------
+    x : float
+        The point.
+    branch : int
+        The branch.
+    """
 
     x: float
     branch: int
@@ -118,6 +127,7 @@ def _pieces_of_side(params: Any, domain: Sides, side: int, samples: int) -> tupl
     return tuple(pieces)
 
 
+@arguments_checked
 def monotone_pieces(params: Any, domain: Sides, *, samples: int = SAMPLES) -> dict[int, tuple[Piece, ...]]:
     """Cut a domain into pieces on which a map stays on one branch and is monotone.
 
@@ -148,7 +158,7 @@ def monotone_pieces(params: Any, domain: Sides, *, samples: int = SAMPLES) -> di
     >>> [(piece.below, piece.above) for piece in pieces[0]]
     [('domain', 'critical'), ('critical', 'domain')]
     """
-    require_one_dimension(params)
+    require_domain(params, domain, samples)
     if not has_slope(params):
         name = kind_of(params).name
         raise AnswerError(
@@ -157,10 +167,25 @@ def monotone_pieces(params: Any, domain: Sides, *, samples: int = SAMPLES) -> di
     return {side: _pieces_of_side(params, domain, side, samples) for side in range(domain.sides)}
 
 
+@arguments_checked
 def turning_points(
     params: Any, domain: Sides, *, samples: int = SAMPLES
 ) -> dict[int, tuple[TurningPoint, ...]]:
-    """Find every x at which the slope of the branch in force changes sign; arguments as for `monotone_pieces`.
+    """Find every x at which the slope of the branch in force changes sign.
+
+    Parameters
+    ----------
+    params : NamedTuple
+        A map in one dimension.
+    domain : Sides
+        Where to look, as for `monotone_pieces`.
+    samples : int
+        Number of samples on each side.
+
+    Returns
+    -------
+    dict of int to tuple of TurningPoint
+        By side, ascending.
 
     Examples
     --------

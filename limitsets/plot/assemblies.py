@@ -6,8 +6,9 @@ import math
 from typing import TYPE_CHECKING
 
 import numpy as np
-from matplotlib.patches import Polygon
+from matplotlib.patches import Patch, Polygon
 
+from limitsets.arguments import arguments_checked
 from limitsets.assembly.assembly_run import OF, OUTCOMES, PAPER
 from limitsets.assembly.counting import rate_of
 from limitsets.plot import style
@@ -35,6 +36,7 @@ PARTS = (("#9CC7E4", style.JOG), ("#F3C9A8", style.FLIP))  # face, edge
 GHOSTS = 3  # poses on the way to rest
 
 
+@arguments_checked
 def assembly(found: Assembly) -> Figure:
     """Draw what became of pairs of parts.
 
@@ -61,6 +63,10 @@ def assembly(found: Assembly) -> Figure:
     for each in axes[panels:]:
         each.set_axis_off()
     one, two = (scene.name for scene in found.pair.scenes)
+    if cases:
+        looks = zip((one, two), PARTS, ("-", style.FLIP_LINE), strict=True)
+        handles = [Patch(label=name, fc=face, ec=edge, ls=line, lw=1.4) for name, (face, edge), line in looks]
+        style.legend(figure, handles, 2)
     meet = {"none": "pass through each other"}.get(found.contact, f"in contact, {found.contact}")
     style.title(figure, f"{one} and {two}, {meet}: {len(found.rows)} trials")
     return figure

@@ -18,6 +18,7 @@ from matplotlib.colors import to_rgb
 from matplotlib.patches import Patch
 from scipy.ndimage import distance_transform_edt, label
 
+from limitsets.arguments import arguments_checked
 from limitsets.errors import AnswerError
 from limitsets.plot import style
 from limitsets.plot.atlas_frame import frame, hatched, mark, pixels, title_of
@@ -69,6 +70,7 @@ def look_of(number: int, name: str) -> dict[str, Any]:
     return {"facecolor": tuple(round(each, 4) for each in mixed.tolist()), "hatch": hatch}
 
 
+@arguments_checked
 def atlas(found: Atlas) -> Figure:
     """Draw the classes of an atlas of one or two axes, with a legend in words, most frequent classes first.
 

@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 from matplotlib.patches import Patch
 
+from limitsets.arguments import arguments_checked
 from limitsets.errors import AnswerError
 from limitsets.plot import style
 from limitsets.plot.atlas_frame import frame, hatched, mark, pixels, title_of
@@ -40,6 +41,7 @@ WORDS = {
 }
 
 
+@arguments_checked
 def atlas_surface(found: Atlas, variable: str, side: int | None = None) -> Figure:
     """Draw one variable of an atlas.
 

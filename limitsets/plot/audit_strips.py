@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from matplotlib.patches import Patch
 
+from limitsets.arguments import arguments_checked
 from limitsets.plot import style
 
 if TYPE_CHECKING:
@@ -22,6 +23,7 @@ BROKEN: dict[str, Any] = {"facecolor": "#E39B72", "edgecolor": "#8A2F00", "hatch
 UNKNOWN: dict[str, Any] = {"facecolor": "#F1F1F1", "edgecolor": "#B5B5B5", "hatch": "...", "lw": 0.0}
 
 
+@arguments_checked
 def audit(found: Audit) -> Figure:
     """Draw where along the arm each assumption of the minimal model holds, and where the limit set lies.
 

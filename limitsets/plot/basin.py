@@ -10,9 +10,10 @@ import numpy as np
 from matplotlib.colors import BoundaryNorm, ListedColormap
 from matplotlib.patches import Patch
 
+from limitsets.arguments import arguments_checked
 from limitsets.cells import CellSet, Grid
 from limitsets.errors import AnswerError
-from limitsets.maps import codes
+from limitsets.maps import codes, kind_of
 from limitsets.plot import style
 from limitsets.scene import Scene
 
@@ -37,6 +38,7 @@ OUT: dict[int, tuple[str, str, str]] = {
 }
 
 
+@arguments_checked
 def basins(source: Any, shares: Basins, found: Any = None) -> Figure:
     """Draw from where each attractor is reached.
 
@@ -90,7 +92,7 @@ def _words(source: Any) -> tuple[str, str]:
         return f" of {source.name}", f" [{source.unit}]"
     if isinstance(source, Grid):
         return "", ""
-    return f" of {type(getattr(source, 'map', source)).__name__}", ""
+    return f" of {kind_of(getattr(source, 'map', source)).name}", ""
 
 
 def _cells_of(found: Any) -> list[CellSet]:

@@ -10,6 +10,7 @@ import numpy as np
 from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.patches import Patch
 
+from limitsets.arguments import arguments_checked
 from limitsets.errors import AnswerError
 from limitsets.plot import style
 from limitsets.scene.quantities import NAMES, base_unit
@@ -38,6 +39,7 @@ EVENTS: dict[str, dict[str, Any]] = {
 MARK: dict[str, Any] = {"ls": "", "ms": 5.5, "mew": 1.2}
 
 
+@arguments_checked
 def bifurcation(found: Continuation, by: str | None = None) -> Figure:
     """Draw where the attractors lie on each side, against one parameter of the path.
 
@@ -169,5 +171,9 @@ def _legend(found: Continuation, kinds: set[str]) -> list[Any]:
         handles.append(Patch(facecolor=face, edgecolor=style.INK, lw=0.5, label=f"attractor {number}"))
     if any(points for each in found.critical for points in each.values()):
         handles.append(style.key("critical point", **CRITICAL))
-    handles += [style.key(kind, mfc="none", **MARK, **look) for kind, look in EVENTS.items() if kind in kinds]
+    handles += [
+        style.key(f"event: {kind}", mfc="none", **MARK, **look)
+        for kind, look in EVENTS.items()
+        if kind in kinds
+    ]
     return handles

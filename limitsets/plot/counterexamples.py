@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 
+from limitsets.arguments import arguments_checked
 from limitsets.errors import AnswerError
 from limitsets.goals import Goal, OrientedBeyond, Reaches
 from limitsets.maps import orbit as orbit_of
@@ -32,6 +33,7 @@ WANTED: dict[str, Any] = {"facecolor": "#E0F0E9", "edgecolor": "#9BC4B2", "hatch
 RING: dict[str, Any] = {"ls": "", "marker": "o", "ms": 14, "mfc": "none", "mec": style.FLIP, "mew": 1.6}
 
 
+@arguments_checked
 def counterexample(
     scene: Scene,
     orbit: Sequence[Mapping[str, Any]],

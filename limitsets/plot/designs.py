@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from matplotlib.patches import Patch
 
+from limitsets.arguments import arguments_checked
 from limitsets.maps import critical_points
 from limitsets.plot import style
 from limitsets.plot.style import Extents
@@ -28,6 +29,7 @@ GAP = 0.9  # between the lanes of one scene and the next, beside the 1
 ANOTHER: dict[str, Any] = {"facecolor": "white", "edgecolor": style.INK, "ls": ":"}
 
 
+@arguments_checked
 def design(found: Design, sets: Sequence[Sequence[Extents]] | None = None) -> Figure:
     """Draw the limit sets of the scenes on a design's path, one group of bars per scene, one bar row per side.
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from matplotlib.patches import Polygon
 
+from limitsets.arguments import arguments_checked
 from limitsets.feeding.falling import FATES, time_to_tip
 from limitsets.feeding.trials import PAPER, SERIES
 from limitsets.geometry.polygon import above_side, side_ends
@@ -39,6 +40,7 @@ WORDS = {
 }
 
 
+@arguments_checked
 def feeding(found: Feeding) -> Figure:
     """Draw what becomes of parts at the end of the arm.
 
@@ -157,7 +159,7 @@ def _throws(axes: Axes, found: Feeding) -> None:
     axes.set_title(f"fates (dots: {trials.fate.size} trials)", loc="left", fontsize=style.TEXT)
     axes.set_xlabel("throws", fontsize=style.SMALL)
     axes.set_ylabel("share of random starts", fontsize=style.SMALL)
-    axes.legend(fontsize=style.SMALL, frameon=False, loc="center right")
+    axes.legend(fontsize=style.SMALL, frameon=False)
     style.open_frame(axes)
 
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.patches import Polygon
 
+from limitsets.arguments import arguments_checked
 from limitsets.plot import style
 from limitsets.plot.poses import about_centre, turned
 from limitsets.robust.noise.proportions import binomial_interval
@@ -27,6 +28,7 @@ __all__ = ["tray", "tray_design"]
 MARKS = 9
 
 
+@arguments_checked
 def tray(found: TrayFill) -> Figure:
     """Draw how a tray's depressions fill.
 
@@ -90,7 +92,7 @@ def _poses(axes: Axes, found: TrayFill) -> None:
         look = {"fc": "#9BD1B8", "ec": style.GOAL} if good else {"fc": "none", "ec": style.FLIP}
         pose = counts.poses[state]
         axes.add_patch(Polygon(_placed(found, pose) + at, closed=True, lw=1.3, **look))
-        for k, (x, y) in enumerate(_placed(found, pose, 0.72) + at):
+        for k, (x, y) in enumerate(_placed(found, pose, 0.55) + at):
             axes.text(x, y, f"P{k}", fontsize=6.5, ha="center", va="center", color=style.FAINT)
         words = f"{_short(counts.states[state])}{': right' if good else ''}"
         axes.text(at[0] - edge, at[1] - plate.depth - 0.1 * tall, words, fontsize=style.SMALL, va="top")
@@ -238,6 +240,7 @@ def _marked(axes: Axes, cells: NDArray[np.bool_]) -> list[Patch]:
     return [axes.add_patch(Polygon(corner + place, fc=style.FLIP, ec="white", lw=0.5)) for place in places]
 
 
+@arguments_checked
 def tray_design(found: TrayDesign) -> Figure:
     """Draw how a tray fills by depth and agitation.
 

@@ -9,6 +9,7 @@ import numpy as np
 from matplotlib.patches import Patch, Polygon
 from numpy.typing import NDArray
 
+from limitsets.arguments import arguments_checked
 from limitsets.errors import AnswerError
 from limitsets.maps import codes
 from limitsets.plot import style
@@ -28,6 +29,7 @@ __all__ = ["flight"]
 Array = NDArray[np.float64]
 
 SHOWN = 3  # outlines in the air, and as many on the way from the impact to rest
+WIDEST, TALLEST, LETTERS = 4.6, 8.0, 11  # of panels beside each other [inches], and letters to an inch
 AIR, LANDED = "#0072B2", "#C04A00"
 FLYING: dict[str, Any] = {"edgecolor": AIR, "ls": (0, (3, 2))}
 STRUCK: dict[str, Any] = {"edgecolor": AIR, "lw": 2.2}
@@ -36,6 +38,7 @@ VERTEX: dict[str, Any] = {"color": LANDED, "marker": "v", "ls": ""}
 CENTRE: dict[str, Any] = {"marker": "o", "ms": 4, "mfc": "white", "mec": style.INK}
 
 
+@arguments_checked
 def flight(scene: Scene, x: float, side: int) -> Figure:
     r"""Draw one throw: above the flight up to the impact, below the way from there to rest.
 
@@ -66,6 +69,9 @@ def flight(scene: Scene, x: float, side: int) -> Figure:
     >>> figure.axes[1].get_title(loc="left").replace("\n", " ")
     'After the impact: a flip, 21.00 to 16.55 in, onto side 0'
     """
+    if x > scene.arm_length:
+        allowed = f"at most {scene.arm_length:.9g} {scene.unit}, the end of the arm"
+        raise AnswerError("the start x", x, allowed, "start where a part can rest")
     throws = throws_of(scene, trace(scene.map, x, side, 1))
     if not throws:
         least = float(scene.sides.a[side])
@@ -106,7 +112,7 @@ def flight(scene: Scene, x: float, side: int) -> Figure:
 def _canvas(width: float, height: float) -> tuple[Figure, list[Axes]]:
     """Two panels of one extent: beside each other where the picture is tall, else one above the other."""
     if height > 0.6 * width:
-        tall = min(8.0, max(3.4, 4.6 * height / width))
+        tall = min(TALLEST, max(3.4, WIDEST * height / width))
         return style.canvas(10.4, tall + 1.6, 1, 2, sharex=True, sharey=True)
     return style.canvas(9.0, 2 * max(1.6, 8.2 * height / width) + 1.9, 2, 1, sharex=True, sharey=True)
 
@@ -167,9 +173,19 @@ def _landing(axes: Axes, scene: Scene, throw: Throw, moves: Motion, rolled: list
 
 
 def _head(axes: Axes, text: str) -> None:
-    """Write a title, in lines of a phrase each where panels stand beside each other."""
-    beside = axes.get_subplotspec().get_gridspec().ncols > 1  # type: ignore[union-attr]  # of a grid
-    axes.set_title(text.replace(", ", ",\n") if beside else text, fontsize=style.TEXT, loc="left")
+    """Write a title, in lines of phrases as wide as the panel where panels stand beside each other."""
+    if axes.get_subplotspec().get_gridspec().ncols > 1:  # type: ignore[union-attr]  # of a grid
+        wide = min(WIDEST, TALLEST * float(np.ptp(axes.get_xlim()) / np.ptp(axes.get_ylim())))
+        first, *phrases = text.split(", ")
+        lines = [first]
+        for phrase in phrases:
+            if len(f"{lines[-1]}, {phrase}") <= LETTERS * wide:
+                lines[-1] += f", {phrase}"
+            else:
+                lines[-1] += ","
+                lines.append(phrase)
+        text = "\n".join(lines)
+    axes.set_title(text, fontsize=style.TEXT, loc="left")
 
 
 def _legend(turns: bool) -> list[Any]:

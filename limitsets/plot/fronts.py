@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from matplotlib.ticker import LogLocator, NullFormatter, ScalarFormatter
 
+from limitsets.arguments import arguments_checked
 from limitsets.errors import AnswerError
 from limitsets.plot import style
 from limitsets.robust.margins.margin_texts import bound
@@ -27,6 +28,7 @@ PALE = "#D6D6D6"
 MOST_ROWS = 12
 
 
+@arguments_checked
 def robust_design(found: RobustDesign, *, wanted: float | None = None, bound: float | None = None) -> Figure:
     """Draw the front of margin against throws to feed, and the cost of each quantity before and after.
 

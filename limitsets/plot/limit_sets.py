@@ -8,6 +8,7 @@ import numpy as np
 from matplotlib.patches import FancyArrowPatch, Patch, Polygon
 from matplotlib.path import Path
 
+from limitsets.arguments import arguments_checked
 from limitsets.goals import OrientedBeyond
 from limitsets.maps import ROLL, Orbit, critical_points, images
 from limitsets.plot import style
@@ -32,6 +33,7 @@ FLIPPED: dict[str, Any] = {"color": style.FLIP, "ls": style.FLIP_LINE}
 ROLLED: dict[str, Any] = {"color": style.ROLL, "ls": style.ROLL_LINE}
 
 
+@arguments_checked
 def limit_set(scene: Scene | TransitionGraph, found: Any, *, axes: Axes | None = None) -> Figure:
     r"""Draw where a part comes to rest on each side, and how throws carry it on.
 

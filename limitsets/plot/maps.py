@@ -9,6 +9,7 @@ import numpy as np
 from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 
+from limitsets.arguments import arguments_checked
 from limitsets.maps import Orbit, critical_points, images
 from limitsets.plot import style
 from limitsets.plot.style import Extents
@@ -36,6 +37,7 @@ DEPARTURE: dict[str, Any] = ARRIVAL | {"marker": "s", "mec": style.FLIP}
 FLAG: dict[str, Any] = {"facecolor": "none", "edgecolor": "#bdbdbd", "hatch": "////", "lw": 0.0}
 
 
+@arguments_checked
 def map(scene: Scene | TransitionGraph, found: Any = None) -> Figure:  # noqa: A001 - ls.plot.map is the word for it
     """Draw x after a throw against x before it, one panel per side.
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from matplotlib.patches import Patch
 
+from limitsets.arguments import arguments_checked
 from limitsets.errors import AnswerError
 from limitsets.plot import style
 from limitsets.robust.margins.margin_texts import bound
@@ -46,6 +47,7 @@ def _percent(margin: Margin, size: float) -> tuple[float, str]:
     ) / least, " (of the shortest side)"
 
 
+@arguments_checked
 def tornado(margins: Sequence[Margin]) -> Figure:
     """Draw the margins of single quantities, the smallest on top, as percent of the value; beside them the numbers.
 
@@ -110,6 +112,7 @@ def _beside(axes: Axes, at: int, row: float, words: str) -> None:
     style.note(axes, words, (1.0, row), (at, 0), xycoords=("axes fraction", "data"), **how)
 
 
+@arguments_checked
 def margin_curve(found: MarginsBeyond) -> Figure:
     """Draw margins against X: between the lines lies the sharp one.
 
@@ -141,6 +144,7 @@ def margin_curve(found: MarginsBeyond) -> Figure:
     return figure
 
 
+@arguments_checked
 def tolerance_box(margin: Margin) -> Figure:
     """Draw a joint margin: what each quantity may do together with all others, proved and refuted.
 
@@ -148,6 +152,11 @@ def tolerance_box(margin: Margin) -> Figure:
     ----------
     margin : Margin
         Of "joint".
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        A bar for each quantity, as far as it is proved, in the box that is refuted.
 
     Raises
     ------

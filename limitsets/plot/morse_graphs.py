@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import networkx as nx
 from matplotlib.patches import FancyArrowPatch
 
+from limitsets.arguments import arguments_checked
 from limitsets.graph import TransitionGraph, morse_graph
 from limitsets.plot import style
 
@@ -22,6 +23,7 @@ MOST = 12
 Place = tuple[float, float]
 
 
+@arguments_checked
 def morse(graph: nx.DiGraph[int] | TransitionGraph, name: str = "", unit: str = "") -> Figure:
     """Draw recurrent components and the order among them.
 
@@ -121,12 +123,15 @@ def _node(axes: Axes, node: Any, data: dict[str, Any], x: float, y: float, *, fe
         members = data.get("members")  # a graph made elsewhere has intervals only
         axes_of = range(1 if members is None else members.grid.dimension)
         along = [data["extents"], *(data["members"].extents(axis) for axis in axes_of[1:])]
+        sides = members is None or members.grid.sides > 1  # a map without sides says nothing of side 0
         every = [(side, axis, parts) for axis in axes_of for side, parts in along[axis].items()]
         for side, axis, parts in every:
             shown = ", ".join(f"{lo:z.2f} to {hi:z.2f}" for lo, hi in parts[:2])
-            shown = f"$x_{axis}$ {shown}" if len(axes_of) > 1 else shown
-            lines.append(f"side {side}: {shown}{' ...' if len(parts) > 2 else ''} {unit}".rstrip())
-    style.note(axes, "\n".join(lines), (x, y), (size / 2 + 7, 0), va="center")
+            words = [f"side {side}:"] * sides + [f"$x_{axis}$"] * (len(axes_of) > 1)
+            lines.append(f"{' '.join([*words, shown])}{' ...' if len(parts) > 2 else ''} {unit}".rstrip())
+    # An arrow to a way out may run behind the words.
+    box = {"boxstyle": "square,pad=0.1", "fc": "white", "ec": "none"}
+    style.note(axes, "\n".join(lines), (x, y), (size / 2 + 7, 0), va="center", bbox=box, gid="words")
 
 
 def _arrow(axes: Axes, start: Place, end: Place, *, dotted: bool) -> None:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from matplotlib.ticker import MaxNLocator
 
+from limitsets.arguments import arguments_checked
 from limitsets.errors import AnswerError
 from limitsets.plot import style
 
@@ -51,6 +52,7 @@ def _plain(axes: Axes) -> None:
     axes.tick_params(labelsize=style.SMALL)
 
 
+@arguments_checked
 def noise_density(found: NoiseStatistics, thrown: SampledStatistics | None = None) -> Figure:
     """Draw how often the part rests where, side by side, and beside it what many throws did.
 
@@ -96,6 +98,7 @@ def _widened(lo: float, hi: float) -> tuple[float, float]:
     return lo - 0.04 * (hi - lo), hi + 0.04 * (hi - lo)
 
 
+@arguments_checked
 def noise_arrivals(found: NoiseStatistics, thrown: SampledStatistics | None = None) -> Figure:
     """Draw how many throws it takes from random starts to the goal: shares, and what is still under way.
 
@@ -147,6 +150,7 @@ def _marks(axes: Axes, found: NoiseStatistics) -> None:
         axes.axvline(most, color=style.GOAL, lw=1.2, ls=(0, (4, 2)), label=f"95 % after {most}")
 
 
+@arguments_checked
 def noise_levels(
     levels: Levels, at: Mapping[str, float], shown: Mapping[str, Sequence[str]] | None = None
 ) -> Figure:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import textwrap
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.patches import Polygon
 from numpy.typing import NDArray
 
+from limitsets.arguments import arguments_checked
 from limitsets.geometry import side_ends
 from limitsets.plot import style
 from limitsets.plot.poses import angle_on_side, outline, turned
@@ -17,8 +19,9 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from limitsets.scene import Scene
+    from limitsets.scene.sketch import Sketch
 
-__all__ = ["part"]
+__all__ = ["part", "refused_part"]
 
 Array = NDArray[np.float64]
 
@@ -32,6 +35,7 @@ TIPS: dict[str, Any] = {"color": style.FLIP, "lw": 3.0, "ls": (0, (1.5, 1))}
 CLEAR = 4
 
 
+@arguments_checked
 def part(scene: Scene) -> Figure:
     """Draw the part as it lies on side 0 on the arm, its sides numbered in the order in which it flips.
 
@@ -72,10 +76,60 @@ def part(scene: Scene) -> Figure:
     _centre(axes, scene, size)
     masses = _masses(scene)
     _added(axes, scene, masses)
-    style.note(axes, "to the joint", (ends[0], 0.0), (6, 8), ha="left", fontsize=style.SMALL, gid="joint")
+    style.note(
+        axes,
+        "\N{LEFTWARDS ARROW} to the joint",
+        (ends[0], 0.0),
+        (6, 8),
+        ha="left",
+        fontsize=style.SMALL,
+        gid="joint",
+    )
     axes.set_axis_off()
     style.title(figure, f"{scene.name}: the part, lying on side 0")
     style.legend(figure, _legend(masses, resting), 3)
+    return figure
+
+
+def refused_part(found: Sketch, why: str) -> Figure:
+    """Draw a part that is refused as it is written: its corners by number, its sides, what is wrong.
+
+    Parameters
+    ----------
+    found : Sketch
+        From `limitsets.scene.sketch.sketch`.
+    why : str
+        The error.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+    """
+    corners, count = found.vertices, len(found.vertices)
+    size = max(float(np.ptp(corners, axis=0).max()), 1e-300)
+    figure, (axes,) = style.canvas(7.6, 6.0)
+    axes.set_aspect("equal")
+    axes.margins(0.25)
+    axes.add_patch(Polygon(corners, closed=True, zorder=2, gid="part", **(OUTLINE | {"ls": "--"})))
+    axes.plot(*corners.T, ls="", marker="o", ms=4, color=style.INK, zorder=3)
+    middle = corners.mean(axis=0)
+    for k, corner in enumerate(corners):
+        away = (corner - middle) / size
+        shift = (28.0 * float(away[0]), 28.0 * float(away[1]))
+        style.note(axes, f"P{k}", tuple(corner.tolist()), shift, ha="center", va="center", gid="corner")
+    for side in range(count):
+        left, right = (corners[k] for k in side_ends(count, side))
+        words = f"side {side}: {float(np.hypot(*(right - left))):.5g} {found.unit}"
+        place = tuple((0.5 * (left + right)).tolist())
+        box = {"boxstyle": "square,pad=0.2", "fc": "white", "ec": "none"}
+        style.note(axes, words, place, (0, 0), ha="center", va="center", bbox=box, zorder=4, gid="side")
+    if found.centre is not None:
+        axes.plot(*found.centre, zorder=5, gid="centre of mass", **CENTRE)
+        style.note(axes, "centre of mass", found.centre, (9, 0), va="center", zorder=5)
+    reason = "\n".join(textwrap.wrap(why, 92))
+    axes.set_xlabel(f"x [{found.unit}]\n\n{reason}", fontsize=style.SMALL)
+    axes.set_ylabel(f"y [{found.unit}]")
+    style.title(figure, f"{found.name}: the part as it is written, which is refused")
     return figure
 
 
@@ -96,10 +150,18 @@ def _sides(axes: Axes, scene: Scene, corners: Array, resting: list[bool]) -> Non
         half = np.array([0.31 * style.TEXT * len(words), 0.5 * style.TEXT])  # of the words [points]
         away = CLEAR + float(np.abs(outward) @ half) + (10 if side == 0 else 0)
         shift = away * outward
+        leader = None
         if outward[1] < -0.1 and side != 0:  # an edge that overhangs: beside it, and not down on the arm
             shift = np.array([away / outward[0], 0.0])
+            leader = {"arrowstyle": "-", "color": style.INK, "lw": 0.7}
         middle = tuple((0.5 * (left + right)).tolist())
-        how: dict[str, Any] = {"ha": "center", "va": "center", "fontsize": style.TEXT, "weight": "bold"}
+        how: dict[str, Any] = {
+            "ha": "center",
+            "va": "center",
+            "fontsize": style.TEXT,
+            "weight": "bold",
+            "arrowprops": leader,
+        }
         if side == 0:  # over the line down from the centre of mass
             how["bbox"] = {"boxstyle": "square,pad=0.2", "fc": "white", "ec": "none"}
         style.note(axes, words, middle, tuple(shift.tolist()), zorder=6, gid="side", **how)
@@ -119,7 +181,6 @@ def _centre(axes: Axes, scene: Scene, size: float) -> None:
     words = f"a = {a:.4g} {scene.unit}, d = {d:.4g} {scene.unit}"
     style.note(axes, words, (max(a, 0.0), low), (6, 0), va="center", color=style.JOG, gid="measure")
     axes.plot(a, d, zorder=5, gid="centre of mass", **CENTRE)
-    axes.plot(a, d, zorder=5, marker="+", ms=9, color=style.INK, ls="")
 
 
 def _masses(scene: Scene) -> list[tuple[Array, str]]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from limitsets.arguments import arguments_checked
 from limitsets.errors import AnswerError
 from limitsets.plot import style
 
@@ -21,6 +22,7 @@ COLOURS = (style.JOG, style.FLIP, style.ROLL, style.INK)
 HATCHES = ("", "////", "....", "xxxx")
 
 
+@arguments_checked
 def policy(found: Synthesis) -> Figure:
     """Draw a policy, one row for each state and one column for each side; up to 60 states are named.
 

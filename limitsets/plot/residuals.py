@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from limitsets.arguments import arguments_checked
 from limitsets.plot import style
 
 if TYPE_CHECKING:
@@ -19,6 +20,7 @@ BARS = "#B5C8D6"
 KINDS = ((0, "o", style.JOG, "jog"), (1, "^", style.FLIP, "flip"))
 
 
+@arguments_checked
 def fit_residuals(found: Fit) -> Figure:
     """Draw measured less predicted landings against the place before, with two standard deviations.
 

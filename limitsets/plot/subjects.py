@@ -74,7 +74,7 @@ def subject_of(source: Scene | TransitionGraph) -> Subject:
     Raises
     ------
     AnswerError
-        Something else, or a map in more than one dimension.
+        A map in more than one dimension.
     """
     if isinstance(source, Scene):
         branches, flags = kind_of(source.map).branches, other_vertex_first(source)
@@ -82,9 +82,6 @@ def subject_of(source: Scene | TransitionGraph) -> Subject:
         return Subject(
             source.name, source.unit, source.map, source.domain, *ends, source.goal, branches, flags, True
         )  # fmt: skip
-    if not isinstance(source, TransitionGraph):
-        remedy = "pass ls.transitions(map, grid): it knows the map and where its states lie"
-        raise AnswerError("what to draw", type(source).__name__, "a scene or a transition graph", remedy)
     domain = source.grid.domain
     if source.grid.dimension > 1:
         remedy = "draw its basins, or a section of it"

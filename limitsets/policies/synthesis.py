@@ -7,6 +7,7 @@ from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from limitsets.arguments import arguments_checked
 from limitsets.cells import CellSet, Grid
 from limitsets.errors import AnswerError
 from limitsets.files import as_table, picked
@@ -153,6 +154,7 @@ def _play(board: Board, sensor: Sensor | None, limits: Limits, progress: Progres
 
 
 @shown_in_notebooks
+@arguments_checked
 def feedback(
     scene: Scene | str,
     sensor: Sensor | str | None = None,
@@ -225,7 +227,7 @@ def feedback(
     >>> found.found.verdict, found.found.throws
     ('solved', 2)
     """
-    chosen = load(scene) if isinstance(scene, str) else scene
+    chosen = load(scene)
     asked = _sensor_of(chosen, sensor)
     own = asked.cuts if isinstance(asked, BeyondSensor) else ()
     board = board_of(chosen, mode, goal, starts, cells, noise, (*cuts, *own), progress)

@@ -11,6 +11,7 @@ from functools import singledispatch
 from pathlib import Path
 from typing import Any, cast
 
+from limitsets.arguments import arguments_checked
 from limitsets.errors import AnswerError
 from limitsets.progress import shown_in_notebooks
 from limitsets.proofs.attraction import Attraction, attraction, near_section
@@ -200,6 +201,7 @@ def spelled_deviations(scene: Scene, given: Mapping[str, str] | None) -> dict[st
 
 @singledispatch
 @shown_in_notebooks
+@arguments_checked
 def certify(
     scene: Scene | str | Path,
     claims: Sequence[str] | None = None,
@@ -251,7 +253,7 @@ def certify(
     >>> proof.claims[0].verdict
     'proved'
     """
-    loaded = scene if isinstance(scene, Scene) else load(scene)
+    loaded = load(scene)
     wanted = _chosen(loaded, claims)
     noise = joined(spelled_deviations(loaded, noise), spelled_deviations(loaded, scattered(loaded)))
     tolerance = spelled_deviations(loaded, tolerance)

@@ -10,6 +10,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from limitsets.arguments import arguments_checked
 from limitsets.errors import AnswerError
 from limitsets.progress import bar, in_notebook
 
@@ -81,6 +82,7 @@ def require_confirmed(file: Path, kept: Path, verdicts: Mapping[str, str], worke
     return report.seconds
 
 
+@arguments_checked
 def recheck(
     path: str | Path, *, workers: int | None = 1, progress: Callable[[int, int], None] | None = None
 ) -> Report:

@@ -21,11 +21,12 @@ from dataclasses import dataclass, replace
 from functools import reduce
 from itertools import product
 from operator import add, mul
-from typing import Any, TypeAlias
+from typing import Any, NoReturn, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
+from limitsets.arguments import arguments_checked
 from limitsets.cells import CellSet, Grid
 from limitsets.errors import AnswerError
 from limitsets.graph import TransitionGraph, transitions
@@ -124,6 +125,21 @@ class ProofOfMap(Tabled):
         """The cells all of whose points are proved to enter the attracting cells."""
         destination = self.graph.condensation().destination
         return CellSet(self.graph.grid, destination >= 0)
+
+    def save(self, path: object = None, **_: object) -> NoReturn:
+        """Refuse: there are certificates of scenes alone (`Proof.save`).
+
+        Raises
+        ------
+        AnswerError
+            Always.
+        """
+        raise AnswerError(
+            "the certificate",
+            f"of the map {type(self.map).__name__}",
+            "one of a scene: nothing rechecks other maps",
+            "keep .to_csv(file) or .to_json(), and the lines that call limitsets.certify",
+        )
 
     def tables(self) -> tuple[Table, ...]:
         """Give the tables that show it, the one that is saved as CSV first."""
@@ -356,9 +372,10 @@ CLAIMS_OF_MAP = (*PROVERS, "cycles")
 """What can be claimed of any map."""
 
 
+@arguments_checked
 def certify_map(
     map: Any,  # noqa: A002  # the field's word
-    grid: Grid,
+    grid: Grid | None = None,
     claims: Sequence[str] | None = None,
     *,
     upper: Any = None,
@@ -392,6 +409,9 @@ def certify_map(
     for claim in wanted:
         if claim not in CLAIMS_OF_MAP:
             raise AnswerError("the claim about a map", claim, ", ".join(CLAIMS_OF_MAP), "correct the word")
+    if grid is None:
+        way = "limitsets.certify(map, limitsets.grid([(lo, hi)], cells=1024))"
+        raise AnswerError("the grid", None, "the cells to prove the claims on", f"pass {way}")
     guard()
     lower = coerce(map)
     upper = lower if upper is None else coerce(upper)

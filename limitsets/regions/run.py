@@ -157,7 +157,7 @@ def certified(
     >>> found.shares()["proved"], found.region.tolist()
     (1.0, [0, 0, 0, 0])
     """
-    loaded = placed(scene if isinstance(scene, Scene) else load(scene), (x, y))
+    loaded = placed(load(scene), (x, y))
     fine = (x.refined(depth), y.refined(depth))
     step = 2**depth
     waiting = [

@@ -11,9 +11,21 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from limitsets.analysis import Analysis, GoalOutcome
+    from limitsets.proofs import Proof
     from limitsets.scene import Scene
 
-__all__ = ["goal_sentence", "next_command", "verdict_of", "void_of", "without_margin"]
+__all__ = [
+    "after_undecided",
+    "after_unproved",
+    "goal_sentence",
+    "next_command",
+    "verdict_of",
+    "void_of",
+    "without_margin",
+]
+
+# So many times as many cells are proposed where starts are undecided, up to the last.
+FINER, MOST_CELLS = 4, 1_000_000
 
 
 def goal_sentence(goal: Goal, unit: str) -> str:
@@ -68,6 +80,33 @@ def next_command(analysis: Analysis) -> str:
     if outcome.holds is None:
         return f"limitsets certify {source} (whether it can be proved)"
     return design_command(scene, [outcome.goal]) or f"limitsets audit {source} (which assumptions it breaks)"
+
+
+def after_undecided(analysis: Analysis) -> str:
+    """Name the command that decides more starts; empty where none is undecided, or there is no room for more cells.
+
+    Examples
+    --------
+    >>> import limitsets as ls
+    >>> after_undecided(ls.analyse("paper-designed", 16))
+    'limitsets analyse paper-designed --cells 64 (finer cells)'
+    """
+    cells = FINER * int(analysis.grid.shape[:, 0].max())
+    if analysis.basins.undecided_between == 0.0 or cells > MOST_CELLS:
+        return ""
+    return f"limitsets analyse {_source(analysis.scene)} --cells {cells} (finer cells)"
+
+
+def after_unproved(proof: Proof) -> str:
+    """Name the command that goes on from a proof in which a claim is not proved."""
+    scene, goal = proof.scene, proof.scene.goal
+    refuted = any(claim.claim == "goal" and claim.verdict == "refuted" for claim in proof.claims)
+    if proof.noise or proof.tolerance:
+        return f"limitsets margin {_source(scene)} (how much each quantity may deviate)"
+    if refuted and goal is not None and (design := design_command(scene, [goal])):
+        return design
+    source = _source(scene)
+    return f"limitsets analyse {source} (what sampled throws say), limitsets audit {source} (what the model leaves out)"
 
 
 def without_margin(scene: Scene, goals: Sequence[Goal], *, fails: bool) -> str:

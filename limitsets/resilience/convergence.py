@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 
+from limitsets.arguments import arguments_checked
 from limitsets.errors import AnswerError
 from limitsets.files import as_table, picked
 from limitsets.graph import TransitionGraph
@@ -101,6 +102,7 @@ class ConvergenceTimes(Tabled):
         return as_table(**picked(self, "attractors", "exits", "undecided", "starts", "steps", "how"))
 
 
+@arguments_checked
 def convergence_times(
     graph: TransitionGraph,
     found: tuple[Attractor, ...],

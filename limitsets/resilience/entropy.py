@@ -22,6 +22,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from limitsets.arguments import arguments_checked
 from limitsets.cells import Grid
 from limitsets.errors import AnswerError
 from limitsets.files import as_table, picked
@@ -96,6 +97,7 @@ class _Boxes:
     undecided: float
 
 
+@arguments_checked
 def basin_entropy(graph: TransitionGraph, found: tuple[Attractor, ...], *, box: int = BOX) -> BasinEntropy:
     """Mean uncertainty, over boxes of cells, of the basin in which a random start of the box lies.
 
@@ -138,6 +140,7 @@ def basin_entropy(graph: TransitionGraph, found: tuple[Attractor, ...], *, box: 
     return _answer(each, value, lo, hi, int(some.sum()), box)
 
 
+@arguments_checked
 def boundary_basin_entropy(
     graph: TransitionGraph, found: tuple[Attractor, ...], *, box: int = BOX
 ) -> BasinEntropy:

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from limitsets.arguments import arguments_checked
 from limitsets.errors import AnswerError
 from limitsets.files import as_table, picked
 from limitsets.graph import TransitionGraph
@@ -72,6 +73,7 @@ class FatalShock(Tabled):
         return as_table(**picked(self, "lo", "hi", "how", "x", "side", "basin", "shock", "into"))
 
 
+@arguments_checked
 def minimal_fatal_shock(
     graph: TransitionGraph, found: tuple[Attractor, ...], x: ArrayLike, side: int = 0
 ) -> FatalShock:

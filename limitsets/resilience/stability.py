@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from limitsets.arguments import arguments_checked
 from limitsets.cells import CellSet
 from limitsets.errors import AnswerError
 from limitsets.files import as_table, picked
@@ -29,7 +30,15 @@ CONFIDENCE = 0.95
 
 @dataclass(frozen=True)
 class Share:
-    """A share of the starts: the best number, of the decided ones within the bracket, and its bracket."""
+    """A share of the starts.
+
+    Attributes
+    ----------
+    share : float
+        The best number: that of the decided starts.
+    lo, hi : float
+        Its bracket.
+    """
 
     share: float
     lo: float
@@ -77,6 +86,7 @@ class BasinStability(Tabled):
         return as_table(**picked(self, "how", "attractors", "exits", "undecided", "starts"))
 
 
+@arguments_checked
 def basin_stability(
     graph: TransitionGraph,
     found: tuple[Attractor, ...],

@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from limitsets.arguments import arguments_checked
 from limitsets.cells import Grid
 from limitsets.errors import AnswerError
 from limitsets.files import as_table, picked
@@ -85,6 +86,7 @@ class UncertaintyExponent(Tabled):
         )
 
 
+@arguments_checked
 def uncertainty_exponent(
     graph: TransitionGraph, found: tuple[Attractor, ...], *, steps: int = STEPS, seed: int = 0
 ) -> UncertaintyExponent:

@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from limitsets.arguments import arguments_checked
 from limitsets.cells import Grid
 from limitsets.errors import AnswerError
 from limitsets.files import as_table, picked
@@ -83,6 +84,7 @@ class Wada(Tabled):
         return as_table(**picked(self, "shares", "basins", "refinements", "boxes", "of", "undecided", "how"))
 
 
+@arguments_checked
 def wada(
     graph: TransitionGraph,
     found: tuple[Attractor, ...],

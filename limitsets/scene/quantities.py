@@ -10,9 +10,9 @@ import re
 from collections.abc import Iterator, Mapping
 from typing import Any, NamedTuple
 
-from limitsets.errors import SceneError
+from limitsets.errors import SceneError, shown
 from limitsets.scene.facts import Deviation
-from limitsets.scene.units import Quantity, convert, parse, shown, written
+from limitsets.scene.units import Quantity, convert, parse, written
 from limitsets.scene.validation import Tree
 
 __all__ = [

@@ -10,10 +10,9 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
-from limitsets.errors import SceneError, TipsError
+from limitsets.errors import SceneError, TipsError, shown
 from limitsets.scene.facts import TIPPING
 from limitsets.scene.scene import Scene
-from limitsets.scene.units import shown
 
 __all__ = ["can_name", "load", "load_to_analyse", "scenes", "structure_of"]
 
@@ -43,14 +42,15 @@ def scenes() -> list[str]:
     )
 
 
-def load(source: str | Path | Mapping[str, Any]) -> Scene:
+def load(source: str | Path | Mapping[str, Any] | Scene) -> Scene:
     """Read a scene.
 
     Parameters
     ----------
-    source : str, Path or mapping
+    source : str, Path, mapping or Scene
         The name of a built-in scene, the path of a TOML file, TOML text (any string with a line break in it), or the
         structure of a scene such as `Scene.as_dict` gives.  A built-in name goes before a file of the same name.
+        A scene that is loaded is given back.
 
     Returns
     -------
@@ -68,10 +68,10 @@ def load(source: str | Path | Mapping[str, Any]) -> Scene:
     >>> scene.kappa, scene.unit
     (25.3778518, 'in')
     """
-    return Scene.of(*structure_of(source))
+    return source if isinstance(source, Scene) else Scene.of(*structure_of(source))
 
 
-def load_to_analyse(source: str | Path | Mapping[str, Any]) -> tuple[Scene, tuple[str, ...]]:
+def load_to_analyse(source: str | Path | Mapping[str, Any] | Scene) -> tuple[Scene, tuple[str, ...]]:
     """Read a scene; of a part that cannot rest on one of its sides with the effects by which it tips on.
 
     Returns
@@ -84,6 +84,8 @@ def load_to_analyse(source: str | Path | Mapping[str, Any]) -> tuple[Scene, tupl
     >>> load_to_analyse("paper-designed")[1]
     ()
     """
+    if isinstance(source, Scene):
+        return source, ()
     structure, file = structure_of(source)
     try:
         return Scene.of(structure, file), ()

@@ -6,9 +6,9 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 
-from limitsets.errors import GeometryError, SceneError
+from limitsets.errors import GeometryError, SceneError, shown
 from limitsets.scene.quantities import base_unit
-from limitsets.scene.units import convert, parse, shown
+from limitsets.scene.units import convert, parse
 
 __all__ = ["LEAST", "Resolver"]
 
@@ -50,10 +50,15 @@ class Resolver:
 
     @contextmanager
     def at(self, key: str) -> Iterator[None]:
-        """Give errors of the geometry their place."""
+        """Give errors of the geometry their place and their unit."""
         try:
             yield
         except GeometryError as error:
             raise type(error)(
-                error.thing, error.value, error.allowed, error.remedy, key=key, file=self.file
+                error.thing,
+                error.value,
+                error.allowed,
+                error.remedy.replace("[length]", self.unit),
+                key=key,
+                file=self.file,
             ) from None

@@ -5,7 +5,7 @@ from __future__ import annotations
 import copy
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, cast
 
@@ -31,6 +31,9 @@ __all__ = ["Scene", "resting_places"]
 # below this share of the way from a_i to the arm's end the number of throws needed to get away is unbounded
 _NEAREST = 1e-6
 
+# Turns of a part thrown from the arm's end, R/(pi kappa), beyond which a bare number for the speed is not believed.
+_MOST_TURNS = 100
+
 
 def resting_places(a: Any, arm_length: Any) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
     """Return the least and the largest x at which a part can rest on sides with these a."""
@@ -38,7 +41,7 @@ def resting_places(a: Any, arm_length: Any) -> tuple[npt.NDArray[np.float64], np
     return a + _NEAREST * (hi - a), hi
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Scene(Tabled):
     """A part, an arm, a throw and what is asked of them.  Build it with `limitsets.load`.
 
@@ -106,7 +109,7 @@ class Scene(Tabled):
     tolerance: Mapping[str, Deviation]
     feedback: Feedback | None
     file: str | None
-    text: Mapping[str, Any] = field(repr=False)
+    text: Mapping[str, Any]
 
     @classmethod
     def of(cls, structure: object, file: str | None) -> Scene:
@@ -124,6 +127,14 @@ class Scene(Tabled):
     def __eq__(self, other: object) -> bool:
         """Two scenes are equal that are written in the same words, wherever they were read."""
         return self.text == other.text if isinstance(other, Scene) else NotImplemented
+
+    def __repr__(self) -> str:
+        """Name it, with its sizes; `print` shows its tables."""
+        arm, kappa = f"arm {self.arm_length:g} {self.unit}", f"kappa {self.kappa:g} {self.unit}"
+        return f"Scene({self.name!r}, {len(self.sides)} sides, {arm}, {kappa})"
+
+    def __str__(self) -> str:
+        return "\n\n".join(table.text() for table in self.tables())
 
     def __hash__(self) -> int:
         return hash((self.name, self.unit, self.kappa, self.arm_length))
@@ -280,7 +291,8 @@ class Scene(Tabled):
         ----------
         values : mapping of str to float or str
             By name of the quantity, text with a unit (``"150 deg/s"``), or numbers in the scene's units: lengths in
-            `unit`, but angles in rad and speeds in rad/s.
+            `unit`, but angles in rad and speeds in rad/s.  A bare speed at which a part thrown from the arm's end
+            would turn more than 100 times is refused: it is meant in deg/s; as text it is taken.
 
         Returns
         -------
@@ -299,7 +311,20 @@ class Scene(Tabled):
         """
         from limitsets.scene.quantities import replaced
 
-        return Scene.of(replaced(self.text, self.unit, self.file, values), self.file)
+        made = Scene.of(replaced(self.text, self.unit, self.file, values), self.file)
+        speed = values.get("throw.speed")
+        turns = made.arm_length / (math.pi * made.kappa)
+        if isinstance(speed, str | None) or turns <= _MOST_TURNS:
+            return made
+        # a number of deg/s, most often: no throw from the outer half of the arm lands within a turn
+        raise SceneError(
+            "this angular speed",
+            f"{float(speed):g} rad/s",
+            f"a speed whose throws land: a part thrown from the arm's end would turn {turns:.0f} times",
+            f'a bare number is read in rad/s: write "{float(speed):g} deg/s", or the text "{float(speed):g} rad/s"',
+            key="throw.speed",
+            file=self.file,
+        )
 
     def as_dict(self) -> dict[str, Any]:
         """Give the scene as it was written, as plain tables and lists that `limitsets.load` reads again."""

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, get_args, get_origin
 
 from limitsets.errors import SceneError
 from limitsets.scene.reading import can_name, load
+from limitsets.scene.units import UNITS, convert, parse
 from limitsets.scene.writing import replace_file
 
 if TYPE_CHECKING:
@@ -26,6 +28,9 @@ HEADED = ("part.mass",)
 
 WIDTH = 100
 
+# Lengths and accelerations of that scene, as its text has them.
+_LENGTHS = re.compile(r'"([+-]?[0-9.]+) in(/s\^2)?"')
+
 HEAD = """\
 # A scene of limitsets: a part, the arm that throws it, and what is asked of them.
 #
@@ -36,8 +41,8 @@ HEAD = """\
 """
 
 
-def starting_text(name: str, file: str) -> str:
-    """Write the scene as TOML; it loads as it is.
+def starting_text(name: str, file: str, unit: str = "in") -> str:
+    """Write the scene as TOML, its lengths in a unit; it loads as it is.
 
     Examples
     --------
@@ -47,7 +52,7 @@ def starting_text(name: str, file: str) -> str:
     from limitsets.scene.schema import scene_table
 
     given = load(LIKE).as_dict() | {"name": name}
-    lines = [HEAD.format(file=file).rstrip("\n"), ""]
+    lines: list[str] = []
     for key, field in scene_table(with_effects=True).model_fields.items():
         inner = _model(field.annotation)
         if inner is not None:
@@ -56,29 +61,44 @@ def starting_text(name: str, file: str) -> str:
             lines += [*_line(key, given[key], field), ""]
         else:
             lines += [*_quantities(key, field), ""]
-    return "\n".join(lines).rstrip("\n") + "\n"
+    body = (
+        _LENGTHS.sub(lambda found: _in_unit(found, unit), "\n".join(lines))
+        if unit != "in"
+        else "\n".join(lines)
+    )
+    return HEAD.format(file=file) + "\n" + body.rstrip("\n") + "\n"
 
 
-def new_scene(file: str | Path) -> Path:
+def _in_unit(found: re.Match[str], unit: str) -> str:
+    """Convert a quantity in inches, to 10 digits."""
+    value = convert(parse(f"{found[1]} in", "length"), unit)
+    return f'"{value:.10g} {unit}{found[2] or ""}"'
+
+
+def new_scene(file: str | Path, unit: str = "in") -> Path:
     """Write a scene to start from, with comments.
 
     Parameters
     ----------
     file : str or Path
         Where to: a name that ends in .toml, of a file that is not there yet.
+    unit : str
+        The unit of its lengths.
 
     Raises
     ------
     SceneError
-        It is there, cannot be written, or is no such name.
+        It is there, cannot be written, or is no such name; or an unknown unit.
     """
     path = Path(file)
     if path.suffix != ".toml":
         raise SceneError("the new scene", str(file), "a name that ends in .toml", f"name it {path.name}.toml")
+    if unit not in UNITS["length"]:
+        raise SceneError("the unit of the new scene", unit, ", ".join(UNITS["length"]), "name one of them")
     if path.exists():
         raise SceneError("the new scene", str(file), "a file that is not there", "name another one")
     name = path.stem if can_name(path.stem) else "mine"
-    replace_file(path, starting_text(name, path.name))
+    replace_file(path, starting_text(name, path.name, unit))
     return path
 
 

@@ -7,14 +7,13 @@ a value already in the target unit is the float of its text.
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Mapping
 from fractions import Fraction
 from functools import lru_cache
 from typing import Any, NamedTuple
 
-from limitsets.errors import SceneError
+from limitsets.errors import LONGEST, SceneError, shown
 
 __all__ = [
     "UNITS",
@@ -101,7 +100,6 @@ _OTHER_NAMES = {
 }
 _NUMBER = r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]{1,3})?"
 _QUANTITY = re.compile(rf"({_NUMBER})(?: +|(?=[%\u00b0]))([^\s].*)")
-_LONGEST = 64
 _SMALLEST, _LARGEST = 1e-300, 1e12
 
 # pint's own 900 definitions take 0.4 s to read; these are the ones needed, and a test compares them with pint's
@@ -169,7 +167,7 @@ def parse(text: object, dimension: str, *, key: str | None = None, file: str | N
 
     if not isinstance(text, str):
         raise refuse(shown(text), f'write it as text with its unit, like "{example}"')
-    if len(text) > _LONGEST:
+    if len(text) > LONGEST:
         raise refuse(shown(text), "shorten it")
     match = _QUANTITY.fullmatch(text.strip(" "))
     if match is None:
@@ -336,20 +334,3 @@ def written(value: float, unit: str) -> str:
     '0.1 in'
     """
     return f"{float(value)!r} {unit}"
-
-
-def shown(value: object) -> object:
-    """Shorten a value for an error: what a scene holds may be a million characters long."""
-    if isinstance(value, str):
-        return value if len(value) <= _LONGEST else value[:_LONGEST] + "..."
-    if isinstance(value, int) and not isinstance(value, bool) and value.bit_length() > 64:
-        return f"an integer of {value.bit_length()} bits"
-    if value is None or isinstance(value, bool | int):
-        return value
-    if isinstance(value, float):
-        return value if math.isfinite(value) else f"{value}"
-    if isinstance(value, dict):
-        return "a table"
-    if isinstance(value, list | tuple):
-        return f"a list of {len(value)}"
-    return f"a {type(value).__name__}"

@@ -6,8 +6,7 @@ import difflib
 import math
 from typing import TYPE_CHECKING, Any, TypeAlias, get_args
 
-from limitsets.errors import SceneError
-from limitsets.scene.units import shown
+from limitsets.errors import SceneError, shown
 
 if TYPE_CHECKING:
     from limitsets.scene.schema import SceneTable, Table

@@ -6,6 +6,7 @@ import errno
 from pathlib import Path
 from typing import Any
 
+from limitsets.arguments import arguments_checked
 from limitsets.errors import SceneError
 from limitsets.files import replaced
 from limitsets.scene.scene import Scene
@@ -17,6 +18,7 @@ _WIDTH = 100
 _HEADED = {"part.mass"}
 
 
+@arguments_checked
 def dump(scene: Scene, path: str | Path | None = None) -> str:
     """Write a scene as TOML, every quantity in the words in which it was given.
 

@@ -8,13 +8,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from limitsets.arguments import arguments_checked
 from limitsets.cells import CellSet
 from limitsets.errors import AnswerError
 from limitsets.graph import TransitionGraph
 from limitsets.maps import has_slope, orbit
 from limitsets.maps.kernels import scattered
 from limitsets.maps.lyapunov import lyapunov, orbit_with_exponent
-from limitsets.tables import BY_CELLS, Column, Table, Tabled, bands_of, facts
+from limitsets.tables import BY_CELLS, Column, Table, Tabled, facts
 
 __all__ = ["Attractor", "attractors"]
 
@@ -34,7 +35,8 @@ class Attractor(Tabled):
     cells : CellSet
         Its cells.
     extents : dict of int to list of (lo, hi)
-        Per side the intervals they make up [length].
+        Per side the intervals they make up [length]; in more dimensions the boxes of their connected pieces, each a
+        tuple with one (lo, hi) per axis (`CellSet.pieces`).
     flip_order : tuple of int, or None
         The sides in the cyclic order in which they are visited, beginning with the smallest; None where the order
         changes along the orbit.
@@ -54,7 +56,7 @@ class Attractor(Tabled):
     """
 
     cells: CellSet
-    extents: dict[int, list[tuple[float, float]]]
+    extents: dict[int, list[Any]]
     flip_order: tuple[int, ...] | None
     jogs_per_visit: dict[int, tuple[int, int]]
     flips_per_throw: float
@@ -65,7 +67,12 @@ class Attractor(Tabled):
 
     def tables(self) -> tuple[Table, ...]:
         """Give the tables that show it, the one that is saved as CSV first."""
-        rows = [(side, span, self.jogs_per_visit.get(side)) for side, span in bands_of(self.extents)]
+        plane = self.cells.grid.dimension > 1
+        rows = [
+            (side, *(box if plane else [box]), self.jogs_per_visit.get(side))
+            for side, boxes in sorted(self.extents.items())
+            for box in boxes
+        ]
         order = None if self.flip_order is None else " ".join(map(str, self.flip_order))
         of = {
             "flip order": order,
@@ -75,7 +82,9 @@ class Attractor(Tabled):
             "share of the orbit in the cells": self.in_cells,
             "stopped": self.stopped,
         }
-        columns = ("side", Column("x", show=".6g", ends=True), Column("jogs per visit", ends=True))
+        names = [f"x[{axis}]" for axis in range(self.cells.grid.dimension)] if plane else ["x"]
+        spans = [Column(name, show=".6g", ends=True) for name in names]
+        columns: tuple[Column | str, ...] = ("side", *spans, Column("jogs per visit", ends=True))
         return Table(columns, rows, "Attractor", BY_CELLS), facts("Its orbit", of, "sampled, not proved")
 
 
@@ -125,13 +134,17 @@ def _attractor(graph: TransitionGraph, cells: CellSet, throws: int) -> Attractor
     sides, states = path.side[skip:], path.x[skip:]
     met = sum(int(cells.holds(states[sides == s], s).sum()) for s in range(graph.grid.sides))
     inside = met / sides.size
+    extents: dict[int, list[Any]] = (
+        dict(cells.extents()) if cells.grid.dimension == 1 else dict(cells.pieces())
+    )
     order, jogs = _visits(sides)
     flips = float((np.diff(sides) != 0).mean()) if sides.size > 1 else 0.0
     return Attractor(
-        cells, cells.extents(), order, jogs, flips, exponent, max(sides.size - 1, 0), inside, path.stopped
+        cells, extents, order, jogs, flips, exponent, max(sides.size - 1, 0), inside, path.stopped
     )
 
 
+@arguments_checked
 def attractors(graph: TransitionGraph, throws: int = 200_000) -> tuple[Attractor, ...]:
     """Attracting components: those from which no path leads elsewhere.
 
@@ -161,9 +174,6 @@ def attractors(graph: TransitionGraph, throws: int = 200_000) -> tuple[Attractor
     >>> found[0].flip_order, found[0].jogs_per_visit[2]
     ((0, 1, 2), (3, 11))
     """
-    if not isinstance(graph, TransitionGraph):
-        given, way = type(graph).__name__, "limitsets.transitions(scene.map, limitsets.grid(scene.domain))"
-        raise AnswerError("the graph", given, "what limitsets.transitions gives", f"pass {way}")
     if throws < 1:
         raise AnswerError("the number of throws", throws, "an integer from 1", "pass throws=200_000")
     sets = graph.recurrent_components()

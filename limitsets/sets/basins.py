@@ -8,11 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from limitsets.arguments import arguments_checked
 from limitsets.cells import Grid
 from limitsets.errors import AnswerError
 from limitsets.graph import TransitionGraph
 from limitsets.graph.components import reach
-from limitsets.graph.condensation import condense
 from limitsets.maps import codes
 from limitsets.sets.attractors import Attractor
 from limitsets.sets.passing import passing
@@ -59,6 +59,7 @@ class Basins(Tabled):
         return (Table(("where paths end", Column("share", show=".6f")), rows, "Basins", BY_CELLS),)
 
 
+@arguments_checked
 def basins(graph: TransitionGraph, found: tuple[Attractor, ...]) -> Basins:
     """Label every cell with what all its paths end in.
 
@@ -97,7 +98,7 @@ def basins(graph: TransitionGraph, found: tuple[Attractor, ...]) -> Basins:
     weight = graph.grid.measure
     total = float(weight.sum())
     sets, through = graph.recurrent_components(), passing(graph)
-    labels = condense(graph.ranges, graph.components(), graph.exits, sets, through).destination
+    labels = graph.condensation().destinations(through)
     lowest = min(codes.UNDECIDED, *graph.exits.values())
     share = np.bincount(labels - lowest, weights=weight, minlength=len(found) - lowest) / total
     by_code = {code: float(share[code - lowest]) for code in range(lowest, len(found))}

@@ -7,8 +7,9 @@ from typing import Any
 
 import numpy as np
 
+from limitsets.arguments import arguments_checked
 from limitsets.cells import CellSet
-from limitsets.errors import AnswerError
+from limitsets.errors import AnswerError, shown
 from limitsets.graph.graph import TransitionGraph
 from limitsets.sets.cycle import Array, Cycle, Cycles, Ints
 from limitsets.sets.line_cycles import cycles_of
@@ -47,6 +48,7 @@ def _inside(cycle: Cycle, cells: CellSet) -> bool:
     return all(number >= 0 and cells.mask[number] for number in numbers)
 
 
+@arguments_checked
 def cycles(graph: TransitionGraph, up_to: int, within: Any = None) -> Cycles:
     """Find periodic orbits, attracting or not.
 
@@ -81,11 +83,13 @@ def cycles(graph: TransitionGraph, up_to: int, within: Any = None) -> Cycles:
         extents = cells.extents() if cells is not None else getattr(within, "extents", None)
         if not isinstance(extents, Mapping):
             raise AnswerError(
-                "the set to look in", within, "an attractor, limit set or cells", "pass one of these"
+                "the set to look in", shown(within), "an attractor, limit set or cells", "pass one of these"
             )
         return cycles_of(graph.map, extents, graph.grid.domain, up_to)
     if cells is None:
-        raise AnswerError("the set to look in", within, "cells, or an answer with cells", "pass an attractor")
+        raise AnswerError(
+            "the set to look in", shown(within), "cells, or an answer with cells", "pass an attractor"
+        )
     found = cycles_from(graph.map, *_middles(cells), up_to)
     if within is None:
         return found

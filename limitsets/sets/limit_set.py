@@ -11,13 +11,15 @@ attracts, or a set N that was chosen too large.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import groupby
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
-from limitsets.errors import AnswerError
+from limitsets.arguments import arguments_checked
+from limitsets.errors import AnswerError, shown
 from limitsets.graph.graph import TransitionGraph
 from limitsets.graph.morse import morse_graph
 from limitsets.maps.contract import kind_of
@@ -227,6 +229,7 @@ def limit_set_of(
     )
 
 
+@arguments_checked
 def limit_set(
     graph: TransitionGraph, attractor: HasExtents | None = None, tolerance: float = 1e-12
 ) -> LimitSet:
@@ -260,7 +263,10 @@ def limit_set(
     [15.205339, 19.752688]
     """
     if attractor is not None:
-        extents = attractor.extents
+        extents = getattr(attractor, "extents", None)
+        if not isinstance(extents, Mapping):
+            remedy = "pass one of limitsets.attractors(graph), such as limitsets.attractors(graph)[0]"
+            raise AnswerError("the argument attractor of limit_set", shown(attractor), "an attractor", remedy)
     else:
         nodes = morse_graph(graph).nodes.values()
         attracting = [node["extents"] for node in nodes if node["attracting"]]

@@ -135,7 +135,11 @@ class TopologyClass(NamedTuple):
 
     @property
     def words(self) -> str:
-        """What a legend says of it."""
+        """What a legend says of it, for a throw."""
+        return self.said("collapse", "collapses")
+
+    def said(self, *collapse: str) -> str:
+        """Say it with these words for what starts do that collapse, and for what every start does."""
         count = len(self.attractors)
         found = f"{_COUNTS[count] if count < len(_COUNTS) else count} attractor{'s' * (count != 1)}"
         kinds = [each.words for each in self.attractors]
@@ -143,9 +147,9 @@ class TopologyClass(NamedTuple):
             found += f", {kinds[0]}"
         elif count > 1:
             found += f", each {kinds[0]}" if len(set(kinds)) == 1 else f": {'; '.join(kinds)}"
-        ways = [(self.leaves, "leave"), (self.collapses, "collapse")]
-        said = [f"{share} starts {way}" for share, way in ways if share == "some"]
-        said += [f"every start {way}s" for share, way in ways if share == "all"]
+        ways = [(self.leaves, ("leave", "leaves")), (self.collapses, collapse)]
+        said = [f"{share} starts {several}" for share, (several, _) in ways if share == "some"]
+        said += [f"every start {one}" for share, (_, one) in ways if share == "all"]
         return "; ".join((found, " and ".join(said))) if said else found
 
 
@@ -291,7 +295,9 @@ def legend(dataset: xr.Dataset) -> list[Entry]:
         here = numbers == number
         if not here.any():
             continue
-        words = "undecided" if number == UNDECIDED else named_class(name).words + _jogs(dataset, here)
+        own = "map" in dataset.attrs.get("plan", {})  # which has no joint: code -1 is an exit of its own
+        way = ("leave by the exit -1", "leaves by the exit -1") if own else ("collapse", "collapses")
+        words = "undecided" if number == UNDECIDED else named_class(name).said(*way) + _jogs(dataset, here)
         entries.append(Entry(number, name, words, float(here.sum() / there.sum())))
     return sorted(entries, key=lambda each: (each.number == UNDECIDED, -each.share, each.name))
 

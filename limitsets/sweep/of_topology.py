@@ -45,6 +45,7 @@ def _variables(
     each = (("attractor", MOST_ATTRACTORS),)
     sides = (*each, ("side", subject.sides))
     doubts = "; ".join(f"{word}: {DOUBTS[number]}" for word, number in _CODES.items())
+    back = "come back to the joint" if isinstance(subject, SceneSubject) else "leave by the exit -1"
     found = {
         "attractors": Variable("int8", about="how many attractors"),
         "undecided": Variable("int8", codes=_CODES, about=doubts),
@@ -59,7 +60,7 @@ def _variables(
         "reach": Variable(dims=sides, unit="length", about="largest x of the attractor on each side"),
         "share": Variable(dims=each, about="of the starts, those that come to the attractor"),
         "leaves": Variable(about="of the starts, those that leave"),
-        "collapses": Variable(about="of the starts, those that come back to the joint"),
+        "collapses": Variable(about=f"of the starts, those that {back}"),
         "flips_per_throw": Variable(dims=each, about="mean along one orbit", default=False),
         "lyapunov": Variable(dims=each, about="Lyapunov exponent per throw", default=False),
         "lyapunov_error": Variable(dims=each, about="its standard error", default=False),

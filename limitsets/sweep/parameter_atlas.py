@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from limitsets.arguments import arguments_checked
 from limitsets.cells import as_domain
 from limitsets.errors import LimitsetsError
 from limitsets.files import as_plain
@@ -102,7 +103,8 @@ class Atlas(Tabled):
             counts = [(word, int((values == code).sum())) for word, code in codes]
             return name, ", ".join(f"{count} {word}" for word, count in counts if count), ""
         good = values[np.isfinite(values) if values.dtype.kind == "f" else values >= 0]
-        said = f"{good.min():.9g} to {good.max():.9g}" if good.size else "none"
+        ends = [f"{end:.9g}" for end in dict.fromkeys((good.min(), good.max()))] if good.size else []
+        said = "none" if not ends or (name == "period" and ends == ["0"]) else " to ".join(ends)
         return name, said, attributes.get("units", "")
 
     def to_json(self) -> dict[str, Any]:
@@ -202,6 +204,7 @@ def _table(variable: xr.DataArray) -> dict[str, Any]:
 
 
 @shown_in_notebooks
+@arguments_checked
 def atlas(
     subject: Any,
     x: str | Axis,
@@ -321,7 +324,7 @@ def plan_of(
 ) -> Plan:
     """Make the plan of an atlas, and refuse one that cannot be carried out (`atlas`)."""
     chosen = _subject(subject, domain)
-    axes = tuple(axis_of(each, chosen.unit_of) for each in (y, x) if each is not None)
+    axes = tuple(axis_of(each, chosen.unit_of) for each in ((x,) if y is None else (y, x)))
     name = named(TOPOLOGY if task is None else task)
     resolved(name)
     shape = tuple(axis.values.size for axis in axes)

@@ -19,31 +19,61 @@ __all__ = ["Energy", "Exact", "Side", "Signed", "SmallAngle", "SmallAngle2", "Th
 
 
 class Exact(NamedTuple):
-    """Flight with the rotation kept exact."""
+    """Flight with the rotation kept exact.
+
+    Attributes
+    ----------
+    full_turn : float
+        Angle up to which a landing is looked for [rad].
+    """
 
     full_turn: float = 2.0 * math.pi
 
 
 class SmallAngle(NamedTuple):
-    """The paper's flight: sin phi -> phi, cos phi -> 1."""
+    """The paper's flight: sin phi -> phi, cos phi -> 1.
+
+    Attributes
+    ----------
+    full_turn : float
+        Angle up to which a landing is looked for [rad].
+    """
 
     full_turn: float = 2.0 * math.pi
 
 
 class SmallAngle2(NamedTuple):
-    """Small-angle flight to consistent second order: phi = 2 (R - a) / (kappa - d)."""
+    """Small-angle flight to consistent second order: phi = 2 (R - a) / (kappa - d).
+
+    Attributes
+    ----------
+    full_turn : float
+        Angle up to which a landing is looked for [rad].
+    """
 
     full_turn: float = 2.0 * math.pi
 
 
 class Signed(NamedTuple):
-    """A flip needs the part to rotate towards the vertex with enough energy."""
+    """A flip needs the part to rotate towards the vertex with enough energy.
+
+    Attributes
+    ----------
+    sign : float
+        1: the direction of the rotation counts.
+    """
 
     sign: float = 1.0
 
 
 class Energy(NamedTuple):
-    """The paper's criterion: a flip needs enough energy, whichever way the part rotates."""
+    """The paper's criterion: a flip needs enough energy, whichever way the part rotates.
+
+    Attributes
+    ----------
+    sign : float
+        0: the direction of the rotation does not count.
+    """
 
     sign: float = 0.0
 

@@ -167,7 +167,7 @@ def tray_design(
     >>> found.right.shape, found.best[0] in found.depths, found.confirmed.seed
     ((2, 1), True, 1)
     """
-    read = scene if isinstance(scene, Scene) else load(scene)
+    read = load(scene)
     if not len(depths) or not len(agitations) or read.tray is None:
         allowed = "one or more of each, of a scene with [tray]"
         value = (len(depths), len(agitations))

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from limitsets.arguments import arguments_checked
 from limitsets.errors import AnswerError
 from limitsets.files import as_table
 from limitsets.progress import shown_in_notebooks
@@ -135,6 +136,7 @@ class TrayFill(Tabled):
 
 
 @shown_in_notebooks
+@arguments_checked
 def tray(
     scene: Scene | str | Path | Mapping[str, Any],
     *,
@@ -212,7 +214,7 @@ def tray(
     >>> found.filled.right.size, bool(0.0 < found.filled.right[-1] < 1.0)
     (21, True)
     """
-    read = scene if isinstance(scene, Scene) else load(scene)
+    read = load(scene)
     if passes < 1 or histories < 0:
         raise AnswerError(
             "the passes and histories", (passes, histories), "1 or more; 0 or more", "correct them"

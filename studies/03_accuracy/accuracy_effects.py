@@ -29,6 +29,9 @@ STARTS, TRANSIENT = 4000, 1000
 # Where a difference of nothing is drawn, for a logarithm has no place for it [in].
 NOTHING = 1e-14
 
+# One for each effect, so that grey prints tell them apart.
+MARKERS = "osD^vP"
+
 
 class Cost(NamedTuple):
     """One effect.
@@ -106,12 +109,12 @@ def effects_figure(panels: Mapping[str, list[Cost]], unit: str = "in") -> Figure
             low, high = max(row.typical, NOTHING), max(row.worst, NOTHING)
             axes.plot([row.ratio] * 2, [low, high], color=f"C{k}", marker="_", linewidth=2)
             label = f"{row.name}: {row.changed:.1%} land elsewhere"
-            axes.plot(row.ratio, low, "o", color=f"C{k}", label=label)
+            axes.plot(row.ratio, low, MARKERS[k], color=f"C{k}", ls="", label=label)
         axes.set(xscale="log", yscale="log", title=title, ylim=(NOTHING / 3, 10.0))
         axes.set_xlabel("seconds of a throw, relative to the bare map")
         axes.axhspan(NOTHING / 3, 3 * NOTHING, color="0.92")
         axes.annotate(
-            "no difference but rounding", (0.97, 0.03), xycoords="axes fraction", color="0.35", ha="right"
+            "no difference but rounding", (0.97, 0.08), xycoords="axes fraction", color="0.35", ha="right"
         )
         axes.grid(alpha=0.25)
         axes.legend(loc="upper left", bbox_to_anchor=(0.0, -0.16), ncols=1, frameon=False, fontsize=9)

@@ -164,4 +164,6 @@ def test_the_figure_has_a_case_of_each_outcome(found, tmp_path):
     figure = ls.plot.assembly(found)
     titles = [axes.get_title(loc="left") for axes in figure.axes]
     assert sum("(trial" in title for title in titles) == sum(count > 0 for count in found.counts.values())
+    words = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert words == [scene.name for scene in found.pair.scenes]  # which of the parts is which
     figure.savefig(tmp_path / "assembly.png")

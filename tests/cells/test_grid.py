@@ -127,3 +127,10 @@ def test_cells_narrower_than_the_spacing_of_numbers_are_refused_however_they_are
     near = Domain([[2.0 + 1e-15]], [[2.0 + 3e-15]], [2.0])
     with pytest.raises(GridError, match="spacing"):
         ls.grid(near, cells=64)
+
+
+def test_a_grid_is_shown_as_a_table():
+    cover = ls.grid([(0.0, 1.0), (0.0, 4.0)], cells=(4, 8))
+    assert cover.table().shown() == [["0", "0", "4", "0 to 1", "0.25"], ["0", "1", "8", "0 to 4", "0.5"]]
+    assert "Grid of 32 cells" in cover._repr_html_()
+    assert repr(cover) == "Grid(32 cells: 4x8)"

@@ -203,6 +203,22 @@ def test_design_for_the_goal(capfd):
     assert run(capfd, "design", "paper-designed", "--goal", "--robust")[0] == 2
 
 
+def test_a_design_that_is_not_proved_names_a_command_to_paste(capfd, monkeypatch):
+    """It said: limitsets certify on the scene found."""
+    from dataclasses import replace
+
+    from limitsets.inverse.margin import for_goal
+
+    found = for_goal.design_for_goal(ls.load("paper-designed"), vary=["throw.kappa"], evaluations=10)
+    monkeypatch.setattr(for_goal, "design_for_goal", lambda *_, **__: replace(found, verdict="undecided"))
+    code, out, _ = run(capfd, "design", "paper-designed", "--goal")
+    assert code == 1
+    assert "next: add -o design.toml to this command, then limitsets certify design.toml (" in out
+    _, out, _ = run(capfd, "design", "paper-designed", "--goal", "-o", "my design.toml")
+    assert "next: limitsets certify 'my design.toml' (" in out
+    assert Path("my design.toml").exists()
+
+
 @pytest.mark.sweep
 def test_a_robust_design_that_was_ended_is_on_disk(capfd, monkeypatch):
     from limitsets.inverse.margin import for_margin

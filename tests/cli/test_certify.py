@@ -235,3 +235,23 @@ def test_ctrl_c_reaches_the_helpers_without_a_traceback(capfd):
     _, err = process.communicate()
     assert process.returncode in (130, 0)  # or it had finished
     assert "Traceback" not in err
+
+
+@pytest.mark.parametrize(
+    ("words", "next_one"),
+    [
+        (("paper-initial",), "limitsets design paper-initial --goal"),
+        (("paper-designed", "--noise", "throw.speed=9 %"), "limitsets margin paper-designed"),
+    ],
+    ids=["refuted", "too much noise"],
+)
+def test_what_is_not_proved_names_the_next_command(capfd, words, next_one):
+    code, out, _ = run(capfd, "certify", *words, "--no-recheck")
+    assert code == 1
+    assert out.splitlines()[-1].startswith(f"next: {next_one} ")
+
+
+def test_a_share_that_is_undecided_names_the_next_command(capfd):
+    _, out, _ = run(capfd, "analyse", "paper-designed", "--cells", "64")
+    assert "of all starts; next: limitsets analyse paper-designed --cells 256 (finer cells)" in out
+    assert "undecided: " not in run(capfd, "analyse", "paper-designed", "--cells", "8192")[1]

@@ -210,3 +210,61 @@ def test_the_doctor_clears_the_compiled_code(capfd, monkeypatch, tmp_path):
     record = json.loads(run(capfd, "doctor", "--json", "--clear")[1])["cache"]
     assert (record["bytes"], record["versions"], record["cleared"]) == (1000, 1, True)
     assert not folder.exists()
+
+
+def test_all_contradictions_of_one_table_are_told():
+    tree = ls.load("paper-designed").as_dict()
+    tree["goal"] = {"oriented_beyond": {"x": "99 in", "side": 7}}
+    tree["tolerance"] = {"throw.speed": "200 %", "arm.length": "-1 in", "gravity.tilt": "1 deg"}
+    tree["world"] = {"stroke": "-30 deg", "throw_rate": "-2 Hz"}
+    keys = ["world.stroke", "world.throw_rate", "goal.oriented_beyond.x", "goal.oriented_beyond.side"]
+    assert {error.key for error in problems(tree)} == {
+        *keys,
+        'tolerance."throw.speed"',
+        'tolerance."arm.length"',
+    }
+
+
+def test_a_new_scene_in_millimetres_is_the_same_feeder(capfd, tmp_path):
+    file = tmp_path / "mine.toml"
+    assert run(capfd, "new", str(file), "--unit", "mm")[0] == 0
+    text = file.read_text(encoding="utf-8")
+    assert ' in"' not in text.partition("[part]")[2]
+    scene, like = ls.load(file), ls.load("paper-designed")
+    assert scene.unit == "mm"
+    assert scene.arm_length == pytest.approx(25.4 * like.arm_length, rel=1e-9)
+    assert scene.kappa == pytest.approx(25.4 * like.kappa, rel=1e-9)
+    code, _, err = run(capfd, "new", str(tmp_path / "other.toml"), "--unit", "yd")
+    assert code == 2
+    assert "mm" in err
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("throw", "paper-designed", "--x", "8", "--side", "two"), "'two' is not a whole number"),
+        (("plot", "paper-designed", "limitset"), "did you mean 'limit-set'?"),
+        (("analyse", "paper-designed", "throw.speed=150"), "scene.with_values({'throw.speed': '150 UNIT'})"),
+        (("analyse", "paper-designed", "--set", "throw.speed=150 deg/s"), "write it into the scene's file"),
+    ],
+)
+def test_what_the_parser_refuses_is_said_in_plain_words(capfd, words, said):
+    code, _, err = run(capfd, *words)
+    assert code == 2
+    assert said in err
+    assert "Input should be" not in err
+    assert "Value error" not in err
+
+
+def test_how_far_a_centre_of_mass_lies_outside_has_a_unit():
+    tree = ls.load("paper-designed").as_dict()
+    tree["part"]["mass"]["center"]["above"] = "-9 in"
+    with pytest.raises(SceneError, match=r"it lies outside, 9 in beyond side 2"):
+        ls.load(tree)
+
+
+def test_a_scene_is_printed_as_its_tables():
+    scene = ls.load("paper-designed")
+    assert repr(scene) == "Scene('paper-designed', 3 sides, arm 28 in, kappa 25.3779 in)"
+    assert "arm length [in]" in str(scene)
+    assert "array(" not in str(scene)

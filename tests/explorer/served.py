@@ -17,6 +17,7 @@ ARGS = [
     "--disable-sync", "--no-first-run",
 ]  # fmt: skip
 CHROMIUM = Path("/usr/bin/chromium")
+HANDLE = 16.0  # of the browser's own slider [pixels]
 
 
 @contextmanager
@@ -36,6 +37,7 @@ def running(*arguments: str) -> Iterator[str]:
             said = process.stdout.readline()
             found = re.search(r"http://\S+", said)
             assert found, said
+            assert said.startswith(("explorer: ", "http")), said  # no other line before it
             yield found[0]
         finally:
             process.send_signal(signal.SIGINT)
@@ -72,18 +74,24 @@ class Visitor:
         self.page.on("pageerror", lambda error: self.complaints.append(str(error)))
         self.page.on("request", lambda request: self.asked.append(request.url))
         self.page.goto(address)
-        self.page.wait_for_selector(".noUi-handle", timeout=60_000)
+        self.page.wait_for_selector("input[type=range]", timeout=60_000)
         self.page.wait_for_function("window.Bokeh && Bokeh.documents.length > 0")
+        self.page.locator("canvas[data-name]").first.wait_for()
 
     def columns(self, name: str) -> dict[str, list[Any]]:
-        """Give what a picture shows, by the name of its source."""
-        script = """name => { const data = Bokeh.documents[0].get_model_by_name(name).data;
-            return Object.fromEntries(Object.entries(data).map(([key, value]) => [key, Array.from(value)])) }"""
-        found: dict[str, list[Any]] = self.page.evaluate(script, name)
-        return found
+        """Give what a picture shows, by the name of its layer."""
+        script = (
+            "(all, name) => all.flatMap((each) => each.shown.layers).find((each) => each.called === name)"
+        )
+        found: dict[str, Any] = self.page.locator("canvas[data-name]").evaluate_all(script, name)
+        return {key: value for key, value in found.items() if isinstance(value, list)}
+
+    def canvas(self, name: str) -> Any:
+        """Find a picture."""
+        return self.page.locator(f'canvas[data-name="{name}"]')
 
     def changed(self, name: str, before: Any) -> Any:
-        """Wait until a source holds something else than before."""
+        """Wait until a layer holds something else than before."""
         for _ in range(200):
             now = self.columns(name)
             if now != before:
@@ -92,7 +100,7 @@ class Visitor:
         pytest.fail(f"{name} did not change")
 
     def settled(self, name: str) -> Any:
-        """Wait until a source has held the same for a second."""
+        """Wait until a layer has held the same for a second."""
         last, same = self.columns(name), 0
         for _ in range(200):
             self.page.wait_for_timeout(100)
@@ -103,23 +111,15 @@ class Visitor:
         pytest.fail(f"{name} did not settle")
 
     def figure(self, name: str) -> dict[str, float]:
-        """Say where the frame of a figure is on the screen."""
-        script = """name => { const view = Bokeh.index.find_one(Bokeh.documents[0].get_model_by_name(name));
-            const box = view.frame.bbox, at = view.canvas_view.el.getBoundingClientRect(),
-                [x, y] = [view.frame.x_scale, view.frame.y_scale];
-            const ranges = [x.source_range, y.source_range];
-            return {left: at.left + box.left, top: at.top + box.top, width: box.width, height: box.height,
-                x0: ranges[0].start, x1: ranges[0].end, y0: ranges[1].start, y1: ranges[1].end} }"""
-        found: dict[str, float] = self.page.evaluate(script, name)
+        """Say where the frame of a picture is on the screen."""
+        script = """canvas => { const at = canvas.getBoundingClientRect(), frame = canvas.frame;
+            return {...frame, left: at.left + frame.left, top: at.top + frame.top} }"""
+        found: dict[str, float] = self.canvas(name).evaluate(script)
         return found
 
     def at(self, name: str, x: float, y: float) -> tuple[float, float]:
-        """Give the place on the screen of a point of a figure, after scrolling it into sight."""
-        self.page.evaluate(
-            """name => Bokeh.index.find_one(Bokeh.documents[0].get_model_by_name(name)).el
-                .scrollIntoView({block: 'center'})""",
-            name,
-        )
+        """Give the place on the screen of a point of a picture, after scrolling it into sight."""
+        self.canvas(name).evaluate("canvas => canvas.scrollIntoView({block: 'center'})")
         box = self.figure(name)
         across = (x - box["x0"]) / (box["x1"] - box["x0"])
         up = (y - box["y0"]) / (box["y1"] - box["y0"])
@@ -134,6 +134,13 @@ class Visitor:
 
     def slide(self, number: int, by: float) -> None:
         """Drag the handle of a slider [pixels]."""
-        box = self.page.locator(".noUi-handle").nth(number).bounding_box()
-        x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+        x, y = self.handle(number)
         self.drag((x, y), (x + by, y))
+
+    def handle(self, number: int) -> tuple[float, float]:
+        """Say where the handle of a slider is on the screen."""
+        bar = self.page.locator("input[type=range]").nth(number)
+        bar.scroll_into_view_if_needed()
+        box = bar.bounding_box()
+        share = bar.evaluate("bar => (bar.value - bar.min) / (bar.max - bar.min)")
+        return box["x"] + HANDLE / 2 + share * (box["width"] - HANDLE), box["y"] + box["height"] / 2

@@ -7,11 +7,22 @@ import sys
 import time
 
 import pytest
-from bokeh.events import Pan, PanEnd, PanStart
 
 import limitsets as ls
 from limitsets.errors import AnswerError, LimitsetsError, SceneError
 from tests.maps_of_tests import TwoState
+
+LEAD = """
+name = "lead"
+[part]
+vertices = [["0 mm", "0 mm"], ["30 mm", "0 mm"], ["0 mm", "20 mm"]]
+mass = { plate_density = "3 kg/m^2", points = [{ x = "20 mm", y = "4 mm", mass = "8 g" }] }
+[arm]
+length = "150 mm"
+surface_height = "-1 mm"
+[throw]
+kappa = "90 mm"
+"""
 
 
 @pytest.fixture
@@ -60,21 +71,21 @@ def test_what_is_typed_moves_the_slider(page):
 
 
 def test_the_mark_in_the_part_moves_the_centre_of_mass(page):
-    figure, (x, y) = page.part.figure, page.scene.centre
-    page._dragged(PanStart(figure, x=x + 3.0, y=y))  # beside the mark
-    page._dragged(Pan(figure, x=2.0, y=1.5))
+    hand, (x, y) = page.part.canvas._handle_msg, page.scene.centre
+    hand({"what": "grasp", "x": x + 3.0, "y": y})  # beside the mark
+    hand({"what": "drag", "x": 2.0, "y": 1.5})
     page.beat()
     assert page.scene.centre == (x, y)
-    page._dragged(PanStart(figure, x=x, y=y))
-    page._dragged(Pan(figure, x=2.0, y=1.5))
+    hand({"what": "grasp", "x": x, "y": y})
+    hand({"what": "drag", "x": 2.0, "y": 1.5})
     page.beat()
     assert page.scene.centre == pytest.approx((2.0, 1.5))
-    page._dragged(Pan(figure, x=-9.0, y=1.5))  # out of the part: the mark stays
+    hand({"what": "drag", "x": -9.0, "y": 1.5})  # out of the part: the mark stays
     page.beat()
     assert "wrong" in page._error.object
     assert page.part.centre.data["x"] == [pytest.approx(2.0)]
-    page._dragged(PanEnd(figure))
-    page._dragged(Pan(figure, x=2.5, y=1.5))
+    hand({"what": "release", "x": 2.0, "y": 1.5})
+    hand({"what": "drag", "x": 2.5, "y": 1.5})
     page.beat()
     assert page.part.centre.data["x"] == [pytest.approx(2.0)]
 
@@ -108,6 +119,47 @@ def test_throws_are_shown_from_a_start_and_end_where_the_map_says(page):
     assert page.lanes._start.data["x"] == [pytest.approx(last.x)]
     page.throw(-5.0, 0)
     assert "wrong" in page._error.object
+
+
+def test_the_arm_is_near_again_after_a_film(page):
+    near = dict(page.arm.canvas.view)
+    page.throw(21.0, 2)
+    assert page.arm.canvas.view["y"][1] > near["y"][1]  # the flight is in sight
+    page._began -= 1000.0
+    page.beat()
+    assert page.arm.canvas.view == near
+
+
+def test_added_masses_are_drawn_where_they_are(page):
+    page.open(ls.load(LEAD))
+    page.beat()
+    masses, words = page.part._masses.data, page.part._heavy.data["words"]
+    assert (masses["x"], masses["y"], words) == ([20.0], [4.0], ["8 g"])
+    page.sliders.put({"part.mass.points[0].x": 10.0})
+    page.beat()
+    assert page.part._masses.data["x"] == [10.0]
+
+
+def test_throws_outside_the_model_are_said(page):
+    assert page._careful.object == ""
+    page._wrote = -1.0  # text is written a few times a second
+    page.sliders.put({"throw.speed": 3000.0})  # no start lands within a full turn
+    page.beat()
+    assert "careful: from 100 % of the starts" in page._careful.object
+
+
+def test_what_a_browser_sends_as_a_place_may_be_anything(page):
+    for sent in (
+        None,
+        "tap",
+        {},
+        {"what": "tap", "x": "1", "y": 2},
+        {"what": "tap", "x": 1.0, "y": math.inf},
+    ):
+        page.lanes.canvas._handle_msg(sent)
+    assert page._film is None
+    page.lanes.canvas._handle_msg({"what": "tap", "x": 21.0, "y": -2.0})
+    assert page._film is not None
 
 
 def test_a_scene_from_outside_is_opened_and_a_path_is_not(page, tmp_path):
@@ -202,10 +254,16 @@ def test_a_stored_atlas_is_shown_and_a_point_of_it_opened(tmp_path):
     ls.atlas("paper-designed", *axes, store=tmp_path / "a.zarr")
     page = ls.explore("paper-designed", atlas=tmp_path / "a.zarr").page()
     assert len(page.atlas._boxes.data["left"]) == 9
-    page.atlas._clicked(151.0, -0.29)
+    page.atlas._canvas._handle_msg({"what": "tap", "x": 151.0, "y": -0.29})
     page.beat()
     assert math.degrees(page.scene.value("throw.speed")) == pytest.approx(150.0)
     assert page.scene.surface_height == pytest.approx(-0.3)
+    steps = ("step", 1.0, 0.0), ("step", 1.0, 1.0), ("step", 1.0, 0.0), ("enter", 0.0, 0.0)  # to the corner
+    for what, x, y in steps:
+        page.atlas._canvas._handle_msg({"what": what, "x": x, "y": y})
+    page.beat()
+    assert math.degrees(page.scene.value("throw.speed")) == pytest.approx(160.0)
+    assert page.scene.surface_height == pytest.approx(-0.2)
     page.close()
 
 

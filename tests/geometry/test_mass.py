@@ -64,7 +64,7 @@ def test_serves_other_numbers() -> None:
         (math.nan, [], "density"),
         (1.0, [(1, 1, 0.0)], "mass of point 0"),
         (1.0, [(1, 1, 1.0), (1, 1, -2.0)], "mass of point 1"),
-        (1.0, [(-0.5, 1, 1.0)], "point mass 0 .*outside, 0.5 beyond side 1"),
+        (1.0, [(-0.5, 1, 1.0)], "point mass 0 .*outside, 0.5 .length. beyond side 1"),
     ],
 )
 def test_refuses_masses_that_cannot_be(

@@ -126,5 +126,5 @@ def test_boundary_is_inside_and_beyond_it_is_not() -> None:
     square = convex_polygon(SQUARE)
     for point in [(0, 0), (1, 0.5), (0.5, 0), (0.3, 0.9)]:
         require_inside(square, point, "the point")
-    with pytest.raises(GeometryError, match=r"the point is .*0\.25 beyond side 3"):
+    with pytest.raises(GeometryError, match=r"the point is .*0\.25 \[length\] beyond side 3"):
         require_inside(square, (1.25, 0.5), "the point")

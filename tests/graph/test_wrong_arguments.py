@@ -1,27 +1,252 @@
-"""What a beginner passes in place of a map, a domain, a grid and a graph: the error says what to pass."""
+"""What a beginner passes in the wrong place: every public function says which argument is wrong, and what to pass."""
 
+import inspect
+
+import numpy as np
 import pytest
 
 import limitsets as ls
-from limitsets.errors import AnswerError, GridError, MapError
+from limitsets.errors import AnswerError, GridError, LimitsetsError, MapError
+from limitsets.graph import memory
+from tests.maps_of_tests import Contraction
 
 SCENE = ls.load("paper-designed")
+GRID = ls.grid(SCENE.domain, cells=64)
+GRAPH = ls.transitions(SCENE.map, GRID)
+FOUND = ls.attractors(GRAPH, throws=100)
+
+WRONG = {
+    "nothing": None,
+    "text": "nonsense",
+    "whole number": 3,
+    "number": -0.5,
+    "nan": float("nan"),
+    "empty list": [],
+    "pair": (1, 2),
+    "array": np.array([1.0, 2.0]),
+    "scene": SCENE,
+    "map": SCENE.map,
+    "graph": GRAPH,
+    "grid": GRID,
+    "attractors": FOUND,
+    "object": object(),
+}
+
+# Values of WRONG that an annotation lets pass, by the words in it.
+FITS = {
+    "None": {"nothing"},
+    "str": {"text"},
+    "Path": {"text"},
+    "int": {"whole number"},
+    "float": {"whole number", "number"},
+    "Scene": {"scene"},
+    "TransitionGraph": {"graph"},
+    "Grid": {"grid"},
+    "tuple[Attractor, ...]": {"attractors", "empty list"},
+    "tuple[float, int]": {"pair"},
+    "tuple[str, ...]": {"empty list"},
+    "Sequence": {"empty list"},
+    "Sequence[int]": {"empty list", "pair"},
+    "Sequence[float]": {"empty list", "pair", "array"},
+}
+
+# What the annotation does not say: `Any`, and the words that stand for several kinds.
+FITS_OF = {
+    ("orbit", "x"): {"whole number", "number"},
+    ("orbit", "params"): {"map"},
+    ("transitions", "map"): {"map"},
+    ("cycles", "within"): {"nothing"},
+    ("critical_points", "params"): {"map"},
+    ("critical_points", "domain"): set(),
+    ("limit_set", "attractor"): {"nothing"},
+    ("grid", "domain"): {"pair", "array"},
+    ("grid", "cells"): {"whole number"},
+    ("load", "source"): {"scene", "text"},
+    ("atlas", "x"): {"text"},
+    ("design", "critical_points"): {"empty list", "pair", "array"},
+    ("atlas", "subject"): {"scene", "map", "text"},
+    ("continuation", "path"): set(),
+    ("plot.basins", "source"): {"scene", "map", "graph", "grid"},
+    ("plot.basins", "found"): {"nothing", "attractors", "empty list"},
+    ("plot.limit_set", "found"): {"attractors", "empty list"},
+    ("plot.map", "found"): {"nothing", "attractors", "empty list"},
+}
+
+# Words in an annotation of which nothing is known here, so that only the parameters in FITS_OF are asked.
+OPEN = ("Any", "Axis", "Curve", "GoalLike", "Bounds", "Starts", "Sensor", "Executor", "ArrayLike", "Sides", "Goal",
+        "HasExtents", "Start", "Extents", "Axes", "type", "Throws", "Levels", "Points")  # fmt: skip
+
+GOOD = {
+    "scene": SCENE,
+    "scene2": SCENE,
+    "graph": GRAPH,
+    "found": FOUND,
+    "map": SCENE.map,
+    "params": SCENE.map,
+    "grid": GRID,
+    "domain": SCENE.domain,
+    "source": SCENE,
+    "subject": SCENE,
+    "x": 20.0,
+    "side": 0,
+    "count": 3,
+    "up_to": 2,
+    "shares": ls.basins(GRAPH, FOUND),
+    "critical_points": [10.0, 10.0, 20.0],
+    "vary": ["throw.speed"],
+    "path": {"throw.speed": ("2 rad/s", "3 rad/s")},
+    "at": {"level": 1.0},
+    "corners": [(0.0, 0.0)],
+    "seat": np.zeros((3, 2)),
+    "file": "none.gif",
+    "throws": "none.csv",
+    "variable": "class",
+    "orbit": [],
+}
+
+
+def _public():
+    rooms = {"": ls, "plot.": ls.plot, "resilience.": ls.resilience, "engine.": ls.engine}
+    for prefix, room in rooms.items():
+        for name in room.__all__:
+            function = getattr(room, name)
+            if inspect.isfunction(function) and name not in ("scenes", "register"):
+                # of `certify`, which asks its first argument whether a scene or a map is meant, both
+                yield prefix + name, getattr(function, "dispatch", lambda kind, own=function: own)(object)
+    yield "certify_map", ls.certify.dispatch(tuple)
+
+
+def _words(annotation):
+    tail = annotation.replace(" ", "")
+    for mark in "[]|,":
+        tail = tail.replace(mark, " ")
+    return [word.rpartition(".")[2] for word in tail.split()]
+
+
+def _fitting(name, parameter):
+    """Names of the values that fit; None where neither the annotation nor the table above tells."""
+    if (name, parameter.name) in FITS_OF:
+        return FITS_OF[name, parameter.name]
+    annotation = parameter.annotation
+    if set(_words(annotation)) & set(OPEN):
+        return None
+    return set().union(*(FITS.get(part.strip(), set()) | FITS.get(part.partition("[")[0].strip(), set())
+                         for part in annotation.split(" | ")))  # fmt: skip
+
+
+CASES = [
+    (name, function, parameter.name, fitting)
+    for name, function in _public()
+    for parameter in inspect.signature(function).parameters.values()
+    if parameter.kind != inspect.Parameter.VAR_KEYWORD and (fitting := _fitting(name, parameter)) is not None
+]
+
+
+ANSWERS = ("found", "levels", "margin")
+
+
+def _good(parameter):
+    """Give a value that fits: of an answer that would take long, an empty one of its class."""
+    if parameter.annotation.isidentifier() and parameter.name in ANSWERS:
+        return type(parameter.annotation, (), {})()
+    return "none" if parameter.annotation == "str | Path" else GOOD[parameter.name]
+
+
+@pytest.mark.parametrize(
+    ("name", "function", "asked", "fitting"), CASES, ids=[f"{name}-{asked}" for name, _, asked, _ in CASES]
+)
+def test_an_argument_of_the_wrong_kind_is_named(name, function, asked, fitting):
+    parameters = inspect.signature(function).parameters
+    required = [each for each in parameters.values() if each.default is inspect.Parameter.empty]
+    for word, wrong in WRONG.items():
+        if word in fitting:
+            continue
+        given = {
+            each.name: _good(each)
+            for each in required
+            if each.kind not in (each.VAR_POSITIONAL, each.VAR_KEYWORD) and each.name != asked
+        }
+        several = parameters[asked].kind == inspect.Parameter.VAR_POSITIONAL
+        with pytest.raises(LimitsetsError) as error:
+            function(*given.values(), wrong) if several else function(**{**given, asked: wrong})
+        named = (f"the argument {asked} of", "the source of a scene", *NAMED.get(asked, ()))
+        assert any(words in str(error.value) for words in named), (word, str(error.value))
+        assert error.value.allowed
+        assert error.value.remedy
+
+
+# How an argument is named by a check that says more of it than its kind.
+NAMED = {
+    "params": ("the map is",),
+    "map": ("the map is",),
+    "subject": ("the map is", "the source of a scene"),
+    "domain": ("the domain",),
+    "cells": ("the number of cells",),
+    "x": ("the start x", "the axis"),
+    "within": ("the set to look in",),
+    "path": ("the path",),
+    "goal": ("the goal",),
+    "source": ("what to draw", "the map is"),
+    "found": ("what to draw",),
+    "grid": ("the grid is",),
+    "depth": ("the depth of the grid",),
+    "grading": ("the grading",),
+}
 
 
 @pytest.mark.parametrize(
     ("asked", "error", "said"),
     [
         (lambda: ls.grid(SCENE), GridError, "the domain is 'Scene'.*pass its .domain"),
-        (lambda: ls.transitions(SCENE, ls.grid(SCENE.domain)), MapError, "the map is 'Scene'.*pass its .map"),
+        (lambda: ls.transitions(SCENE, GRID), MapError, "the map is 'Scene'.*pass its .map"),
         (
             lambda: ls.transitions(SCENE.map, SCENE.domain),
             AnswerError,
-            "the grid is 'Domain'.*pass limitsets.grid",
+            "grid of transitions is 'a Domain'.*pass limitsets.grid",
         ),
-        (lambda: ls.attractors(SCENE), AnswerError, "the graph is 'Scene'.*pass limitsets.transitions"),
+        (
+            lambda: ls.attractors(SCENE),
+            AnswerError,
+            "graph of attractors is 'a Scene'.*limitsets.transitions",
+        ),
+        (
+            lambda: ls.limit_set(GRAPH, FOUND),
+            AnswerError,
+            r"attractor of limit_set.*attractors\(graph\)\[0\]",
+        ),
+        (lambda: ls.critical_points(SCENE.map, [(5, 28)]), AnswerError, "the domain.*pass scene.domain"),
+        (lambda: ls.certify(Contraction()), AnswerError, "the grid is None.*limitsets.certify"),
+        (lambda: ls.orbit(SCENE.map, "8 in", 0, 3), MapError, "start x is '8 in'.*in the map's own unit"),
+        (lambda: ls.plot.flight(SCENE, 30.0, 0), AnswerError, "start x is 30.0.*at most 28 in"),
+        (lambda: ls.attractors(GRAPH, throws=1e5), AnswerError, "pass throws=200000"),
     ],
-    ids=["domain", "map", "grid", "graph"],
+    ids=["domain", "map", "grid", "graph", "tuple", "list", "no grid", "unit", "flight", "float"],
 )
 def test_a_scene_in_the_wrong_place_is_told_what_goes_there(asked, error, said):
     with pytest.raises(error, match=said):
         asked()
+
+
+def test_a_missing_argument_is_named_by_python():
+    with pytest.raises(TypeError, match="missing 1 required positional argument: 'up_to'"):
+        ls.cycles(GRAPH)
+
+
+def test_every_public_function_holds_its_arguments_against_its_annotations():
+    checked = {"checked", "with_bar"}
+    for name, function in _public():
+        codes = set()
+        while function is not None:
+            codes.add(function.__code__.co_name)
+            function = getattr(function, "__wrapped__", None)
+        assert codes & checked or name in ("grid", "load"), name
+
+
+def test_a_large_graph_is_told_of_before_it_is_built(monkeypatch, capsys):
+    cover = ls.grid([(0.0, 1.0)] * 3, cells=512)
+    monkeypatch.setattr(memory, "_free_bytes", lambda: 10**12)
+    memory.require_memory(cover, "corners-padded", 16)
+    said = capsys.readouterr().err
+    assert "limitsets: the graph of 134217728 cells takes about 21 GB and" in said  # 155 bytes a cell
+    memory.require_memory(ls.grid([(0.0, 1.0)] * 3, cells=64), "corners-padded", 16)
+    assert capsys.readouterr().err == ""

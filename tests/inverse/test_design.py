@@ -68,7 +68,8 @@ def test_the_pairs_of_the_paper(name, known, counted, tmp_path):
     assert again.value(SPEED) > start.value(SPEED)
     assert again.name == f"{name}-design"
     assert found.path[0] == start
-    assert found.path[-1].kappa == again.kappa
+    assert found.path[-1] is found.scene
+    assert found.scene.kappa == again.kappa
     assert found.residual == pytest.approx((0.0, 0.0, 0.0), abs=1e-9)
     assert found.condition == pytest.approx(6.9 if again.flip == "energy" else 7.1, abs=0.06)
 
@@ -226,7 +227,7 @@ def test_an_open_speed():
         ({"critical_points": [None] * 3}, AnswerError, "not all free"),
         ({"critical_points": [10, 10, 30]}, AnswerError, "up to 28 in"),
         ({"critical_points": [10, 10, "20 deg"]}, SceneError, "unit of angle"),
-        ({"critical_points": [10, 10, float("nan")]}, AnswerError, "a place on the arm"),
+        ({"critical_points": [10, 10, float("nan")]}, AnswerError, "argument critical_points"),
         ({"vary": []}, AnswerError, "one or more"),
         ({"vary": [ALONG, ALONG]}, AnswerError, "each once"),
         ({"vary": ["part.mass.centre.along"]}, SceneError, "did you mean"),

@@ -154,7 +154,7 @@ def test_wrong_questions_are_refused() -> None:
     for arguments, allowed in (
         ((Bare(1.0), 0.5, 0, 10), "image_on"),
         ((maps.Henon(), 0.5, 0, 10), "2 finite numbers"),
-        ((maps.Logistic(), math.nan, 0, 10), "1 finite numbers"),
+        ((maps.Logistic(), math.nan, 0, 10), "a finite number"),
         ((maps.Logistic(), 0.5, -1, 10), "from 0"),
         ((maps.Logistic(), 0.5, 0, -1), "from 0"),
         ((maps.Logistic(), 0.5, 0, 10, -1), "from 0"),

@@ -51,6 +51,12 @@ def test_titles_of_a_high_throw_stay_in_their_panels(kappa, x):
     assert all(made.bbox.x0 <= box.x0 and box.x1 <= made.bbox.x1 and box.y1 <= made.bbox.y1 for box in boxes)
 
 
+def test_titles_of_a_throw_fill_their_panels():
+    """Lines as wide as the panel: two of them, and not one for each phrase."""
+    made = drawn(ls.plot.flight(ls.load("paper-designed"), 21.0, 2))
+    assert [axes.get_title(loc="left").count("\n") for axes in made.axes] == [1, 1]
+
+
 @pytest.mark.parametrize("draw", [ls.plot.limit_set, ls.plot.map], ids=["limit-set", "map"])
 def test_the_number_of_a_side_is_one_subscript(draw):
     scene = ls.load(many_sides())
@@ -94,9 +100,9 @@ def test_a_map_of_ones_own_leaves_its_domain():
 
 
 def test_a_bare_map_says_what_it_lacks():
-    with pytest.raises(AnswerError, match="transition graph"):
+    with pytest.raises(AnswerError, match=r"pass .* or limitsets\.transitions\("):
         ls.plot.map(ls.maps.Logistic(3.8))
-    with pytest.raises(AnswerError, match="transition graph"):
+    with pytest.raises(AnswerError, match=r"pass .* or limitsets\.transitions\("):
         ls.plot.limit_set(ls.maps.Logistic(3.8), own()[1])
 
 
@@ -139,3 +145,16 @@ def test_the_morse_graph_of_the_plane_shows_both_axes():
     ][:1]
     assert "$x_0$" in attracting
     assert found[0].cells.extents(axis=1)
+
+
+def test_the_morse_graph_of_a_map_without_sides_names_none_and_stays_legible():
+    """An arrow to a way out runs behind the words of another node."""
+    graph = ls.transitions(
+        ls.maps.Leslie(), ls.grid([(-0.001, 90.0), (-0.001, 70.0)], depth=12), "corners-padded"
+    )
+    words = named(ls.plot.morse(graph).axes[0], "words")
+    assert words
+    for each in words:
+        assert "side" not in each.get_text()
+        assert "$x_0$" in each.get_text()
+        assert each.get_bbox_patch().get_facecolor() == (1.0, 1.0, 1.0, 1.0)

@@ -40,7 +40,7 @@ def test_every_side_shows_its_bands_its_critical_points_and_the_event(thrown):
     assert mark.get_xdata()[0] == pytest.approx(math.degrees(event.values[0]["throw.speed"]))
     assert mark.get_ydata()[0] == pytest.approx(event.collision.x)
     words = [text.get_text() for text in figure.legends[0].get_texts()]
-    assert words == ["attractor 0", "critical point", "border collision"]
+    assert words == ["attractor 0", "critical point", "event: border collision"]
 
 
 def test_against_t_or_another_quantity(thrown):

@@ -6,10 +6,13 @@ import re
 import numpy as np
 import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.text import Text
 
 import limitsets as ls
+from limitsets.plot.parts import refused_part
 from limitsets.report.audit_pages import write_audit
 from limitsets.report.writing import write
+from limitsets.scene.sketch import sketch
 from tests.cli.command import run
 from tests.lead_quad import LEAD_QUAD
 
@@ -53,7 +56,9 @@ def test_names_of_the_sides_keep_off_the_part_and_each_other(source):
     FigureCanvasAgg(figure).draw()
     (axes,) = figure.axes
     (outline,) = named(axes, "part")
-    boxes = [text.get_window_extent() for text in named(axes, "side")]
+    boxes = [
+        Text.get_window_extent(text) for text in named(axes, "side")
+    ]  # of the words, without their leader
     assert not any(
         outline.get_path().transformed(outline.get_transform()).intersects_bbox(box) for box in boxes
     )
@@ -80,3 +85,38 @@ def test_it_is_the_first_figure_of_reports(tmp_path):
     for page in ("report.md", "audit.md"):
         assert re.search(r"!\[.*?\]\((.*?)\)", (tmp_path / page).read_text())[1] == "part.png"
     assert (tmp_path / "part.png").exists()
+
+
+CONCAVE = {
+    "name": "bent",
+    "part": {
+        "vertices": [["0 mm", "0 mm"], ["130 mm", "0 mm"], ["60 mm", "30 mm"], ["150 mm", "70 mm"]],
+        "mass": {"center": {"side": 0, "along": "70 mm", "above": "40 mm"}, "radius_of_gyration": "40 mm"},
+    },
+    "arm": {"length": "700 mm", "surface_height": "-5 mm"},
+    "throw": {"kappa": "640 mm"},
+}
+
+
+def test_a_part_that_is_refused_is_drawn_as_it_is_written(capfd, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    text = ls.dump(ls.load("paper-designed")).replace(
+        '"5.75 in"', '"50 in"'
+    )  # longer than the other two together
+    (tmp_path / "needle.toml").write_text(text, encoding="utf-8")
+    code, out, err = run(capfd, "plot", "needle.toml", "part")
+    assert (code, out) == (2, "figure: paper-designed-part.png\n")
+    assert "part.sides" in err
+    assert (tmp_path / "paper-designed-part.png").is_file()
+    found = sketch(CONCAVE)
+    assert found.vertices.tolist() == [[0, 0], [130, 0], [60, 30], [150, 70]]
+    assert found.centre == (70.0, 40.0)
+    axes = refused_part(found, "the polygon is not convex").axes[0]
+    assert [text.get_text() for text in named(axes, "side")][1] == f"side 1: {np.hypot(150, 70):.5g} mm"
+    assert "not convex" in axes.get_xlabel()
+    assert sketch({"part": {"vertices": "none"}}) is None
+
+
+def test_the_name_of_a_side_that_overhangs_is_led_to_it():
+    axes = ls.plot.part(ls.load("paper-quadrilateral")).axes[0]
+    assert [text.arrow_patch is not None for text in named(axes, "side")] == [False, True, False, False]

@@ -64,6 +64,20 @@ def test_what_is_set_is_what_is_read(data: st.DataObject, name: str) -> None:
     assert load("paper-designed") == DESIGNED
 
 
+def test_a_bare_speed_meant_in_degrees_is_refused_and_names_its_unit() -> None:
+    with pytest.raises(SceneError, match=r"150 rad/s.*read in rad/s: write \"150 deg/s\"") as error:
+        DESIGNED.with_values({"throw.speed": 150})
+    assert error.value.key == "throw.speed"
+    assert (
+        DESIGNED.with_values({"throw.speed": "150 rad/s"}).value("throw.speed") == 150.0
+    )  # as text it is meant
+    slower = DESIGNED.with_values({"throw.speed": "150 deg/s"})
+    assert slower.value("throw.speed") == pytest.approx(math.radians(150.0), rel=1e-15)
+    assert DESIGNED.with_values({"throw.speed": math.radians(150.0)}).kappa == pytest.approx(
+        slower.kappa, rel=1e-14
+    )
+
+
 def test_everything_that_follows_is_computed_anew() -> None:
     moved = DESIGNED.with_values({"part.mass.center.along": 4.0, "arm.length": np.float32(30.0)})
     assert moved.sides.a[2] == 4.0

@@ -65,3 +65,15 @@ def test_undecided_cells_are_a_state_of_their_own():
     assert share.labels[middle] == UNDECIDED
     assert share.undecided_between > 0.0
     assert share.attractors[0] == pytest.approx(share.attractors[1], rel=1e-9)
+
+
+def test_extents_in_the_plane_are_a_box_for_each_piece():
+    params = ls.maps.Henon(0.9, 0.3)  # a stable cycle of period 2, between a = 0.3675 and 0.9125
+    found = ls.attractors(ls.transitions(params, ls.grid([(-2, 2), (-1, 1)], cells=256)), throws=1000)[0]
+    roots = np.roots([0.81, -0.9 * 0.7, 0.49 - 0.9])  # of a^2 x^2 - a (1 - b) x + (1 - b)^2 - a
+    assert len(found.extents[0]) == 2
+    for root, other in (roots, roots[::-1]):  # y is 0.3 times the x before
+        assert any(
+            lo <= root <= hi and low <= 0.3 * other <= high for (lo, hi), (low, high) in found.extents[0]
+        )
+    assert found.table().heads == ["side", "x[0]", "x[1]", "jogs per visit"]

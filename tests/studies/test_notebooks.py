@@ -37,7 +37,7 @@ def test_stored_as_it_ran(path):
     assert not [
         output for output in outputs if output.output_type == "error" or output.get("name") == "stderr"
     ]
-    assert path.stat().st_size < 500_000
+    assert path.stat().st_size < 150_000
 
 
 @pytest.mark.parametrize("path", TO_RUN, ids=lambda path: path.name)

@@ -155,3 +155,14 @@ def test_windows_of_the_logistic_map():
     words = [named_class(names[each]).words for each in numbers.tolist()]
     kinds = ["a fixed point", "a cycle of 2", "a cycle of 4", "a cycle of 3", "1 band"]
     assert words == [f"one attractor, {kind}" for kind in kinds]
+
+
+def test_starts_of_a_map_do_not_collapse_but_leave_by_its_exit(monkeypatch):
+    found = named_class("bands:1,order:0,period:0;leaves:none;collapses:some")
+    assert found.words == "one attractor, 1 band; some starts collapse"
+    data = ls.atlas(maps.Logistic(3.9), "r=3.9:3.95:2", domain=[(0, 1)]).dataset
+    number = found.number
+    data["class"].values[:] = number
+    data["class"].attrs.update(flag_meanings=found.name, flag_values=[number])
+    assert legend(data)[0].words.startswith("one attractor, 1 band; some starts leave by the exit -1")
+    assert "joint" not in data["collapses"].attrs["long_name"]

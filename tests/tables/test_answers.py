@@ -7,6 +7,7 @@ from xml.etree import ElementTree as ET
 import pytest
 
 import limitsets as ls
+from limitsets.robust.margins.finding import Margin
 from limitsets.tables import Tabled
 
 
@@ -176,3 +177,11 @@ def test_every_answer_of_a_public_function_is_tabled():
     for each in answers:
         assert issubclass(each, Tabled), each
         assert each.tables is not Tabled.tables, each
+
+
+def test_a_margin_is_rounded_to_the_safe_side():
+    scene = ls.load("paper-designed")
+    ends = 0.7331966, 0.7337001
+    found = Margin("throw.speed", "fixed", (), *ends, "%", 2.7, "", True, 1.0, scene, {}, {}, {}, (), None)
+    assert found.table().shown()[0][2:4] == ["0.7331", "0.7338"]  # at six digits 0.733197 would be claimed
+    assert found.table().csv().splitlines()[1].split(",")[2:4] == ["0.7331966", "0.7337001"]

@@ -3,6 +3,7 @@
 import io
 import sys
 import time
+from types import SimpleNamespace
 
 import pytest
 
@@ -55,6 +56,42 @@ def test_a_terminal_has_a_bar_with_the_same_count(monkeypatch):
     assert "designs [x]" in stream.getvalue()
     assert "100 of 100" in stream.getvalue()
     assert "101" not in stream.getvalue()
+
+
+def test_a_step_that_counts_anew_has_a_bar_of_its_own(monkeypatch):
+    shown = []
+
+    class Bars:
+        def __init__(self, *columns, **how):
+            self.tasks = []
+
+        def __enter__(self):
+            shown.append(self)
+            return self
+
+        def __exit__(self, *_):
+            pass
+
+        def add_task(self, description, total, number):
+            self.tasks.append(
+                SimpleNamespace(description=description, total=total, completed=0, number=number)
+            )
+            return len(self.tasks) - 1
+
+        def update(self, task, **now):
+            vars(self.tasks[task]).update(now)
+
+        def stop_task(self, task):
+            pass
+
+    monkeypatch.setattr("rich.progress.Progress", Bars)
+    with progress._on_terminal() as tell:
+        for step, done, of in (("a", 0, 2), ("b", 1, 2), ("cells", 0, 9), ("cells", 5, 9)):
+            tell(step, done, of)
+    assert [(each.description, each.completed, each.total) for each in shown[0].tasks] == [
+        ("b", 2, 2),
+        ("cells", 5, 9),
+    ]
 
 
 def test_outside_of_a_notebook_a_function_is_as_silent_as_it_was(impatient, capfd):

@@ -155,7 +155,7 @@ def critical_jacobian(scene: Scene | str, *names: str) -> CriticalJacobian:
     >>> round(found.determinant, 1), round(found.condition, 1)
     (2152.1, 7.1)
     """
-    chosen = scene if isinstance(scene, Scene) else load(scene)
+    chosen = load(scene)
     require_minimal(chosen)
     if len(set(names)) != len(names):
         raise AnswerError("the quantities", ", ".join(names), "each named once", "leave the repetition out")

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from limitsets.arguments import arguments_checked
 from limitsets.errors import AnswerError
 from limitsets.files import as_table, picked
 from limitsets.inverse.critical.derivatives import CriticalJacobian, condition_of, require_minimal
@@ -124,6 +125,7 @@ class Design(Tabled):
 
 
 @shown_in_notebooks
+@arguments_checked
 def design(
     scene: Scene | str,
     *,
@@ -184,7 +186,7 @@ def design(
     >>> found.reached, [round(value[1], 4) for value in found.quantities().values()]
     (True, [4.2256, 0.7082, 158.0245])
     """
-    chosen = scene if isinstance(scene, Scene) else load(scene)
+    chosen = load(scene)
     require_minimal(chosen)
     targets = _targets(chosen, critical_points)
     unknowns = unknowns_of(chosen, _names(vary), bounds)
@@ -275,7 +277,7 @@ def _answer(search: TrialLog, targets: tuple[float | None, ...], outcome: Soluti
         for target, x in zip(targets, after.x.tolist(), strict=True)
     )
     found = _named(after.scene, search.scene) if outcome.trial is not None else search.scene
-    scenes = [trial.found.scene for trial in outcome.path]
+    scenes = [found if trial is outcome.trial else trial.found.scene for trial in outcome.path]
     return Design(
         scene=found,
         start=search.scene,

@@ -259,7 +259,7 @@ def design_for_goal(
     """
     from scipy.optimize import differential_evolution
 
-    begin, start = time.perf_counter(), scene if isinstance(scene, Scene) else load(scene)
+    begin, start = time.perf_counter(), load(scene)
     if not isinstance(start.goal, OrientedBeyond | Reaches):
         kind = None if start.goal is None else start.goal.kind
         remedy = "add one to [goal], or ask for --critical-points"

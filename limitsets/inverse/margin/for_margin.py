@@ -17,6 +17,7 @@ from pathlib import Path
 
 import numpy as np
 
+from limitsets.arguments import arguments_checked
 from limitsets.errors import AnswerError
 from limitsets.goals import Goal, OrientedBeyond, Reaches
 from limitsets.inverse.margin.counterweight import counterweight_of
@@ -125,6 +126,7 @@ def _with_purpose(scene: Scene, x: float, side: int, tolerance: Mapping[str, str
 
 
 @shown_in_notebooks
+@arguments_checked
 def robust_design(
     scene: Scene | str | Path,
     *,
@@ -187,7 +189,7 @@ def robust_design(
     >>> found.scene.name, found.side
     ('paper-designed-robust', 2)
     """
-    start = scene if isinstance(scene, Scene) else load(scene)
+    start = load(scene)
     on = _side(start, side)
     if evaluations < 1:
         raise AnswerError("the evaluations", evaluations, "1 or more", "allow for some designs")

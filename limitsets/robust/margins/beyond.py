@@ -22,6 +22,7 @@ from limitsets.progress import shown_in_notebooks
 from limitsets.proofs.query import Query
 from limitsets.robust.margins.finding import Margin, margin
 from limitsets.robust.margins.joint import joint_margin
+from limitsets.robust.margins.margin_texts import bound, bound_above
 from limitsets.scene import Scene, load
 from limitsets.tables import Column, Table, Tabled
 
@@ -64,9 +65,9 @@ class MarginsBeyond(Tabled):
     def tables(self) -> tuple[Table, ...]:
         """Give the tables that show it, the one that is saved as CSV first."""
         bounds = [
-            Column(f"{name} {word}", unit, ".6g")
+            Column(f"{name} {word}", unit, show)
             for name, unit in zip(self.names, self.units, strict=True)
-            for word in ("proved", "refuted")
+            for word, show in (("proved", bound), ("refuted", bound_above))
         ]
         rows = [
             (x, *(end for pair in zip(low, high, strict=True) for end in pair))
@@ -134,7 +135,7 @@ def margins_beyond(
     >>> margins_beyond("paper-designed", 2, x=[20.0]).proved[:, 0].round(1).tolist()
     [0.7]
     """
-    loaded = scene if isinstance(scene, Scene) else load(scene)
+    loaded = load(scene)
     at = np.sort(np.asarray(places_beyond(loaded, side, places) if x is None else x, dtype=float))
     rows: list[tuple[Margin, ...]] = []
     for number, place in enumerate(at.tolist()):

@@ -12,6 +12,7 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
+from limitsets.arguments import arguments_checked
 from limitsets.errors import AnswerError
 from limitsets.goals import Goal, Predicate, unknown_goal
 from limitsets.progress import shown_in_notebooks
@@ -50,6 +51,7 @@ def goals_of(scene: Scene, goal: GoalLike | Sequence[GoalLike] | None) -> tuple[
 
 
 @shown_in_notebooks
+@arguments_checked
 def margin(
     scene: Scene | str | Path,
     *quantities: str,
@@ -94,7 +96,7 @@ def margin(
     >>> speed.proved < 0.733 < speed.refuted, speed.unit
     (True, '%')
     """
-    loaded = scene if isinstance(scene, Scene) else load(scene)
+    loaded = load(scene)
     if not 1e-4 <= width < 1:
         raise AnswerError("the width", width, "from 0.0001 to below 1", "0.01 is a hundredth")
     goals = goals_of(loaded, goal)

@@ -16,6 +16,7 @@ from limitsets.proofs.goals import State, rechecked
 from limitsets.proofs.proof import Claim, Proof
 from limitsets.proofs.query import Outcome
 from limitsets.proofs.refutation import KINDS, write_refutation
+from limitsets.robust.margins.margin_texts import bound, bound_above
 from limitsets.scene import Scene
 from limitsets.tables import Column, Table, Tabled
 
@@ -84,7 +85,7 @@ class Margin(Tabled):
 
     def tables(self) -> tuple[Table, ...]:
         """Give the tables that show it, the one that is saved as CSV first."""
-        shown = Column("proved safe up to", show=".6g"), Column("shown to fail from", show=".6g")
+        shown = Column("proved safe up to", show=bound), Column("shown to fail from", show=bound_above)
         columns = ("quantity", "reading", *shown, "unit", Column("value", show=".6g"))
         unit = self.unit or "times the tolerance"
         row = (self.quantity, self.reading, self.proved, self.refuted, unit, self.nominal)

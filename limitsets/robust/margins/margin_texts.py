@@ -8,7 +8,7 @@ from decimal import ROUND_CEILING, ROUND_FLOOR, Context, Decimal
 from limitsets.goals import Goal, OrientedBeyond
 from limitsets.proofs.query import Outcome
 
-__all__ = ["bound", "reach_of", "void_of"]
+__all__ = ["bound", "bound_above", "reach_of", "void_of"]
 
 
 def bound(value: float | None, unit: str = "", *, up: bool = False) -> str:
@@ -25,6 +25,11 @@ def bound(value: float | None, unit: str = "", *, up: bool = False) -> str:
         return f"0 {unit}".rstrip()
     context = Context(prec=4, rounding=ROUND_CEILING if up else ROUND_FLOOR)
     return f"{context.create_decimal(Decimal(repr(value))):f} {unit}".rstrip()
+
+
+def bound_above(value: float) -> str:
+    """Write what is refuted from here on, without its unit."""
+    return bound(value, up=True)
 
 
 def reach_of(pieces: Sequence[Outcome]) -> float | None:

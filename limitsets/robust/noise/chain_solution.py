@@ -192,7 +192,7 @@ def chain_problem_of(
     """Read what is asked."""
     from limitsets.scene import load
 
-    read = load(scene) if isinstance(scene, str) else scene
+    read = load(scene)
     return ChainProblem(read, _goal_of(read, goal), starts_from(read, offset), cells, strata)
 
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from limitsets.arguments import arguments_checked
 from limitsets.files import as_table, picked
 from limitsets.progress import shown_in_notebooks
 from limitsets.robust.noise.chain_solution import (
@@ -136,6 +137,7 @@ class Levels:
 
 
 @shown_in_notebooks
+@arguments_checked
 def noise_statistics(
     scene: Scene | str,
     scatter: Scattering | None = None,

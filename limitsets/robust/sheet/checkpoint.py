@@ -21,7 +21,7 @@ from limitsets.robust.margins.margin_result import goal_table, settled
 from limitsets.robust.sheet.entries import Entry
 from limitsets.scene import Scene
 
-__all__ = ["CERTIFICATES", "RECORD", "Checkpoint"]
+__all__ = ["CERTIFICATES", "RECORD", "Checkpoint", "written"]
 
 RECORD, CERTIFICATES = "robustness.json", "certificates"
 
@@ -121,12 +121,13 @@ class Checkpoint:
 
     def add(self, margin: Margin) -> Entry:
         """Write a margin's files, and it into the record."""
-        if self.folder is None:
-            return Entry.of(margin)
-        left, files = self._files(margin)
-        entry = Entry.of(left, files)
-        self.entries[entry.key] = entry
-        self._write()
+        return self.keep(written(margin, self.folder, self.recheck))
+
+    def keep(self, entry: Entry) -> Entry:
+        """Write an entry, whose files are there, into the record."""
+        if self.folder is not None:
+            self.entries[entry.key] = entry
+            self._write()
         return entry
 
     def add_curve(self, table: dict[str, Any]) -> None:
@@ -147,11 +148,13 @@ class Checkpoint:
         with replaced(self.folder) as draft:
             (draft / RECORD).write_text(as_json(record), encoding="utf-8", newline="\n")
 
-    def _files(self, margin: Margin) -> tuple[Margin, list[str]]:
-        """Write the proof and the counterexample; what the checker confirms, and the names from the report's folder."""
-        assert self.folder is not None
-        try:
-            left, written = settled(margin, self.folder / CERTIFICATES, recheck=self.recheck)
-        except AnswerError:  # effects are on, or a goal is code: nothing rechecks it, the margin stands
-            return margin, []
-        return left, [f"{CERTIFICATES}/{path.name}" for path in written]
+
+def written(margin: Margin, folder: Path | None, recheck: bool) -> Entry:
+    """Write a margin's proof and counterexample into a report's folder; the entry names what the checker confirms."""
+    if folder is None:
+        return Entry.of(margin)
+    try:
+        left, files = settled(margin, folder / CERTIFICATES, recheck=recheck)
+    except AnswerError:  # effects are on, or a goal is code: nothing rechecks it, the margin stands
+        return Entry.of(margin, [])
+    return Entry.of(left, [f"{CERTIFICATES}/{path.name}" for path in files])

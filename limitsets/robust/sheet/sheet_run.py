@@ -4,24 +4,27 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import Executor
 from contextlib import contextmanager
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from limitsets.arguments import arguments_checked
 from limitsets.errors import AnswerError
-from limitsets.goals import Goal, OrientedBeyond, Reaches
+from limitsets.goals import Goal, OrientedBeyond, Predicate, Reaches
 from limitsets.progress import shown_in_notebooks
 from limitsets.proofs.query import Query
 from limitsets.robust.margins.beyond import MarginsBeyond
 from limitsets.robust.margins.deviations import DeviationScale, deviation_scale, deviation_scales
-from limitsets.robust.margins.finding import GoalLike, Margin, goals_of, margin
+from limitsets.robust.margins.finding import GoalLike, goals_of, margin
 from limitsets.robust.margins.joint import joint_margin
 from limitsets.robust.margins.margin_texts import reach_of
 from limitsets.robust.margins.vector import Tolerance
 from limitsets.robust.noise.scattering import Scattering
 from limitsets.robust.noise.statistics import CELLS, Levels, NoiseStatistics, noise_levels, noise_statistics
-from limitsets.robust.sheet.checkpoint import Checkpoint
+from limitsets.robust.sheet.checkpoint import Checkpoint, written
 from limitsets.robust.sheet.entries import Entry, nominal_of
 from limitsets.robust.sheet.margin_curve import curve
 from limitsets.robust.sheet.noise_input import noise_of, still
@@ -44,7 +47,7 @@ NO_NOISE = (
 NO_PLACE = "it is asked for goals with an x and a side, oriented_beyond or reaches"
 
 # For the proofs, and of what is left the share for the joint margin.
-SECONDS, FOR_JOINT = 24.0, 0.5
+SECONDS, FOR_JOINT = 12.0, 0.5
 
 Progress = Callable[[str, int, int], None]
 
@@ -61,8 +64,10 @@ class _SheetRun:
         checkpoint: Checkpoint,
         progress: Progress,
         seconds: float,
+        executor: Executor | None,
     ) -> None:
-        self.end = time.perf_counter() + seconds
+        self.seconds, self.executor = seconds, executor
+        self.end: float | None = None
         self.scene, self.goals, self.todo, self.tolerance = scene, goals, todo, tolerance
         self.checkpoint, self.progress = checkpoint, progress
         self.left_out: dict[str, str] = {}
@@ -80,24 +85,38 @@ class _SheetRun:
         self.done += 1
 
     def left(self) -> float:
-        """Seconds that are left for proofs."""
+        """Seconds that are left for the joint margin and the curve; they count from the first question on."""
+        if self.end is None:
+            self.end = time.perf_counter() + self.seconds
         return max(self.end - time.perf_counter(), 0.0)
 
     def singles(self, width: float, verdict: str) -> list[Entry]:
-        """Find the margins of single quantities."""
+        """Find the margins of single quantities, those that no earlier run left."""
+        known = [self.checkpoint.find(one.quantity, one.reading, one.unit) for one in self.todo]
+        todo = [one for one, entry in zip(self.todo, known, strict=True) if entry is None]
+        first = next((entry for entry in known if entry is not None), None)
+        answers = iter(self._answers(todo, width, verdict, first))
         found: list[Entry] = []
-        for one in self.todo:
+        for one, entry in zip(self.todo, known, strict=True):
             with self.step(f"margin of {one.quantity}, {one.reading}"):
-                entry = self.checkpoint.find(one.quantity, one.reading, one.unit)
-                if entry is None and verdict != "proved" and found:
-                    entry = _same(found[0], one, self.scene)
-                found.append(entry or self.checkpoint.add(self._single(one, width)))
+                found.append(entry or self.checkpoint.keep(next(answers)))
         return found
 
-    def _single(self, one: DeviationScale, width: float) -> Margin:
-        quiet: dict[str, Any] = {"reading": one.reading, "goal": self.goals, "width": width}
-        (found,) = margin(self.scene, one.quantity, progress=lambda step, _, __: self.tell(step), **quiet)
-        return found
+    def _answers(
+        self, todo: Sequence[DeviationScale], width: float, verdict: str, first: Entry | None
+    ) -> Iterator[Entry]:
+        """Ask for margins, one after the other, or on the executor; it is not handed goals that are code."""
+        folder, recheck = self.checkpoint.folder, self.checkpoint.recheck
+        ask = partial(_single, self.scene, self.goals, width, folder, recheck)
+        if verdict != "proved" and todo:  # no deviation is small enough, whatever the quantity
+            first = first or ask(todo[0], self.tell)
+            yield from (_same(first, one, self.scene) for one in todo)
+        elif (
+            self.executor is None or len(todo) < 2 or any(isinstance(goal, Predicate) for goal in self.goals)
+        ):
+            yield from (ask(one, self.tell) for one in todo)
+        else:
+            yield from self.executor.map(ask, todo)
 
     def joint(self, width: float) -> Entry:
         """Find the factor on the tolerance."""
@@ -146,6 +165,21 @@ class _SheetRun:
         return found, levels
 
 
+def _single(
+    scene: Scene,
+    goals: tuple[Goal, ...],
+    width: float,
+    folder: Path | None,
+    recheck: bool,
+    one: DeviationScale,
+    tell: Callable[[str], None] | None = None,
+) -> Entry:
+    """Find the margin of one quantity and write its files; called in other processes, too."""
+    told = None if tell is None else lambda step, _, __: tell(step)
+    (found,) = margin(scene, one.quantity, reading=one.reading, goal=goals, width=width, progress=told)
+    return written(found, folder, recheck)
+
+
 def _same(entry: Entry, one: DeviationScale, scene: Scene) -> Entry:
     """Return the margin of a quantity where the scene as it is fails or is not proved: that of any other."""
     nominal, unit = nominal_of(scene, one.quantity)
@@ -178,6 +212,7 @@ def _todo(scene: Scene, quantities: Sequence[str], reading: str | None) -> list[
 
 
 @shown_in_notebooks
+@arguments_checked
 def robustness(
     scene: Scene | str | Path,
     *quantities: str,
@@ -191,6 +226,7 @@ def robustness(
     seconds: float = SECONDS,
     folder: str | Path | None = None,
     recheck: bool = True,
+    executor: Executor | None = None,
     progress: Progress | None = None,
 ) -> Robustness:
     """Say how far a scene may drift before its goal fails, and what noise does to it.
@@ -222,6 +258,8 @@ def robustness(
         Margins are written there as they are found, with their certificates, and found again by the next run.
     recheck : bool
         Whether certificates are checked before they get their names.
+    executor : Executor, optional
+        Where the margins of single quantities are searched for; default, here.  Goals that are functions stay here.
     progress : callable, optional
         Called with what is done, how much of it, and of how much.
 
@@ -248,7 +286,7 @@ def robustness(
     for part in leave_out:
         if part not in PARTS:
             raise AnswerError("what to leave out", part, ", ".join(PARTS), "correct the word")
-    given = scene if isinstance(scene, Scene) else load(scene)
+    given = load(scene)
     goals, quiet = _goals(given, goal), still(given)
     query = Query.of(quiet, goals)
     query.box(None, {})  # refuses a scene of which nothing can be proved
@@ -267,7 +305,7 @@ def robustness(
         recheck=recheck,
     )
     told = progress or (lambda step, done, of: None)
-    sheet = _SheetRun(quiet, goals, todo, vector, checkpoint, told, seconds)
+    sheet = _SheetRun(quiet, goals, todo, vector, checkpoint, told, seconds, executor)
     return _filled(sheet, given, noise, law, width, cells, frozenset(leave_out), begin)
 
 

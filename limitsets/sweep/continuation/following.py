@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from limitsets.arguments import arguments_checked
 from limitsets.errors import AnswerError
 from limitsets.progress import shown_in_notebooks
 from limitsets.scene import load
@@ -24,6 +25,7 @@ Progress = Callable[[str, int, int], None]
 
 
 @shown_in_notebooks
+@arguments_checked
 def continuation(
     subject: Any,
     path: Curve,
