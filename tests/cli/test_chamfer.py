@@ -54,7 +54,6 @@ def test_with_the_lines_nothing_is_switched_on_and_nothing_said(capfd):
     [
         ("certify", "chamfered.toml"),
         ("throw", "chamfered.toml", "--x", "20", "--side", "0"),
-        ("plot", "chamfered.toml", "part"),
         ("audit", "chamfered.toml"),
         ("margin", "chamfered.toml"),
     ],
