@@ -92,6 +92,10 @@ class GeometryError(SceneError):
     """A part that cannot be, or that cannot rest where it should."""
 
 
+class TipsError(GeometryError):
+    """A part with a side on which it cannot rest, in a scene that does not simulate what it does there."""
+
+
 class MapError(LimitsetsError):
     """A map's parameters, kernels or states do not fit the map contract."""
 

@@ -311,7 +311,8 @@ def analyse(
     -------
     Analysis
         Attractors, basins, limit sets, critical points, the goal's verdict.  With ``auto = true`` in ``[effects]``,
-        of the scene with the effects that the audit calls for on its limit set and whose facts are given.
+        of the scene with the effects that the audit calls for on its limit set and whose facts are given.  Of a part
+        that cannot rest on one of its sides, with `landing` and `roll`, where what is read does not switch them on.
 
     Raises
     ------
@@ -332,7 +333,7 @@ def analyse(
     from limitsets.auditing import choose_effects
     from limitsets.graph import morse_graph
     from limitsets.maps import critical_points
-    from limitsets.scene import load
+    from limitsets.scene import load_to_analyse
     from limitsets.sets import cycles as cycles_of
     from limitsets.sets import spurious
 
@@ -343,7 +344,8 @@ def analyse(
     asked_error = None if error is None else require_error(error)
     steps = _Steps(10 + (cycles > 0) + 2 * (asked_error is not None), progress)
     with steps.step("scene"):
-        choice = choose_effects(load(scene))
+        read, tipping = load_to_analyse(scene)
+        choice = replace(choose_effects(read), tipping=tipping)
         chosen = choice.scene
     plan = None
     if asked_error is not None:

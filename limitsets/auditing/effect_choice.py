@@ -6,8 +6,11 @@ import copy
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from limitsets.auditing.findings import Finding, audit
 from limitsets.files import as_table, picked
+from limitsets.scene.facts import NOT_TIPPING
 
 if TYPE_CHECKING:
     from limitsets.scene import Scene
@@ -30,15 +33,32 @@ class EffectChoice:
         The effects that the audit switched on.
     left_out : dict of str to str
         Effects, or assumptions without one, that are called for or cannot be told, and why they are not simulated.
+    tipping : tuple of str
+        The effects that were switched on because the part cannot rest on one of its sides.
     """
 
     scene: Scene
     switched_on: tuple[str, ...]
     left_out: dict[str, str]
+    tipping: tuple[str, ...] = ()
+
+    @property
+    def notice(self) -> str:
+        """What was switched on because of a side on which the part cannot rest, a clause; empty for nothing."""
+        if not self.tipping:
+            return ""
+        sides = " and ".join(str(side) for side in np.flatnonzero(~self.scene.sides.rests))
+        lines = " and ".join(f"{effect} = true" for effect in self.tipping)
+        return (
+            f"switched on {' and '.join(self.tipping)}: the part cannot rest on side {sides}, and tips on from there; "
+            f"other commands ask for {lines} in [effects]"
+        )
 
     def to_json(self) -> dict[str, Any]:
         """Give it as plain tables for JSON."""
-        return as_table(simulated=self.scene.effects.on(), **picked(self, "switched_on", "left_out"))
+        return as_table(
+            simulated=self.scene.effects.on(), **picked(self, "switched_on", "left_out", "tipping")
+        )
 
 
 def _hindrance(scene: Scene, finding: Finding, others: tuple[str, ...]) -> str:
@@ -57,6 +77,8 @@ def _hindrance(scene: Scene, finding: Finding, others: tuple[str, ...]) -> str:
     missing = [fact for fact in EFFECTS[effect].needs if getattr(scene.world, fact) is None]
     if missing:
         return f"called for, but {' and '.join(f'world.{fact}' for fact in missing)} missing"
+    if effect in NOT_TIPPING and not scene.sides.rests.all():
+        return "called for, but it does not know a side on which the part cannot rest"
     barred = [each for each in others if each in EFFECTS[effect].excludes or effect in EFFECTS[each].excludes]
     return f"called for, but it cannot be simulated together with {' and '.join(barred)}" if barred else ""
 

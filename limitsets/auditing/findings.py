@@ -21,6 +21,7 @@ from limitsets.auditing.judging import Row, all_hold, enclosed_at
 from limitsets.auditing.places import Places, Sample, places
 from limitsets.auditing.stretches import where
 from limitsets.files import as_table, picked
+from limitsets.scene.facts import TIPPING
 from limitsets.tables import Column, Table, Tabled
 
 if TYPE_CHECKING:
@@ -276,7 +277,8 @@ def audit(scene: str | Path | Mapping[str, Any] | Scene) -> Audit:
 
     chosen = load(scene)
     # what the minimal model assumes is asked of its throws, whichever effects are on
-    box = parameter_box(load({**chosen.as_dict(), "effects": {}}))
+    without = {} if chosen.sides.rests.all() else dict.fromkeys(TIPPING, True)
+    box = parameter_box(load({**chosen.as_dict(), "effects": without}))
     rows = [Row(about, about.terms(chosen, box)) for about in ASSUMPTIONS]
     sites = places(chosen, box)
     two = (_findings(place, chosen, box, rows, sites) for place in ("limit-set", "domain"))

@@ -92,7 +92,9 @@ def _limit_sets(scene: Scene, box: ParameterBox) -> tuple[list[CellSet], Cells, 
     from limitsets.sets import attractors
 
     covered = cover(box, CELLS)
-    domain = {side: (edges[:-1], edges[1:]) for side, (edges,) in enumerate(covered.grid.edges)}
+    domain = {
+        side: (edges[:-1], edges[1:]) for side, (edges,) in enumerate(covered.grid.edges) if edges.size > 1
+    }
     if not scene.effects.on():
         found = attraction(covered)
         sets = [CellSet(covered.grid, found.component == k) for k in range(int(found.component.max()) + 1)]
@@ -141,7 +143,7 @@ def places(scene: Scene, box: ParameterBox) -> Places:
     lo, hi = scene.domain.lo[:, 0], scene.domain.hi[:, 0]
     domain = {
         side: Sample(np.linspace(lo[side], hi[side], SAMPLES), np.full(SAMPLES, codes.UNDECIDED))
-        for side in range(len(scene.sides))
+        for side in np.flatnonzero(scene.sides.rests).tolist()
     }
     extents = {} if union is None else union.extents()
     return Places(limit, domain_cells, enclosed, _orbits(scene, sets), domain, extents)

@@ -108,7 +108,7 @@ class CellSet:
         met = self.mask[self.grid.of_side(side)].astype(np.int8)
         border = edges[np.flatnonzero(np.diff(np.concatenate([[0], met, [0]])))]
         inside: NDArray[np.bool_] = np.searchsorted(border, states, side="right") % 2 == 1
-        if met[-1]:
+        if met[-1:].any():
             inside |= states == edges[-1]  # of the last cell, whose upper border is nobody else's
         return inside
 
@@ -189,8 +189,7 @@ class CellSet:
         for side in range(self.grid.sides):
             block = self.mask[self.grid.of_side(side)].reshape(tuple(self.grid.shape[side]))
             for axis in range(self.grid.dimension):
-                block = np.repeat(
-                    block, int(fine.shape[side, axis] // self.grid.shape[side, axis]), axis=axis
-                )
+                parts = int(fine.shape[side, axis] // max(self.grid.shape[side, axis], 1))
+                block = np.repeat(block, parts, axis=axis)
             mask[fine.of_side(side)] = block.ravel()
         return CellSet(fine, mask)

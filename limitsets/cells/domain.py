@@ -1,4 +1,4 @@
-"""Where states may lie: a box of x for each side."""
+"""Where states may lie: a box of x for each side, or none."""
 
 from __future__ import annotations
 
@@ -19,14 +19,15 @@ class Domain:
     Attributes
     ----------
     lo, hi : ndarray, shape (n_sides, dimension)
-        Corners of the boxes.
+        Corners of the boxes.  A side without states has ``lo == hi``: a chamfer on which a part cannot rest.
     anchor : ndarray, shape (n_sides,), or None
         In one dimension: a point below `lo` towards which graded cells shrink (the throw: R = a_i).
 
     Raises
     ------
     GridError
-        For shapes that do not fit, empty boxes, numbers that are not finite, or an anchor inside a box.
+        For shapes that do not fit, boxes that end before they begin, no side with states, numbers that are not finite,
+        or an anchor inside a box.
 
     Examples
     --------
@@ -48,7 +49,8 @@ class Domain:
                 "lo and hi of shape (sides, dimension), dimension 1 to 3",
                 "pass one row per side",
             )
-        if not (np.isfinite(lo).all() and np.isfinite(hi).all() and (lo < hi).all()):
+        some, none = (lo < hi).all(axis=1), (lo == hi).all(axis=1)
+        if not (np.isfinite(lo).all() and np.isfinite(hi).all() and (some | none).all() and some.any()):
             raise GridError(
                 "the domain", (lo.tolist(), hi.tolist()), "finite boxes with lo < hi", "correct the corners"
             )
@@ -69,6 +71,12 @@ class Domain:
     def sides(self) -> int:
         """Number of sides."""
         return int(self.lo.shape[0])
+
+    @property
+    def inhabited(self) -> NDArray[np.bool_]:
+        """Which sides have states, shape (n_sides,)."""
+        some: NDArray[np.bool_] = np.logical_and.reduce(self.lo < self.hi, axis=1)
+        return some
 
     @property
     def dimension(self) -> int:

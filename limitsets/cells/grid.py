@@ -34,7 +34,8 @@ class Grid(Tabled):
     domain : Domain
         What is covered.
     edges : tuple of tuple of ndarray
-        ``edges[side][axis]``, shape (n + 1,): ascending cell borders, float64.
+        ``edges[side][axis]``, shape (n + 1,): ascending cell borders, float64; a side without states has one, and no
+        cell.
 
     Raises
     ------
@@ -54,7 +55,9 @@ class Grid(Tabled):
                 "float64",
                 "compute the borders in float64: narrower numbers may merge them",
             )
-        if not all(axis.size > 1 and (axis[1:] > axis[:-1]).all() for axis in axes):
+        cut = zip(self.edges, self.domain.inhabited.tolist(), strict=True)
+        least = [1 + some for side, some in cut for _ in side]
+        if not all(a.size >= n and (a[1:] > a[:-1]).all() for a, n in zip(axes, least, strict=True)):
             raise GridError(
                 "the cells",
                 [int(axis.size) - 1 for axis in axes],
@@ -128,7 +131,7 @@ class Grid(Tabled):
         number = np.zeros(len(states), dtype=np.int64)
         for axis, edges in enumerate(self.edges[side]):
             column = states[:, axis]
-            inside &= (column >= edges[0]) & (column <= edges[-1])
+            inside &= (column >= edges[0]) & (column <= edges[-1]) & (edges.size > 1)
             k = np.clip(np.searchsorted(edges, column, side="right") - 1, 0, edges.size - 2)
             number = number * (edges.size - 1) + k
         return np.where(inside, number + self.offset[side], -1)
@@ -271,10 +274,12 @@ def grid(
         )
     graded = region.anchor is not None and grading != "uniform"
     sides = []
-    for side in range(region.sides):
-        if graded and region.anchor is not None:
+    for side, some in enumerate(region.inhabited.tolist()):
+        if not some:
+            axes: tuple[NDArray[np.float64], ...] = tuple(end[None] for end in region.hi[side])
+        elif graded and region.anchor is not None:
             lo, hi, anchor = float(region.lo[side, 0]), float(region.hi[side, 0]), float(region.anchor[side])
-            axes: tuple[NDArray[np.float64], ...] = (_graded(lo, hi, anchor, counts[0]),)
+            axes = (_graded(lo, hi, anchor, counts[0]),)
         else:
             pairs = zip(region.lo[side], region.hi[side], counts, strict=True)
             axes = tuple(np.linspace(lo, hi, n + 1) for lo, hi, n in pairs)

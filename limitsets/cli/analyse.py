@@ -47,12 +47,16 @@ def analyse(
 ) -> None:
     """Find limit sets, basins and critical points, and write report.md, analysis.json and figures."""
     with progress() as tell:
-        chosen, folder = opened(scene, out, "analysis")
+        from limitsets.scene import load_to_analyse
+
+        _, folder = opened(scene, out, "analysis", lambda source: load_to_analyse(source)[0])
         from limitsets.analysis import analyse as run
         from limitsets.report.writing import write
 
-        analysis = run(chosen, cells, error=error, progress=tell, announce=_announce)
+        analysis = run(scene, cells, error=error, progress=tell, announce=_announce)
         files = write(analysis, folder, form=form, html=html, progress=tell)
+    if json and analysis.choice.notice:
+        print(f"limitsets: {analysis.choice.notice}", file=sys.stderr, flush=True)
     answer(analysis, json, lambda: _text(analysis, files[0]), csv=(csv, analysis.table))
 
 
@@ -66,6 +70,8 @@ def _text(analysis: Analysis, page: Path) -> None:
     from limitsets.report.tables import count, intervals, percent
 
     unit = analysis.scene.unit
+    if analysis.choice.notice:
+        typer.echo(analysis.choice.notice)
     if not analysis.attractors:
         undecided = analysis.basins.undecided_between
         left = f"no limit set was found, and {percent(undecided)} of all starts are undecided"

@@ -139,11 +139,16 @@ def show(found: Table) -> None:
     table(found.heads, found.shown())
 
 
-def opened(scene: str, out: Path | None, word: str = "") -> tuple[SceneOf, Path]:
-    """Load a scene; a folder, by default NAME-WORD, that cannot be written is refused before anything is computed."""
+def opened(
+    scene: str, out: Path | None, word: str = "", read: Callable[[str], SceneOf] | None = None
+) -> tuple[SceneOf, Path]:
+    """Load a scene; a folder, by default NAME-WORD, that cannot be written is refused before anything is computed.
+
+    `read`: how, instead of `limitsets.load`.
+    """
     from limitsets.scene import load
 
-    chosen = load(scene)
+    chosen = (read or load)(scene)
     folder = out or Path(f"{chosen.name}-{word}")
     if out or word:
         from limitsets.report.writing import require_place

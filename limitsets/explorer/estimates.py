@@ -168,6 +168,8 @@ def _runs(split: Basins) -> list[tuple[int, float, float, int]]:
     found = []
     for side in range(split.grid.sides):
         edges, labels = split.grid.edges[side][0], split.labels[split.grid.of_side(side)]
+        if not labels.size:
+            continue
         border = np.concatenate([[0], np.flatnonzero(np.diff(labels)) + 1, [labels.size]])
         for first, last in pairwise(border.tolist()):
             found.append((side, float(edges[first]), float(edges[last]), int(labels[first])))

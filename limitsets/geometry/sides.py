@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from limitsets.errors import GeometryError
+from limitsets.errors import GeometryError, TipsError
 from limitsets.geometry.polygon import Scalar, Vector, above_side, side_ends
 
 __all__ = ["OnSide", "RestingSides", "require_rest", "rest_of", "resting_sides"]
@@ -86,6 +86,11 @@ class RestingSides:
 
     def __len__(self) -> int:
         return len(self.a)
+
+    @property
+    def rests(self) -> npt.NDArray[np.bool_]:
+        """On which sides the part can rest: the centre of mass stands above the inside of the side."""
+        return (self.a > 0) & (self.a < self.length)
 
 
 def rest_of(
@@ -172,7 +177,7 @@ def resting_sides(
     return RestingSides(*np.array(rest_of(corners, (centre[0], centre[1]), lengths)).T)
 
 
-def require_rest(sides: RestingSides, unit: str = "") -> None:
+def require_rest(sides: RestingSides, unit: str = "", *, tips: bool = False) -> None:
     """Refuse a part that tips over on one of its sides.
 
     A part rests on side i when its centre of mass stands above the inside of that side: 0 < a_i < L_i and d_i > 0.
@@ -183,11 +188,15 @@ def require_rest(sides: RestingSides, unit: str = "") -> None:
         What to check.
     unit : str
         Unit of length, for the message.
+    tips : bool
+        Whether it may tip over on some sides, for it is followed from there; it still rests on one at least.
 
     Raises
     ------
-    GeometryError
+    TipsError
         With the first side on which it cannot rest, and by how much it fails.
+    GeometryError
+        For a centre of mass that is not above every side.
     """
     for side, (a, d, length) in enumerate(
         zip(sides.a.tolist(), sides.d.tolist(), sides.length.tolist(), strict=True)
@@ -199,13 +208,14 @@ def require_rest(sides: RestingSides, unit: str = "") -> None:
                 "above 0",
                 "move the centre of mass into the part",
             )
-        if 0 < a < length:
+        if 0 < a < length or (tips and sides.rests.any()):
             continue
         end, excess = ("left", -a) if a <= 0 else ("right", a - length)
-        raise GeometryError(
+        raise TipsError(
             f"the foot of the centre of mass on side {side}, from its left end,",
             f"{a:.6g} {unit}".strip(),
             f"between 0 and {f'{length:.6g} {unit}'.strip()}",
             f"the part cannot rest on side {side}: it tips over the {end} end by {f'{excess:.3g} {unit}'.strip()}; "
-            "move the centre of mass or change the shape",
+            "move the centre of mass, change the shape, or simulate it: "
+            "add landing = true and roll = true to [effects]",
         )

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from limitsets.graph.target import Target, place
 from limitsets.jit import kernel
 
-__all__ = ["TargetBoxes", "leaving", "merged", "placed"]
+__all__ = ["TargetBoxes", "leaving", "merged", "no_boxes", "placed"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,6 +24,12 @@ class TargetBoxes:
     hi: NDArray[np.int32]
     exits: NDArray[np.uint8]
     second_pass: float
+
+
+def no_boxes(dimension: int) -> TargetBoxes:
+    """Boxes of a side without cells."""
+    none, corner = np.empty(0, np.int64), np.empty((0, dimension), np.int32)
+    return TargetBoxes(none, none.astype(np.int32), corner, corner.copy(), np.empty(0, np.uint8), 0.0)
 
 
 @kernel(entry=True, counting=False)

@@ -10,6 +10,7 @@ from limitsets.arguments import arguments_checked
 from limitsets.cells import Grid
 from limitsets.errors import AnswerError
 from limitsets.graph.agreement import require_agreement
+from limitsets.graph.boxes import no_boxes
 from limitsets.graph.graph import TransitionGraph
 from limitsets.graph.images import METHODS
 from limitsets.graph.memory import require_memory
@@ -74,7 +75,11 @@ def transitions(map: Any, grid: Grid, method: str | None = None, **options: Any)
     require_memory(grid, chosen, options.get("samples", 16))
     require_agreement(map, grid, chosen == "boxes")
     target = Target.of(grid, kind.exits)
-    parts = [METHODS[chosen](map, grid, side, target, **options) for side in range(grid.sides)]
+    inhabited = grid.domain.inhabited.tolist()
+    parts = [
+        METHODS[chosen](map, grid, side, target, **options) if some else no_boxes(grid.dimension)
+        for side, some in enumerate(inhabited)
+    ]
     if len(parts) == 1:
         cell, side, lo, hi, exits = (
             getattr(parts[0], name) for name in ("cell", "side", "lo", "hi", "exits")

@@ -131,7 +131,9 @@ def _code_of(params: Any, side: int) -> Callable[[Array], Codes]:
 
 
 def branches_of_side(params: Any, domain: Sides, side: int, samples: int) -> tuple[Array, Codes]:
-    """Sample one side and its branches, with every change of branch between adjacent floats."""
+    """Sample one side and its branches, with every change of branch between adjacent floats; none without states."""
+    if not domain.lo[side, 0] < domain.hi[side, 0]:
+        return np.empty(0), np.empty(0, np.int64)
     x, code = located(_code_of(params, side), _sampled(domain, side, samples))
     if not kind_of(params).has_margin:
         return x, code

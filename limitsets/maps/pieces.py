@@ -107,6 +107,8 @@ def _monotone_parts(branch: _Branch, x: Array) -> tuple[list[Array], list[str]]:
 def _pieces_of_side(params: Any, domain: Sides, side: int, samples: int) -> tuple[Piece, ...]:
     """Cut one side at its changes of branch, then every branch."""
     x, code = branches_of_side(params, domain, side, samples)
+    if not x.size:
+        return ()
     changes = np.flatnonzero(np.diff(code)) + 1
     runs = np.split(x, changes)
     branches = code[np.concatenate([[0], changes])].tolist()

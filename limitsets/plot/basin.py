@@ -116,6 +116,8 @@ def _strips(shares: Basins, sets: list[style.Extents], unit: str) -> Figure:
     figure, (axes,) = style.canvas(9.0, 0.72 * grid.sides + 1.7)
     for side in range(grid.sides):
         edges, labels = grid.edges[side][0], shares.labels[grid.of_side(side)]
+        if not labels.size:
+            continue
         border = np.concatenate([[0], np.flatnonzero(np.diff(labels)) + 1, [labels.size]])
         for first, last in pairwise(border.tolist()):
             label, ends = int(labels[first]), (float(edges[first]), float(edges[last]))

@@ -144,6 +144,8 @@ def _limits(axes: Axes, about: Subject, sets: list[Extents], critical: list[floa
 def _frame(axes: Axes, about: Subject, side: int, critical: list[float]) -> None:
     axes.set_aspect("equal")
     leads = f" (a flip leads to side {(side + 1) % about.sides})" if about.thrown else ""
+    if not about.domain.lo[side, 0] < about.domain.hi[side, 0]:
+        leads = ": no part rests there"
     if about.sides > 1:
         axes.set_title(f"on side {side}{leads}", fontsize=style.TEXT)
     for number, x in enumerate(critical):

@@ -71,10 +71,7 @@ def part(scene: Scene) -> Figure:
     )
     axes.axhline(0.0, color=style.INK, lw=2.0, zorder=1)
     axes.add_patch(Polygon(corners, closed=True, zorder=2, gid="part", **OUTLINE))
-    resting = [
-        0.0 < a < length
-        for a, length in zip(scene.sides.a.tolist(), scene.sides.length.tolist(), strict=True)
-    ]
+    resting = scene.sides.rests.tolist()
     _sides(axes, scene, corners, resting)
     _centre(axes, scene, size)
     masses = _masses(scene)

@@ -71,7 +71,7 @@ class Attraction:
     def shares(self) -> dict[str, float]:
         """Shares of the arm where only the starts in the attracting cells are claimed."""
         lo, hi = self.cover.box.bare
-        total = float((hi.arm_length - lo.a).sum())
+        total = float((hi.arm_length - lo.a)[self.cover.box.rests].sum())
         inside = sum(high - low for parts in self.cells.extents().values() for low, high in parts) / total
         share = max(0.0, inside - ROUNDING)
         others = self.basin.leaves + self.basin.creeps
@@ -122,7 +122,7 @@ def _verdict(
     if lost.any():
         return False, f"nothing is proved of the image of {found.place(int(np.flatnonzero(lost)[0]))}"
     if found.box.landing > 0.0:
-        return False, f"near the joint: {joint[0].reason}"
+        return False, f"near the joint: {next(near.reason for near in joint if not near.empty)}"
     leaving = np.flatnonzero(found.graph.ranges.exits)
     if leaving.size:
         return False, f"the image of {found.place(int(leaving[0]))} may leave the cells"
@@ -143,6 +143,8 @@ def near_section(found: Attraction) -> dict[str, dict[str, Any]]:
     """Write what a recheck needs of the starts below the cells: by side the factor, the bracket of a fixed point."""
     section: dict[str, dict[str, Any]] = {}
     for side, near in enumerate(found.joint):
+        if near.empty:
+            continue
         section[str(side)] = {"q": near.q.hex()}
         if near.fixed_point is not None:
             section[str(side)]["fixed_point"] = [end.hex() for end in near.fixed_point]

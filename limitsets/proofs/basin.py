@@ -17,6 +17,7 @@ Source: docs/certificates.md, "For which starts".
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -66,10 +67,10 @@ class Basin:
     near : bool
         Whether the starts below the cells are in it, on every side: those beyond the jog's fixed point, if it has one.
     start : ndarray, shape (sides,)
-        On each side every start beyond this x is in it.
+        On each side every start beyond this x is in it; inf where the part cannot rest.
     explained : ndarray, shape (sides,)
         Starts up to this x are proved to be lost under the worst noise of the landing place, or to creep to the joint;
-        the foot of the part, a_i, where there are none.
+        the foot of the part, a_i, where there are none; inf where the part cannot rest.
     share : float
         Share of the arm that is in it, rounded down.
     leaves : float
@@ -107,7 +108,7 @@ class Basin:
         if self.near and not self.creeps and not (self.rank < 0).any():
             return "almost-every" if self.thinning else "every"
         if self.from_start:
-            return {"from": {str(side): float(x) for side, x in enumerate(self.start)}}
+            return {"from": {str(side): float(x) for side, x in enumerate(self.start) if math.isfinite(x)}}
         return "cells"
 
 
@@ -256,6 +257,10 @@ def _start(
     """On each side, from where on every start is claimed, and up to where the starts are lost or creep."""
     (lo, hi), start, explained = found.box.bare, [], []
     for side, (each, (edges,)) in enumerate(zip(joint, found.grid.edges, strict=True)):
+        if each.empty:
+            start.append(math.inf)
+            explained.append(math.inf)
+            continue
         last = int(np.flatnonzero(shut[found.grid.of_side(side)]).max(initial=-1))
         point = each.fixed_point if near else None
         below = float(hi.a[side]) if point is None else point[1]
@@ -272,18 +277,19 @@ def _shares(
     found: Cover, joint: Sequence[NearHinge], shut: Mask, near: bool, start: Floats, explained: Floats
 ) -> tuple[float, float, float, float, bool]:
     """Shares of the arm that are claimed, leave, creep and are open; whether all beyond `start` is claimed."""
-    lo, hi = found.box.bare
-    total = float((lo.arm_length - hi.a).sum())
-    wide = float((hi.arm_length - lo.a).sum())
-    from_start = bool((start - explained).sum() <= MOST_UNEXPLAINED * total and (start < lo.arm_length).all())
+    (lo, hi), rests = found.box.bare, found.box.rests
+    total = float((lo.arm_length - hi.a)[rests].sum())
+    wide = float((hi.arm_length - lo.a)[rests].sum())
+    unexplained = float((start[rests] - explained[rests]).sum())
+    from_start = unexplained <= MOST_UNEXPLAINED * total and bool((start[rests] < lo.arm_length).all())
     claimed = 0.0
     for side, (edges,) in enumerate(found.grid.edges):
         good = ~shut[found.grid.of_side(side)] & ((edges[:-1] >= start[side]) | (not from_start))
         claimed += float(np.diff(edges)[good].sum())
-        if near:
+        if near and rests[side]:
             point = joint[side].fixed_point
             claimed += float(edges[0]) - (float(hi.a[side]) if point is None else point[1])
-    explains = float((explained - lo.a).sum())
+    explains = float((explained - lo.a)[rests].sum())
     creeps = explains if near and any(each.fixed_point is not None for each in joint) else 0.0
     if found.box.landing > 0.0:
         leaves = explains

@@ -105,15 +105,15 @@ def cover(
     AnswerError
         For a part that may stand beyond the arm's end.
     """
-    foot, end = box.hi.a, np.full(box.hi.a.size, box.hi.arm_length)
+    rests, end = box.rests, np.full(box.hi.a.size, box.hi.arm_length)
+    foot, anchor, points = np.where(rests, box.hi.a, 0.0), np.where(rests, box.lo.a, 0.0), fixed_points(box)
     if not (foot < box.lo.arm_length).all():
         raise AnswerError("the arm", box.lo.arm_length, f"longer than a = {foot.max()}", "lengthen it")
-    foot, anchor, points = foot.copy(), box.lo.a.copy(), fixed_points(box)
     for side, point in enumerate(points):
         if not point.reason:
             foot[side] = anchor[side] = point.hi
     unknown = np.minimum(UNKNOWN * (box.hi.a - box.lo.a), 0.1 * (end - foot)) if not points else 0.0
-    lo = foot + np.maximum(NEAREST * (end - foot), unknown)
+    lo = np.where(rests, foot + np.maximum(NEAREST * (end - foot), unknown), end)
     plain = grid(Domain(lo[:, None], end[:, None], anchor), cells=cells)
     sides = []
     for side, (edges,) in enumerate(plain.edges):
@@ -172,7 +172,7 @@ def targets(found: Cover, branch: int, turned: int | None = None) -> NDArray[np.
             if of_branch != branch or (turned is not None and (to - side) % grid.sides != turned):
                 continue
             edges = grid.edges[to][0]
-            some = lo <= hi
+            some = (lo <= hi) & (edges.size > 1)  # no image comes to rest on a side without cells
             first = np.clip(np.searchsorted(edges, lo[some], side="right") - 1, 0, edges.size - 2)
             last = np.clip(np.searchsorted(edges, hi[some], side="left") - 1, 0, edges.size - 2)
             rows = grid.offset[side] + np.flatnonzero(some)

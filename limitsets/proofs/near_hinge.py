@@ -61,6 +61,8 @@ class NearHinge:
         With the arm's surface above the joint: R* lies between them.
     rolls : bool
         Whether a throw from (a_i, x] may roll on to another side.
+    empty : bool
+        Whether no throw begins on this side, for the part cannot rest on it; all is proved of no starts.
     """
 
     x: float
@@ -71,6 +73,11 @@ class NearHinge:
     reason: str
     fixed_point: tuple[float, float] | None = None
     rolls: bool = False
+    empty: bool = False
+
+
+# Of a side on which the part cannot rest.
+NO_STARTS = NearHinge(np.inf, np.inf, -np.inf, True, True, "", empty=True)
 
 
 @proof_kernel(entry=True)
@@ -152,6 +159,9 @@ def near_hinge(found: Cover) -> tuple[NearHinge, ...]:
     """
     answers = []
     for side, (edges,) in enumerate(found.grid.edges):
+        if not found.box.rests[side]:
+            answers.append(NO_STARTS)
+            continue
         if found.points:
             answers.append(_beyond(found, side, float(edges[0])))
             continue

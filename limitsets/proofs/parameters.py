@@ -13,6 +13,7 @@ from fractions import Fraction
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from limitsets.errors import AnswerError
 from limitsets.geometry import side_ends
@@ -67,6 +68,11 @@ class ParameterBox:
     def effects(self) -> bool:
         """Whether more than the minimal model is thrown."""
         return isinstance(self.lo, FullThrow)
+
+    @property
+    def rests(self) -> npt.NDArray[np.bool_]:
+        """On which sides the part rests; on the others it tips over, for all parameters."""
+        return (self.lo.a > 0) & (self.hi.a < self.lo.length)
 
     @property
     def middle_kappa(self) -> float:
@@ -243,13 +249,18 @@ def body_at(
 
 
 def _require_rest(
-    sides: Sequence[tuple[Any, ...]], kappa: RationalInterval, radius: RationalInterval
+    sides: Sequence[tuple[Any, ...]],
+    rests: Sequence[bool],
+    kappa: RationalInterval,
+    radius: RationalInterval,
 ) -> None:
-    """Refuse parameters some of which are those of no part, or of one that falls over at rest."""
-    for side, (a, d, length) in enumerate(sides):
-        if not (a.lo > 0 and d.lo > 0 and a.hi < length.lo):
+    """Refuse parameters some of which are those of no part, or of one that falls over where the scene's rests."""
+    for side, ((a, d, length), stays) in enumerate(zip(sides, rests, strict=True)):
+        good = a.lo > 0 and a.hi < length.lo if stays else a.hi <= 0 or a.lo >= length.hi
+        if not (good and d.lo > 0):
+            does = "rests" if stays else "tips over the same end"
             raise AnswerError(
-                f"side {side}", float(a), "a side on which the part rests, throughout", NARROWER
+                f"side {side}", float(a), f"a side on which the part {does}, throughout", NARROWER
             )
     if not (kappa.lo > 0 and radius.lo > 0):
         raise AnswerError("kappa or the radius of gyration", float(kappa), "above 0 throughout", NARROWER)
@@ -310,7 +321,7 @@ def parameter_box(
         raise AnswerError(
             "the part", "such sides", "one that can be, throughout the tolerance", NARROWER
         ) from None
-    _require_rest(sides, kappa, radius)
+    _require_rest(sides, scene.sides.rests.tolist(), kappa, radius)
     scalars = [kappa, reader.number("arm.surface_height"), reader.number("arm.length"), radius]
     ends = [span.outward() for span in scalars]
     columns = [np.array([side[k].outward() for side in sides]) for k in range(3)]

@@ -222,8 +222,11 @@ class Proof(Tabled):
             or with the arm's surface above the joint x - R* does, down to the jog's fixed point R*.
         """
         starts = [[float(edges[0]) for (edges,) in found.cover.grid.edges] for found in self.attractions]
+        rests = self.scene.sides.rests
         return {
-            "beyond": {str(side): max(each) for side, each in enumerate(zip(*starts, strict=True))},
+            "beyond": {
+                str(side): max(each) for side, each in enumerate(zip(*starts, strict=True)) if rests[side]
+            },
             "throws": max(found.max_rank for found in self.attractions),
             "near_joint": min(near.q for found in self.attractions for near in found.joint),
         }

@@ -70,6 +70,11 @@ def next_command(analysis: Analysis) -> str:
     outcome, scene = analysis.goal, analysis.scene
     source = _source(scene)
     assert outcome is not None
+    if analysis.choice.tipping:  # which no other command switches on
+        lines = " and ".join(f"{effect} = true" for effect in analysis.choice.tipping)
+        return (
+            f"write {lines} under [effects] of {source}; limitsets check {source} says whether it is in order"
+        )
     if outcome.holds and not outcome.vacuous:
         return f"limitsets certify {source} (a proof), limitsets margin {source} (how much each quantity may deviate)"
     if outcome.holds is None:

@@ -9,7 +9,7 @@ what to do.  Lengths stay in the scene's own unit, that of the arm's length.
 from limitsets.scene.cavity import Cavity
 from limitsets.scene.facts import Deviation, Effects, Scatter, World
 from limitsets.scene.quantities import NAMES, deviation
-from limitsets.scene.reading import load, scenes
+from limitsets.scene.reading import load, load_to_analyse, scenes
 from limitsets.scene.scene import Scene
 from limitsets.scene.tray import Tray
 from limitsets.scene.writing import dump
@@ -26,5 +26,6 @@ __all__ = [
     "deviation",
     "dump",
     "load",
+    "load_to_analyse",
     "scenes",
 ]

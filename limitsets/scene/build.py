@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from limitsets.geometry import RestingSides
 from limitsets.scene.cavity import resolve_cavity
-from limitsets.scene.facts import Deviation
+from limitsets.scene.facts import NOT_TIPPING, Deviation, Effects
 from limitsets.scene.floats import Floats
 from limitsets.scene.purpose import resolve_effects, resolve_goal, resolve_world
 from limitsets.scene.quantities import deviation, require
@@ -42,12 +43,12 @@ def resolved(structure: object, file: str | None) -> dict[str, Any]:
     resolver = Resolver(unit, file)
     numbers = Floats(tree, resolver)
     arm_length, body = numbers.number("arm.length"), numbers.body
-    _require_reach(body.sides.a.tolist(), arm_length, table, resolver)
+    _require_reach(body.sides, arm_length, table, resolver)
     gravity = numbers.gravity
     world = resolve_world(table.world, resolver)
     goal = None
     if table.goal is not None:
-        goal = resolve_goal(table.goal, len(body.sides), arm_length, resolver)
+        goal = resolve_goal(table.goal, body.sides.rests.tolist(), arm_length, resolver)
     cavity = None
     if table.cavity is not None:
         feet, lengths = body.sides.a.tolist(), body.sides.length.tolist()
@@ -55,6 +56,8 @@ def resolved(structure: object, file: str | None) -> dict[str, Any]:
     tray = None
     if table.tray is not None:
         tray = resolve_tray(table.tray, body.vertices, body.sides.length, goal, resolver)
+    effects = resolve_effects(table.effects, world, table.model.flight, resolver)
+    _require_tipping(body.sides, effects, table, resolver)
     return {
         "name": table.name,
         "unit": unit,
@@ -69,7 +72,7 @@ def resolved(structure: object, file: str | None) -> dict[str, Any]:
         "cavity": cavity,
         "tray": tray,
         "world": world,
-        "effects": resolve_effects(table.effects, world, table.model.flight, resolver),
+        "effects": effects,
         "tolerance": _tolerance(tree, table, resolver),
         "feedback": _feedback(table, len(body.sides), arm_length, resolver, gravity=gravity is not None),
         "file": file,
@@ -77,9 +80,9 @@ def resolved(structure: object, file: str | None) -> dict[str, Any]:
     }
 
 
-def _require_reach(feet: list[float], arm_length: float, table: SceneTable, resolver: Resolver) -> None:
-    for side, a in enumerate(feet):
-        if not arm_length > a:
+def _require_reach(sides: RestingSides, arm_length: float, table: SceneTable, resolver: Resolver) -> None:
+    for side, (a, rests) in enumerate(zip(sides.a.tolist(), sides.rests.tolist(), strict=True)):
+        if rests and not arm_length > a:
             raise resolver.refusal(
                 "arm.length",
                 "the length of the arm",
@@ -87,6 +90,26 @@ def _require_reach(feet: list[float], arm_length: float, table: SceneTable, reso
                 f"more than {a:.6g} {resolver.unit}",
                 f"the part resting on side {side} needs that much before any throw can lift it; lengthen the arm",
             )
+
+
+def _require_tipping(sides: RestingSides, effects: Effects, table: SceneTable, resolver: Resolver) -> None:
+    """Refuse what says nothing of a part that tips over on one of its sides."""
+    tips = [str(side) for side, rests in enumerate(sides.rests.tolist()) if not rests]
+    if not tips:
+        return
+    where = f"the part cannot rest on side {' and '.join(tips)}"
+    if table.model.flip != "signed":
+        allowed = 'flip = "signed" in [model]'
+        remedy = f"{where}, and tips from there the way it turns; correct it"
+        raise resolver.refusal("model.flip", "the criterion of a flip", table.model.flip, allowed, remedy)
+    for effect in NOT_TIPPING:
+        if effect in effects.on():
+            remedy = f"{where}, but may on an arm that leans; leave it out"
+            raise resolver.refusal(f"effects.{effect}", "this effect", effect, "another effect", remedy)
+    for key, given in (("cavity", table.cavity), ("tray", table.tray), ("feedback", table.feedback)):
+        if given is not None:
+            allowed = "a part that rests on each of its sides"
+            raise resolver.refusal(key, "the part", where, allowed, f"leave [{key}] out, or change the shape")
 
 
 def _tolerance(tree: Tree, table: SceneTable, resolver: Resolver) -> dict[str, Deviation]:

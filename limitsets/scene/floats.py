@@ -22,6 +22,7 @@ from limitsets.geometry import (
     triangle,
 )
 from limitsets.geometry.polygon import Vector
+from limitsets.scene.facts import TIPPING
 from limitsets.scene.numbers import Numbers
 from limitsets.scene.quantities import find, text_at
 from limitsets.scene.resolve import LEAST, Resolver
@@ -112,13 +113,14 @@ class Floats(Numbers):
 
     @cached_property
     def body(self) -> Body:
-        """The part, refused where it cannot rest on each of its sides."""
+        """The part, refused where it cannot rest on each of its sides; with `landing` and `roll` it tips there."""
         self._require_words_of_part()
         pairs, centre, lengths, radius = self.shape
         vertices: Array = np.array(pairs)
         sides = resting_sides(vertices, centre, lengths)
         with self.at("part.mass.center" if isinstance(centre, OnSide) else "part.mass"):
-            require_rest(sides, self.resolver.unit)
+            effects = self.tree.get("effects", {})
+            require_rest(sides, self.resolver.unit, tips=all(effects.get(each) is True for each in TIPPING))
         vertices.flags.writeable = False
         x, y = centre.in_frame(pairs) if isinstance(centre, OnSide) else centre
         return Body(vertices, (x, y), radius, sides)

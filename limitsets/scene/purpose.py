@@ -16,16 +16,22 @@ if TYPE_CHECKING:
 __all__ = ["resolve_effects", "resolve_goal", "resolve_world"]
 
 
-def resolve_goal(table: GoalTable, count: int, arm_length: float, resolver: Resolver) -> Goal:
-    """Resolve ``[goal]`` for a part with `count` sides."""
+def resolve_goal(table: GoalTable, rests: list[bool], arm_length: float, resolver: Resolver) -> Goal:
+    """Resolve ``[goal]`` for a part that rests on these of its sides."""
     named = [kind for kind in GOALS if getattr(table, kind) is not None]
     if len(named) != 1:
         found = " and ".join(named) or "none"
         raise resolver.refusal("goal", "the goal", found, f"one of {', '.join(GOALS)}", "name exactly one")
 
     def side(value: int, key: str) -> int:
-        if value >= count:
-            raise resolver.refusal(key, "the side", value, f"0 to {count - 1}", "name a side of this part")
+        if value >= len(rests):
+            allowed = f"0 to {len(rests) - 1}"
+            raise resolver.refusal(key, "the side", value, allowed, "name a side of this part")
+        if not rests[value]:
+            allowed = ", ".join(str(each) for each, good in enumerate(rests) if good)
+            raise resolver.refusal(
+                key, "the side", value, allowed, "the part cannot rest on it; name another"
+            )
         return value
 
     def position(text: str, key: str) -> float:

@@ -10,10 +10,11 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
-from limitsets.errors import SceneError, shown
+from limitsets.errors import SceneError, TipsError, shown
+from limitsets.scene.facts import TIPPING
 from limitsets.scene.scene import Scene
 
-__all__ = ["can_name", "load", "scenes", "structure_of"]
+__all__ = ["can_name", "load", "load_to_analyse", "scenes", "structure_of"]
 
 _MOST_BYTES = 1 << 20
 _MOST_DOTS = 16
@@ -68,6 +69,30 @@ def load(source: str | Path | Mapping[str, Any] | Scene) -> Scene:
     (25.3778518, 'in')
     """
     return source if isinstance(source, Scene) else Scene.of(*structure_of(source))
+
+
+def load_to_analyse(source: str | Path | Mapping[str, Any] | Scene) -> tuple[Scene, tuple[str, ...]]:
+    """Read a scene; of a part that cannot rest on one of its sides with the effects by which it tips on.
+
+    Returns
+    -------
+    (Scene, tuple of str)
+        The scene, and the effects that were switched on for that, mostly none.
+
+    Examples
+    --------
+    >>> load_to_analyse("paper-designed")[1]
+    ()
+    """
+    if isinstance(source, Scene):
+        return source, ()
+    structure, file = structure_of(source)
+    try:
+        return Scene.of(structure, file), ()
+    except TipsError:  # the words are in order, so that there is a table of effects or none
+        effects = structure.get("effects", {})
+        more = tuple(effect for effect in TIPPING if effects.get(effect) is not True)
+        return Scene.of({**structure, "effects": {**effects, **dict.fromkeys(more, True)}}, file), more
 
 
 def structure_of(source: str | Path | Mapping[str, Any]) -> tuple[dict[str, Any], str | None]:

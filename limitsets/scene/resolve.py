@@ -54,7 +54,7 @@ class Resolver:
         try:
             yield
         except GeometryError as error:
-            raise GeometryError(
+            raise type(error)(
                 error.thing,
                 error.value,
                 error.allowed,

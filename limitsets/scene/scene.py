@@ -225,12 +225,15 @@ class Scene(Tabled):
 
     @cached_property
     def domain(self) -> Domain:
-        """Where the part can rest on each side, from just beyond the least x with a flight to the arm's end."""
+        """Where the part can rest on each side, from just beyond the least x with a flight to the arm's end.
+
+        A side on which it cannot rest, a chamfer, has no states: its box is empty, at the arm's end.
+        """
         from limitsets.cells import Domain
 
-        a = self.sides.a
+        a, rests = self.sides.a, self.sides.rests
         lo, hi = resting_places(a, self.arm_length)
-        return Domain(lo[:, None], hi[:, None], a)
+        return Domain(np.where(rests, lo, hi)[:, None], hi[:, None], np.where(rests, a, 0.0))
 
     def value(self, name: str) -> float:
         """Give the value of a quantity.

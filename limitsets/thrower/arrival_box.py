@@ -13,9 +13,18 @@ from typing import Any
 
 from limitsets.interval import Interval
 from limitsets.interval.number import square_root
-from limitsets.jit import generic, proof_kernel
+from limitsets.jit import entry_of, generic, proof_kernel
+from limitsets.thrower.effects.roll import Roll
 from limitsets.thrower.impact import margin, swing
-from limitsets.thrower.motion_box import NOTHING, FullSideBox, box_of, corner_box, vertex_box, wait
+from limitsets.thrower.motion_box import (
+    NOTHING,
+    FullSideBox,
+    box_of,
+    corner_box,
+    tips_box,
+    vertex_box,
+    wait,
+)
 from limitsets.thrower.turn_box import exact_turn, turn_box, turn_point
 
 __all__ = ["came_down", "landed"]
@@ -136,10 +145,28 @@ def came_down(part: FullSideBox, k: int, x: Interval, phi: Interval, place: Inte
 
 
 @proof_kernel
+def _barrier(
+    roll: Any, part: FullSideBox, k: int, above: Interval, low: Interval, high: Interval, barrier: Interval
+) -> Interval:
+    """Return sgn(X) V about vertex k, sides on which the part cannot rest counted in: see `pivot._over`.
+
+    `low`, `high`: heights of the centre of mass over side k and over the next one.
+    """
+    if roll is None:
+        return barrier
+    kappa = part.own.kappa
+    behind, ahead = kappa * (above - low), kappa * (high - above)
+    left, right = tips_box(part, k) == 1, tips_box(part, k + 1) == -1
+    found = behind if left else (ahead if right else barrier)
+    return Interval(found.lo, found.hi)
+
+
+@proof_kernel
 def _came_down(part: FullSideBox, k: int, x: Interval, phi: Interval, place: Interval, count: int) -> int:
     b, after = box_of(part, k), box_of(part, k + 1)
     right, above = _x_and_h(part, k, phi)
     omega, barrier = swing(b, right, above, x - b.kappa * phi, part.own.h + part.own.d)
+    barrier = _barrier(entry_of(part.effects, Roll), part, k, above, b.d, after.d, barrier)
     flips = margin(b.flip, b.inertia, omega, barrier)
     kinetic = 0.5 * b.inertia * omega**2
     if not flips.lo > 0.0:

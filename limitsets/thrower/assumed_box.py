@@ -174,12 +174,18 @@ def _branch(b: SideBox, rest: Rest, thrown: Any, jog: bool, image: Interval, arm
     """Widen by what one branch needs after the landing."""
     at, omega, energy = thrown
     per_weight = energy / b.kappa
+    rests = (rest.a.lo > 0.0) & (rest.right.lo > 0.0)
     top = peak(b.ell, at.right, at.start, omega, per_weight, jog)
+    # about the end over which the part tips back no top is passed: it is highest when the side is down
+    before_top = rest.right.hi <= 0.0
+    top = Interval(rest.d.lo if before_top else top.lo, rest.d.hi if before_top else top.hi)
     force, friction = hinge_force(b.ell, b.rho2, b.inertia, at.start, top, rest.d, per_weight)
     _wider(out, FORCE, force)
     _wider(out, HOLD_FRICTION, friction)
-    _wider(out, ROLL, _rolls(b, rest, energy, jog))
-    _wider(out, ON_ARM, smaller(arm - image, image - rest.a))
+    rolls, room = _rolls(b, rest, energy, jog), smaller(arm - image, image - rest.a)
+    # where it cannot rest it surely goes on, and nothing is known of the place to which it does
+    _wider(out, ROLL, Interval(rolls.lo if rests else math.inf, rolls.hi if rests else math.inf))
+    _wider(out, ON_ARM, Interval(room.lo if rests else -math.inf, room.hi if rests else math.inf))
 
 
 @proof_kernel

@@ -76,7 +76,7 @@ def full_outcome(part: FullSide, x: float, side: int) -> tuple[float, int, int]:
     impacts, rolls, before = 0, -1, side
     while moving and impacts < MOST_EVENTS:
         impacts += 1
-        contact, face, ends = turned_down(pivot, slip, part, struck(bounce, slip, part, hit))
+        contact, face, ends = turned_down(pivot, slip, roll, part, struck(bounce, slip, part, hit))
         if ends == LOST:
             return 0.0, 0, codes.OUTSIDE_MODEL
         if ends == OFF:

@@ -42,6 +42,7 @@ __all__ = [
     "side_number",
     "stays",
     "thrown",
+    "tips",
     "varied",
     "without",
 ]
@@ -252,6 +253,15 @@ def on_to_next(part: FullSide, vertex: int) -> float:
     """How much farther inward the part lies on side `vertex` + 1 than on side `vertex`, turned about that vertex."""
     k, after = side_number(part, vertex), side_number(part, vertex + 1)
     return part.a[k] + (part.length[after] - part.a[after])  # type: ignore[no-any-return]  # kernels take arrays as Any
+
+
+@kernel
+def tips(part: FullSide, k: int) -> int:
+    """Which end of side number k the part tips over of its own accord: 1 the left one, -1 the right one, 0 none."""
+    number = side_number(part, k)
+    if part.a[number] <= 0.0:
+        return 1
+    return -1 if part.a[number] >= part.length[number] else 0
 
 
 def outline_of(bare: Throw) -> Outline:

@@ -36,6 +36,7 @@ __all__ = [
     "no_way",
     "put",
     "thrown_box",
+    "tips_box",
     "vertex_box",
     "wait",
 ]
@@ -166,6 +167,19 @@ def vertex_box(part: FullSideBox, k: int) -> tuple[Interval, Interval]:
     """Place of vertex number k from the centre of mass, before the throw."""
     n = k % part.lo.a.size
     return Interval(part.p_lo[n], part.p_hi[n]), Interval(part.q_lo[n], part.q_hi[n])
+
+
+@proof_kernel
+def tips_box(part: FullSideBox, k: int) -> int:
+    """Which end of side number k the part tips over, as `motion.tips`, for all parameters; 2 where that differs."""
+    n = k % part.lo.a.size
+    a = Interval(part.lo.a[n], part.hi.a[n])
+    right = Interval(part.lo.length[n], part.hi.length[n]) - a
+    if a.hi <= 0.0:
+        return 1
+    if right.hi <= 0.0:
+        return -1
+    return 0 if (a.lo > 0.0) & (right.lo > 0.0) else 2
 
 
 @proof_kernel

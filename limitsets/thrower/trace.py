@@ -134,6 +134,10 @@ def _check_side(params: Throw | FullThrow, side: int) -> None:
         )
 
 
+def _rests(params: Throw | FullThrow, side: int) -> bool:
+    return bool(0.0 < params.a[side] < params.length[side])
+
+
 def trace(params: Throw | FullThrow, x: float, side: int, count: int = 1) -> Trace:
     """Throw a part `count` times, with the angle, displacement and broken assumptions of each throw.
 
@@ -156,7 +160,7 @@ def trace(params: Throw | FullThrow, x: float, side: int, count: int = 1) -> Tra
     Raises
     ------
     MapError
-        For a side the part has not.
+        For a side the part has not, or on which it cannot rest.
 
     Examples
     --------
@@ -166,6 +170,14 @@ def trace(params: Throw | FullThrow, x: float, side: int, count: int = 1) -> Tra
     0.311437
     """
     _check_side(params, side)
+    if not _rests(params, side):
+        rests = [str(k) for k in range(params.a.size) if _rests(params, k)]
+        raise MapError(
+            "the side",
+            side,
+            f"a side on which the part rests: {', '.join(rests)}",
+            f"it tips over on side {side}, so that no throw begins there",
+        )
     path = orbit(params, x, side, count)
     made = path.code.size
     phi, shift, turned, other = _seen(_path_details, params, path.x[:made], path.side[:made])
@@ -222,7 +234,7 @@ def impact_angles(params: Throw | FullThrow, x: ArrayLike, side: int) -> NDArray
     starts = np.ascontiguousarray(x, dtype=np.float64)
     count = starts.size
     phi, _, _, _ = _seen(_all_details, params, starts, np.full(count, side, dtype=np.int64))
-    inside = (starts > params.a[side]) & (phi > 0.0) & (phi <= params.flight.full_turn)
+    inside = _rests(params, side) & (starts > params.a[side]) & (phi > 0.0) & (phi <= params.flight.full_turn)
     return np.where(inside, phi, math.nan)
 
 

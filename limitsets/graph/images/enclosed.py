@@ -204,7 +204,7 @@ def boxes_of(found: Enclosures, target: Target, exits: int) -> TargetBoxes:
     lost = np.flatnonzero(found.lost)
     everywhere = np.full(int(lost.max(initial=-1)) + 1, 0, np.uint8)
     everywhere[lost] = 2**exits - 1
-    for side in range(sides):
+    for side in np.flatnonzero(target.cells.prod(axis=1)).tolist():
         last = np.tile((target.cells[side] - 1).astype(np.int32), (lost.size, 1))
         of_side = np.full(lost.size, side, np.int32)
         parts.append(TargetBoxes(lost, of_side, np.zeros_like(last), last, everywhere, 0.0))

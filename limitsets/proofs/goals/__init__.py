@@ -11,6 +11,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+import numpy as np
+
 from limitsets.goals import Goal, unknown_goal
 from limitsets.proofs.attraction import Attraction, near_section
 from limitsets.proofs.goals import attracts_all, flip_order, oriented_beyond, predicate, reaches, stays_on_arm
@@ -114,7 +116,8 @@ def _for_starts(found: Attraction, answer: Answer, *, almost: bool) -> Answer:
     if isinstance(starts, dict):
         section["starts"] = {"from": {side: x.hex() for side, x in starts["from"].items()}}
         if found.cover.box.landing > 0.0:
-            section["lost"] = {str(side): float(x).hex() for side, x in enumerate(basin.explained)}
+            finite = ((side, float(x)) for side, x in enumerate(basin.explained) if np.isfinite(x))
+            section["lost"] = {str(side): x.hex() for side, x in finite}
     if basin.thinning:
         section["thinning"] = basin.thinning
     if basin.near:

@@ -52,6 +52,8 @@ def _missing(found: Attraction, goal: Predicate) -> str:
         return f"{goal.name}: not where a throw from {start} may land"
     foot = found.cover.box.bare[0].a
     for side, near in enumerate(found.joint):
+        if near.empty:
+            continue
         landing = np.array([foot[side]]), np.array([near.reach])
         if near.rolls or not _good(goal, *landing, side).all():
             return f"{goal.name}: not where a throw from near the joint on side {side} may land"

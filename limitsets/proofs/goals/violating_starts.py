@@ -72,6 +72,8 @@ def _starts(found: Attraction) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     """Choose starts on all of the arm; with scattered landings also one nearer to the joint than these scatter."""
     box, x, side = found.cover.box, [], []
     for s, (edges,) in enumerate(found.cover.grid.edges):
+        if not box.rests[s]:
+            continue
         centres = 0.5 * (edges[:-1] + edges[1:])
         near = [box.hi.a[s] + 0.125 * box.landing] if box.landing > 0.0 and not found.cover.points else []
         x.append(np.concatenate([near, centres[:: max(1, centres.size // STARTS)]]))

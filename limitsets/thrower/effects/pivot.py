@@ -32,6 +32,7 @@ from limitsets.thrower.motion import (
     on_to_next,
     right_of,
     side_number,
+    tips,
 )
 from limitsets.thrower.sliding import slide_on
 
@@ -72,7 +73,24 @@ def _margin(pivot: Any, part: FullSide, inertia: float, omega: float, barrier: f
 
 
 @kernel
-def _hinged(pivot: Any, part: FullSide, hit: Contact) -> Face:
+def _over(roll: Any, part: FullSide, hit: Contact, kinetic: float, high: float, over: bool) -> bool:
+    """Whether the part gets over its vertex, sides on which it cannot rest counted in.
+
+    About an end over which the part tips, that side's height is the greatest that the centre of mass passes: there is
+    no top to climb beyond it.
+    """
+    if roll is None:
+        return over
+    k, after = side_number(part, hit.vertex), side_number(part, hit.vertex + 1)
+    if tips(part, hit.vertex) > 0:
+        return hit.omega >= 0.0 or kinetic < part.own.kappa * (part.d[k] - high)
+    if tips(part, hit.vertex + 1) < 0:
+        return hit.omega > 0.0 and kinetic > part.own.kappa * (part.d[after] - high)
+    return over
+
+
+@kernel
+def _hinged(pivot: Any, roll: Any, part: FullSide, hit: Contact) -> Face:
     """Turn the part about its vertex until a side comes down.
 
     By energy: over the top or back, then down with what was there at the start and the height lost.
@@ -87,6 +105,7 @@ def _hinged(pivot: Any, part: FullSide, hit: Contact) -> Face:
     far = (ell - high) if right > 0.0 else (high - ell)
     barrier = gravity * (near if high > 0.0 else far)
     over = _margin(pivot, part, inertia, hit.omega, barrier) > 0.0
+    over = _over(roll, part, hit, kinetic, above(part, hit.vertex, hit.psi), over)
     side = hit.vertex + 1 if over else hit.vertex
     k = side_number(part, side)
     foot = part.a[k] - part.length[k] if over else part.a[k]
@@ -115,18 +134,20 @@ def _holds(pivot: Any, part: FullSide, mu: float, hit: Contact, slid: bool) -> t
 
 
 @kernel
-def turned_down(pivot: Any, slip: Any, part: FullSide, struck: Contact) -> tuple[Contact, Face, int]:
+def turned_down(
+    pivot: Any, slip: Any, roll: Any, part: FullSide, struck: Contact
+) -> tuple[Contact, Face, int]:
     """Turn the part about its vertex until a side comes down (DOWN), the vertex lets go (OFF), or it is LOST."""
     hit, ends = struck, OFF if struck.lift > 0.0 else ON
     if pivot is None and slip is None:
-        return hit, _hinged(pivot, part, hit), DOWN if ends == ON else OFF
+        return hit, _hinged(pivot, roll, part, hit), DOWN if ends == ON else OFF
     mu = _friction(pivot, slip)
     way = 0 if hit.slide == 0.0 else int(math.copysign(1.0, hit.slide))
     for slides in range(MOST_SLIDES):
         if ends == ON and way == 0:
             hit, holds = _holds(pivot, part, mu, hit, slides > 0)
             if holds:
-                return hit, _hinged(pivot, part, hit), DOWN
+                return hit, _hinged(pivot, roll, part, hit), DOWN
             way, ends = gives_way(part, mu, hit)
         if ends == ON:
             hit, ends = slide_on(part, mu, way, hit)

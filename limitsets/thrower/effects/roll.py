@@ -6,7 +6,9 @@ Coming down on a side about one of its ends, the part strikes the arm with the o
 
 a stop where the bracket is negative.  What is then left of the energy may lift it over k', or only rock it up and down
 again; each impact keeps a part of the energy smaller than one, and the part rests when it can be lifted over neither
-end.  Oracle: Housner's rocking block, whose rates are as 1 - (3/2) sin^2 alpha.  Source: docs/model.md, effects.
+end.  On a side beside which its centre of mass stands, a chamfer, it never rests: it tips over the end that is nearer,
+at the latest after it has rocked on the other one, and no throw begins there.
+Oracle: Housner's rocking block, whose rates are as 1 - (3/2) sin^2 alpha.  Source: docs/model.md, effects.
 """
 
 from __future__ import annotations
@@ -18,7 +20,17 @@ from limitsets.jit import entry_of, kernel
 from limitsets.thrower.declared import Effect, declare
 from limitsets.thrower.effects.bounce import struck
 from limitsets.thrower.effects.drive import Drive, leant
-from limitsets.thrower.motion import Arrival, Contact, Face, FullSide, on_to_next, right_of, side_number
+from limitsets.thrower.motion import (
+    Arrival,
+    Contact,
+    Face,
+    FullSide,
+    on_to_next,
+    possible,
+    right_of,
+    side_number,
+    tips,
+)
 from limitsets.thrower.motion_box import enclosed, encloses
 from limitsets.thrower.turn import turn
 
@@ -54,15 +66,16 @@ def _rolls(roll: Any, part: FullSide, face: Face, after: Contact) -> bool:
     """Whether a part that does not bounce moves on over the end that struck.
 
     It has to turn on the same way, not against the side's other end, with energy enough to be lifted over the nearer
-    end, however much of that it has by sliding; but not just by sliding, flat on its side.
+    end, however much of that it has by sliding; but not just by sliding, flat on its side.  Where it cannot rest it
+    moves on with whatever is left.
     """
     if roll is None:
         return False
-    k = side_number(part, face.side)
-    a, d = part.a[k], part.d[k]
-    lift = min(_lift(part, a, d), _lift(part, a - part.length[k], d))  # over the nearer end
+    if tips(part, face.side) != 0:
+        return True
+    lift = min(_left_lift(part, face.side), _right_lift(part, face.side))  # over the nearer end
     right = right_of(part, after.vertex, after.psi)
-    along, up = after.slide - after.omega * d, after.omega * right
+    along, up = after.slide - after.omega * part.d[side_number(part, face.side)], after.omega * right
     turning = part.own.rho2 * after.omega * after.omega + up * up
     # kernels take arrays as Any, and with them d and all that comes of it
     return (after.omega * face.omega > 0.0) & (turning + along * along > 2.0 * lift) & (turning > FLAT * lift)  # type: ignore[no-any-return]
@@ -85,6 +98,31 @@ def _lift(part: FullSide, foot: float, d: float) -> float:
     return gravity * right * right / (math.hypot(right, high) + high)  # ell - H
 
 
+@kernel
+def _left_lift(part: FullSide, side: int) -> float:
+    """Energy to get over the left end of a side: to the top, or on to a next side that is lower than that."""
+    k, after = side_number(part, side), side_number(part, side + 1)
+    if tips(part, side + 1) < 0:
+        return part.own.kappa * (part.d[after] - part.d[k])  # type: ignore[no-any-return]  # kernels take arrays as Any
+    return _lift(part, part.a[k], part.d[k])
+
+
+@kernel
+def _right_lift(part: FullSide, side: int) -> float:
+    """Energy to get over the right end of a side, see `_left_lift`."""
+    k, before = side_number(part, side), side_number(part, side - 1)
+    if tips(part, side - 1) > 0:
+        return part.own.kappa * (part.d[before] - part.d[k])  # type: ignore[no-any-return]  # kernels take arrays as Any
+    return _lift(part, part.a[k] - part.length[k], part.d[k])
+
+
+@kernel
+def _begins(roll: Roll, so_far: bool, part: FullSide, x: float) -> bool:
+    """Whether a throw can begin on a side: not where the part cannot rest."""
+    return so_far and tips(part, part.own.side) == 0
+
+
+possible.on(Roll, _begins)
 encloses.on(Roll, enclosed)
 declare(
     Effect("roll", Roll, lambda world, how: Roll(), "the part then stays where it is until the next throw")

@@ -331,10 +331,21 @@ class Simulation:
             return True
         if not self.law.roll or (self.lever(y, corner) @ after[3:6])[1] <= 0:
             return False
-        feet = self.body.reach(y[2])[[corner, other]]
-        lift = min(np.hypot(foot[0], foot[1]) - abs(foot[1]) for foot in feet)
+        reach = self.body.reach(y[2])
+        left, right = sorted((corner, other), key=lambda k: reach[k, 0])
+        if not reach[left, 0] < 0.0 < reach[right, 0]:
+            self.modes.append("tips")  # nothing holds it there
+            return True
+        lift = min(self.lift(reach, left, left - 1, 1.0), self.lift(reach, right, right + 1, -1.0))
         turning = self.body.rho**2 * after[5] ** 2 + after[4] ** 2
         return bool(turning + after[3] ** 2 > 2 * self.kappa * lift and turning > 2e-12 * self.kappa * lift)
+
+    def lift(self, reach: np.ndarray, foot: int, after: int, way: float) -> float:
+        """How far the centre of mass rises at most while the part turns about a foot until the next corner is down."""
+        along, up = reach[after % len(reach)] - reach[foot]
+        free = np.arctan2(up, -way * along)  # until that corner is down
+        ell, top = np.hypot(*reach[foot]), np.arctan2(-way * reach[foot, 0], -reach[foot, 1])
+        return float(ell * (np.cos(top - min(top, free)) - np.cos(top)))
 
     def stop(self, y: np.ndarray, corner: int, other: int) -> tuple[float, int]:
         """Come to rest on a side: one impact of both ends, then sliding."""

@@ -137,7 +137,7 @@ def ledger(params: Any, x: float, side: int, book: Any) -> int:
         _note(book, line, 3, high, hit.vx, hit.vy, hit.omega)
         vx, vy = start.slide - start.omega * high, start.lift + start.omega * right
         _note(book, line, 7, high, vx, vy, start.omega)
-        contact, face, ends = turned_down(pivot, slip, part, start)
+        contact, face, ends = turned_down(pivot, slip, roll, part, start)
         if ends == LOST:
             return -1
         book[line + 1, 0] = TURN
