@@ -269,6 +269,7 @@ def test_wrong_calls(error, call):
 # ---------------------------------------------------------------- random starts
 
 
+@pytest.mark.sweep
 def test_random_starts_that_stay_elsewhere_ask_for_finer_cells():
     """At 4096 cells a side the set that collects 83 % of the starts has an edge out; at 16 384 it has none."""
     found = ls.analyse(FOUR_GON)

@@ -96,6 +96,7 @@ def test_a_gif_has_the_frames_and_their_delays(tmp_path):
     assert film.frames - 5 <= len(delays) <= film.frames
 
 
+@pytest.mark.sweep
 def test_an_mp4_has_the_frames(tmp_path):
     import imageio_ffmpeg
 

@@ -190,6 +190,7 @@ def test_a_trial_depends_on_its_number_alone():
     assert again[0] != pass_through(joined, 4, 5)
 
 
+@pytest.mark.sweep
 def test_without_contact_there_is_no_engine():
     code = (
         "import sys, limitsets as ls; ls.assemble('paper-triangle', 'paper-quadrilateral', trials=2);"

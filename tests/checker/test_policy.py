@@ -599,6 +599,7 @@ def test_a_cavity_is_where_parts_are_caught():
     assert ls.feedback(scene, starts=FEW, cells=64, throws=1).goal == (20.0, 2)  # nothing is caught in stop
 
 
+@pytest.mark.sweep
 def test_other_sensors_on_the_same_images():
     """`places` and `asking` find what `feedback` finds with the same borders of cells."""
     sensors = [BeyondSensor(x, 0.05) for x in (18.0, 20.0)]

@@ -52,6 +52,7 @@ def test_bad_input_is_exit_2(capfd, words):
     assert err
 
 
+@pytest.mark.sweep
 def test_analyse_resolves_auto_and_says_so(capfd):
     tree = ls.load("paper-initial").as_dict() | {"effects": {"auto": True}}
     ls.dump(ls.load(tree), "auto.toml")

@@ -83,6 +83,7 @@ def test_a_map_in_the_place_of_a_scene_is_named(ask):
         ask(ls.maps.Henon())
 
 
+@pytest.mark.sweep
 def test_a_report_of_another_scene_is_not_replaced_without_a_word(capfd):
     words = ("--cells", "64", "-o", "reports")
     _, _, err = run(capfd, "analyse", "paper-designed", *words)
@@ -93,6 +94,7 @@ def test_a_report_of_another_scene_is_not_replaced_without_a_word(capfd):
     assert "reports holds the report of another scene, paper-designed: it is replaced" in err
 
 
+@pytest.mark.sweep
 @pytest.mark.skipif(sys.platform == "win32", reason="no locks of this kind there")
 def test_two_runs_at_once_do_not_write_into_one_folder(capfd, tmp_path):
     """The first holds the folder as long as it runs, however it ends."""
@@ -123,6 +125,7 @@ def test_one_word_for_one_thing(capfd):
 # ---------------------------------------------------------------- what comes next, and how long it takes
 
 
+@pytest.mark.sweep
 def test_a_goal_that_fails_names_the_next_command(capfd):
     _, out, _ = run(capfd, "analyse", "paper-initial", "--cells", "1024", "-o", "found")
     assert "next: limitsets design paper-initial --goal" in out
@@ -282,6 +285,7 @@ def test_a_speed_in_a_wrong_unit_is_asked_about(capfd, tmp_path):
     assert "has the speed the right unit?" in out
 
 
+@pytest.mark.sweep
 def test_a_goal_that_fails_comes_with_the_x_from_which_it_holds(capfd, tmp_path):
     own = tmp_path / "own.toml"
     slow = ls.load("paper-designed").with_values({"throw.speed": "150 deg/s"})

@@ -222,6 +222,7 @@ def test_without_flint_there_is_one_clear_error(capfd, monkeypatch):
     assert "pip install python-flint" in err
 
 
+@pytest.mark.sweep
 @pytest.mark.skipif(sys.platform == "win32", reason="signals")
 def test_ctrl_c_reaches_the_helpers_without_a_traceback(capfd):
     """From a terminal the whole group of processes hears it."""

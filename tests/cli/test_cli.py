@@ -351,6 +351,7 @@ def test_ctrl_c_while_the_package_is_imported(module):
     assert (done.returncode, done.stdout, done.stderr) == (130, "", "limitsets: interrupted\n")
 
 
+@pytest.mark.sweep
 @pytest.mark.skipif(sys.platform == "win32", reason="signals")
 def test_ctrl_c_leaves_the_old_files_whole(tmp_path):
     folder = tmp_path / "report"

@@ -42,6 +42,7 @@ def test_json_alone_and_noise(capfd):
     assert table["success"]["wanted"] == 0.95
 
 
+@pytest.mark.sweep
 def test_the_certificate_is_written_and_rechecked(capfd):
     file = written("paper-designed", position="20.5 in")
     quick = ("--trials", "50", "--cells", "32", "--certificate", "fed.proof.zip")

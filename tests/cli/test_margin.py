@@ -22,6 +22,7 @@ def test_a_table_in_units_that_people_use(capfd):
     assert not list(Path().iterdir())
 
 
+@pytest.mark.sweep
 def test_a_margin_of_a_goal_that_no_part_gets_to_says_so(capfd):
     _, out, _ = run(capfd, "margin", "paper-designed", "landing.x", "--width", "0.3", "--x", "25")
     assert "landing.x: what is proved holds vacuously, no part gets beyond x = 25 in" in out
@@ -83,6 +84,7 @@ def test_the_joint_margin_has_a_figure_of_its_own(capfd):
     assert "margins.png" not in names
 
 
+@pytest.mark.sweep
 def test_another_x_and_a_reading(capfd):
     words = ("margin", "paper-designed", "throw.speed", "--reading", "per-throw", "--width", "0.2", "--json")
     _, at_20, _ = run(capfd, *words)

@@ -27,6 +27,7 @@ def without(modules, *words):
     )
 
 
+@pytest.mark.sweep
 @pytest.mark.parametrize(
     ("extra", "modules", "words"),
     [
@@ -50,6 +51,7 @@ def test_one_line_names_the_extra(extra, modules, words):
     assert f"pip install 'limitsets[{extra}]'" in line
 
 
+@pytest.mark.sweep
 def test_without_any_extra_the_rest_works():
     every = "pymunk,xarray,zarr,pandas,pyarrow,imageio_ffmpeg,panel,bokeh,distributed,dask,IPython"
     throw = ("throw", "paper-designed", "--x", "15", "--side", "2")

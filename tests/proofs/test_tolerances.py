@@ -52,6 +52,7 @@ def test_each_quantity_is_proved_and_rechecked(tmp_path, name, width):
     assert report.claims == [("attracts-all", "proved", ""), ("goal", "proved", "")]
 
 
+@pytest.mark.sweep
 @pytest.mark.parametrize("name", ["arm.surface_height", "part.mass.center.along"])
 def test_above_the_joint_too(tmp_path, name):
     scene = ls.load("paper-designed").with_values({"arm.surface_height": 0.1})
@@ -68,6 +69,7 @@ def test_two_quantities_at_once(tmp_path):
     assert ls.recheck(proof.save(tmp_path / "x.proof.zip")).verdict == "proved"
 
 
+@pytest.mark.sweep
 @pytest.mark.parametrize(
     ("name", "width"), [("part.mass.center.along", "0.16 in"), ("arm.surface_height", "0.08 in")]
 )
@@ -241,6 +243,7 @@ def test_a_scene_that_leaves_its_model_to_the_defaults_is_rechecked(tmp_path, mo
     assert f"flight exact, flip {flip}" in report.relied_on[0]
 
 
+@pytest.mark.sweep
 def test_corners_and_masses_with_a_tolerance_are_rechecked(tmp_path):
     """The length of a side bends with its corners: an interval holds it narrower than a ball does."""
     tolerance = {

@@ -143,6 +143,7 @@ def test_no_orbit_of_any_scene_exceeds_what_is_proved_and_some_nearly_reach_it(g
     assert box.proved(reached + gap)
 
 
+@pytest.mark.sweep
 def test_no_orbit_exceeds_it_with_the_worst_landings_either():
     box = Attacked("paper-designed", {name: SMALL[name] for name in ("throw.kappa", "part.sides[0]")}, 0.02)
     reached = box.highest_with_noise(np.random.default_rng(7))

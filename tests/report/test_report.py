@@ -202,6 +202,7 @@ def test_a_flag_on_the_limit_set_is_said_at_the_top():
     assert "This touches the limit set: side 0: 19.000 to 19.753 in" in text
 
 
+@pytest.mark.sweep
 def test_nothing_stays(tmp_path):
     scene = ls.load(SCENES / "five-sides.toml").with_values({"throw.kappa": 60.0, "arm.surface_height": -0.5})
     files = write(ls.analyse(scene), tmp_path)
@@ -227,6 +228,7 @@ def test_bands_tell_which_sides_occur_where():
 # ---------------------------------------------------------------- files
 
 
+@pytest.mark.sweep
 @pytest.mark.parametrize("fault", [RuntimeError, KeyboardInterrupt])
 def test_a_fault_while_drawing_leaves_the_old_files_whole(tmp_path, monkeypatch, fault):
     write(analysed("paper-initial"), tmp_path)
@@ -241,6 +243,7 @@ def test_a_fault_while_drawing_leaves_the_old_files_whole(tmp_path, monkeypatch,
     assert bytes_of(tmp_path) == before
 
 
+@pytest.mark.sweep
 def test_a_fault_while_writing_the_page_leaves_the_old_files_whole(tmp_path, monkeypatch):
     write(analysed("paper-initial"), tmp_path)
     before = bytes_of(tmp_path)

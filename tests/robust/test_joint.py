@@ -81,6 +81,7 @@ def test_the_landing_place_differs_at_every_throw():
     assert abs(0.02 * alone.refuted - landing.refuted) < 0.02 * landing.refuted
 
 
+@pytest.mark.sweep
 def test_what_runs_out_of_time_says_so_and_keeps_what_is_proved(tmp_path):
     # the highest place of paper-initial off side 2 is three throws from what decides it: two throws do not settle the
     # box; without any time each stage is tried once, as a whole: the same on every machine

@@ -115,6 +115,7 @@ def test_lengths_are_bracketed(name):
     assert 0.97 * found.refuted < least <= 1.02 * found.refuted
 
 
+@pytest.mark.sweep
 def test_a_tolerance_in_turns_or_milligrams_says_the_unit_of_the_margin():
     scene = ls.load("paper-designed").as_dict()
     scene["throw"], scene["gravity"] = {"speed": "26.336 rpm"}, {"acceleration": "193.045 in/s^2"}
@@ -199,6 +200,7 @@ def below_20_off_side_2(lo, hi, side):
     return (hi <= 20.0) | (side == 2)
 
 
+@pytest.mark.sweep
 @pytest.mark.parametrize("reading", ["fixed", "per-throw"])
 def test_a_function_of_the_callers_is_a_goal(tmp_path, reading):
     goal = Predicate(below_20_off_side_2, "below 20 in off side 2", cuts=(20.0,))

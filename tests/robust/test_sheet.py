@@ -356,6 +356,7 @@ def test_a_curve_that_asks_more_than_the_goal_is_not_taken_for_it(sheet, at_best
     assert (joint == bound(sheet.joint.proved)) is says
 
 
+@pytest.mark.sweep
 def test_room_is_compared_in_the_units_of_the_tolerance():
     """Heights have 0.05 in of room, 60 times 20 um; 0.05 was taken for so many of 20 um.  A share needs no blank."""
     tolerance = {"throw.speed": "1%", "gravity.tilt": "0.1\u00b0", "arm.surface_height": "20 \u00b5m"}

@@ -161,6 +161,7 @@ def test_json(gaussian):
     assert back["sensitivity"]["speed"]["mean throws"]["slope"] is not None
 
 
+@pytest.mark.sweep
 def test_scene_with_scatter_and_a_goal_needs_no_more():
     tree = ls.load("paper-designed").as_dict()
     tree["world"] = {"scatter": {"speed": "0.5 %", "landing": "0.02 in"}}
