@@ -89,6 +89,9 @@ def _text(analysis: Analysis, page: Path) -> None:
             for side, parts in extents.items()
         ]
         table(["side", f"x [{unit}]", "jogs per visit"], rows)
+    exits = ", ".join(f"{name} {percent(share)}" for name, share in analysis.basins.exits.items() if share)
+    if exits:
+        typer.echo(f"of all starts leave: {exits}")
     broken = ", ".join(str(side) for side in sorted(other_vertex_in_limit_sets(analysis)))
     if broken:
         typer.echo(

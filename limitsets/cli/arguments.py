@@ -10,13 +10,13 @@ from limitsets.errors import LimitsetsError
 if TYPE_CHECKING:
     from limitsets.scene import Scene
 
-__all__ = ["HELP_NO_RECHECK", "Ends", "deviations", "ends_of", "number", "place", "places_of", "position"]
+__all__ = ["HELP_NO_RECHECK", "bounds_of", "deviations", "number", "place", "places_of", "position"]
 
 HELP_NO_RECHECK = "Write certificates without checking them first."
 
 _BARE = re.compile(r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]{1,3})?")
 
-Ends: TypeAlias = tuple[float | str | None, float | str | None]
+_Ends: TypeAlias = tuple[float | str | None, float | str | None]
 """Lowest and highest: a number in the scene's unit, text with a unit, or None for no bound."""
 
 
@@ -70,9 +70,9 @@ def deviations(option: str, words: list[str] | None) -> dict[str, str]:
     return found
 
 
-def ends_of(words: list[str] | None) -> dict[str, Ends]:
+def _ends_of(words: list[str] | None) -> dict[str, _Ends]:
     """Read the words of --bounds, QUANTITY=LOWEST:HIGHEST each."""
-    found: dict[str, Ends] = {}
+    found: dict[str, _Ends] = {}
     for word in words or []:
         name, sign, text = word.partition("=")
         lo, colon, hi = text.partition(":")
@@ -85,4 +85,24 @@ def ends_of(words: list[str] | None) -> dict[str, Ends]:
             raise LimitsetsError("the bounds", word, "QUANTITY=LOWEST:HIGHEST", remedy, key="--bounds")
         ends = [number(end.strip("'\" ")) if end.strip("'\" ") else None for end in (lo, hi)]
         found[name.strip()] = (ends[0], ends[1])
+    return found
+
+
+def bounds_of(scene: Scene, words: list[str] | None) -> dict[str, tuple[float | None, float | None]]:
+    """Read --bounds in the units of a scene; a bare number is in the unit in which people read the quantity."""
+    from limitsets.scene.quantities import in_units, unit_read
+
+    def read(name: str, end: float | str | None) -> float | None:
+        if end is None:
+            return None
+        text = end if isinstance(end, str) else f"{end!r} {unit_read(scene.text, scene.unit, name)}".strip()
+        return in_units(scene.unit, name, text, key="--bounds")
+
+    found = {name: (read(name, lo), read(name, hi)) for name, (lo, hi) in _ends_of(words).items()}
+    for name, (lo, hi) in found.items():
+        if lo is not None and hi is not None and not lo < hi:
+            word = next(word for word in words or [] if word.split("=")[0].strip() == name)
+            raise LimitsetsError(
+                "the bounds", word, "a lower and a higher one", "turn them round", key="--bounds"
+            )
     return found

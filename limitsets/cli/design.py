@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from limitsets.cli.arguments import HELP_NO_RECHECK, ends_of, number
+from limitsets.cli.arguments import HELP_NO_RECHECK, bounds_of, number
 from limitsets.cli.output import (
     Csv,
     Form,
@@ -45,7 +45,8 @@ HELP_STARTS = "With --critical-points: other starts to draw at most."
 HELP_STAGES = "With --critical-points: move them there in N steps, of which the figure shows twelve at most."
 HELP_EVALUATIONS = "Designs to look at: with --robust 1200 by default, with --goal 600."
 HELP_BOUNDS = (
-    "Bounds of one of them, like part.mass.center.along='4 in':'5 in'; either may be left out; repeatable."
+    "Bounds of one of them, like part.mass.center.along='4 in':'5 in'; bare numbers are in the unit of the scene's "
+    "text; either may be left out; repeatable."
 )
 
 
@@ -91,9 +92,7 @@ def design(
     if goal:
         from limitsets.cli.design_goal import run_goal
 
-        raise typer.Exit(
-            run_goal(scene, names, ends_of(bounds), evaluations or 600, out, form, csv, json=json)
-        )
+        raise typer.Exit(run_goal(scene, names, bounds, evaluations or 600, out, form, csv, json=json))
     if critical_points is None:
         from limitsets.cli.design_robust import run_robust
 
@@ -101,7 +100,7 @@ def design(
             run_robust(
                 scene,
                 names,
-                ends_of(bounds),
+                bounds,
                 evaluations or 1200,
                 seconds,
                 out,
@@ -119,7 +118,7 @@ def design(
             chosen,
             critical_points=_points(critical_points),
             vary=names,
-            bounds=ends_of(bounds),
+            bounds=bounds_of(chosen, bounds),
             starts=starts,
             stages=stages,
             progress=tell,

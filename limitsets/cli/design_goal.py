@@ -8,14 +8,13 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from limitsets.cli.arguments import Ends
+from limitsets.cli.arguments import bounds_of
 from limitsets.cli.output import answer, opened, progress, save_scene, show, show_scene
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Sequence
 
     from limitsets.inverse.margin.for_goal import GoalDesign
-    from limitsets.scene import Scene
 
 __all__ = ["run_goal"]
 
@@ -23,7 +22,7 @@ __all__ = ["run_goal"]
 def run_goal(
     name: str,
     vary: Sequence[str],
-    bounds: Mapping[str, Ends],
+    bounds: list[str] | None,
     evaluations: int,
     out: Path | None,
     form: str,
@@ -36,23 +35,16 @@ def run_goal(
         from limitsets.inverse.margin.for_goal import design_for_goal, own_bounds
 
         scene, _ = opened(name, None if out and out.suffix == ".toml" else out)
-        own = own_bounds(scene, list(bounds)) if bounds else {}
-        ends = {one: _ends(scene, one, bounds[one], own[one]) for one in bounds}
+        given = bounds_of(scene, bounds)
+        own = own_bounds(scene, list(given)) if given else {}
+        ends = {
+            one: (own[one][0] if lo is None else lo, own[one][1] if hi is None else hi)
+            for one, (lo, hi) in given.items()
+        }
         found = design_for_goal(scene, vary=vary, bounds=ends, evaluations=evaluations, progress=tell)
         files = [] if out is None else _written(found, out, form)
     answer(found, json, lambda: _text(found, files), csv=(csv, found.table))
     return 0 if found.verdict == "proved" else 1
-
-
-def _ends(scene: Scene, name: str, ends: Ends, own: tuple[float, float]) -> tuple[float, float]:
-    """Read bounds; an end that is left out is that of the search's own."""
-    from limitsets.scene.quantities import in_units
-
-    lo, hi = (
-        of if end is None else in_units(scene.unit, name, end, key="--bounds")
-        for end, of in zip(ends, own, strict=True)
-    )
-    return lo, hi
 
 
 def _written(found: GoalDesign, out: Path, form: str) -> list[Path]:

@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING
 
 import typer
 
+from limitsets.cli.arguments import bounds_of
 from limitsets.cli.output import answer, opened, progress, save_scene, show, show_scene
 from limitsets.errors import LimitsetsError
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Sequence
 
-    from limitsets.cli.arguments import Ends
     from limitsets.inverse import RobustDesign
     from limitsets.scene import Scene
 
@@ -24,7 +24,7 @@ __all__ = ["run_robust"]
 def run_robust(
     name: str,
     vary: Sequence[str],
-    bounds: Mapping[str, Ends],
+    bounds: list[str] | None,
     evaluations: int,
     seconds: float,
     out: Path | None,
@@ -62,25 +62,20 @@ def _kept(best: Scene, file: Path) -> None:
 
 
 def _varied(
-    scene: Scene, names: Sequence[str], bounds: Mapping[str, Ends]
+    scene: Scene, names: Sequence[str], words: list[str] | None
 ) -> dict[str, tuple[float, float]] | None:
     """Give the bounds of what is varied: those given, else the usual ones."""
-    from limitsets.inverse.margin.search import bounds_of
+    from limitsets.inverse.margin.search import bounds_of as usual_bounds
 
-    if not names and not bounds:
+    if not names and not words:
         return None
-    both = list(dict.fromkeys([*names, *bounds]))
-    usual = bounds_of(scene, [one for one in both if one not in bounds])
-    return {one: _ends(scene, one, bounds[one]) if one in bounds else usual[one] for one in both}
-
-
-def _ends(scene: Scene, name: str, ends: Ends) -> tuple[float, float]:
-    from limitsets.scene.quantities import in_units
-
-    lo, hi = ends
-    if lo is None or hi is None:
-        raise LimitsetsError("the bounds", name, "a lower and an upper one", "give both", key="--bounds")
-    return in_units(scene.unit, name, lo, key="--bounds"), in_units(scene.unit, name, hi, key="--bounds")
+    given: dict[str, tuple[float, float]] = {}
+    for name, (lo, hi) in bounds_of(scene, words).items():
+        if lo is None or hi is None:
+            raise LimitsetsError("the bounds", name, "a lower and an upper one", "give both", key="--bounds")
+        given[name] = lo, hi
+    both = list(dict.fromkeys([*names, *given]))
+    return usual_bounds(scene, [one for one in both if one not in given]) | given
 
 
 def _written(found: RobustDesign, out: Path, form: str, *, recheck: bool) -> tuple[RobustDesign, list[Path]]:

@@ -82,10 +82,13 @@ class Query:
         The scene.
     goals : tuple of Goal
         What is asked.
+    known : dict
+        "base": cells per side, outside what attracts, with which the goals were proved last.
     """
 
     scene: Scene
     goals: tuple[Goal, ...]
+    known: dict[str, int] = field(default_factory=dict)
 
     @classmethod
     def of(cls, scene: Scene, goals: tuple[Goal, ...]) -> Query:
@@ -139,15 +142,15 @@ class Query:
         noise = dict(noise or {})
         try:
             box = self.box(piece, noise)
-            found = self._coarse(box, bases)
-            for step in range(finest + 1):
-                if step:
-                    found = self._finer(found, box, step)
-                answers = self._each(found)
+            for base in self._bases():
+                coarse = self._coarse(box, bases, base)
+                found, answers = self._refined(coarse, box, finest, base)
                 missing = answers[-1]
                 if missing.verdict == "proved":
+                    self.known["base"] = base
                     return Outcome("proved", "", found, answers, piece=piece, noise=noise)
-                if missing.final or not (found.component >= 0).any():
+                # finer cells where nothing attracts are needed only for starts that are not proved to come
+                if missing.final or missing.verdict != "proved-on-cells":
                     break
         except AnswerError as error:
             return Outcome("impossible", _said(error), piece=piece, noise=noise)
@@ -160,6 +163,23 @@ class Query:
         if not (found.component >= 0).any():
             reason = f"{reason}: from some of them, parts may leave the arm"
         return Outcome("undecided", reason, found, piece=piece, noise=noise)
+
+    def _bases(self) -> tuple[int, ...]:
+        """Cells per side outside what attracts: first as many as proved the goals last, or the fewest; then more."""
+        return BASES[:1] if self.anywhere else BASES[BASES.index(self.known.get("base", BASE)) :]
+
+    def _refined(
+        self, found: Attraction, box: ParameterBox, finest: int, base: int
+    ) -> tuple[Attraction, tuple[Answer, ...]]:
+        """Refine what attracts until the goals are proved, or finer cells cannot do it."""
+        for step in range(finest + 1):
+            if step:
+                found = self._finer(found, box, step, base)
+            answers = self._each(found)
+            missing = answers[-1]
+            if missing.verdict == "proved" or missing.final or not (found.component >= 0).any():
+                break
+        return found, answers
 
     def _each(self, found: Attraction) -> tuple[Answer, ...]:
         """Prove one goal after the other, up to the first that is not: it comes last then."""
@@ -179,14 +199,14 @@ class Query:
         wanted = [float(x) for goal in self.goals for x in borders(goal)]
         return dict.fromkeys(range(sides), wanted)
 
-    def _coarse(self, box: ParameterBox, bases: int = len(BASES)) -> Attraction:
-        for cells in BASES[:bases]:
+    def _coarse(self, box: ParameterBox, bases: int = len(BASES), base: int = BASE) -> Attraction:
+        for cells in (base, *(more for more in BASES[:bases] if more > base)):
             found = attraction(cover(box, cells, self._cuts(box.lo.a.size), PIECES[0]))
             if (found.component >= 0).any():
                 break
         return found
 
-    def _finer(self, found: Attraction, box: ParameterBox, step: int) -> Attraction:
+    def _finer(self, found: Attraction, box: ParameterBox, step: int, base: int = BASE) -> Attraction:
         """Cut what attracts into more cells; or everything, where a goal is about every start."""
         cuts = self._cuts(box.lo.a.size)
         if self.anywhere:
@@ -197,7 +217,7 @@ class Query:
             for lo, hi in parts:
                 count = max(2, round(FINE[step] * (hi - lo) / total))
                 cuts[side] = [*cuts[side], *np.linspace(lo, hi, count).tolist()]
-        return attraction(cover(box, BASE, cuts, PIECES[step]))
+        return attraction(cover(box, base, cuts, PIECES[step]))
 
     def refute(self, piece: SceneBox | None = None, noise: Mapping[str, str] | None = None) -> Outcome:
         """Search for an orbit of one scene that violates one of the goals.

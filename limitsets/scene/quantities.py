@@ -29,6 +29,7 @@ __all__ = [
     "require",
     "text_at",
     "texts",
+    "unit_read",
 ]
 
 NAMES: dict[str, str] = {
@@ -61,6 +62,9 @@ _RIVALS = {
     "gravity.tilt": "gravity.acceleration",
 }
 NOISE_ONLY = "landing.x"
+
+# Units in which people read what a scene does not give.
+READ_IN = {"angular speed": "deg/s", "angle": "deg"}
 
 
 class Place(NamedTuple):
@@ -144,6 +148,20 @@ def text_at(tree: Mapping[str, Any], name: str) -> Any:
             return None
         node = node[word]
     return node
+
+
+def unit_read(tree: Mapping[str, Any], length: str, name: str) -> str:
+    """Give the unit in which people read a quantity of a scene: that of the scene's text, or the usual one.
+
+    Examples
+    --------
+    >>> unit_read({"throw": {"speed": "2 rad/s"}}, "in", "throw.speed"), unit_read({}, "in", "throw.speed")
+    ('rad/s', 'deg/s')
+    """
+    place, given = find(name), text_at(tree, name)
+    if given is not None:
+        return parse(given, place.dimension, key=name).unit
+    return READ_IN.get(place.dimension) or base_unit(place.dimension, length)
 
 
 def texts(tree: Any, name: str = "") -> Iterator[tuple[str, Any]]:

@@ -109,9 +109,10 @@ class ArmTable(Table):
 class ThrowTable(Table):
     """The throw, by kappa or by its angular speed."""
 
-    kappa: Annotated[Length | None, says("gravity over the squared angular speed, a length", "25.4 in")] = (
-        None
-    )
+    kappa: Annotated[
+        Length | None,
+        says("gravity over the squared angular speed, a length; [gravity] then changes no throw", "25.4 in"),
+    ] = None
     speed: Annotated[
         AngularSpeed | None,
         says("instead of kappa, with [gravity]: angular speed of the arm when it stops", "158 deg/s"),
@@ -119,7 +120,7 @@ class ThrowTable(Table):
 
 
 class GravityTable(Table):
-    """Gravity in the plane of the motion."""
+    """Gravity in the plane of the motion; with kappa given it only tells which speed that is."""
 
     acceleration: Annotated[Acceleration | None, says("in the plane of the motion", "193.045 in/s^2")] = None
     tilt: Annotated[Angle | None, says("instead: of the table; 90 deg stands upright", "30 deg")] = None

@@ -16,7 +16,7 @@ import numpy.typing as npt
 from limitsets.cells import Domain
 from limitsets.errors import AnswerError, MapError, SceneError
 from limitsets.scene import Scene
-from limitsets.scene.quantities import base_unit, find, text_at
+from limitsets.scene.quantities import base_unit, find, unit_read
 from limitsets.scene.units import Quantity, convert, parse
 
 if TYPE_CHECKING:
@@ -27,7 +27,6 @@ __all__ = ["MapSubject", "Points", "SceneSubject", "Subject", "source_of"]
 Array: TypeAlias = npt.NDArray[np.float64]
 
 # What people read these in, where the scene gives no unit for them.
-_READ_IN = {"angular speed": "deg/s", "angle": "deg"}
 
 
 class Points(NamedTuple):
@@ -76,10 +75,7 @@ class SceneSubject:
         place = find(name, file=self.scene.file)
         if text is not None:
             return parse(text, place.dimension, key=name).unit
-        given = text_at(self.scene.text, name)
-        if given is not None:
-            return parse(given, place.dimension, key=name).unit
-        return _READ_IN.get(place.dimension) or base_unit(place.dimension, self.scene.unit)
+        return unit_read(self.scene.text, self.scene.unit, name)
 
     def in_base(self, axis: Axis) -> Array:
         """Return an axis' values in the scene's units: what the scene reads in the decimals of each."""

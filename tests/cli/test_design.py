@@ -1,11 +1,14 @@
 """`limitsets design`: words, JSON, files, exit codes."""
 
 import json
+import math
 from pathlib import Path
 
 import pytest
 
 import limitsets as ls
+from limitsets.cli.arguments import bounds_of
+from limitsets.errors import LimitsetsError
 from tests.cli.command import run
 
 VARY = "part.mass.center.along,part.mass.center.above,throw.speed"
@@ -89,3 +92,19 @@ def test_bad_input_is_exit_2(capfd, words):
     assert code == 2
     assert out == ""
     assert err
+
+
+def test_bare_bounds_are_in_the_unit_of_the_scenes_text():
+    scene = ls.load("paper-initial").with_values({"throw.speed": "158 deg/s"})
+    found = bounds_of(scene, ["throw.speed=150:160", "arm.length=25:", "part.mass.center.along=4 in:0.2 m"])
+    assert found == {
+        "throw.speed": pytest.approx((math.radians(150), math.radians(160)), rel=1e-15),
+        "arm.length": (25.0, None),
+        "part.mass.center.along": (4.0, pytest.approx(0.2 / 0.0254, rel=1e-15)),
+    }
+
+
+@pytest.mark.parametrize("word", ["throw.speed=160:150", "arm.length=28 in:0.7 m", "arm.length=28:28"])
+def test_bounds_that_are_turned_round_are_refused(word):
+    with pytest.raises(LimitsetsError, match="a lower and a higher one"):
+        bounds_of(ls.load("paper-initial"), [word])

@@ -14,6 +14,7 @@ from mpmath import mp, mpf
 import limitsets as ls
 from limitsets.errors import LimitsetsError
 from limitsets.goals import AttractsAll, OrientedBeyond, Predicate, Reaches
+from limitsets.proofs.query import Query
 from limitsets.robust.margins.deviations import deviation_scale, deviation_scales, given
 from tests.thrower import reference
 
@@ -329,3 +330,39 @@ def test_a_scene_without_a_goal_is_asked_for_one():
     del tree["goal"]
     with pytest.raises(LimitsetsError, match="say what has to hold"):
         ls.margin(ls.load(tree), "throw.speed")
+
+
+# A quadrilateral in mm with a lead weight: parts that lie far outside the attractor come to it by throws that a few
+# hundred cells a side do not tell from throws off the arm.
+FROM_AFAR = """
+name = "from-afar"
+[part]
+vertices = [["0 mm", "0 mm"], ["80 mm", "0 mm"], ["88 mm", "42 mm"], ["14 mm", "55 mm"]]
+[part.mass]
+plate_density = "2700 kg/m^3"
+plate_thickness = "2 mm"
+points = [{x = "44.2635 mm", y = "31.2089 mm", mass = "37.1433 g"}]
+[arm]
+surface_height = "-3.3130 mm"
+length = "400 mm"
+[throw]
+speed = "170.9105 deg/s"
+[gravity]
+tilt = "30 deg"
+[goal]
+oriented_beyond = {x = "314.774 mm", side = 2}
+"""
+
+
+def test_a_goal_that_certify_proves_is_proved_by_the_search_for_margins():
+    scene = ls.load(FROM_AFAR)
+    (goal,) = (claim for claim in ls.certify(scene, claims=["goal"]).claims if claim.claim == "goal")
+    assert goal.verdict == "proved"
+    assert Query.of(scene, (scene.goal,)).prove().verdict == "proved"
+
+
+@pytest.mark.sweep
+def test_a_scene_whose_starts_need_more_cells_has_a_margin():
+    (speed,) = ls.margin(FROM_AFAR, "throw.speed", reading="fixed", width=0.5)
+    assert speed.proved > 0.02
+    assert speed.refuted > speed.proved
