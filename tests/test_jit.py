@@ -237,7 +237,7 @@ class Place:
             shutil.copytree(
                 source / room, self.maps.parent / room, ignore=shutil.ignore_patterns("__pycache__")
             )
-        for file in ("errors.py", "files.py", "tables.py"):
+        for file in ("arguments.py", "errors.py", "files.py", "tables.py"):
             shutil.copy(source / file, self.maps.parent / file)
         (self.maps.parent / "__init__.py").write_text("from limitsets.maps import register\n")
         (self.maps / "probe.py").write_text(PROBE)

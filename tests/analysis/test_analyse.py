@@ -206,7 +206,7 @@ def test_json(source):
     (attractor,) = record["attractors"]
     assert {"extents", "flip_order", "jogs_per_visit", "flips_per_throw", "lyapunov"} <= set(attractor)
     assert attractor["extents_from"] == "end points"
-    assert record["effects"] == {"simulated": [], "switched_on": [], "left_out": {}}
+    assert record["effects"] == {"simulated": [], "switched_on": [], "left_out": {}, "tipping": []}
     assert attractor["extents"] == {
         str(side): [list(pair) for pair in parts] for side, parts in found.extents[0].items()
     }

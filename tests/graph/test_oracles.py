@@ -1,5 +1,7 @@
 """Every algorithm on ranges against scipy and networkx on the graph written out edge by edge."""
 
+from dataclasses import replace
+
 import networkx as nx
 import numpy as np
 import pytest
@@ -24,7 +26,8 @@ def graphs(draw):
         tuple(draw(st.integers(1, 4 if dimension > 1 else 12)) for _ in range(dimension))
         for _ in range(sides)
     ]
-    domain = ls.grid([(0, 1)] * dimension, cells=1).domain
+    of_one = ls.grid([(0, 1)] * dimension, cells=1).domain
+    domain = replace(of_one, lo=of_one.lo.repeat(sides, 0), hi=of_one.hi.repeat(sides, 0))
     edges = tuple(tuple(np.linspace(0, 1, n + 1) for n in size) for size in sizes)
     grid = type(ls.grid(domain))(domain, edges)
     rng = np.random.default_rng(draw(st.integers(0, 2**32)))

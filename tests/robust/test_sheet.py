@@ -148,7 +148,7 @@ def test_an_interrupted_run_keeps_what_it_had_found(tmp_path, monkeypatch):
 def kept(folder, scene=None, goals=None, tolerance=None, width=0.1):
     scene = scene or ls.load("paper-designed")
     return Checkpoint(
-        folder, scene, goals or (scene.goal,), tolerance or {"throw.speed": "2 %"}, width, seconds=24.0
+        folder, scene, goals or (scene.goal,), tolerance or {"throw.speed": "2 %"}, width, seconds=12.0
     )
 
 
