@@ -6,7 +6,8 @@
 PY := .venv/bin/python
 SCENE ?= paper-designed
 
-# A worker of the tests for each core, each of up to 1 GB; one that is done takes tests from the others.
+# A worker of the tests for each core, each of up to 2 GB, or 5 GB where all has to be compiled; one that is done takes
+# tests from the others.
 WORKERS ?= logical
 PYTEST := $(PY) -m pytest -n $(WORKERS) --maxprocesses 8 --dist worksteal
 

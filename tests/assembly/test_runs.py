@@ -40,6 +40,7 @@ class Killed(Executor):
         return future
 
 
+@pytest.mark.sweep
 def test_the_same_by_threads_in_any_order_and_by_processes(whole):
     with ThreadPoolExecutor(3) as pool:
         assert ls.assemble(*NAMES, NOISE, trials=COUNT, seed=8, executor=pool).rows == plain(whole)

@@ -28,6 +28,7 @@ def test_words_files_and_exit(capfd):
     assert json.loads(Path("fed/feeding.json").read_text())["scene"] == "paper-designed"
 
 
+@pytest.mark.sweep
 def test_json_alone_and_noise(capfd):
     file = written("paper-designed")
     code, out, _ = run(

@@ -34,6 +34,7 @@ def test_the_sharp_margin_of_the_height():
     assert not violates("-0.142 in")
 
 
+@pytest.mark.sweep
 def test_report_and_files(capfd):
     code, out, _ = run(capfd, "robustness", "paper-designed", "-o", "sheet", *QUICK, *NOISE)
     assert code == 0

@@ -69,12 +69,14 @@ def rejected(count, seed, **how):
     return sum(lacking(given, film(draw, machine(draw), **how)) for _ in range(count))
 
 
+@pytest.mark.sweep
 @pytest.mark.parametrize("effect", ["roll", "slip"])
 def test_a_machine_with_an_effect_is_told_apart(effect):
     # of a power of 90 % fewer than this come once in a thousand times
     assert told_apart(effect, 20, seed=21) >= binom.ppf(1e-3, 20, 0.9)
 
 
+@pytest.mark.sweep
 def test_a_machine_without_one_is_left_alone():
     assert rejected(20, seed=23) <= binom.ppf(0.9999, 20, 0.05)
 

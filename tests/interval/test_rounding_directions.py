@@ -52,6 +52,7 @@ print(bad, sound)
 """
 
 
+@pytest.mark.sweep
 @pytest.mark.parametrize("name", DIRECTIONS)
 def test_enclosures_hold_and_the_guard_notices(name):
     if platform.machine() not in ("x86_64", "AMD64") or ctypes.util.find_library("m") is None:

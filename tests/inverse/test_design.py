@@ -190,6 +190,7 @@ def test_what_cannot_be_reached_says_what_is_in_the_way():
     assert "the critical point of side 2 does not depend on what is varied" in fixed.message
 
 
+@pytest.mark.sweep
 def test_a_start_without_critical_points():
     """Small angles and signs: initial has none (known table, none below 80), so other starts are drawn."""
     tree = ls.load("paper-initial-small-angle").as_dict()

@@ -279,6 +279,7 @@ def _loop(params, lo, hi, count):
         count[k], _, _, _ = image_box(params, params, pick(lo, k), pick(hi, k), 0)
 
 
+@pytest.mark.sweep
 @pytest.mark.parametrize("cls", [maps.Henon, maps.Leslie, maps.Cubic], ids=lambda cls: cls.__name__)
 def test_boxes_are_compiled_without_fused_operations(cls):
     params = cls()

@@ -51,6 +51,7 @@ def test_a_side_that_is_never_farthest_is_refused():
         margins_beyond("paper-designed", 0, places=2)
 
 
+@pytest.mark.sweep
 def test_bars_are_the_brackets():
     margins = ls.margin("paper-designed", "arm.surface_height", "throw.speed", "landing.x", width=0.1)
     figure = ls.plot.tornado(margins)

@@ -190,6 +190,7 @@ def test_a_speed_that_is_fixed_but_unknown(tmp_path):
     assert verdicts(proof)["goal"] == "refuted"
 
 
+@pytest.mark.sweep
 def test_a_tolerance_is_cut_where_two_throws_do_not_do(tmp_path):
     """The highest place of paper-initial off side 2, 21.5545 in, is three throws from what decides it."""
     scene = ls.load("paper-initial").as_dict() | {"goal": {"oriented_beyond": {"x": "21.6 in", "side": 2}}}

@@ -287,6 +287,7 @@ FALSE = {
 }
 
 
+@pytest.mark.sweep
 @pytest.mark.parametrize("name", FALSE)
 def test_what_has_become_false_is_not_proved(good, tmp_path, name):
     forged = good.copy()

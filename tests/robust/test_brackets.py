@@ -64,6 +64,7 @@ NOISES = [
 ]
 
 
+@pytest.mark.sweep
 @pytest.mark.parametrize(("scatter", "count"), NOISES)
 @pytest.mark.parametrize("name", ["paper-designed", "paper-initial"])
 def test_one_throw_is_bounded_at_every_place(name, scatter, count):

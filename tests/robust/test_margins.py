@@ -74,6 +74,7 @@ def test_sharp_margins_of_the_speed_are_those_of_the_table():
     assert sharp_speed(True) == pytest.approx(0.00397, abs=5e-6)
 
 
+@pytest.mark.sweep
 @pytest.mark.parametrize("reading", ["fixed", "per-throw"])
 def test_the_speed_is_bracketed_to_a_hundredth(reading):
     (found,) = ls.margin("paper-designed", "throw.speed", reading=reading)
@@ -213,6 +214,7 @@ def test_a_function_of_the_callers_is_a_goal(tmp_path, reading):
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.sweep
 def test_a_plain_function_is_taken_and_a_wrong_one_refused():
     (found,) = ls.margin(
         "paper-designed", "arm.surface_height", goal=lambda lo, hi, side: hi < 24.0, width=0.5

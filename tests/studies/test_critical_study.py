@@ -48,6 +48,7 @@ def test_the_method(study):
     assert few["apart"] < 1e-8
 
 
+@pytest.mark.sweep
 def test_the_recorded_constants_do_not_reproduce_the_printed_points(study):
     """What is recorded is what the search's own formulas give there, and no short search finds anything better."""
     _, printed = study

@@ -13,6 +13,7 @@ def recorded():
     return json.loads((STUDIES / "04_margins" / "expected.json").read_text(encoding="utf-8"))
 
 
+@pytest.mark.sweep
 def test_brackets_are_found_again_within_each_other(recorded, tmp_path):
     study = load_study("04_margins")
     found = study.main(

@@ -40,6 +40,7 @@ def test_stored_as_it_ran(path):
     assert path.stat().st_size < 150_000
 
 
+@pytest.mark.sweep
 @pytest.mark.parametrize("path", TO_RUN, ids=lambda path: path.name)
 def test_runs_and_shows_what_is_stored(path, tmp_path):
     with warnings.catch_warnings():  # of jupyter's own making

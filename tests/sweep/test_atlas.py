@@ -379,6 +379,7 @@ def test_what_stands_in_a_script_is_not_sent_to_processes():
     assert lines[1] == "21"
 
 
+@pytest.mark.sweep
 def test_a_script_without_a_guard_may_start_processes(tmp_path):
     script = tmp_path / "script.py"
     script.write_text(

@@ -201,6 +201,7 @@ def test_a_chunk_that_always_kills_its_worker_is_named(tmp_path):
         atlas("paper-designed", *axes, task=task, chunk=(1, 4), store=tmp_path / "s.zarr", workers=2)
 
 
+@pytest.mark.sweep
 def test_ctrl_c_ends_the_workers_and_keeps_what_is_done(tmp_path, whole):
     store = tmp_path / "s.zarr"
     command = [sys.executable, "-m", "tests.sweep.tasks_of_tests", str(store)]

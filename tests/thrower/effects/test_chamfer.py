@@ -54,6 +54,7 @@ def chamfered_cases(count: int, seed: int) -> list[Case]:
     return found
 
 
+@pytest.mark.sweep
 def test_it_ends_where_the_rigid_body_does() -> None:
     """Integrated in (x, y, theta); many of these throws come down on the chamfer, and go on over it or back."""
     on = back = 0

@@ -86,6 +86,7 @@ def test_it_slips_where_the_cone_ends() -> None:
     assert not lets_go(square(5.0), 5.0, start)[1]
 
 
+@pytest.mark.sweep
 def test_throws_end_where_an_independent_simulation_sees_them_end() -> None:
     names = ("landing", "pivot")
     assert [case for case in cases(60, 6) if not agree(case, names)] == []

@@ -165,6 +165,7 @@ def test_it_is_the_limit_of_friction_that_is_a_smooth_function_of_the_sliding() 
             np.testing.assert_allclose(at.struck(rates, at.mu, 0.6), seen, rtol=0, atol=1e-4)
 
 
+@pytest.mark.sweep
 @pytest.mark.parametrize("restitution", [0.0, 0.6])
 def test_the_law_has_no_jump(restitution: float) -> None:
     """Approach velocities on a line over v_t = 0 and both borders of the cone: a jump does not shrink with the step."""
@@ -290,6 +291,7 @@ def test_painleves_paradox_is_outside_the_model() -> None:
         assert (ends == LOST) is lost
 
 
+@pytest.mark.sweep
 @pytest.mark.parametrize("names", [("landing", "slip"), ("landing", "slip", "roll")])
 def test_throws_end_where_an_independent_simulation_sees_them_end(names: tuple[str, ...]) -> None:
     assert [case for case in cases(60, 3) if not agree(case, names)] == []
