@@ -111,8 +111,8 @@ def _kind_of(node: ast.expr) -> _Kind | None:
     name = node.attr if isinstance(node, ast.Attribute) else ast.unparse(node)
     if name in GIVEN_BY:
         call = GIVEN_BY[name]
-        mine = lambda value: name in {each.__name__ for each in type(value).__mro__}  # noqa: E731 - a test as above
-        return _Kind(mine, f"what {call.partition('(')[0]} gives", call)
+        words = f"what {call.partition('(')[0]} gives"
+        return _Kind(lambda value: name in {each.__name__ for each in type(value).__mro__}, words, call)
     return _PLAIN.get(name)
 
 

@@ -237,8 +237,8 @@ class Place:
             shutil.copytree(
                 source / room, self.maps.parent / room, ignore=shutil.ignore_patterns("__pycache__")
             )
-        for file in ("arguments.py", "errors.py", "files.py", "tables.py"):
-            shutil.copy(source / file, self.maps.parent / file)
+        for file in source.glob("[!_]*.py"):  # what stands beside the rooms, for all of them
+            shutil.copy(file, self.maps.parent / file.name)
         (self.maps.parent / "__init__.py").write_text("from limitsets.maps import register\n")
         (self.maps / "probe.py").write_text(PROBE)
         self.user.mkdir()
