@@ -60,6 +60,15 @@ def test_own_bounds_hold_the_value(scene):
     assert own_bounds(loaded, ["arm.length"])["arm.length"][0] == loaded.arm_length
 
 
+@pytest.mark.parametrize("height", [0.3, -3.0])
+def test_own_bounds_reach_out_to_a_value_beyond_the_usual_ones(height):
+    """The usual ones end at 0.2 and 0.005 mean sides below the joint, -1.07 and -0.027 in."""
+    scene = ls.load("paper-designed").with_values({"arm.surface_height": height})
+    lo, hi = own_bounds(scene, ["arm.surface_height"])["arm.surface_height"]
+    assert lo <= height <= hi
+    assert lo < hi
+
+
 def test_what_ruled_designs_out_is_said():
     """About kappa = 33.36 in no part gets oriented: other sides come beyond 20 in (the paper's figure 6)."""
     found = design_for_goal("paper-initial", bounds={"throw.kappa": (33.0, 33.5)}, evaluations=24)
