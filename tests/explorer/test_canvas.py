@@ -6,8 +6,6 @@ import json
 import numpy as np
 import pytest
 
-pytest.importorskip("panel")
-
 from limitsets.explorer.canvas import Canvas, Layer
 
 
