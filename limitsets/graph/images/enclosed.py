@@ -102,13 +102,13 @@ class Enclosures:
     lost: NDArray[np.bool_]
 
 
-def _check(params: Any, upper: Any) -> None:
-    if not kind_of(params).has_image_box:
+def _check(map: Any, upper: Any) -> None:  # noqa: A002  # the field's word
+    if not kind_of(map).has_image_box:
         raise AnswerError(
-            "the map", kind_of(params).name, "one with image_box", "register image_box, or sample instead"
+            "the map", kind_of(map).name, "one with image_box", "register image_box, or sample instead"
         )
-    if type(upper) is not type(params):
-        allowed = f"parameters of {kind_of(params).name}"
+    if type(upper) is not type(map):
+        allowed = f"parameters of {kind_of(map).name}"
         raise AnswerError("the upper corner of the parameters", type(upper).__name__, allowed, "pass such")
     for name, low, high in zip(map._fields, map, upper, strict=True):
         if isinstance(low, (int, float, np.ndarray)) and (np.asarray(low) > np.asarray(high)).any():
