@@ -11,6 +11,9 @@ import pytest
 pytest.importorskip("flint", reason="the checker needs python-flint")
 
 import limitsets as ls
+from limitsets.checker.end_points import Throws
+from limitsets.checker.region import decided_on
+from limitsets.checker.scene import read_scene
 from limitsets.errors import AnswerError
 from limitsets.maps import images, orbit
 from limitsets.regions import (
@@ -403,3 +406,15 @@ def test_effects_and_axes_that_are_one_are_refused():
     tree = ls.load("paper-designed").as_dict() | {"effects": {"landing": True}}
     with pytest.raises(AnswerError, match="effects"):
         certified(ls.load(tree), x, evenly("arm.surface_height", "-0.2 in", "-0.1 in", 1))
+
+
+@pytest.mark.parametrize(
+    ("branch", "lo", "hi", "proved"),
+    [(0, 15.0, 19.9, True), (1, 20.1, 23.0, True), (0, 19.0, 21.0, False), (1, 19.0, 21.0, False)],
+)
+def test_a_decision_is_proved_on_either_side_of_its_switch_and_not_across(branch, lo, hi, proved):
+    """On side 2 of paper-designed the throw flips from r_2 = 20 in on."""
+    given = ls.load("paper-designed").as_dict()
+    raw = {word: given[word] for word in ("name", "part", "arm", "throw", "gravity") if word in given}
+    scene = read_scene(raw | {"model": {"flight": "exact", "flip": "signed"}}, None)
+    assert decided_on(Throws(scene), 2, branch, lo, hi) is proved
