@@ -142,15 +142,12 @@ def _ends(b: Any, phi: Any) -> Any:
     return (least.lo if grows else shift.lo), (most.hi if grows else shift.hi)
 
 
-def _displacements(found: Cover) -> list[Floats]:
-    """Per side, what `_shifts` says of its cells."""
-    answers = []
-    for side, (edges,) in enumerate(found.grid.edges):
-        out = np.full((edges.size - 1, 4), np.nan)
-        lo, hi = np.ascontiguousarray(edges[:-1]), np.ascontiguousarray(edges[1:])
-        _shifts(*found.box.bare, side, lo, hi, out)
-        answers.append(out)
-    return answers
+def _displacements(found: Cover, side: int, wanted: NDArray[np.int64]) -> Floats:
+    """Return what `_shifts` says of some cells of a side, by their numbers there."""
+    (edges,) = found.grid.edges[side]
+    out = np.full((wanted.size, 4), np.nan)
+    _shifts(*found.box.bare, side, edges[:-1][wanted], edges[1:][wanted], out)
+    return out
 
 
 # ---------------------------------------------------------------- the basin
@@ -179,9 +176,7 @@ def basin(found: Cover, component: NDArray[np.int32], joint: Sequence[NearHinge]
     lost = np.concatenate([images.lost for images in found.images])
     leaving = found.graph.ranges.exits > 0
     again = parts.recurrent[parts.label] & ~inside
-    displaced = _displacements(found) if again.any() or found.box.landing > 0.0 else []
-    if again.any():
-        again &= ~((parts.size[parts.label] == 1) & _passing(found, displaced))
+    again &= ~_passing(found, again & (parts.size[parts.label] == 1))
     shut = _reaching(found, lost | leaving)
     thin, throws = again & ~shut, 0
     thick = flat = np.zeros_like(inside)
@@ -197,7 +192,7 @@ def basin(found: Cover, component: NDArray[np.int32], joint: Sequence[NearHinge]
         thin &= ~shut
     near = _near(found, joint, shut, thin=bool(thin.any()))
     rank[shut] = -1
-    start, explained = _start(found, joint, shut, near, displaced)
+    start, explained = _start(found, joint, shut, near)
     reasons = (
         (lost, "nothing is proved of the image of {}"),
         (leaving, "the image of {} may leave the cells"),
@@ -231,13 +226,17 @@ def _reaching(found: Cover, cells: Mask) -> Mask:
     return marks
 
 
-def _passing(found: Cover, displaced: Sequence[Floats]) -> Mask:
-    """Cells from which jogs are proved to go one way by more than the noise of the landing place."""
+def _passing(found: Cover, alone: Mask) -> Mask:
+    """Of some cells, those from which jogs are proved to go one way by more than the noise of the landing place."""
+    passing = np.zeros_like(alone)
     if found.box.effects:  # another vertex may land, elsewhere
-        return np.zeros(found.grid.n_cells, dtype=bool)
-    least, most = (np.concatenate([each[:, k] for each in displaced]) for k in (0, 3))
-    by = np.maximum(least, -most)
-    passing: Mask = by - found.box.landing > ROOM * by
+        return passing
+    for side in range(len(found.grid.edges)):
+        own = found.grid.of_side(side)
+        wanted = np.flatnonzero(alone[own])
+        least, _, _, most = _displacements(found, side, wanted).T
+        by = np.maximum(least, -most)
+        passing[own][wanted] = by - found.box.landing > ROOM * by
     return passing
 
 
@@ -251,9 +250,7 @@ def _near(found: Cover, joint: Sequence[NearHinge], shut: Mask, *, thin: bool) -
     return True
 
 
-def _start(
-    found: Cover, joint: Sequence[NearHinge], shut: Mask, near: bool, displaced: Sequence[Floats]
-) -> tuple[Floats, Floats]:
+def _start(found: Cover, joint: Sequence[NearHinge], shut: Mask, near: bool) -> tuple[Floats, Floats]:
     """On each side, from where on every start is claimed, and up to where the starts are lost or creep."""
     (lo, hi), start, explained = found.box.bare, [], []
     for side, (each, (edges,)) in enumerate(zip(joint, found.grid.edges, strict=True)):
@@ -267,7 +264,8 @@ def _start(
         start.append(below if near and last < 0 else float(edges[last + 1]))
         ends = float(lo.a[side]) if point is None else point[0]
         if each.reason == SCATTERED and each.reach - each.x < found.box.landing:
-            lost = (displaced[side][:, 3] < found.box.landing * (1.0 - ROOM)) & (displaced[side][:, 2] > 0.0)
+            _, _, decided, most = _displacements(found, side, np.arange(last + 1)).T
+            lost = (most < found.box.landing * (1.0 - ROOM)) & (decided > 0.0)
             ends = float(edges[int(np.argmin([*lost, False]))])
         explained.append(ends)
     return np.array(start), np.array(explained)

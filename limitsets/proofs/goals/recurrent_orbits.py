@@ -54,8 +54,9 @@ LATEST, RETURNS = 1000, 8
 # A periodic orbit is looked for this near to a place, relative to x; beyond such a slope floats do not resolve it.
 NEAR, STEEPEST = 1e-3, 1e10
 
-# Starts per side, besides those in the attracting cells, and throws of theirs that are searched.
-OTHERS, SHORT = 12, 2000
+# Starts per side, besides those in the attracting cells, throws after which most have settled, and throws of theirs
+# that are searched.
+OTHERS, QUICK, SHORT = 12, 200, 2000
 
 # Steering back: places of the raster along the arm, values of kappa, throws at most, ways to close that are tried.
 PLACES, KAPPAS, BACK, CLOSINGS = 20_000, 5, 400, 20
@@ -187,13 +188,22 @@ def _paths(found: Attraction, box: ParameterBox) -> Iterator[Orbit]:
         yield _lasting(map_now, *first, SEARCHED)
     for side, (edges,) in enumerate(found.cover.grid.edges):
         for x in np.linspace(edges[0], edges[-1], OTHERS + 2)[1:-1].tolist():
-            path = _lasting(map_now, x, side, SETTLING)
-            last = float(path.x[-1]), int(path.side[-1])
-            if path.stopped is not None or _component(found, *last) in met:
+            last = _unmet(found, map_now, x, side, met)
+            if last is None:
                 continue
             met.add(_component(found, *last))
             met.discard(-1)  # off the attracting cells any two may end in different places
             yield _lasting(map_now, *last, SHORT)
+
+
+def _unmet(found: Attraction, map_now: Any, x: float, side: int, met: set[int]) -> tuple[float, int] | None:
+    """Where a start ends; None where it stops, or comes to an attracting component that was met: it stays there."""
+    for count in (QUICK, SETTLING - QUICK):
+        path = _lasting(map_now, x, side, count)
+        x, side = float(path.x[-1]), int(path.side[-1])
+        if path.stopped is not None or _component(found, x, side) in met:
+            return None
+    return x, side
 
 
 def _lasting(map_now: Any, x: float, side: int, throws: int) -> Orbit:
