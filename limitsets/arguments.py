@@ -143,7 +143,7 @@ def _kind_of_many(node: ast.Subscript) -> _Kind | None:
             ),
             f"({', '.join(kind.words if kind else '...' for kind in several)})",
         )
-    return _PLAIN["Callable"] if outer == "Callable" else _kind_of(node.value)
+    return _kind_of(node.value)
 
 
 def _asked_of(annotation: str) -> _Kind | None:
