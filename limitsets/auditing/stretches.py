@@ -21,7 +21,7 @@ def where(true: Callable[[Array], Flags], x: Array, seen: Flags | None = None) -
     true : callable
         The condition, of many places at once.
     x : ndarray, shape (n,)
-        Samples, ascending; a narrower interval between two of them may be missed.
+        Samples [length], ascending; a narrower interval between two of them may be missed.
     seen : ndarray of bool, shape (n,), optional
         The condition at the samples, where that is known.
 

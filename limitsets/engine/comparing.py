@@ -28,9 +28,9 @@ class Comparison:
     x, side : ndarray, shape (n,)
         Where the part rested before the throw [length], and on which side.
     x_map, side_map, code_map : ndarray, shape (n,)
-        Where it rests after it by the map, and what the throw was (`limitsets.maps`).
+        Where it rests after it by the map [length], and what the throw was (`limitsets.maps`).
     x_engine, side_engine : ndarray, shape (n,)
-        The same in the engine; side -1 where it did not come to rest.
+        The same in the engine [length]; side -1 where it did not come to rest.
     status : ndarray of str, shape (n,)
         How the throw ended in the engine (`Landing.status`).
     struck : ndarray of int, shape (n,)

@@ -157,7 +157,7 @@ class Images:
     Attributes
     ----------
     x : ndarray, shape (n,) or (n, dimension)
-        Where they land.
+        Where they land, in the map's unit.
     side, code : ndarray of int, shape (n,)
         On which side, and what happened (`limitsets.maps.codes`).
     second_pass : float
@@ -255,7 +255,7 @@ class Orbit(Tabled):
     Attributes
     ----------
     x : ndarray, shape (m + 1,) or (m + 1, dimension)
-        States, the start first.
+        States, the start first, in the map's unit.
     side : ndarray of int, shape (m + 1,)
         Their sides.
     code : ndarray of int, shape (m,)
@@ -301,7 +301,7 @@ def orbit(params: Any, x: Any, side: int, count: int) -> Orbit:
     params : NamedTuple
         A map.
     x : float or sequence of float
-        Start; the formulas of a map know no domain, so that of the throw it may lie beyond the arm's end.
+        Start, in the map's unit; the formulas of a map know no domain, so that of the throw it may lie beyond the arm's end.
     side : int
         Side of the start.
     count : int

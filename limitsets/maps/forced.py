@@ -54,7 +54,7 @@ def along(
     Returns
     -------
     x, side, slope : ndarray, shape (n,)
-        Where they end, and the derivative of the whole with respect to the start.
+        Where they end, in the map's unit, and the derivative of the whole with respect to the start.
 
     Examples
     --------

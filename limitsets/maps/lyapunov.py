@@ -117,7 +117,7 @@ def lyapunov(params: Any, x: Any, side: int, count: int, skip: int = 1000) -> Ly
     params : NamedTuple
         A map with `image_on`.
     x : float or sequence of float
-        Start.
+        Start, in the map's unit.
     side : int
         Side of the start.
     count : int

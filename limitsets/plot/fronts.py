@@ -37,9 +37,9 @@ def robust_design(found: RobustDesign, *, wanted: float | None = None, bound: fl
     found : RobustDesign
         From `limitsets.inverse.robust_design`.
     wanted : float, optional
-        A margin that was wanted, as a line.
+        A margin that was wanted, a factor on the tolerance, as a line.
     bound : float, optional
-        A margin that no design can have, as a line.
+        A margin that no design can have, a factor on the tolerance, as a line.
 
     Returns
     -------

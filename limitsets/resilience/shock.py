@@ -48,7 +48,7 @@ class FatalShock(Tabled):
     basin : int or str
         Where it comes to: number of the attractor, or name of the exit.
     shock : ndarray, shape (dimension,)
-        The push to the nearest place known to be fatal.
+        The push to the nearest place known to be fatal, in the map's unit.
     into : int or str
         Where the nearest decided place that is fatal leads to.
     """

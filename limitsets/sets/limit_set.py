@@ -242,7 +242,8 @@ def limit_set(
     attractor : Attractor, optional
         Which one; needed where there are several.  Its `extents` are the set to start from.
     tolerance : float
-        See `limit_set_of`.
+        The ends rest when two images in turn move none of them by more, relative to its size or to the extent of the
+        largest side, whichever is larger.
 
     Returns
     -------

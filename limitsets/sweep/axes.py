@@ -30,7 +30,7 @@ class Axis:
     name : str
         The quantity of a scene, or the field of a map's parameters.
     values : ndarray, shape (n,)
-        Its values, in ascending order.
+        Its values [`unit`], in ascending order.
     unit : str
         Their unit; empty for a field of a map.
 
