@@ -253,6 +253,11 @@ def test_parameters_are_compared_anew_and_at_both_corners():
         ls.certify(Beside(1.7, 0.5), INSIDE, ["invariant"], upper=Beside(1.7, 0.5001))
 
 
+def test_an_atlas_compares_the_map_that_it_is_given():
+    with pytest.raises(MapError, match="sign of the kernel margin of Beside"):
+        ls.atlas(Beside(1.8, 0.503), "slope=1.7:1.8:3", domain=[(0.15, 0.93)])
+
+
 def test_a_margin_of_the_wrong_sign_is_told_so_on_a_sampled_graph():
     with pytest.raises(MapError, match="wrong everywhere: give its negative"):
         ls.transitions(Turned(1.8, 0.5), INSIDE)
