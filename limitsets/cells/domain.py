@@ -51,8 +51,14 @@ class Domain:
             )
         some, none = (lo < hi).all(axis=1), (lo == hi).all(axis=1)
         if not (np.isfinite(lo).all() and np.isfinite(hi).all() and (some | none).all() and some.any()):
+            wrong = ~(np.isfinite(lo) & np.isfinite(hi) & (lo < hi)) & (~none[:, None] | none.all())
+            side, axis = np.argwhere(wrong)[0].tolist()
+            low, high = float(lo[side, axis]), float(hi[side, axis])
             raise GridError(
-                "the domain", (lo.tolist(), hi.tolist()), "finite boxes with lo < hi", "correct the corners"
+                f"the domain{f' on side {side}' if len(lo) > 1 else ''} along axis {axis}",
+                (low, high),
+                "(lo, hi), finite and with lo < hi",
+                "swap them" if low > high else "correct them",
             )
         object.__setattr__(self, "lo", lo)
         object.__setattr__(self, "hi", hi)

@@ -77,7 +77,7 @@ def explore(
     required()
     from limitsets.explorer.visits import Explorer
 
-    if isinstance(scene, tuple):
+    if isinstance(scene, tuple | type):
         return Explorer.of_map(scene, domain)
     if domain is not None:
         raise AnswerError("the domain", "given", "none beside a scene", "a scene has one: leave it out")

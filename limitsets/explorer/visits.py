@@ -18,7 +18,8 @@ from limitsets.explorer.map_page import MapPage
 from limitsets.explorer.outside import within_reach
 from limitsets.explorer.page import ScenePage
 from limitsets.explorer.serving import serve
-from limitsets.maps import coerce, domain_of
+from limitsets.maps import coerce, domain_of, kind_of
+from limitsets.maps.contract import require_dimension
 from limitsets.progress import Progress, bar
 from limitsets.scene import Scene, load
 
@@ -56,12 +57,14 @@ class Explorer(pn.viewable.Viewer):  # type: ignore[misc]  # panel is not follow
     @classmethod
     def of_map(cls, params: Any, domain: Any) -> Explorer:
         """Look at a map."""
+        kind_of(params)
         chosen = coerce(params)
         try:
             where = as_domain(domain_of(chosen) if domain is None else domain)
         except MapError:
             name = f"the domain of {type(chosen).__name__}"
             raise AnswerError(name, domain, "one (lo, hi) per axis", "pass domain=[(lo, hi), ...]") from None
+        require_dimension(chosen, "domain", where.dimension)
         return cls(lambda: MapPage(chosen, where), type(chosen).__name__)
 
     def __panel__(self) -> pn.viewable.Viewable:

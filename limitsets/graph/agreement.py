@@ -1,62 +1,138 @@
 """Consistency of the kernels of a user's map.
 
-When the first graph of a class is built, each kernel is evaluated at a few hundred points of the grid.  Errors are a
-code that is no branch, a forced image that is not the image on the branch taken, and a proved box that does not hold
-the image of one of its points.  A wrong forced image would silently leave cycles and end points empty; a wrong box
-would prove false statements.
+Before a graph is built, each kernel is evaluated at a few hundred points of the grid, and at growing distances on both
+sides of each place where the branch changes.  Errors are a code that is no branch, a sign of `margin` that is not the
+branch taken, a forced image that is not the image on that branch, and a proved box that does not hold the image of one
+of its points.  A wrong forced image would silently leave cycles and end points empty; a wrong margin or box would prove
+false statements.
+
+It is a sample, not a proof: a contradiction that no sample meets passes.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from itertools import product
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from limitsets.cells import Grid
+from limitsets.cells import Domain
 from limitsets.errors import MapError
 from limitsets.graph.images.hulls import BOTH, NOTHING, BoxImages
 from limitsets.interval import rounding_is_sound
-from limitsets.maps import images, images_on, kind_of
+from limitsets.maps import coerce, images, images_on, kind_of
+from limitsets.maps.bisection import bisected, hidden, sign_code
 from limitsets.maps.contract import require_codes
+from limitsets.maps.critical import margins
 from limitsets.maps.drivers import columns
 
 __all__ = ["require_agreement"]
 
-POINTS = 256
+Floats = NDArray[np.float64]
+
+# Samples of a side, and changes of branch between them that are looked at.
+POINTS, CHANGES = 512, 64
 
 # Two ways to compute one image may differ by rounding, this much relative to the domain and the numbers met.
 SAME = 1e-7
 
-# Classes that were asked: (class, whether the boxes too).
-_ASKED: set[tuple[type, bool]] = set()
+# The nearest that kernels are compared beside a change of branch, in shares of the side's extent or, where these are
+# larger, of the numbers on it: nearer, two ways to compute the place may differ by rounding.  From there on by factors
+# of 16 to some gaps between samples.
+NEAREST, STEPS = 2.0**-40, 9
 
 
-def _starts(grid: Grid, side: int) -> NDArray[np.float64]:
-    """Points spread over one side, the same in every run: shape (POINTS, dimension)."""
-    draws = np.random.default_rng(side).random((POINTS, grid.dimension))
-    lo, hi = np.array([edges[[0, -1]] for edges in grid.edges[side]]).T
-    starts: NDArray[np.float64] = lo + draws * (hi - lo)
+def _starts(domain: Domain, side: int) -> Floats:
+    """Points spread over one side, the same in every run: shape (POINTS, dimension), one in each of POINTS strata."""
+    random = np.random.default_rng(side)
+    strata = random.permuted(np.tile(np.arange(POINTS), (domain.dimension, 1)), axis=1).T
+    shares = (strata + random.random(strata.shape)) / POINTS
+    shares = shares if domain.dimension > 1 else np.sort(shares, axis=0)
+    nearest = _nearest(domain, side)
+    shares[0], shares[-1] = nearest, 1.0 - nearest  # beside two corners: on them an image may end
+    starts: Floats = domain.lo[side] + shares * _extent(domain, side)
     return starts
 
 
-def _refuse(what: str, params: Any, at: NDArray[np.float64], side: int, value: Any, allowed: Any) -> None:
-    x = ", ".join(f"{v:.6g}" for v in at)
+def _extent(domain: Domain, side: int) -> Floats:
+    extent: Floats = domain.hi[side] - domain.lo[side]
+    return extent
+
+
+def _nearest(domain: Domain, side: int) -> float:
+    """Smallest distance between points that rounding does not blur, as a share of the extent."""
+    largest = np.maximum(np.abs(domain.lo[side]), np.abs(domain.hi[side]))
+    return NEAREST * float(np.maximum(largest / _extent(domain, side), 1.0).max())
+
+
+def _refuse(
+    what: str,
+    params: Any,
+    at: Floats,
+    side: int,
+    value: Any,
+    allowed: Any,
+    remedy: str = "make the two kernels agree",
+) -> None:
+    x = ", ".join(f"{v:.12g}" for v in at)
     raise MapError(
         f"{what} of {kind_of(params).name} at x = {x}, side {side}",
         value,
         f"{allowed}, as its kernel image has it",
-        "make the two kernels agree",
+        remedy,
     )
 
 
-def _plain(values: NDArray[np.float64]) -> float | tuple[float, ...]:
+def _plain(values: Floats) -> float | tuple[float, ...]:
     numbers = tuple(float(v) for v in values)
     return numbers[0] if len(numbers) == 1 else numbers
 
 
-def require_agreement(params: Any, grid: Grid, boxes: bool) -> None:
-    """Ask the kernels of a class from outside the package, once; `boxes`: `image_box` too.
+def _around_changes(code_of: Callable[[Floats], Any], starts: Floats, domain: Domain, side: int) -> Floats:
+    """Points on both sides of each change of code between consecutive starts, at growing distances from it."""
+    code, extent = code_of(starts), _extent(domain, side)
+    k = np.flatnonzero(code[1:] != code[:-1])[:CHANGES]
+    way = starts[k + 1] - starts[k]
+    length = np.abs(way / extent).max(axis=1)
+    way /= length[:, None]
+
+    def along(distance: Floats) -> Floats:
+        return np.clip(starts[k] + distance[:, None] * way, domain.lo[side], domain.hi[side])
+
+    # counted from 1, where floats are of one spacing: at most 52 halvings
+    lo, hi = bisected(
+        np.ones(k.size), 1.0 + length, lambda _lo, middle, _hi: code_of(along(middle - 1.0)) == code[k]
+    )
+    distances = _nearest(domain, side) * 16.0 ** np.arange(STEPS)
+    both = [points for d in distances for points in (along(lo - 1.0 - d), along(hi - 1.0 + d))]
+    return np.concatenate(both)
+
+
+def _points(params: Any, domain: Domain, side: int) -> tuple[Floats, int]:
+    """Where the kernels are compared: the starts, then those around changes of branch; how many starts there are."""
+    starts, found = _starts(domain, side), []
+
+    def code_of(x: Floats) -> Any:
+        return images(params, x, side).code
+
+    def sign_of(x: Floats) -> Any:
+        return sign_code(margins(params, x, side))
+
+    if len(kind_of(params).branches) == 1:
+        return starts, len(starts)
+    if kind_of(params).has_margin:
+        if domain.dimension == 1:  # two changes of sign between a pair of starts
+            more = hidden(lambda x: margins(params, x, side), starts[:, 0])
+            starts = np.unique(np.append(starts, more))[:, None]
+        found.append(_around_changes(sign_of, starts, domain, side))
+    found.append(_around_changes(code_of, starts, domain, side))
+    return np.concatenate([starts, *found]), len(starts)
+
+
+def require_agreement(params: Any, domain: Domain, boxes: bool, upper: Any = None) -> None:
+    """Ask the kernels of a class from outside the package, at both corners of its parameters; `boxes`: `image_box` too.
 
     Raises
     ------
@@ -64,21 +140,40 @@ def require_agreement(params: Any, grid: Grid, boxes: bool) -> None:
         They contradict each other.
     """
     cls, kind = type(params), kind_of(params)
-    if (cls, boxes) in _ASKED or cls.__module__.split(".")[0] == "limitsets":
+    if cls.__module__.split(".")[0] == "limitsets":
         return
-    for side in range(grid.sides):
-        starts = _starts(grid, side)
-        x = starts[:, 0] if kind.dimension == 1 else starts
-        found = images(params, x, side)
-        require_codes(params, found.code)
-        after = found.x.reshape(starts.shape)
+    corners = [params, coerce(upper)] if type(upper) is cls and upper is not params else [params]
+    for corner, side in product(corners, np.flatnonzero(domain.inhabited).tolist()):
+        points, count = _points(corner, domain, side)
+        found = images(corner, points, side)
+        require_codes(corner, found.code)
+        after = found.x.reshape(points.shape)
         usable = (found.code >= 0) & np.isfinite(after).all(axis=1)
-        size = np.ptp(starts, axis=0) + np.abs(after)
+        size = _extent(domain, side) + np.abs(after)
+        if kind.has_margin and len(kind.branches) > 1:
+            _ask_margin(corner, points, side, np.where(usable, found.code, -1), count)
         if kind.has_image_on:
-            _ask_forced(params, starts, side, (after, found.side, found.code), usable, size)
+            _ask_forced(corner, points, side, (after, found.side, found.code), usable, size)
         if boxes and kind.has_image_box and rounding_is_sound():
-            _ask_boxes(params, grid, starts, side, (after, found.side, found.code), usable, size)
-    _ASKED.add((cls, boxes))
+            _ask_boxes(corner, domain, points, side, (after, found.side, found.code), usable, size)
+
+
+def _ask_margin(params: Any, points: Floats, side: int, code: Any, count: int) -> None:
+    """Compare the sign of `margin` with the branch taken; the first `count` points are spread over the side."""
+    margin, names = margins(params, points, side), kind_of(params).branches
+    sign = sign_code(margin)
+    asked = (code >= 0) & (code <= 1) & (sign >= 0)
+    wrong = asked & (sign != code)
+    if not wrong.any():
+        return
+    k = int(np.where(wrong, np.abs(margin), -1.0).argmax())
+    remedy = "write image in terms of margin and image_on, so that they cannot differ"
+    spread = asked[:count]
+    if (wrong[:count] == spread).all() and np.unique(code[:count][spread]).size == 2:
+        remedy = "its sign is wrong everywhere: give its negative"
+    got, want = (f"{each} ({names[each]})" for each in (int(sign[k]), int(code[k])))
+    what = "the branch by the sign of the kernel margin"
+    _refuse(what, params, points[k], side, got, want, remedy)
 
 
 def _ask_forced(params: Any, starts: Any, side: int, seen: Any, usable: Any, size: Any) -> None:
@@ -104,7 +199,9 @@ def _ask_forced(params: Any, starts: Any, side: int, seen: Any, usable: Any, siz
             )
 
 
-def _ask_boxes(params: Any, grid: Grid, starts: Any, side: int, seen: Any, usable: Any, size: Any) -> None:
+def _ask_boxes(
+    params: Any, domain: Domain, starts: Any, side: int, seen: Any, usable: Any, size: Any
+) -> None:
     """Compare the boxes of single points."""
     after, to, code = seen
     points = columns(starts, starts.shape[1])
@@ -116,7 +213,7 @@ def _ask_boxes(params: Any, grid: Grid, starts: Any, side: int, seen: Any, usabl
         inside |= held & (found.to[2 * slot] == to) & ((slot == 0) | (found.count == BOTH))
     undefined = np.isnan(after).any(axis=1)
     proved = found.count != NOTHING
-    _ask_exits(params, grid, starts, side, code, found, proved & ~usable & ~undefined)
+    _ask_exits(params, domain, starts, side, code, found, proved & ~usable & ~undefined)
     for k in np.flatnonzero(proved & ((usable & ~inside) | undefined))[:1]:
         box = tuple((float(lo[k]), float(hi[k])) for lo, hi in zip(*found.slots[0], strict=True))
         got = (*box, int(found.to[0, k]))
@@ -131,15 +228,14 @@ def _ask_boxes(params: Any, grid: Grid, starts: Any, side: int, seen: Any, usabl
 
 
 def _ask_exits(
-    params: Any, grid: Grid, starts: Any, side: int, code: Any, found: BoxImages, gone: NDArray[np.bool_]
+    params: Any, domain: Domain, starts: Any, side: int, code: Any, found: BoxImages, gone: NDArray[np.bool_]
 ) -> None:
     """Refuse boxes in the domain, of points that have left the map: only `image` knows of that exit."""
     lo, hi = (np.stack(corner, axis=1) for corner in found.slots[0])
     for k in np.flatnonzero(gone):
-        edges = grid.edges[int(found.to[0, k]) % grid.sides]
-        ends = np.array([axis[[0, -1]] for axis in edges])
-        if ((ends[:, 0] <= lo[k]) & (hi[k] <= ends[:, 1])).all():
-            x = ", ".join(f"{v:.6g}" for v in starts[k])
+        to = int(found.to[0, k]) % domain.sides
+        if ((domain.lo[to] <= lo[k]) & (hi[k] <= domain.hi[to])).all():
+            x = ", ".join(f"{v:.12g}" for v in starts[k])
             raise MapError(
                 f"the image of {kind_of(params).name} at x = {x}, side {side}",
                 f"code {int(code[k])}, an exit",

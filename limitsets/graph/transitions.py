@@ -17,7 +17,7 @@ from limitsets.graph.memory import require_memory
 from limitsets.graph.ranges import build
 from limitsets.graph.target import Target
 from limitsets.maps import kind_of
-from limitsets.maps.contract import require_sides
+from limitsets.maps.contract import require_dimension, require_sides
 
 __all__ = ["transitions"]
 
@@ -61,19 +61,13 @@ def transitions(map: Any, grid: Grid, method: str | None = None, **options: Any)
     5
     """
     kind = kind_of(map)
-    if kind.dimension != grid.dimension:
-        raise AnswerError(
-            "the dimension of the grid",
-            grid.dimension,
-            f"{kind.dimension}, that of {kind.name}",
-            "cut another domain",
-        )
+    require_dimension(map, "grid", grid.dimension)
     require_sides(map, 0, grid.sides - 1)
     chosen = method or ("end-points" if grid.dimension == 1 else "corners-padded")
     if chosen not in METHODS:
         raise AnswerError("the image method", chosen, ", ".join(METHODS), "correct the word")
     require_memory(grid, chosen, options.get("samples", 16))
-    require_agreement(map, grid, chosen == "boxes")
+    require_agreement(map, grid.domain, chosen == "boxes", options.get("upper"))
     target = Target.of(grid, kind.exits)
     inhabited = grid.domain.inhabited.tolist()
     parts = [

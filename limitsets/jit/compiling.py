@@ -97,6 +97,15 @@ _KERNEL = re.compile(
 # Where an array or a list stands for a state: the kernel gave it as its new x.
 _NO_STATE = re.compile(r"(?:>>> float\(|>>> setitem\(.*, |Cannot unify )(array|list|reflected list)\(")
 
+# Where the new x has not as many coordinates as the map: a tuple for a number, or a number for a tuple.
+_NO_COORDINATES = re.compile(
+    r">>> setitem\(array.*, (UniTuple\(.*\))\)|>>> put\(UniTuple\(array.*, (float64)\)"
+    r"|Cannot unify (.*) and .* for 'after"
+)
+
+# What stands where a kernel takes the entries of a number, as of a tuple.
+_NO_ENTRIES = re.compile(r">>> getitem\(float64, |failed to unpack float64")
+
 _OPERATION = re.compile(r">>> (add|sub|mul|truediv|pow|neg)\((.*)\)$")
 _SIGNS = {"add": " + ", "sub": " - ", "mul": " * ", "truediv": " / ", "pow": " ** ", "neg": "-"}
 
@@ -142,7 +151,7 @@ def _explained(error: Exception, cls: type) -> MapError:
             f"what {name} of {cls.__name__} does with x or a parameter ({place})",
             linecache.getline(file, number).strip(),
             f"for boxes: {NUMBERS_DO}",
-            "register image_on for each branch, with margin; or an image_box",
+            "give each branch a number and a name (branches=), and register image_on, margin; or image_box",
         )
     if any(_NO_STATE.search(line) for line in lines):
         return MapError(
@@ -150,6 +159,20 @@ def _explained(error: Exception, cls: type) -> MapError:
             "an array or a list",
             "a number; in two and three dimensions a tuple of numbers",
             "return (y, z), side, code in place of np.array([y, z]), side, code",
+        )
+    if spot and any(_NO_ENTRIES.match(line) for line in lines):
+        return MapError(
+            f"what {kernel} takes entries of ({place})",
+            "a number",
+            "a tuple",
+            "in one dimension write x, not x[0]; of a map of 2 or 3 pass dimension= to limitsets.register",
+        )
+    if found := next((found for line in lines if (found := _NO_COORDINATES.match(line))), None):
+        return MapError(
+            f"the new x that the kernel image of {cls.__name__} gives",
+            _in_words("mul", next(filter(None, found.groups()))),
+            "as many numbers as the map has dimensions: one as it is, two or three as a tuple",
+            "correct what image returns, or pass dimension= to limitsets.register",
         )
     if found := next((found for line in lines if (found := _OPERATION.match(line))), None):
         return MapError(

@@ -41,11 +41,21 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from limitsets.errors import MapError
+from limitsets.errors import AnswerError, MapError
 from limitsets.jit import cover_foreign_class
 from limitsets.maps import codes, derived, kernels
 
-__all__ = ["MapKind", "coerce", "has_slope", "kind_of", "register", "require_codes", "require_sides"]
+__all__ = [
+    "MapKind",
+    "coerce",
+    "has_slope",
+    "kind_of",
+    "or_register",
+    "register",
+    "require_codes",
+    "require_dimension",
+    "require_sides",
+]
 
 
 EXITS_OF_A_MAP = {"outside": codes.OUTSIDE}
@@ -276,14 +286,13 @@ def kind_of(params: Any) -> MapKind:
     """
     kind = _KINDS.get(type(params))
     if kind is None:
-        raise MapError(
-            "the map",
-            type(params).__name__,
-            "parameters of a registered class",
-            "pass its .map"
-            if type(getattr(params, "map", None)) in _KINDS
-            else "register it with limitsets.register",
-        )
+        value, remedy = type(params).__name__, "register it with limitsets.register"
+        if type(getattr(params, "map", None)) in _KINDS:
+            remedy = "pass its .map"
+        elif isinstance(params, type):
+            fields = ", ".join(f"{name}=..." for name in getattr(params, "_fields", ()))
+            value, remedy = f"the class {params.__name__}", f"pass {params.__name__}({fields})"
+        raise MapError("the map", value, "parameters of a registered class", remedy)
     return kind
 
 
@@ -323,6 +332,8 @@ def has_slope(params: Any) -> bool:
 
 def _fewest_entries(params: Any) -> int | None:
     """Length of the shortest array among the parameters, None where there is none."""
+    if any(isinstance(field, str | complex) for field in params):
+        coerce(params)  # which refuses it by its name
     counts = [
         len(field) if isinstance(field, np.ndarray) else _fewest_entries(field)
         for field in params
@@ -344,6 +355,28 @@ def require_sides(params: Any, least: int, most: int) -> None:
             "an integer from 0" if known is None else f"an integer from 0 to {known - 1}",
             "name a side of the map",
         )
+
+
+def require_dimension(params: Any, what: str, dimension: int) -> None:
+    """Refuse a domain or a grid of another dimension than the map's.
+
+    Raises
+    ------
+    AnswerError
+        It has too many axes, or too few.
+    """
+    kind = kind_of(params)
+    if kind.dimension != dimension:
+        allowed = f"{kind.dimension}, that of {kind.name}"
+        remedy = "give one (lo, hi) for each coordinate of x" + or_register(params, dimension)
+        raise AnswerError(f"the dimension of the {what}", dimension, allowed, remedy)
+
+
+def or_register(params: Any, dimension: int) -> str:
+    """Say how a map of one's own is registered with another dimension; nothing of the package's maps."""
+    if type(params).__module__.split(".")[0] == "limitsets":
+        return ""
+    return f"; if x has {dimension}, pass dimension={dimension} to limitsets.register"
 
 
 def coerce(params: Any) -> Any:
@@ -373,17 +406,24 @@ def coerce(params: Any) -> Any:
     >>> maps.coerce(maps.Logistic(4))
     Logistic(r=4.0)
     """
+    return _coerced(params, "a parameter of the map")
+
+
+def _coerced(params: Any, what: str) -> Any:
     if params is None or isinstance(params, (bool, np.bool_)):
         return params
     if isinstance(params, tuple) and hasattr(params, "_fields"):
-        return type(params)(*(coerce(field) for field in params))
+        name = type(params).__name__
+        return type(params)(
+            *map(_coerced, params, (f"the field {each} of {name}" for each in params._fields))
+        )
     if isinstance(params, (int, float, np.integer, np.floating)):
         return float(params)
     if isinstance(params, (np.ndarray, list)):
         return np.array(params, dtype=np.float64, order="C")
     raise MapError(
-        "a parameter of the map",
+        what,
         params,
         "a number, an array, a NamedTuple of such, or None",
-        "convert it first",
+        "give a number, without quotes" if isinstance(params, str) else "convert it first",
     )

@@ -18,8 +18,8 @@ from limitsets.errors import AnswerError, shown
 from limitsets.jit import kernel
 from limitsets.maps.bisection import Array, Codes, hidden, inserted, located, sign_code
 from limitsets.maps.contract import kind_of, require_sides
-from limitsets.maps.drivers import images
-from limitsets.maps.kernels import margin, on_side
+from limitsets.maps.drivers import columns, images
+from limitsets.maps.kernels import margin, on_side, pick
 
 __all__ = [
     "CriticalPoint",
@@ -80,10 +80,10 @@ class CriticalPoint(NamedTuple):
 
 
 @kernel(entry=True)
-def _margins(params: Any, side: int, x: Any, out: Any) -> None:
+def _margins(params: Any, side: int, xs: Any, out: Any) -> None:
     here = on_side(params, side)
-    for k in range(x.size):
-        out[k] = margin(here, x[k], side)
+    for k in range(out.size):
+        out[k] = margin(here, pick(xs, k), side)
 
 
 def margins(params: Any, x: ArrayLike, side: int) -> Array:
@@ -102,10 +102,11 @@ def margins(params: Any, x: ArrayLike, side: int) -> Array:
 def _margins_of(params: Any, side: int) -> Callable[[Array], Array]:
     """Margins of one side, which is held against the map once for all."""
     require_sides(params, side, side)
+    dimension = kind_of(params).dimension
 
     def found(x: Array) -> Array:
-        out = np.empty(x.size)
-        _margins(params, side, np.ascontiguousarray(x), out)
+        out = np.empty(len(x))
+        _margins(params, side, columns(x, dimension), out)
         return out
 
     return found

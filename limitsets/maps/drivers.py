@@ -16,7 +16,7 @@ from limitsets.arguments import arguments_checked
 from limitsets.errors import MapError, shown
 from limitsets.jit import kernel
 from limitsets.maps import codes
-from limitsets.maps.contract import kind_of, require_codes, require_sides
+from limitsets.maps.contract import kind_of, or_register, require_codes, require_sides
 from limitsets.maps.kernels import (
     displacement,
     entries_of,
@@ -287,6 +287,8 @@ def start_of(params: Any, x: Any, side: int) -> tuple[float, ...]:
     numbers = "a finite number" if kind.dimension == 1 else f"{kind.dimension} finite numbers"
     if start.shape != (kind.dimension,) or not np.isfinite(start).all():
         remedy = "give x as a number, in the map's own unit" if isinstance(x, str) else "give one state"
+        if start.ndim == 1 and 0 < start.size <= 3:
+            remedy += or_register(params, start.size)
         raise MapError("the start x", shown(x), numbers, remedy)
     require_sides(params, side, side)
     return tuple(float(v) for v in start)

@@ -7,12 +7,12 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from fractions import Fraction
-from functools import singledispatch
 from pathlib import Path
-from typing import Any, cast
+from typing import Any, overload
 
 from limitsets.arguments import arguments_checked
-from limitsets.errors import AnswerError
+from limitsets.cells import Grid
+from limitsets.errors import AnswerError, shown
 from limitsets.progress import shown_in_notebooks
 from limitsets.proofs.attraction import Attraction, attraction, near_section
 from limitsets.proofs.cover import cover
@@ -20,7 +20,7 @@ from limitsets.proofs.end_points import proved_ends
 from limitsets.proofs.expansion import least_slope
 from limitsets.proofs.goals import borders, prove, prove_or_refute
 from limitsets.proofs.goals.violating_starts import start_that_leaves
-from limitsets.proofs.of_map import certify_map
+from limitsets.proofs.of_map import ProofOfMap, certify_map
 from limitsets.proofs.orbits import proved_cycles
 from limitsets.proofs.parameters import ParameterBox, parameter_box
 from limitsets.proofs.proof import Claim, Proof
@@ -199,49 +199,73 @@ def spelled_deviations(scene: Scene, given: Mapping[str, str] | None) -> dict[st
     return found
 
 
-@singledispatch
-@shown_in_notebooks
-@arguments_checked
+@overload
 def certify(
     scene: Scene | str | Path,
+    grid: Sequence[str] | None = None,
     claims: Sequence[str] | None = None,
     *,
     noise: Mapping[str, str] | None = None,
     tolerance: Mapping[str, str] | None = None,
     progress: Progress | None = None,
-) -> Proof:
-    """Prove claims about the limit set of a scene; or of any map: ``certify(map, grid, claims)``.
-
-    Of a map see `limitsets.proofs.of_map.certify_map`; the following is about a scene.
+) -> Proof: ...
+@overload
+def certify(
+    scene: tuple[Any, ...],
+    grid: Grid | None = None,
+    claims: Sequence[str] | None = None,
+    *,
+    upper: Any = None,
+) -> ProofOfMap: ...
+def certify(
+    scene: Any,
+    grid: Any = None,
+    claims: Sequence[str] | None = None,
+    *,
+    noise: Mapping[str, str] | None = None,
+    tolerance: Mapping[str, str] | None = None,
+    upper: Any = None,
+    progress: Progress | None = None,
+) -> Proof | ProofOfMap:
+    """Prove claims about a scene, ``certify(scene, claims)``, or about any map, ``certify(map, grid, claims)``.
 
     Parameters
     ----------
-    scene : Scene, str or Path
-        A scene, or what `limitsets.load` takes.
+    scene : Scene, str, Path, or a map's parameters
+        A scene, what `limitsets.load` takes, or the parameters of a registered map.
+    grid : Grid
+        Of a map alone: the cells; finer ones prove more.  Behind a scene the claims may stand here.
     claims : sequence of str, optional
-        Of "attracts-all" (every start on the arm enters the attracting cells and stays; with the arm's surface above
+        Of a map any of `limitsets.proofs.of_map.CLAIMS_OF_MAP`, by default attracts-all.  Of a scene any of
+        "attracts-all" (every start on the arm enters the attracting cells and stays; with the arm's surface above
         the joint, every start beyond the jog's unstable fixed point, and those before it tend to the joint),
         "invariant", "expanding" (every slope on the attracting cells exceeds 1), "trapping" (the attracting cells are
         mapped into their interior), "end-points" (those of the limit set, in brackets), "cycles" (periodic orbits
         exist, and attract or repel) and "goal".  Default: attracts-all, and the goal if there is one.
     noise : mapping of str to str, optional
-        ``{"throw.speed": "0.3 %"}``: what may differ at every throw; the claims are then proved for every sequence of
-        throws.  A scene whose effects have spread = "bounded" adds its scatter.
+        Of a scene alone: ``{"throw.speed": "0.3 %"}``: what may differ at every throw; the claims are then proved for
+        every sequence of throws.  A scene whose effects have spread = "bounded" adds its scatter.
     tolerance : mapping of str to str, optional
-        ``{"throw.speed": "0.7 %"}``: what is fixed but unknown; the claims are then proved for every such value.
+        Of a scene alone: ``{"throw.speed": "0.7 %"}``: what is fixed but unknown; the claims are then proved for every
+        such value.
+    upper : NamedTuple, optional
+        Of a map alone: the upper corner of a box of parameters, whose lower corner is `scene`; the claims are then
+        proved for every map between.
     progress : callable, optional
-        Called with what is tried, how much of it is done, and of how much, before each attempt.
+        Of a scene alone: called with what is tried, how much of it is done, and of how much, before each attempt.
 
     Returns
     -------
-    Proof
+    Proof or ProofOfMap
         With the verdict, and the reason where something is not proved.
 
     Raises
     ------
     AnswerError
-        For a word that is no claim, an effect of which nothing can be proved, noise that cannot be enclosed, or a
-        thread that does not round to nearest.
+        For a word that is no claim, an argument for maps beside a scene or for scenes beside a map, an effect of which
+        nothing can be proved, noise that cannot be enclosed, or a thread that does not round to nearest.
+    MapError
+        For a class in place of its values, and for a map that cannot be enclosed or that contradicts itself.
 
     Examples
     --------
@@ -253,6 +277,35 @@ def certify(
     >>> proof.claims[0].verdict
     'proved'
     """
+    if isinstance(scene, tuple | type):
+        _require_none({"noise": noise, "tolerance": tolerance, "progress": progress}, "beside a map")
+        return certify_map(scene, grid, claims, upper=upper)
+    twice = isinstance(grid, Grid) or claims is not None  # else the claims stand in its place
+    _require_none({"upper": upper, "grid": grid if twice else None}, "beside a scene")
+    return certify_scene(
+        scene, claims if grid is None else grid, noise=noise, tolerance=tolerance, progress=progress
+    )
+
+
+def _require_none(given: Mapping[str, Any], beside: str) -> None:
+    """Refuse arguments of the other kind of proof."""
+    for name, value in given.items():
+        if value is not None:
+            remedy = "leave it out; a scene has tolerance=, a map upper="
+            raise AnswerError(f"the argument {name} of certify", shown(value), f"none {beside}", remedy)
+
+
+@shown_in_notebooks
+@arguments_checked
+def certify_scene(
+    scene: Scene | str | Path,
+    claims: Sequence[str] | None = None,
+    *,
+    noise: Mapping[str, str] | None = None,
+    tolerance: Mapping[str, str] | None = None,
+    progress: Progress | None = None,
+) -> Proof:
+    """Prove claims about a scene, by the arguments of `certify`."""
     loaded = load(scene)
     wanted = _chosen(loaded, claims)
     noise = joined(spelled_deviations(loaded, noise), spelled_deviations(loaded, scattered(loaded)))
@@ -265,9 +318,6 @@ def certify(
         found = (one,)
     seconds = time.perf_counter() - begin
     return Proof(loaded, noise, tolerance, found, answers, seconds)
-
-
-certify.register(tuple, cast(Any, certify_map))  # a map is a NamedTuple; its answer is another class
 
 
 def _attempt(

@@ -38,7 +38,7 @@ from limitsets.maps.derived import NEVER, SURE, UNKNOWN, BranchBoxes, branch_box
 from limitsets.proofs.intervals import Intervals
 from limitsets.proofs.proof import Claim
 from limitsets.sets import Cycle, cycles
-from limitsets.tables import Table, Tabled
+from limitsets.tables import Column, Table, Tabled, bands_of
 
 __all__ = ["CLAIMS_OF_MAP", "CycleOfMap", "ProofOfMap", "certify_map"]
 
@@ -144,10 +144,31 @@ class ProofOfMap(Tabled):
     def tables(self) -> tuple[Table, ...]:
         """Give the tables that show it, the one that is saved as CSV first."""
         rows = [(each.claim, each.verdict, each.reason or None) for each in self.claims]
-        return (Table(("claim", "verdict", "missing"), rows, f"Proofs of {type(self.map).__name__}"),)
+        claims = Table(("claim", "verdict", "missing"), rows, f"Proofs of {type(self.map).__name__}")
+        if not len(self.cells):
+            return (claims,)
+        kept = _region(self.cells, "Attracting cells", "no image leads out")
+        return claims, kept, _region(self.enters, "Basin", "every point of its cells enters them")
+
+    def __str__(self) -> str:
+        return "\n\n".join(table.text() for table in self.tables())
 
 
 # ---------------------------------------------------------------- claims about cells
+
+
+def _region(cells: CellSet, caption: str, proved: str) -> Table:
+    """Say where cells are: which intervals on a line, else by boxes around their connected pieces."""
+    rows: list[tuple[Any, ...]]
+    if cells.grid.dimension == 1:
+        names, rows = ["x"], [(side, band) for side, band in bands_of(cells.extents())]
+    else:
+        names = [f"x[{axis}]" for axis in range(cells.grid.dimension)]
+        rows = [(side, *box) for side, boxes in cells.pieces().items() for box in boxes]
+    spans = [Column(name, show=".6g", ends=True) for name in names]
+    caption += ": boxes around its pieces" if cells.grid.dimension > 1 else ""
+    how = f"proved: {proved}; {len(cells)} of {cells.grid.n_cells} cells"
+    return Table(("side", *spans), rows, caption, how)
 
 
 def _place(grid: Grid, cell: int) -> str:
@@ -405,6 +426,7 @@ def certify_map(
         For a map whose images cannot be enclosed: the line names the function and the way out.
     """
     begin = time.perf_counter()
+    kind_of(map)
     wanted = tuple(dict.fromkeys(claims or ("attracts-all",)))
     for claim in wanted:
         if claim not in CLAIMS_OF_MAP:

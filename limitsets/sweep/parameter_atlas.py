@@ -16,6 +16,7 @@ from limitsets.cells import as_domain
 from limitsets.errors import LimitsetsError
 from limitsets.files import as_plain
 from limitsets.maps import coerce, kind_of
+from limitsets.maps.contract import require_dimension
 from limitsets.progress import shown_in_notebooks
 from limitsets.scene import Scene, load
 from limitsets.sweep.axes import Axis, axis_of
@@ -351,7 +352,10 @@ def _subject(subject: Any, domain: Any) -> Subject:
             )
         return SceneSubject(subject)
     kind_of(subject)
-    return MapSubject(coerce(subject), None if domain is None else as_domain(domain))
+    box = None if domain is None else as_domain(domain)
+    if box is not None:
+        require_dimension(subject, "domain", box.dimension)
+    return MapSubject(coerce(subject), box)
 
 
 def _work(plan: Plan) -> Work:

@@ -15,6 +15,7 @@ import numpy.typing as npt
 
 from limitsets.cells import Domain
 from limitsets.errors import AnswerError, MapError, SceneError
+from limitsets.graph.agreement import require_agreement
 from limitsets.scene import Scene
 from limitsets.scene.quantities import base_unit, find, unit_read
 from limitsets.scene.units import Quantity, convert, parse
@@ -192,6 +193,7 @@ class MapSubject:
         """Refuse what a block task cannot do without."""
         if block:
             self.points({name: values[:1] for name, values in axes.items()})
+            require_agreement(self.params, self._domain, boxes=False)
 
 
 Subject: TypeAlias = SceneSubject | MapSubject

@@ -72,7 +72,7 @@ class Broken(NamedTuple):
 
 
 def broken(params, x, side):
-    return 0.5 * x, side, 0
+    return 0.5 * x, 5 if params.way == 5.0 else side, 0
 
 
 def broken_box(low, high, lo, hi, side):

@@ -6,12 +6,16 @@ import numpy as np
 import pytest
 
 import limitsets as ls
+from limitsets import maps
 from limitsets.errors import AnswerError, GridError, LimitsetsError, MapError
 from limitsets.graph import memory
+from limitsets.proofs.certify import certify_scene
+from limitsets.proofs.of_map import certify_map
 from tests.maps_of_tests import Contraction
 
 SCENE = ls.load("paper-designed")
 GRID = ls.grid(SCENE.domain, cells=64)
+LINE, MAP = ls.grid([(0.0, 1.0)], cells=64), maps.Logistic(3.5)
 GRAPH = ls.transitions(SCENE.map, GRID)
 FOUND = ls.attractors(GRAPH, throws=100)
 
@@ -111,9 +115,9 @@ def _public():
         for name in room.__all__:
             function = getattr(room, name)
             if inspect.isfunction(function) and name not in ("scenes", "register"):
-                # of `certify`, which asks its first argument whether a scene or a map is meant, both
-                yield prefix + name, getattr(function, "dispatch", lambda kind, own=function: own)(object)
-    yield "certify_map", ls.certify.dispatch(tuple)
+                # `certify` asks its first argument whether a scene or a map is meant
+                yield prefix + name, {"certify": certify_scene}.get(name, function)
+    yield "certify_map", certify_map
 
 
 def _words(annotation):
@@ -219,12 +223,78 @@ NAMED = {
         (lambda: ls.orbit(SCENE.map, "8 in", 0, 3), MapError, "start x is '8 in'.*in the map's own unit"),
         (lambda: ls.plot.flight(SCENE, 30.0, 0), AnswerError, "start x is 30.0.*at most 28 in"),
         (lambda: ls.attractors(GRAPH, throws=1e5), AnswerError, "pass throws=200000"),
+        (lambda: ls.certify("paper-designed", "goal"), AnswerError, "argument claims of .* is 'goal'"),
+        (
+            lambda: ls.certify(SCENE, GRID),
+            AnswerError,
+            "grid of certify is 'a Grid'; allowed: none beside a s",
+        ),
+        (lambda: ls.certify(SCENE, ["goal"], ["goal"]), AnswerError, "grid of certify is 'a list of 1'"),
+        (
+            lambda: ls.certify(scene=SCENE, upper=3),
+            AnswerError,
+            "upper of certify is 3; .* scene has tolerance=",
+        ),
+        (
+            lambda: ls.certify(MAP, LINE, noise={}),
+            AnswerError,
+            "noise of certify .*; allowed: none beside a map",
+        ),
+        (
+            lambda: ls.certify(maps.Logistic, LINE),
+            MapError,
+            r"the class Logistic'.*pass Logistic\(r=\.\.\.\)",
+        ),
+        (
+            lambda: ls.transitions(maps.Logistic, LINE),
+            MapError,
+            r"the class Logistic'.*pass Logistic\(r=\.\.\.\)",
+        ),
+        (lambda: ls.continuation(maps.Logistic, {"r": (3, 4)}), MapError, "the map is 'the class Logistic'"),
+        (lambda: ls.explore(maps.Logistic, domain=[(0, 1)]), MapError, "the map is 'the class Logistic'"),
+        (
+            lambda: ls.explore(maps.Henon(), domain=[(0, 1)]),
+            AnswerError,
+            "the domain is 1; allowed: 2, that of He",
+        ),
+        (
+            lambda: ls.atlas(MAP, "r=3:4:3", domain=[(0, 1)] * 2),
+            AnswerError,
+            "the domain is 2; allowed: 1, that",
+        ),
+        (
+            lambda: ls.continuation(MAP, {"r": (3, 4)}, domain=[(0, 1)] * 2),
+            AnswerError,
+            "the domain is 2; allowed: 1, that",
+        ),
+        (
+            lambda: ls.orbit(maps.Logistic("3.5"), 0.1, 0, 3),
+            MapError,
+            "the field r of Logistic is '3.5'.*quotes",
+        ),
+        (
+            lambda: ls.transitions(maps.Logistic("3.5"), LINE),
+            MapError,
+            "the field r of Logistic is '3.5'.*quotes",
+        ),
+        (
+            lambda: ls.grid([(-1, 1), (3, -3)]),
+            GridError,
+            r"domain along axis 1 is \(3.0, -3.0\); allowed: \(lo, hi\), finite and with lo < hi; swap them",
+        ),
     ],
-    ids=["domain", "map", "grid", "graph", "tuple", "list", "no grid", "unit", "flight", "float"],
 )
 def test_a_scene_in_the_wrong_place_is_told_what_goes_there(asked, error, said):
     with pytest.raises(error, match=said):
         asked()
+
+
+def test_what_certify_takes_is_shown_and_taken_by_name():
+    assert {"scene", "grid", "claims", "noise", "tolerance", "upper", "progress"} == set(
+        inspect.signature(ls.certify).parameters
+    )
+    assert ls.certify(scene="paper-designed", claims=["invariant"]).proved
+    assert ls.certify(scene=maps.Logistic(2.5), grid=ls.grid([(0.1, 0.9)], cells=512), upper=None).proved
 
 
 def test_a_missing_argument_is_named_by_python():

@@ -1,6 +1,7 @@
 """Kernels of a map of one's own that contradict each other: one line each, of the package's family of errors."""
 
 import math
+import re
 from typing import NamedTuple
 
 import numpy as np
@@ -170,6 +171,175 @@ def test_an_orbit_names_what_it_met():
     misspelling = made("Case", image=misspelt)
     with pytest.raises(MapError, match="'slop'"):
         ls.orbit(misspelling(1.0), 0.95, 0, 3)
+
+
+# ---------------------------------------------------------------- margin and image
+
+
+class Beside(NamedTuple):
+    """A tent whose image changes its branch at `at`; its margin changes sign at 1/2."""
+
+    slope: float
+    at: float
+
+
+def beside(params, x, side):
+    return (params.slope * (1.0 - x), side, 1) if x > params.at else (params.slope * x, side, 0)
+
+
+def beside_margin(params, x, side):
+    return x - 0.5
+
+
+def turned_margin(params, x, side):
+    return params.at - x
+
+
+def back(params, x, side):
+    """Take branch 1 between 1/2 and `at` only."""
+    return (params.slope * (1.0 - x), side, 1) if 0.5 < x < params.at else (params.slope * x, side, 0)
+
+
+class Turned(Beside):
+    """Its margin has the wrong sign."""
+
+
+class Back(Beside):
+    """Its image changes its branch where the margin does not change its sign."""
+
+
+MARGIN = {"image_on": tent_on, "branches": TWO}
+ls.register(Beside, image=beside, margin=beside_margin, **MARGIN)
+ls.register(Turned, image=beside, margin=turned_margin, **MARGIN)
+ls.register(Back, image=back, margin=beside_margin, **MARGIN)
+INSIDE = ls.grid([(0.15, 0.93)], cells=256)
+
+
+def place_in(error):
+    """The x that an error names."""
+    return float(re.search(r" at x = (\S+), side 0", str(error))[1])
+
+
+@pytest.mark.parametrize("way", [-1, 1])
+@pytest.mark.parametrize("off", [3e-3, 2e-4, 1e-6, 1e-9, 1e-11])
+def test_a_margin_that_changes_sign_beside_the_switch_of_image_is_refused(off, way):
+    params = Beside(1.8, 0.5 + way * off)
+    for method in (None, "boxes"):
+        with pytest.raises(
+            MapError, match=r"'\d \(\w+\)'; allowed: \d \(\w+\), as its kernel image"
+        ) as caught:
+            ls.transitions(params, INSIDE, method)
+        x = place_in(caught.value)
+        # there the two do differ: by the plain functions
+        assert beside(params, x, 0)[2] != (1 if beside_margin(params, x, 0) > 0.0 else 0)
+        assert "in terms of margin and image_on" in caught.value.remedy
+
+
+def test_what_would_be_proved_of_a_margin_beside_the_switch_is_false_of_image():
+    """The core of a tent of slope 1.8 ends at 0.9; with its switch at 0.503 an image lies beyond."""
+    assert beside(Beside(1.8, 0.503), 0.503, 0)[0] > 0.905
+    with pytest.raises(MapError, match="sign of the kernel margin of Beside"):
+        ls.certify(Beside(1.8, 0.503), INSIDE, ["invariant"])
+    proof = ls.certify(Beside(1.8, 0.5), INSIDE, ["invariant"])
+    assert proof.proved
+    assert 0.9 <= proof.cells.extents()[0][-1][1] < 0.905
+
+
+def test_parameters_are_compared_anew_and_at_both_corners():
+    ls.transitions(Beside(1.7, 0.5), INSIDE)
+    with pytest.raises(MapError, match="sign of the kernel margin of Beside"):
+        ls.transitions(Beside(1.7, 0.6), INSIDE)
+    with pytest.raises(MapError, match="sign of the kernel margin of Beside"):
+        ls.certify(Beside(1.7, 0.5), INSIDE, ["invariant"], upper=Beside(1.7, 0.5001))
+
+
+def test_an_atlas_compares_the_map_that_it_is_given():
+    with pytest.raises(MapError, match="sign of the kernel margin of Beside"):
+        ls.atlas(Beside(1.8, 0.503), "slope=1.7:1.8:3", domain=[(0.15, 0.93)])
+
+
+def test_a_margin_of_the_wrong_sign_is_told_so_on_a_sampled_graph():
+    with pytest.raises(MapError, match="wrong everywhere: give its negative"):
+        ls.transitions(Turned(1.8, 0.5), INSIDE)
+
+
+@pytest.mark.parametrize("at", [0.8, 0.5 + 2.0**-8])
+def test_a_change_of_branch_without_a_change_of_sign_is_refused(at):
+    params = Back(1.8, at)
+    with pytest.raises(MapError, match=r"'1 \(right\)'; allowed: 0 \(left\)") as caught:
+        ls.transitions(params, INSIDE)
+    assert place_in(caught.value) > at
+
+
+class OneOver(NamedTuple):
+    """A tent whose switch is computed in two ways, which differ by rounding."""
+
+    slope: float
+    shift: float
+
+
+def one_over(params, x, side):
+    branch = 1 if (x - params.shift) * params.slope > 1.0 else 0
+    after, to = one_over_on(params, x, side, branch)
+    return after, to, branch
+
+
+def one_over_on(params, x, side, branch):
+    u = x - params.shift
+    return params.shift + (2.0 - params.slope * u if branch == 1 else params.slope * u), side
+
+
+def one_over_margin(params, x, side):
+    return x - (params.shift + 1.0 / params.slope)
+
+
+ls.register(OneOver, image=one_over, image_on=one_over_on, margin=one_over_margin, branches=TWO)
+
+
+@pytest.mark.parametrize("shift", [0.0, 1e6])
+def test_switches_that_differ_by_rounding_are_one(shift):
+    differing = 0
+    for slope in np.linspace(1.5, 1.9, 41).tolist():
+        params = OneOver(slope, shift)
+        x = shift + 1.0 / slope
+        near = x + np.spacing(x) * np.arange(-3, 4)
+        differing += any(
+            one_over(params, v, 0)[2] != (one_over_margin(params, v, 0) > 0.0) for v in near.tolist()
+        )
+        ls.transitions(params, ls.grid([(shift + 0.01, shift + 1.1)], cells=16))
+    assert differing > 0
+
+
+class Disc(NamedTuple):
+    square: float
+
+
+def disc(params, x, side):
+    branch = 1 if x[0] * x[0] + x[1] * x[1] > params.square else 0
+    after, to = disc_on(params, x, side, branch)
+    return after, to, branch
+
+
+def disc_on(params, x, side, branch):
+    return ((0.3 * x[0], 0.4 * x[1]) if branch == 1 else (0.5 * x[1], 0.5 * x[0])), side
+
+
+def disc_margin(params, x, side):
+    return x[0] * x[0] + x[1] * x[1] - 0.3
+
+
+ls.register(Disc, image=disc, image_on=disc_on, margin=disc_margin, dimension=2, branches=("in", "out"))
+
+
+@pytest.mark.parametrize("off", [1e-2, 1e-5, -1e-9])
+def test_a_margin_beside_the_switch_in_the_plane(off):
+    square = ls.grid([(-1.0, 1.0)] * 2, cells=16)
+    for method in (None, "boxes"):
+        ls.transitions(Disc(0.3), square, method)
+        with pytest.raises(MapError, match="sign of the kernel margin of Disc") as caught:
+            ls.transitions(Disc(0.3 + off), square, method)
+        x, y = map(float, re.search(r" at x = (\S+), (\S+), side 0", str(caught.value)).groups())
+        assert min(0.3, 0.3 + off) <= x * x + y * y <= max(0.3, 0.3 + off)
 
 
 @pytest.mark.sweep

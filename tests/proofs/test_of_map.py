@@ -1,6 +1,7 @@
 """Claims about any map, proved from its plain kernels: against answers on paper, and against sampled orbits."""
 
 import math
+import re
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -129,6 +130,24 @@ def test_an_orbit_that_is_not_there_is_not_proved():
     (true,) = cycles(proof.graph, 2, proof.cells)
     assert not isinstance(_prove(proof, true), str)
     assert _prove(proof, replace(true, x=true.x + 0.02)) == "no box is found that Newton's operator contracts"
+
+
+def test_a_proof_is_printed_with_the_region_that_it_is_about():
+    # the core of a tent ends at 1.8 / 2, and no start beyond 1 - 0.15 / 1.8 has an image in the grid
+    text = str(ls.certify(Tent(1.8), ls.grid([(0.15, 0.93)], cells=2048), ["invariant"]))
+    kept, basin = (
+        re.search(rf"{head}.*\n.*\n0 +(\S+) to (\S+)$", text, re.M) for head in ("Attracting", "Basin")
+    )
+    lo, hi = map(float, kept.groups())
+    assert lo <= 1.8 * (1.0 - 0.9) + 1e-6
+    assert 0.9 - 1e-6 <= hi < 0.901
+    assert float(basin[1]) == 0.15
+    assert float(basin[2]) == pytest.approx(1.0 - 0.15 / 1.8, abs=1e-3)
+    assert "Tent" in text
+    assert "proved" in text
+    plane = str(ls.certify(Spiral(0.3, 0.4), ls.grid([(-1.0, 1.0)] * 2, cells=(16, 16)), ["invariant"]))
+    assert "boxes around its pieces" in plane  # which are more than its cells
+    assert "x[1]" in plane
 
 
 def test_words_and_maps_that_cannot_be_proved():

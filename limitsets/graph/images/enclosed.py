@@ -103,10 +103,14 @@ class Enclosures:
 
 
 def _check(map: Any, upper: Any) -> None:  # noqa: A002  # the field's word
-    if not kind_of(map).has_image_box:
-        raise AnswerError(
-            "the map", kind_of(map).name, "one with image_box", "register image_box, or sample instead"
-        )
+    kind = kind_of(map)
+    if not kind.has_image_box:
+        given = {"image_on": kind.has_image_on, "margin": kind.has_margin}
+        wanted = " and ".join(name for name, there in given.items() if not there)
+        way = f"register {wanted} too" if len(kind.branches) == 2 else "register image_box"
+        branches = f"{kind.name}, of the branches {', '.join(kind.branches)}"
+        allowed = "one with image_on and margin, of two branches; or with image_box"
+        raise AnswerError("the map", branches, allowed, f"{way}, or sample instead")
     if type(upper) is not type(map):
         allowed = f"parameters of {kind_of(map).name}"
         raise AnswerError("the upper corner of the parameters", type(upper).__name__, allowed, "pass such")

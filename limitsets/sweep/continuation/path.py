@@ -13,6 +13,7 @@ import numpy as np
 from limitsets.cells import Domain, as_domain
 from limitsets.errors import AnswerError
 from limitsets.maps import coerce, domain_of, has_slope, kind_of
+from limitsets.maps.contract import require_dimension
 from limitsets.scene import Scene
 from limitsets.scene.quantities import in_units
 from limitsets.sets.interval_map import IntervalMap
@@ -169,7 +170,9 @@ def _of_scene(scene: Scene, path: Curve) -> Path:
 
 
 def _of_map(params: Any, path: Curve, domain: Any) -> Path:
+    kind_of(params)
     box = as_domain(domain_of(params) if domain is None else domain)
+    require_dimension(params, "domain", box.dimension)
     ends = _ends(path)
     curve: Any = path if ends is None else _straight(ends)
 
