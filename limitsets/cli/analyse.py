@@ -103,9 +103,9 @@ def _text(analysis: Analysis, page: Path) -> None:
     if finer and analysis.attractors:
         typer.echo(f"undecided: {percent(undecided)} of all starts; next: {finer}")
     if analysis.goal is not None:
-        void = void_of(analysis.goal, unit)
+        void, said = void_of(analysis.goal, unit), verdict_of(analysis.goal, sum(analysis.basins.attractors))
         typer.echo(
-            f"goal {analysis.goal.goal.kind}: {verdict_of(analysis.goal, sum(analysis.basins.attractors))} ({analysis.goal.how}, not proved)"
+            f"goal {analysis.goal.goal.kind}: {said} ({analysis.goal.how}, not proved)"
             + (f"; but {void}" if void else "")
         )
         threshold = analysis.goal.threshold

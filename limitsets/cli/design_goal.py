@@ -35,7 +35,8 @@ def run_goal(
         from limitsets.inverse.margin.for_goal import design_for_goal
 
         scene, _ = opened(name, None if out and out.suffix == ".toml" else out)
-        found = design_for_goal(scene, vary=vary, bounds=bounds_of(scene, bounds), evaluations=evaluations, progress=tell)
+        given = bounds_of(scene, bounds)
+        found = design_for_goal(scene, vary=vary, bounds=given, evaluations=evaluations, progress=tell)
         files = [] if out is None else _written(found, out, form)
     answer(found, json, lambda: _text(found, files), csv=(csv, found.table))
     return 0 if found.verdict == "proved" else 1

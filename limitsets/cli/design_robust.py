@@ -91,7 +91,8 @@ def _text(found: RobustDesign, files: list[Path]) -> None:
         if sampled is None or not isfinite(sampled.x):
             typer.echo(f"{label}: fed at no X in spite of any deviation")
             continue
-        typer.echo(f"{label}: X = {sampled.x:.4g} {unit}, joint margin by floats {sampled.margin:.4g} times the tolerance")
+        margin = f"joint margin by floats {sampled.margin:.4g} times the tolerance"
+        typer.echo(f"{label}: X = {sampled.x:.4g} {unit}, {margin}")
         for one in margins:
             fails = "" if one.refuted is None else f", shown to fail from {one.refuted:.4g}"
             typer.echo(f"  {one.goals[0].kind}: proved up to {one.proved:.4g}{fails}")

@@ -70,7 +70,7 @@ def estimate_words(found: Estimate, goal: Goal | None, unit: str) -> str:
 
 def _goal_words(found: Estimate, goal: Goal, unit: str) -> str:
     share = sum(share for label, share in found.shares if label >= 0)
-    words = verdict_words(goal, found.holds, share, vacuous=found.vacuous)
+    words = verdict_words(goal, found.holds, share, len(found.sets), vacuous=found.vacuous)
     return words + ("" if found.threshold is None else f"; threshold x = {found.threshold:.4f} {unit}")
 
 

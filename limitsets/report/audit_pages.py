@@ -112,7 +112,11 @@ def audit_line(found: Audit, file: str) -> str:
     broken = [each for each in found.on("limit-set") if each.called_for and not each.simulated]
     effects = ", ".join(dict.fromkeys(each.effect for each in broken))
     count = "1 assumption breaks" if len(broken) == 1 else f"{len(broken)} assumptions break"
-    said = f"{count} on the limit set ({effects})" if broken else "no assumption is seen to break on the limit set"
+    said = (
+        f"{count} on the limit set ({effects})"
+        if broken
+        else "no assumption is seen to break on the limit set"
+    )
     return f"audit: {said}; limitsets audit {quote(file)}"
 
 

@@ -62,16 +62,16 @@ def verdict_of(outcome: GoalOutcome, share: float) -> str:
     >>> verdict_of(GoalOutcome(OrientedBeyond(20.0, 2), True, 17.5, reach=(19.0,)), 0.965)
     'holds vacuously'
     """
-    return verdict_words(outcome.goal, outcome.holds, share, vacuous=outcome.vacuous)
+    return verdict_words(outcome.goal, outcome.holds, share, len(outcome.reach), vacuous=outcome.vacuous)
 
 
-def verdict_words(goal: Goal, holds: bool | None, share: float, *, vacuous: bool) -> str:
-    """Say the same of a goal that was judged otherwise: `holds`, and whether `vacuous`ly."""
+def verdict_words(goal: Goal, holds: bool | None, share: float, sets: int, *, vacuous: bool) -> str:
+    """Say the same of a goal that was judged otherwise, on so many limit sets."""
     if vacuous:
         return "holds vacuously"
     if holds and not (goal.from_anywhere or goal.of_every_start):
         come = "" if share >= 1.0 - ROUNDING else f", to which {percent(share)} of all starts come"
-        return f"holds of the limit set{come}"
+        return f"holds of {'the' if sets < 2 else 'each'} limit set{come}"
     return {True: "holds", False: "does not hold", None: "was not decided"}[holds]
 
 

@@ -10,11 +10,11 @@ from mpmath import mp
 import limitsets as ls
 from limitsets.errors import LimitsetsError
 from limitsets.inverse import robust_design
+from limitsets.inverse.margin.bounds import bounds_of
 from limitsets.inverse.margin.counterweight import counterweight_for, counterweight_of
 from limitsets.inverse.margin.front import unbeaten
 from limitsets.inverse.margin.model_validity import validity_slack
 from limitsets.inverse.margin.polishing import polished
-from limitsets.inverse.margin.bounds import bounds_of
 from limitsets.inverse.margin.search import DesignSearch
 from limitsets.maps import advance
 from limitsets.robust.margins.estimate import estimated, failing

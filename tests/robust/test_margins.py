@@ -112,7 +112,10 @@ def test_lengths_are_bracketed(name):
     (found,) = ls.margin("paper-designed", name, width=0.02)
     assert found.unit == "in"
     assert found.closed
-    least = min(breaks_at(name, sign, np.array([0.97, 1.0, 1.02]) * found.refuted) for sign in (-1, 1))
+    least, sign = min(
+        (breaks_at(name, sign, np.array([0.97, 1.0, 1.02]) * found.refuted), sign) for sign in (-1, 1)
+    )
+    assert found.direction == ("less" if sign < 0 else "more")
     assert found.proved <= least
     assert 0.97 * found.refuted < least <= 1.02 * found.refuted
 

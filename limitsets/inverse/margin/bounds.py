@@ -80,7 +80,7 @@ def _usual(scene: Scene) -> list[str]:
 
 
 def _own(scene: Scene, name: str) -> tuple[float, float]:
-    """Give bounds of one quantity which hold its value; a throw beyond the usual ones may become as slow or fast again."""
+    """Give bounds of one quantity which hold its value; beyond the usual ones a throw may have half or twice of it."""
     dimension, value = find(name).dimension, scene.value(name)
     corners, size = scene.vertices, float(scene.sides.length.mean())
     half, twice = sorted((0.5 * value, 2.0 * value))

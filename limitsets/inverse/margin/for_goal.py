@@ -114,7 +114,9 @@ class GoalDesign(Tabled):
         """Give it as plain tables for JSON."""
         return as_table(
             scene=self.scene.as_dict(),
-            **picked(self, "message", "room", "room_before", "leaving", "verdict", "ruled_out", "evaluations"),
+            **picked(
+                self, "message", "room", "room_before", "leaving", "verdict", "ruled_out", "evaluations"
+            ),
             quantities={
                 name: {"before": self.before.value(name), "after": self.scene.value(name), "bounds": ends}
                 for name, ends in self.varied.items()

@@ -109,7 +109,8 @@ def orders_of(scene: Scene) -> list[Scene]:
 
 def _edges(corners: NDArray[np.float64]) -> NDArray[np.float64]:
     """Give the two edges of a triangle from its first corner."""
-    return corners[1:] - corners[0]
+    edges: NDArray[np.float64] = corners[1:] - corners[0]
+    return edges
 
 
 def _searched(
@@ -117,13 +118,18 @@ def _searched(
 ) -> tuple[DesignSearch, list[list[float]]]:
     """Draw in every order, go on in the best, and give the best search with the unknowns of its best design."""
     rng = np.random.default_rng(seed)
-    drawn = []
-    for number, search in enumerate(searches):
-        tell("orders of the sides", number, len(searches))
-        unknowns, ratings = search.drawn(rng, max(POPULATION, min(DRAWN, evaluations)))
-        best = np.argsort(-ratings)[:POPULATION]
-        drawn.append((float(ratings[best[0]]), number, unknowns[best]))
-    drawn.sort(key=lambda row: -row[0])
+    drawn: list[tuple[float, int, NDArray[np.float64]]] = []
+    for strict in (False, True):
+        if drawn and drawn[0][0] > 0.0:
+            break
+        drawn = []
+        for number, search in enumerate(searches):
+            tell("orders of the sides", number, len(searches))
+            search.strict = strict  # once nothing that is drawn feeds
+            unknowns, ratings = search.drawn(rng, max(POPULATION, min(DRAWN, evaluations)))
+            best = np.argsort(-ratings)[:POPULATION]
+            drawn.append((float(ratings[best[0]]), number, unknowns[best]))
+        drawn.sort(key=lambda row: -row[0])
     first = []
     for _, number, population in drawn[:ORDERS_KEPT]:
         share = evaluations // (2 * min(ORDERS_KEPT, len(drawn)))
@@ -172,8 +178,8 @@ def robust_design(
     side : int, optional
         The side on which parts are to be fed; default that of the scene's goal, else the last.
     vary : mapping of str to (float or None, float or None), or sequence of str, optional
-        Quantities, with bounds in the scene's units or without; default the mass, the throw and the surface's height, as
-        the scene gives them.  Bounds left out are usual ones, which hold the scene's own value.
+        Quantities, with bounds in the scene's units or without; default the mass, the throw and the surface's height,
+        as the scene gives them.  Bounds left out are usual ones, which hold the scene's own value.
     tolerance : mapping of str to str, optional
         What the margin multiplies, ``{"throw.speed": "1 %", "landing.x": "0.01 in"}``; default the scene's, or
         `TOLERANCE`.  landing.x is noise at every throw, all else fixed but unknown.
@@ -243,7 +249,8 @@ def robust_design(
             "the design",
             f"none that feeds among {sum(each.evaluations for each in searches)}",
             "one at least",
-            f"{said(sum((each.ruled_out for each in searches), Counter()))}; widen the bounds, look at more designs, or ask the goal of another side",
+            f"{said(sum((each.ruled_out for each in searches), Counter()))}; "
+            "widen the bounds, look at more designs, or ask the goal of another side",
         )
     made, found = best
     x = round(found.x, DECIMALS_OF_X)

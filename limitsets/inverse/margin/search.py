@@ -84,6 +84,9 @@ class DesignSearch:
         Whether the part has to be a uniform plate with one point mass on it.
     everywhere : bool
         Whether no start on the arm may be lost, in the scene as it is.
+    strict : bool
+        Whether every design that feeds, and breaks a condition, rates above all that do not feed.  Else how far it is
+        from being a design decides: a search ends there where few designs feed.
     """
 
     scene: Scene
@@ -93,6 +96,7 @@ class DesignSearch:
     order: int = 0
     lead: bool = True
     everywhere: bool = True
+    strict: bool = False
     hard: list[Signs] = field(default_factory=list)
     history: list[Candidate] = field(default_factory=list)
     evaluations: int = 0
@@ -135,11 +139,11 @@ class DesignSearch:
         found = estimate(scene)
         if found is None or not found.margin > 0.0:
             self.ruled_out[LOST if found is None else OTHER_SIDE] += 1
-            return (-10.0 if found is None else found.margin), None
+            return (-10.0 if found is None else found.margin - self.strict), None
         lacking = self.broken(scene, found)
         if lacking < 0.0:
             self.ruled_out[LEAVES if validity_slack(scene, found.invariant) >= 0.0 else ASSUMPTION] += 1
-            return lacking, None
+            return max(lacking, -1.0) if self.strict else lacking, None
         return found.margin, found
 
     def lacking(self, scene: Scene) -> float:
