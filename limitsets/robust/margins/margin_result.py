@@ -90,7 +90,7 @@ class Margin(Tabled):
     def tables(self) -> tuple[Table, ...]:
         """Give the tables that show it, the one that is saved as CSV first."""
         shown = Column("proved safe up to", show=bound), Column("shown to fail from", show=bound_above)
-        columns = ("quantity", "reading", *shown, "unit", Column("value", show=".6g"), "fails at")
+        columns = ("quantity", "reading", *shown, "unit", Column("value", show=".6g"), "direction")
         unit = self.unit or "times the tolerance"
         row = (self.quantity, self.reading, self.proved, self.refuted, unit, self.nominal, self.direction)
         how = "brackets: proved below, refuted above"
@@ -147,8 +147,11 @@ class Margin(Tabled):
         folder.mkdir(parents=True, exist_ok=True)
         stem, written = self.stem, []
         for number, goal in enumerate(self.goals if self.pieces else ()):
+            answers = [piece.answers[number] for piece in self.pieces]
+            # pieces may be proved for different starts: all together for the fewest
             claims = [
-                Claim("goal", "proved", "", dict(piece.answers[number].section)) for piece in self.pieces
+                Claim("goal", "proved", "", dict(one.section), starts=one.starts, shares=dict(one.shares))
+                for one in answers
             ]
             found = tuple(piece.found for piece in self.pieces if piece.found is not None)
             proof = Proof(self.scene, self.noise, self.deviations, found, (weakest_of(claims),), self.seconds)
