@@ -44,6 +44,8 @@ __all__ = ["Analysis", "analyse"]
 Extents = dict[int, list[tuple[float, float]]]
 Progress = Callable[[str, int, int], None]
 
+# Spurious sets that are written to JSON: the largest.
+SPURIOUS_WRITTEN = 20
 # 512 to 2048 cells per side are where the last set of spurious cells goes in the paper's four scenes; twice that.
 CELLS = 4096
 
@@ -207,11 +209,20 @@ class Analysis(Tabled):
             goal_vacuous=None if goal is None else goal.vacuous,
             effects=self.choice,
             other_vertex_first=_ordered(self.other_vertex_first),
-            spurious=[{"cells": len(cells), "extents": cells.extents()} for cells in self.spurious],
+            spurious=[
+                {"cells": len(cells), "extents": cells.extents()}
+                for cells in self.largest_spurious[:SPURIOUS_WRITTEN]
+            ],
+            spurious_count=len(self.spurious),
             accuracy=self.accuracy,
             second_pass=self.second_pass,
             timings={step: round(seconds, 6) for step, seconds in self.timings.items()},
         )
+
+    @property
+    def largest_spurious(self) -> list[CellSet]:
+        """The sets of `spurious`, the largest first: below a low surface there are thousands of single cells."""
+        return sorted(self.spurious, key=len, reverse=True)
 
     def _attractor(self, k: int) -> dict[str, Any]:
         found = self.attractors[k]

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from limitsets.cli.output import Csv, Form, Format, Json, Scene, answer, opened, option, progress, table
+from limitsets.cli.output import Csv, Form, Format, Html, Json, Scene, answer, opened, option, progress, table
 
 if TYPE_CHECKING:
     from limitsets.analysis import Analysis, Plan
@@ -20,7 +20,6 @@ MOST_CELLS = 10_000_000
 
 # Share of the starts that leave the model, above which the speed is likely to have a wrong unit.
 MOST = 0.99
-HELP_HTML = "Write report.html too: the report in one file, figures inside."
 
 
 def analyse(
@@ -40,7 +39,7 @@ def analyse(
     out: Annotated[
         Path | None, option("--out -o", "DIR", "Folder of the report, ./NAME-analysis by default.")
     ] = None,
-    html: Annotated[bool, typer.Option("--html", help=HELP_HTML)] = False,
+    html: Html = False,
     form: Format = Form.PNG,
     csv: Csv = None,
     json: Json = False,
@@ -104,9 +103,9 @@ def _text(analysis: Analysis, page: Path) -> None:
     if finer and analysis.attractors:
         typer.echo(f"undecided: {percent(undecided)} of all starts; next: {finer}")
     if analysis.goal is not None:
-        void = void_of(analysis.goal, unit)
+        void, said = void_of(analysis.goal, unit), verdict_of(analysis.goal, sum(analysis.basins.attractors))
         typer.echo(
-            f"goal {analysis.goal.goal.kind}: {verdict_of(analysis.goal)} ({analysis.goal.how}, not proved)"
+            f"goal {analysis.goal.goal.kind}: {said} ({analysis.goal.how}, not proved)"
             + (f"; but {void}" if void else "")
         )
         threshold = analysis.goal.threshold

@@ -159,6 +159,7 @@ def _words(proof: Proof, claim: Claim) -> list[str]:
 def _goal(proof: Proof, claim: Claim) -> list[str]:
     """Say a goal that is proved, for which starts, and what becomes of the others."""
     from limitsets.proofs.goals import sentence
+    from limitsets.robust.margins.margin_texts import bound
 
     shares = claim.shares
     lines = [sentence(claim.section)]
@@ -167,15 +168,15 @@ def _goal(proof: Proof, claim: Claim) -> list[str]:
     if shares["share"] < 1.0:
         worst = " under the worst noise" if "landing.x" in proof.noise else ""
         others = [
-            (f"{_percent(shares['leaves'])} are proved to leave the arm{worst}", shares["leaves"]),
+            (f"{bound(100.0 * shares['leaves'], '%')} are proved to leave the arm{worst}", shares["leaves"]),
             (
-                f"{_percent(shares['creeps'])} are proved to creep to the joint, and stay on the arm",
+                f"{bound(100.0 * shares['creeps'], '%')} are proved to creep to the joint, and stay on the arm",
                 shares["creeps"],
             ),
-            (f"of {_percent(shares['open'])} nothing is proved", shares["open"]),
+            (f"of {bound(100.0 * shares['open'], '%', up=True)} nothing is proved", shares["open"]),
         ]
         told = "; ".join(text for text, share in others if share > 0.0)
-        lines.append(f"These are {_percent(shares['share'])} of all starts on the arm; {told}.")
+        lines.append(f"These are {bound(100.0 * shares['share'], '%')} of all starts on the arm; {told}.")
     if "starts" in claim.section and proof.noise and "thinning" in claim.section:
         lines.append("Which starts are excepted may depend on the sequence of the noise.")
     if claim.verdict != "proved":
@@ -185,11 +186,6 @@ def _goal(proof: Proof, claim: Claim) -> list[str]:
 
 def _sentence(text: str) -> str:
     return f"{text[:1].upper()}{text[1:]}."
-
-
-def _percent(share: float) -> str:
-    """Write a share with three digits."""
-    return f"{100.0 * share:.3g} %"
 
 
 def _attraction(proof: Proof, claim: Claim) -> list[str]:

@@ -158,4 +158,4 @@ def _text(found: Design, files: list[Path]) -> None:
     for side, reason in enumerate(found.jacobian.reasons):
         if reason is not None:
             typer.echo(f"no derivative on side {side}: {reason}")
-    show_scene(found.scene, files)
+    show_scene(found.scene, files, met=found.reached)

@@ -32,16 +32,11 @@ def run_goal(
 ) -> int:
     """Search, prove, write and print; the exit code."""
     with progress() as tell:
-        from limitsets.inverse.margin.for_goal import design_for_goal, own_bounds
+        from limitsets.inverse.margin.for_goal import design_for_goal
 
         scene, _ = opened(name, None if out and out.suffix == ".toml" else out)
         given = bounds_of(scene, bounds)
-        own = own_bounds(scene, list(given)) if given else {}
-        ends = {
-            one: (own[one][0] if lo is None else lo, own[one][1] if hi is None else hi)
-            for one, (lo, hi) in given.items()
-        }
-        found = design_for_goal(scene, vary=vary, bounds=ends, evaluations=evaluations, progress=tell)
+        found = design_for_goal(scene, vary=vary, bounds=given, evaluations=evaluations, progress=tell)
         files = [] if out is None else _written(found, out, form)
     answer(found, json, lambda: _text(found, files), csv=(csv, found.table))
     return 0 if found.verdict == "proved" else 1
@@ -63,17 +58,23 @@ def _written(found: GoalDesign, out: Path, form: str) -> list[Path]:
 def _text(found: GoalDesign, files: list[Path]) -> None:
     show(found.table())
     typer.echo(found.message[:1].upper() + found.message[1:] + ".")
-    if found.room > 0.0 and found.ruled_out:
+    met = found.room > 0.0
+    if met and found.ruled_out:
         from limitsets.inverse.margin.search import said
 
         typer.echo(
             f"{sum(found.ruled_out.values())} of {found.evaluations} designs were ruled out: {said(found.ruled_out)}"
         )
-    if found.room > 0.0 and found.verdict != "proved":
+    if met and found.leaving is not None:
+        from limitsets.report.tables import percent
+
+        typer.echo(
+            f"careful: from {percent(found.leaving)} of all starts (sampled) parts leave the arm; no design was found"
+            " that meets the goal and that no part leaves, and margins of this one may be 0 by that"
+        )
+    if met and found.verdict != "proved":
         file = next((str(path) for path in files if path.suffix == ".toml"), None)
         save = "" if file else "add -o design.toml to this command, then "
         command = f"limitsets certify {quote(file or 'design.toml')}"
         typer.echo(f"next: {save}{command} (what keeps the design from a proof)")
-    if files and not found.room > 0.0:
-        typer.echo("the scene written is the best of those, and does not meet the goal")
-    show_scene(found.scene, files)
+    show_scene(found.scene, files, met=met)

@@ -10,7 +10,6 @@ import typer
 
 from limitsets.cli.arguments import bounds_of
 from limitsets.cli.output import answer, opened, progress, save_scene, show, show_scene
-from limitsets.errors import LimitsetsError
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -42,7 +41,7 @@ def run_robust(
         so_far = None if out is None else out if out.suffix == ".toml" else out / f"{scene.name}-so-far.toml"
         found = robust_design(
             scene,
-            vary=_varied(scene, vary, bounds),
+            vary=(dict.fromkeys(vary, (None, None)) | bounds_of(scene, bounds)) or None,
             evaluations=evaluations,
             prove=seconds,
             progress=tell,
@@ -59,23 +58,6 @@ def _kept(best: Scene, file: Path) -> None:
     """Write the best design so far: a search that is ended has it."""
     file.parent.mkdir(parents=True, exist_ok=True)
     save_scene(best, file)
-
-
-def _varied(
-    scene: Scene, names: Sequence[str], words: list[str] | None
-) -> dict[str, tuple[float, float]] | None:
-    """Give the bounds of what is varied: those given, else the usual ones."""
-    from limitsets.inverse.margin.search import bounds_of as usual_bounds
-
-    if not names and not words:
-        return None
-    given: dict[str, tuple[float, float]] = {}
-    for name, (lo, hi) in bounds_of(scene, words).items():
-        if lo is None or hi is None:
-            raise LimitsetsError("the bounds", name, "a lower and an upper one", "give both", key="--bounds")
-        given[name] = lo, hi
-    both = list(dict.fromkeys([*names, *given]))
-    return usual_bounds(scene, [one for one in both if one not in given]) | given
 
 
 def _written(found: RobustDesign, out: Path, form: str, *, recheck: bool) -> tuple[RobustDesign, list[Path]]:
@@ -109,7 +91,8 @@ def _text(found: RobustDesign, files: list[Path]) -> None:
         if sampled is None or not isfinite(sampled.x):
             typer.echo(f"{label}: fed at no X in spite of any deviation")
             continue
-        typer.echo(f"{label}: X = {sampled.x:.4g} {unit}, joint margin by floats {sampled.margin:.4g}")
+        margin = f"joint margin by floats {sampled.margin:.4g} times the tolerance"
+        typer.echo(f"{label}: X = {sampled.x:.4g} {unit}, {margin}")
         for one in margins:
             fails = "" if one.refuted is None else f", shown to fail from {one.refuted:.4g}"
             typer.echo(f"  {one.goals[0].kind}: proved up to {one.proved:.4g}{fails}")
@@ -121,9 +104,10 @@ def _text(found: RobustDesign, files: list[Path]) -> None:
     asked = getattr(found.before.goal, "x", None)
     if asked is not None and asked != found.x:
         typer.echo(f"the goal's X has moved from {asked:g} to {found.x:g} {unit} (design --goal keeps it)")
-    lead = found.lead
-    typer.echo(
-        f"lead weight: {100 * lead.share:.1f} % of the mass at x = {lead.x:.4g}, y = {lead.y:.4g} {unit}"
-        " in the frame of the vertices"
-    )
+    if "center" in found.scene.text["part"]["mass"]:  # else the file has the masses
+        lead = found.lead
+        typer.echo(
+            f"lead weight: {100 * lead.share:.1f} % of the mass at x = {lead.x:.4g}, y = {lead.y:.4g} {unit}"
+            " in the frame of the vertices"
+        )
     show_scene(found.scene, files)

@@ -109,12 +109,12 @@ def _write(
 def _text(given: SceneOf, found: tuple[Margin, ...], out: Path | None, *, no_recheck: bool) -> None:
     from limitsets.report.goals import goal_sentence, without_margin
     from limitsets.report.robust_pages import READINGS
-    from limitsets.robust.margins.margin_texts import bound, reach_of, void_of
+    from limitsets.robust.margins.margin_texts import bound, failing, reach_of, void_of
 
     rows = []
     for each in found:
         unit = each.unit or "times"
-        low, high = bound(each.proved, unit), bound(each.refuted, unit, up=True)
+        low, high = bound(each.proved, unit), failing(each.refuted, unit, each.direction)
         rows.append([each.quantity, READINGS[each.reading], low, high])
     scene = found[0].scene
     typer.echo(f"{scene.name}: {' and '.join(goal_sentence(goal, scene.unit) for goal in found[0].goals)}")

@@ -11,6 +11,7 @@ from contextlib import contextmanager, suppress
 from enum import StrEnum
 from json import loads
 from pathlib import Path
+from shlex import quote
 from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
 
 import typer
@@ -31,6 +32,7 @@ __all__ = [
     "Csv",
     "Form",
     "Format",
+    "Html",
     "Json",
     "Out",
     "Scene",
@@ -71,6 +73,9 @@ Scene = Annotated[
     ),
 ]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON, and nothing else, on stdout.")]
+Html = Annotated[
+    bool, typer.Option("--html", help="Write report.html too: the report in one file, figures inside.")
+]
 Out = Annotated[Path | None, option("--out -o", "FILE", "Write the JSON to this file as well.")]
 
 
@@ -127,8 +132,10 @@ def table(heads: Sequence[str], rows: Sequence[Sequence[object]]) -> None:
     # rich asks the terminal, or COLUMNS; where neither says anything lines are as long as they are
     wide = None if sys.stdout.isatty() or os.environ.get("COLUMNS") else 200
     grid = Table(box=SIMPLE_HEAD, pad_edge=False)
-    for head in heads:
-        grid.add_column(escape(head), no_wrap=wide is not None)
+    for number, head in enumerate(heads):
+        # names stay whole as long as others can be broken: a name that is cut could be another's
+        names = number == 0 and not any(" " in str(row[0]) for row in rows)
+        grid.add_column(escape(head), no_wrap=names or wide is not None, overflow="fold")
     for row in rows:
         grid.add_row(*(escape(str(cell)) for cell in row))
     Console(width=wide).print(grid)
@@ -222,11 +229,32 @@ def save_scene(scene: SceneOf, file: Path) -> list[Path]:
     return [file]
 
 
-def show_scene(scene: SceneOf, files: list[Path]) -> None:
-    """Say where the scene is, or print it where it is in no file."""
+def show_scene(scene: SceneOf, files: list[Path], *, met: bool = True) -> None:
+    """Say where a design is, or print it where it is in no file; of one that is not as wanted say that it is none.
+
+    Parameters
+    ----------
+    scene : Scene
+        The design.
+    files : list of Path
+        Written files, the scene among them.
+    met : bool
+        Whether it is as wanted: of a near miss nothing is printed that looks like an answer.
+    """
+    from limitsets.auditing import audit
+    from limitsets.report.audit_pages import audit_line
     from limitsets.scene import dump
 
-    typer.echo(f"scene: {files[0]}" if files else "\n" + dump(scene).rstrip("\n"))
+    file = next((str(path) for path in files if path.suffix == ".toml"), None)
+    if met:
+        typer.echo(audit_line(audit(scene), file or f"{scene.name}.toml"))
+    elif file is None:
+        typer.echo("the values above are the nearest miss, no answer; add -o FILE.toml to save that scene")
+        return
+    if file is not None:
+        typer.echo(f"scene: {file}" + ("" if met else " (the nearest miss, no answer)"))
+        return
+    typer.echo(f"scene (add -o {quote(scene.name)}.toml to save it):\n\n{dump(scene)}".rstrip("\n"))
 
 
 class _Interrupts:

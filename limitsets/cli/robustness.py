@@ -12,6 +12,7 @@ from limitsets.cli.output import (
     Csv,
     Form,
     Format,
+    Html,
     Json,
     Scene,
     Words,
@@ -62,6 +63,7 @@ def robustness(
     out: Annotated[
         Path | None, option("--out -o", "DIR", "Folder of the report, ./NAME-robustness by default.")
     ] = None,
+    html: Html = False,
     form: Format = Form.PNG,
     csv: Csv = None,
     json: Json = False,
@@ -95,7 +97,7 @@ def robustness(
             progress=tell,
         )
         tell("files", len(found.entries), len(found.entries) + 1)
-        files = write_robustness(found, folder, form)
+        files = write_robustness(found, folder, form, html=html)
     answer(found, json, lambda: _text(chosen, found, files), csv=(csv, found.table))
     raise typer.Exit(0 if found.verdict == "proved" else 1)
 

@@ -12,7 +12,7 @@ from limitsets.explorer.pictures import look_of
 from limitsets.goals import Goal
 from limitsets.maps import codes
 from limitsets.plot.style import interval_text
-from limitsets.report.goals import goal_sentence
+from limitsets.report.goals import goal_sentence, starts_words, verdict_words
 
 __all__ = ["KEY", "careful_line", "error_line", "estimate_words", "proof_words"]
 
@@ -22,10 +22,10 @@ KEY = (
 )
 
 VERDICTS = {
-    "proved": "proved",
-    "proved-on-cells": "proved for some starts only",
-    "refuted": "not proved: an orbit refutes it",
-    "undecided": "not proved",
+    "proved": "&#10003; <b>proved</b>",
+    "proved-on-cells": "&#9680; <b>proved</b>",
+    "refuted": "&#10007; <b>not proved: an orbit refutes it</b>",
+    "undecided": "&#10007; <b>not proved</b>",
 }
 
 
@@ -63,15 +63,14 @@ def estimate_words(found: Estimate, goal: Goal | None, unit: str) -> str:
     if points:
         rows.append(("critical points", f"{points} {unit}"))
     if goal is not None:
-        rows.append((f"goal: {escape(goal_sentence(goal, unit))}", _goal_words(found, unit)))
+        rows.append((f"goal: {escape(goal_sentence(goal, unit))}", _goal_words(found, goal, unit)))
     how = f"from {CELLS} cells a side" + (", ends from the compiled loop of the atlas" if found.sharp else "")
     return _table("Estimated (follows the sliders, proves nothing)", rows, how)
 
 
-def _goal_words(found: Estimate, unit: str) -> str:
-    words = {True: "holds", False: "does not hold", None: "not decided"}[found.holds]
-    if found.vacuous:
-        words = "holds, but no part gets there"
+def _goal_words(found: Estimate, goal: Goal, unit: str) -> str:
+    share = sum(share for label, share in found.shares if label >= 0)
+    words = verdict_words(goal, found.holds, share, len(found.sets), vacuous=found.vacuous)
     return words + ("" if found.threshold is None else f"; threshold x = {found.threshold:.4f} {unit}")
 
 
@@ -81,15 +80,12 @@ def proof_words(lines: Sequence[Mapping[str, Any]], knobs: Sequence[Knob], state
     rows = []
     for line in lines:
         if "claim" in line:
-            starts = line.get("starts")
-            of = f", for {escape(str(starts).replace('-', ' '))} start" if isinstance(starts, str) else ""
             reason = f" ({escape(str(line['reason']))})" if line.get("reason") else ""
             verdict = str(line["verdict"])
-            proved = verdict == "proved"
-            sign = "&#10003;" if proved else "&#10007;"
-            rows.append(
-                (escape(str(line["claim"])), f"{sign} <b>{VERDICTS[verdict]}</b>{of if proved else reason}")
-            )
+            written = verdict.startswith("proved") and line.get("starts")
+            of = f", {escape(starts_words(line['starts'], line['share']))}" if written else ""
+            left = "" if verdict == "proved" else reason
+            rows.append((escape(str(line["claim"])), f"{VERDICTS[verdict]}{of}{left}"))
         elif "margin" in line and "proved" in line:
             limit = "" if line["refuted"] is None else f"; refuted at {escape(str(line['refuted']))}"
             held = line["proved"]

@@ -52,7 +52,8 @@ def _proofs(scene: Scene, margins: list[str]) -> Iterator[dict[str, Any]]:
 
     proof = certify(scene)
     for claim in proof.claims:
-        yield {"claim": claim.claim, "verdict": claim.verdict, "reason": claim.reason, "starts": claim.starts}
+        told = {"starts": claim.starts, "share": claim.shares.get("share")}
+        yield {"claim": claim.claim, "verdict": claim.verdict, "reason": claim.reason, **told}
     if scene.goal is None or not proof.proved:
         return
     for name in margins:

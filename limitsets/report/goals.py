@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import math
 import shlex
 from typing import TYPE_CHECKING
 
 from limitsets.goals import Goal, OrientedBeyond, Reaches, StaysOnArm, unknown_goal
+from limitsets.report.tables import percent
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -19,13 +21,18 @@ __all__ = [
     "after_unproved",
     "goal_sentence",
     "next_command",
+    "starts_words",
     "verdict_of",
+    "verdict_words",
     "void_of",
     "without_margin",
 ]
 
 # So many times as many cells are proposed where starts are undecided, up to the last.
 FINER, MOST_CELLS = 4, 1_000_000
+
+# Of a sum of shares.
+ROUNDING = 1e-9
 
 
 def goal_sentence(goal: Goal, unit: str) -> str:
@@ -44,18 +51,41 @@ def goal_sentence(goal: Goal, unit: str) -> str:
     return f"{goal.question(unit)} (asked of {where})"
 
 
-def verdict_of(outcome: GoalOutcome) -> str:
-    """Say in a word or two what became of a goal.
+def verdict_of(outcome: GoalOutcome, share: float) -> str:
+    """Say what became of a goal: where it holds, of what, and which share of the starts comes there.
 
     Examples
     --------
     >>> from limitsets.analysis import GoalOutcome
-    >>> verdict_of(GoalOutcome(OrientedBeyond(20.0, 2), True, 17.5, reach=(19.0,)))
+    >>> verdict_of(GoalOutcome(OrientedBeyond(20.0, 2), True, 17.5, reach=(24.0,)), 0.965)
+    'holds of the limit set, to which 96.5 % of all starts come'
+    >>> verdict_of(GoalOutcome(OrientedBeyond(20.0, 2), True, 17.5, reach=(19.0,)), 0.965)
     'holds vacuously'
     """
-    if outcome.vacuous:
+    return verdict_words(outcome.goal, outcome.holds, share, len(outcome.reach), vacuous=outcome.vacuous)
+
+
+def verdict_words(goal: Goal, holds: bool | None, share: float, sets: int, *, vacuous: bool) -> str:
+    """Say the same of a goal that was judged otherwise, on so many limit sets."""
+    if vacuous:
         return "holds vacuously"
-    return {True: "holds", False: "does not hold", None: "was not decided"}[outcome.holds]
+    if holds and not (goal.from_anywhere or goal.of_every_start):
+        come = "" if share >= 1.0 - ROUNDING else f", to which {percent(share)} of all starts come"
+        return f"holds of {'the' if sets < 2 else 'each'} limit set{come}"
+    return {True: "holds", False: "does not hold", None: "was not decided"}[holds]
+
+
+def starts_words(starts: object, share: float | None) -> str:
+    """Say for which starts a goal is proved, the share rounded down.
+
+    Examples
+    --------
+    >>> starts_words("every", 1.0), starts_words("cells", 0.96459)
+    ('for every start', 'for 96.4 % of all starts')
+    """
+    if starts in ("every", "almost-every"):
+        return f"for {str(starts).replace('-', ' ')} start"
+    return f"for {math.floor(1000.0 * (share or 0.0)) / 10.0:g} % of all starts"
 
 
 def next_command(analysis: Analysis) -> str:

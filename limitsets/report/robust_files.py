@@ -50,8 +50,10 @@ def _noise(found: Robustness) -> Iterator[tuple[str, Figure]]:
     yield "levels", plot.noise_levels(found.levels, {"level of the noise, as given = 1": 1.0})
 
 
-def write_robustness(found: Robustness, folder: str | Path, form: str = "png") -> list[Path]:
-    """Write report.md, robustness.json and the figures into a folder, all of them or none.
+def write_robustness(
+    found: Robustness, folder: str | Path, form: str = "png", *, html: bool = False
+) -> list[Path]:
+    """Write report.md, robustness.json and the figures into a folder, all of them or none; report.html where asked for.
 
     Raises
     ------
@@ -63,4 +65,5 @@ def write_robustness(found: Robustness, folder: str | Path, form: str = "png") -
         _drawn(found),
         lambda figures: {"report.md": robustness_page(found, figures), "robustness.json": as_json(found)},
         form,
+        html=html,
     )

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from limitsets.goals import Goal, OrientedBeyond, Reaches
 from limitsets.report.pages import words
 from limitsets.report.tables import in_time
-from limitsets.robust.margins.margin_texts import bound, void_of
+from limitsets.robust.margins.margin_texts import bound, failing, void_of
 from limitsets.robust.noise.laws import Gaussian, Law, Uniform
 from limitsets.robust.sheet.entries import Entry, in_unit_of, percent_of
 from limitsets.scene.quantities import parsed_deviation
@@ -115,6 +115,7 @@ def _told(found: Robustness) -> dict[str, Any]:
         "void": void_of(found.goals, found.reach, found.scene.unit),
         "readings": READINGS,
         "bound": bound,
+        "failing": failing,
         "tightest": tightest,
         "by_tolerance": _by_tolerance,
         "called_for": _called_for,
@@ -166,7 +167,7 @@ def lines_of(found: Robustness) -> list[list[str]]:
                 value,
                 READINGS[entry.reading],
                 bound(entry.proved, entry.unit),
-                bound(entry.refuted, entry.unit, up=True),
+                failing(entry.refuted, entry.unit, entry.direction),
                 share,
             ]
         )

@@ -122,6 +122,8 @@ def laid(
     drawn: Iterable[tuple[str, Figure]],
     texts: Callable[[dict[str, str]], dict[str, str]],
     form: str = "png",
+    *,
+    html: bool = False,
 ) -> list[Path]:
     """Write figures and texts into a folder, all of them or none.
 
@@ -135,6 +137,8 @@ def laid(
         Takes the figures' files by kind, gives texts by file.
     form : str
         Of the figures: "png", "svg" or "pdf".
+    html : bool
+        Whether to write report.html too: report.md in one file that stands alone, figures inside.
 
     Returns
     -------
@@ -147,11 +151,16 @@ def laid(
         The folder cannot be written.
     """
     figures: dict[str, str] = {}
+    inside: dict[str, str] = {}
     with filled(folder) as draft:
         for kind, figure in drawn:
             figures[kind] = f"{kind}.{form}"
             figure.savefig(draft / figures[kind], dpi=DPI)
+            if html:
+                inside[figures[kind]] = as_uri(figure)
         told = texts(figures)
+        if html:
+            told["report.html"] = as_html(told["report.md"], inside)
         for name, text in told.items():
             (draft / name).write_text(text, encoding="utf-8", newline="\n")
     return [Path(folder) / name for name in (*told, *figures.values())]
@@ -203,8 +212,6 @@ def write(
     tell = progress or (lambda file, done, of: None)
     count = len(FIGURES) + 2
 
-    inside: dict[str, str] = {}
-
     def drawn() -> Iterator[tuple[str, Figure]]:
         for number, kind in enumerate(FIGURES):
             tell(f"{kind}.{form}", number, count)
@@ -214,15 +221,10 @@ def write(
                 if kind != "flight":
                     raise
                 continue  # throws too hard for the model have no flight to draw
-            if html:
-                inside[kind] = as_uri(shown)
             yield kind, shown
         tell("report.md", len(FIGURES), count)
 
     def texts(figures: dict[str, str]) -> dict[str, str]:
-        text = page(analysis, figures)
-        found = {"report.md": text, "analysis.json": as_json(analysis)}
-        uris = {figures[kind]: uri for kind, uri in inside.items()}
-        return found | {"report.html": as_html(text, uris)} if html else found
+        return {"report.md": page(analysis, figures), "analysis.json": as_json(analysis)}
 
-    return laid(folder, drawn(), texts, form)
+    return laid(folder, drawn(), texts, form, html=html)

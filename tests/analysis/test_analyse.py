@@ -118,6 +118,11 @@ def _inside(found):
 def test_coarse_cells_are_told():
     found = analysed("paper-initial", 512)
     assert len(found.spurious) > 1000
+    written = found.to_json()
+    assert written["spurious_count"] == len(found.spurious)
+    sizes = [one["cells"] for one in written["spurious"]]
+    assert sizes == sorted((len(cells) for cells in found.spurious), reverse=True)[: len(sizes)]
+    assert len(sizes) == 20
     assert found.extents[0][0] == [pytest.approx((13.522673689975, 20.915912223359), abs=1e-9)]
 
 
@@ -175,7 +180,7 @@ def test_starts_that_leave_count_against_staying():
 
 WORDS = {
     "scene", "units", "cells", "critical_points", "attractors", "basins", "cycles", "goal", "other_vertex_first",
-    "goal_vacuous", "effects", "spurious", "second_pass", "timings", "accuracy", "starts", "advice",
+    "goal_vacuous", "effects", "spurious", "spurious_count", "second_pass", "timings", "accuracy", "starts", "advice",
 }  # fmt: skip
 
 

@@ -15,6 +15,7 @@ from limitsets.errors import SceneError
 from limitsets.report.robust_pages import robustness_page
 from tests.cli.command import run
 from tests.lead_quad import LEAD_QUAD
+from tests.lead_triangle import left_by_some
 
 SCATTER = {"world": {"scatter": {"speed": "1 %"}}, "effects": {"spread": "bounded"}}
 
@@ -141,7 +142,7 @@ def test_a_goal_that_is_not_proved_names_the_certificate(capfd):
     ls.dump(ls.load(LEAD_QUAD), "lead.toml")
     code, out, _ = run(capfd, "margin", "lead.toml", "throw.speed", "arm.surface_height")
     assert code == 1
-    assert "2 margins, all of them 0: the goal is not proved of the scene as it is" in out
+    assert "2 margins, all of them 0: the goal is not proved of every start of the scene as it is" in out
     assert "next: limitsets certify lead.toml" in out
 
 
@@ -188,8 +189,25 @@ def test_design_for_the_goal(capfd):
         capfd, "design", "paper-designed", "--goal", "--vary", "throw.kappa", "--evaluations", "10"
     )
     assert code == 0
-    assert "The goal holds at X = 20 in" in out
-    assert "(proved)" in out
+    assert "The goal holds of the limit set at X = 20 in (proved), with " in out
+    assert re.search(
+        r"audit: \d assumptions? breaks? on the limit set \(.*\); limitsets audit paper-designed-", out
+    )
+    assert "scene (add -o paper-designed-design.toml to save it):\n\nname = " in out
+    code, out, _ = run(
+        capfd,
+        "design",
+        "paper-initial",
+        "--goal",
+        "--bounds",
+        "throw.kappa=33 in:33.5 in",
+        "--evaluations",
+        "5",
+    )
+    assert code == 1
+    assert "name = " not in out  # it printed a scene that looked like the answer
+    assert "nearest miss" in out
+    assert "audit" not in out
     words = ("--bounds", "throw.kappa=33 in:33.5 in", "--evaluations", "10", "-o", "found", "--json")
     code, out, _ = run(capfd, "design", "paper-initial", "--goal", *words)
     assert code == 1
@@ -204,6 +222,17 @@ def test_design_for_the_goal(capfd):
     }
     assert ls.load("found/paper-initial-design.toml").goal == ls.load("paper-initial").goal
     assert run(capfd, "design", "paper-designed", "--goal", "--robust")[0] == 2
+
+
+def test_a_design_that_parts_leave_says_so(capfd):
+    ls.dump(ls.load(left_by_some()), "left.toml")
+    words = ("--goal", "--bounds", "throw.speed=279.379:279.380", "--evaluations", "5", "-o", "found.toml")
+    code, out, _ = run(capfd, "design", "left.toml", *words)
+    assert code == 1
+    share = re.search(r"careful: from (\S+) % of all starts \(sampled\) parts leave the arm", out)[1]
+    assert float(share) == pytest.approx(3.5, abs=1.0)
+    assert "limitsets audit found.toml" in out
+    assert out.splitlines()[-1] == "scene: found.toml"
 
 
 def test_a_design_that_is_not_proved_names_a_command_to_paste(capfd, monkeypatch):

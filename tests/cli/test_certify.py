@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -12,6 +13,7 @@ import pytest
 import limitsets as ls
 from limitsets.proofs import confirm
 from tests.cli.command import PROGRESS, run
+from tests.lead_triangle import left_by_some
 
 
 def test_proved_is_exit_0_and_rechecks(capfd):
@@ -30,6 +32,22 @@ def test_proved_is_exit_0_and_rechecks(capfd):
     assert record["verdict"] == "proved"
     assert [claim[:2] for claim in record["claims"]] == [["attracts-all", "proved"], ["goal", "proved"]]
     assert json.loads(Path("report.json").read_text()) == record
+
+
+def test_shares_of_the_starts_are_rounded_to_the_safe_side(capfd):
+    """96.456 % were said to be 96.5 %, and proved."""
+    ls.dump(ls.load(left_by_some()), "left.toml")
+    _, out, _ = run(capfd, "certify", "left.toml", "--claim", "goal", "--json")
+    (record,) = json.loads(out)
+    code, out, _ = run(capfd, "certify", "left.toml", "--claim", "goal")
+    assert code == 1
+    words = (
+        r"These are ([\d.]+) % .*; ([\d.]+) % are proved to leave the arm; of ([\d.e-]+) % nothing is proved"
+    )
+    share, leaves, rest = (float(word) for word in re.search(words, out).groups())
+    assert share <= 100.0 * record["share"] < share + 0.01
+    assert leaves <= 100.0 * record["leaves"] < leaves + 0.001
+    assert rest >= 100.0 * record["open"]
 
 
 def test_two_basins_in_words(capfd):

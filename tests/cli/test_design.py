@@ -61,12 +61,21 @@ def test_a_file_and_a_folder(capfd):
     assert (folder / "design.png").read_bytes().startswith(b"\x89PNG")
 
 
+def test_a_near_miss_that_is_written_is_said_to_be_one(capfd):
+    words = ("--critical-points", "10,free,20", "--vary", "throw.speed", "--starts", "0", "-o", "found.toml")
+    code, out, _ = run(capfd, "design", "paper-initial", *words, "--bounds", "throw.speed=:'150 deg/s'")
+    assert code == 1
+    assert out.splitlines()[-1] == "scene: found.toml (the nearest miss, no answer)"
+
+
 def test_not_reached_is_exit_1(capfd):
     words = ("--critical-points", "10,free,20", "--vary", "throw.speed", "--starts", "0")
     bounds = ("--bounds", "throw.speed=:'150 deg/s'")
     code, out, _ = run(capfd, "design", "paper-initial", *words, *bounds)
     assert code == 1
     assert "Not reached: the nearest found misses by" in out
+    assert "name = " not in out
+    assert "nearest miss, no answer; add -o FILE.toml" in out
     assert "1 varied for 2 wanted: least squares; throw.speed is at its upper bound" in out
     (free,) = [line for line in out.splitlines() if line.strip().startswith("r_1 ")]
     assert free.split()[-2:] == ["-", "-"]  # wanted nowhere, off by nothing

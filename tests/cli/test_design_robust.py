@@ -57,7 +57,7 @@ def test_the_scene_alone(capfd):
         ((), "give one of them"),
         (("--robust", "--critical-points", "10,10,20", "--vary", "throw.speed"), "give one of them"),
         (("--robust", "--bounds", "arm.length=20 in"), "QUANTITY=LOWEST:HIGHEST"),
-        (("--robust", "--bounds", "arm.length=20 in:"), "give both"),
+        (("--robust", "--bounds", "arm.length=:20 in"), "a lower and a higher one"),
         (("--robust", "--vary", "arm.legnth"), "arm.length"),
     ],
 )

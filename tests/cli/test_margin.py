@@ -16,8 +16,15 @@ def test_a_table_in_units_that_people_use(capfd):
     assert code == 0
     assert "beyond x = 20 in lies on side 2" in out
     rows = {line.split()[0]: line for line in out.splitlines() if line.split()[:1]}
-    low, high = (float(word) for word in rows["throw.speed"].replace("%", "").split()[-2:])
-    assert low < 0.733 < high
+    *low, high, direction = rows["throw.speed"].replace("%", "").split()[-3:]
+    assert float(low[0]) < 0.733 < float(high)
+    # 0.7 % slower throws carry another side beyond 20 in, as much faster ones do not
+    assert direction == "less"
+    scene = ls.load("paper-designed")
+    kappa = [scene.kappa / (1.0 + sign * 0.0075) ** 2 for sign in (-1, 1)]
+    slower, faster = (ls.analyse(scene.with_values({"throw.kappa": each}), 1024).goal.holds for each in kappa)
+    assert (slower, faster) == (False, True)
+    assert rows["arm.surface_height"].split()[-2:] == ["in", "less"]
     assert rows["arm.surface_height"].count(" in") == 2
     assert not list(Path().iterdir())
 

@@ -36,7 +36,7 @@ def test_the_sharp_margin_of_the_height():
 
 @pytest.mark.sweep
 def test_report_and_files(capfd):
-    code, out, _ = run(capfd, "robustness", "paper-designed", "-o", "sheet", *QUICK, *NOISE)
+    code, out, _ = run(capfd, "robustness", "paper-designed", "-o", "sheet", "--html", *QUICK, *NOISE)
     assert code == 0
     assert "this holds, proved" in out
     assert "no joint: the scene has no [tolerance]" in out
@@ -50,9 +50,11 @@ def test_report_and_files(capfd):
     assert {path.name for path in folder.iterdir()} == {
         *figures,
         "report.md",
+        "report.html",
         "robustness.json",
         "certificates",
     }
+    assert (folder / "report.html").read_text(encoding="utf-8").count('src="data:image/svg') == len(figures)
     assert all((folder / name).read_bytes().startswith(b"\x89PNG") for name in figures)
     commands = re.findall(r"^    limitsets recheck (\S+)$", page, re.MULTILINE)
     assert {path.name for path in (folder / "certificates").iterdir()} == {

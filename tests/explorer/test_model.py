@@ -9,9 +9,12 @@ import pytest
 import limitsets as ls
 from limitsets.cells import as_domain
 from limitsets.errors import LimitsetsError, SceneError
+from limitsets.explorer.answers import estimate_words, proof_words
 from limitsets.explorer.estimates import estimate, estimate_of_map, points_of_map
 from limitsets.explorer.knobs import centre_at, knobs_of, knobs_of_map, map_with, scene_with
 from limitsets.explorer.outside import MOST_BYTES, MOST_SIDES, scene_from, with_outline
+from limitsets.explorer.work import answers
+from tests.lead_triangle import left_by_some
 
 PAPER = ls.load("paper-designed")
 
@@ -29,6 +32,23 @@ def test_the_ends_are_those_that_end_points_are_proved_for():
     assert found.threshold == pytest.approx(
         limit.extents[0][0][1], abs=1e-7
     )  # side 0 reaches farthest, but for side 2
+
+
+def test_of_a_goal_it_says_for_which_starts():
+    """It said "holds" above and a cross below, beside "proved for some starts only": 3.5 % of the starts leave."""
+    scene = ls.load(left_by_some())
+    assert "holds of the limit set, to which 96." in estimate_words(estimate(scene), scene.goal, scene.unit)
+    lines = list(answers({"what": "proof", "scene": ls.dump(scene), "margins": []}))
+    assert [line["verdict"] for line in lines] == ["refuted", "proved-on-cells"]
+    share = math.floor(1000 * lines[1]["share"]) / 10
+    assert 96.0 < share < 97.0
+    said = proof_words(lines, (), "").split("<tr>")[2]
+    assert f"&#9680; <b>proved</b>, for {share:g} % of all starts" in said
+    assert "&#10007;" not in said
+    first = estimate_words(estimate(PAPER), PAPER.goal, PAPER.unit)
+    assert "<td>holds of the limit set; threshold" in first
+    lines = list(answers({"what": "proof", "scene": ls.dump(PAPER), "margins": []}))
+    assert "&#10003; <b>proved</b>, for every start</td>" in proof_words(lines, (), "")
 
 
 def test_shares_of_the_starts_are_all_of_them():

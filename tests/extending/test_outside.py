@@ -148,10 +148,13 @@ def test_the_goal_is_asked_answered_and_reported():
     # the limit set of the paper's scene ends at 23.38 (docs/model.md)
     assert evaluate(scene.goal, {0: [(15.2, 19.8)], 2: [(8.9, 23.38)]}) == (True, 23.38)
     text = page(ls.analyse(scene, cells=1024), {})
-    assert "Asked: no part rests beyond x = 24 in (asked of the limit set). **It holds**" in text
+    assert (
+        "Asked: no part rests beyond x = 24 in (asked of the limit set). **It holds of the limit set**"
+        in text
+    )
     assert "The farthest part is at x = 23.3" in text
     false = GoalOutcome(outside.KeepsBelow(20.0), False, 23.38)
-    assert verdict_of(false) == "does not hold"
+    assert verdict_of(false, 1.0) == "does not hold"
     with pytest.raises(SceneError, match=r"goal.keeps_below.*from 0 to below the arm's length"):
         asking("30 in")
     with pytest.raises(AnswerError, match="KeepsBelow"):

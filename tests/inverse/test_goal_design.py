@@ -2,14 +2,20 @@
 
 import re
 
+import numpy as np
 import pytest
 
 import limitsets as ls
 from limitsets.errors import AnswerError
 from limitsets.inverse import robust_design
-from limitsets.inverse.margin.for_goal import design_for_goal, own_bounds
+from limitsets.inverse.margin.bounds import bounds_of
+from limitsets.inverse.margin.for_goal import design_for_goal
+from limitsets.inverse.margin.for_margin import orders_of, tolerance_of
+from limitsets.maps import advance
+from limitsets.robust.margins.vector import Tolerance
 from limitsets.scene.spelling import unit_of
 from tests.lead_quad import LEAD_QUAD
+from tests.lead_triangle import LEAD_TRIANGLE, left_by_some
 
 
 def test_a_goal_that_fails_is_met_at_its_own_x():
@@ -54,19 +60,73 @@ def test_quantities_stay_in_the_units_of_the_file():
 @pytest.mark.parametrize("scene", ["paper-designed", LEAD_QUAD])
 def test_own_bounds_hold_the_value(scene):
     loaded = ls.load(scene)
-    for name, (lo, hi) in own_bounds(loaded).items():
+    for name, (lo, hi) in bounds_of(loaded).items():
         assert lo < hi
         assert lo <= loaded.value(name) <= hi
-    assert own_bounds(loaded, ["arm.length"])["arm.length"][0] == loaded.arm_length
+    assert bounds_of(loaded, ["arm.length"])["arm.length"][0] == loaded.arm_length
 
 
 @pytest.mark.parametrize("height", [0.3, -3.0])
 def test_own_bounds_reach_out_to_a_value_beyond_the_usual_ones(height):
     """The usual ones end at 0.2 and 0.005 mean sides below the joint, -1.07 and -0.027 in."""
     scene = ls.load("paper-designed").with_values({"arm.surface_height": height})
-    lo, hi = own_bounds(scene, ["arm.surface_height"])["arm.surface_height"]
+    lo, hi = bounds_of(scene, ["arm.surface_height"])["arm.surface_height"]
     assert lo <= height <= hi
     assert lo < hi
+
+
+@pytest.mark.parametrize(
+    ("given", "ends"),
+    [
+        # the usual ones: 2.2 and 8 mean side lengths of 5.36667 in
+        ({"throw.kappa": (None, 30.0)}, (2.2 * 16.1 / 3.0, 30.0)),
+        ({"throw.kappa": (20.0, None)}, (20.0, 8.0 * 16.1 / 3.0)),
+    ],
+)
+def test_a_bound_that_is_left_out_is_the_usual_one(given, ends):
+    assert bounds_of(ls.load("paper-designed"), given=given)["throw.kappa"] == pytest.approx(ends)
+
+
+def test_a_throw_beyond_the_usual_ones_may_become_as_fast_again():
+    """Of paper-initial-small-angle kappa is 15.9 mean side lengths."""
+    scene = ls.load("paper-initial-small-angle")
+    assert bounds_of(scene)["throw.kappa"] == pytest.approx((2.2 * 16.1 / 3.0, 2.0 * scene.kappa))
+
+
+def test_bounds_with_nothing_between_are_refused():
+    with pytest.raises(AnswerError, match=r"arm\.length.*28 to 20"):
+        bounds_of(ls.load("paper-designed"), given={"arm.length": (None, 20.0)})
+
+
+def leaving(scene):
+    """Share of random starts on the whole arm from which parts leave it within 500 throws."""
+    rng = np.random.default_rng(7)
+    side = rng.integers(len(scene.sides), size=4000)
+    a = scene.sides.a[side]
+    x = a + rng.random(4000) * (scene.arm_length - a)
+    return float((advance(scene.map, x, side, 500)[2] < 0).mean())
+
+
+def test_a_design_that_no_part_leaves_comes_first():
+    """It handed out `left_by_some`, for its room is larger by a millimetre: its margins are 0."""
+    found = design_for_goal(LEAD_TRIANGLE)
+    assert leaving(ls.load(left_by_some())) == pytest.approx(0.035, abs=0.01)
+    assert leaving(found.scene) == 0.0
+    assert found.leaving is None
+    assert found.verdict == "proved"
+    assert found.ruled_out["lose parts from some starts on the arm"] > 0
+    (speed,) = ls.margin(found.scene, "throw.speed", reading="fixed")
+    assert speed.proved > 0.0
+
+
+def test_of_a_design_that_parts_leave_it_is_said():
+    scene = ls.load(left_by_some())
+    speed = scene.value("throw.speed")
+    found = design_for_goal(scene, bounds={"throw.speed": (0.9999 * speed, 1.0001 * speed)}, evaluations=10)
+    assert found.room > 0.0
+    assert found.leaving == pytest.approx(0.035, abs=0.01)
+    assert found.ruled_out == {"lose parts from some starts on the arm": 10}
+    assert found.verdict == "undecided"
 
 
 def test_what_ruled_designs_out_is_said():
@@ -99,6 +159,48 @@ def test_a_robust_search_says_what_ruled_designs_out():
             "paper-designed", vary={"part.mass.radius_of_gyration": (3.0, 3.1)}, tolerance={"throw.speed": "1 %"},
             orders=False, evaluations=2, prove=0.0,
         )  # fmt: skip
+
+
+def test_a_robust_search_moves_the_masses_that_a_scene_gives():
+    """ "none that feeds among 1371: all cannot be built" was said: it moved a centre of mass that they do not give."""
+    speed = {"throw.speed": "1 %"}
+    found = robust_design(LEAD_TRIANGLE, tolerance=speed, orders=False, evaluations=60, prove=0.0)
+    assert {f"part.mass.points[0].{word}" for word in ("x", "y", "mass")} <= set(found.varied)
+    assert found.sampled.margin > 0.0
+    held = ls.analyse(found.scene, 1024)
+    assert held.goal.holds
+    assert not held.goal.vacuous
+    assert leaving(found.scene) == 0.0
+
+
+@pytest.mark.sweep
+def test_a_robust_search_goes_on_where_nothing_drawn_feeds():
+    """ "none that feeds among 1323" was said: designs near to feeding rated above those that feed and lose a start."""
+    found = robust_design(LEAD_QUAD, tolerance={"throw.speed": "1 %"}, evaluations=500, prove=0.0)
+    assert found.sampled.margin > 1.0
+    assert leaving(found.scene) == 0.0
+    held = ls.analyse(found.scene, 1024).goal
+    assert held.holds
+    assert not held.vacuous
+
+
+@pytest.mark.parametrize("scene", ["paper-designed", LEAD_TRIANGLE, LEAD_QUAD])
+def test_the_usual_tolerance_is_of_what_the_scene_gives(scene):
+    """It named the radius of gyration of parts that have none, and the search ended."""
+    loaded = ls.load(scene)
+    texts = tolerance_of(loaded, None)
+    assert len(Tolerance.of(loaded, texts).deviations) == len(texts) - 1  # landing.x is noise
+    assert ("part.mass.points[0].x" in texts) == (scene != "paper-designed")
+
+
+def test_a_point_mass_keeps_its_place_on_a_part_whose_sides_change_places():
+    """Its barycentric coordinates stay."""
+    for order in orders_of(ls.load(LEAD_TRIANGLE)):
+        point = [order.value(f"part.mass.points[0].{word}") for word in "xy"]
+        shares = np.linalg.solve(np.vstack([order.vertices.T, np.ones(3)]), [*point, 1.0])
+        first = ls.load(LEAD_TRIANGLE).vertices
+        own = np.linalg.solve(np.vstack([first.T, np.ones(3)]), [30.0, 8.0, 1.0])
+        assert shares == pytest.approx(own, abs=1e-6)
 
 
 def test_a_robust_search_that_is_ended_has_left_its_best():

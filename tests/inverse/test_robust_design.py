@@ -10,11 +10,12 @@ from mpmath import mp
 import limitsets as ls
 from limitsets.errors import LimitsetsError
 from limitsets.inverse import robust_design
+from limitsets.inverse.margin.bounds import bounds_of
 from limitsets.inverse.margin.counterweight import counterweight_for, counterweight_of
 from limitsets.inverse.margin.front import unbeaten
 from limitsets.inverse.margin.model_validity import validity_slack
 from limitsets.inverse.margin.polishing import polished
-from limitsets.inverse.margin.search import DesignSearch, bounds_of
+from limitsets.inverse.margin.search import DesignSearch
 from limitsets.maps import advance
 from limitsets.robust.margins.estimate import estimated, failing
 from limitsets.robust.margins.invariant_set import invariant_intervals
@@ -205,7 +206,7 @@ def test_polishing_never_ends_below_its_start():
     """The scene itself as the start, its margin from a search for the worst corner that knows nothing of polishing."""
     scene = ls.load("paper-designed")
     box = Tolerance.of(scene, SPEED)
-    search = DesignSearch(scene, box, 2, bounds_of(scene, {"throw.kappa": (20.0, 30.0)}))
+    search = DesignSearch(scene, box, 2, {"throw.kappa": (20.0, 30.0)})
     start = math.log(scene.kappa / 20.0) / math.log(1.5)
     before = estimated(scene, box, 2, steps=20).margin
     made, found = polished(search, [[start]], lambda each: each, 12, lambda *_: None)
@@ -237,7 +238,7 @@ def test_the_same_seed_gives_the_same_designs():
     scene = ls.load("paper-designed")
     found = []
     for _ in range(2):
-        search = DesignSearch(scene, Tolerance.of(scene, SPEED), 2, bounds_of(scene, None))
+        search = DesignSearch(scene, Tolerance.of(scene, SPEED), 2, bounds_of(scene))
         drawn, _ = search.drawn(np.random.default_rng(8), 5)
         found.append(search.improved(drawn, 1, 3, lambda *_: None)[0])
     assert (found[0] == found[1]).all()
@@ -268,7 +269,7 @@ def test_a_quantity_that_is_no_length_keeps_its_unit():
     [
         ({"side": 3}, "0 to 2"),
         ({"evaluations": 0}, "1 or more"),
-        ({"vary": ["arm.length"]}, "give bounds"),
+        ({"vary": {"arm.length": (None, 20.0)}}, "a lower and a higher one"),
         ({"vary": {"part.mass.center.along": (0.1, 0.2)}}, "none that feeds"),
     ],
 )
@@ -282,5 +283,5 @@ def test_the_usual_bounds_are_in_the_scenes_unit():
     tree = inches.as_dict()
     tree["arm"]["length"] = f"{28 * 2.54} cm"
     cm = ls.load(tree)
-    for name, (lo, hi) in bounds_of(inches, None).items():
-        assert bounds_of(cm, None)[name] == pytest.approx((2.54 * lo, 2.54 * hi), rel=1e-12)
+    for name, (lo, hi) in bounds_of(inches).items():
+        assert bounds_of(cm)[name] == pytest.approx((2.54 * lo, 2.54 * hi), rel=1e-12)

@@ -14,8 +14,10 @@ from mpmath import mp, mpf
 import limitsets as ls
 from limitsets.errors import LimitsetsError
 from limitsets.goals import AttractsAll, OrientedBeyond, Predicate, Reaches
+from limitsets.proofs import Proof
 from limitsets.proofs.query import Query
 from limitsets.robust.margins.deviations import deviation_scale, deviation_scales, given
+from tests.lead_triangle import left_by_some
 from tests.thrower import reference
 
 X = 20
@@ -100,6 +102,23 @@ def breaks_at(name, sign, sizes):
     return math.inf
 
 
+@pytest.mark.sweep
+def test_of_pieces_proved_for_different_starts_the_fewest_are_claimed(monkeypatch, tmp_path):
+    """Below the joint's height every start comes, above it those from R* on: the file claimed every start."""
+    tree = left_by_some() | {"goal": {"oriented_beyond": {"x": "111.591 mm", "side": 2}}}
+    tree["part"] |= {"sides": ["54 mm", "30 mm", "46 mm"]}
+    tree["part"]["mass"]["points"] = [{"x": "9.5479 mm", "y": "11.3473 mm", "mass": "12.4147 g"}]
+    tree["arm"]["surface_height"], tree["throw"]["speed"] = "-0.9991 mm", "322.9838 deg/s"
+    (found,) = ls.margin(ls.load(tree), "arm.surface_height", width=0.5)
+    kinds = [piece.answers[0].starts for piece in found.pieces]
+    assert "every" in kinds
+    froms = [each["from"] for each in kinds if each != "every"]
+    claimed = []
+    monkeypatch.setattr(Proof, "save", lambda proof, path, **_: claimed.append(proof.claims[0]))
+    found.save(tmp_path)
+    assert claimed[0].starts["from"] == {side: max(each[side] for each in froms) for side in froms[0]}
+
+
 @pytest.mark.parametrize(
     "name",
     [
@@ -112,7 +131,10 @@ def test_lengths_are_bracketed(name):
     (found,) = ls.margin("paper-designed", name, width=0.02)
     assert found.unit == "in"
     assert found.closed
-    least = min(breaks_at(name, sign, np.array([0.97, 1.0, 1.02]) * found.refuted) for sign in (-1, 1))
+    least, sign = min(
+        (breaks_at(name, sign, np.array([0.97, 1.0, 1.02]) * found.refuted), sign) for sign in (-1, 1)
+    )
+    assert found.direction == ("less" if sign < 0 else "more")
     assert found.proved <= least
     assert 0.97 * found.refuted < least <= 1.02 * found.refuted
 

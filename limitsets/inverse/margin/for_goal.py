@@ -2,7 +2,8 @@
 
 The room is the least of two distances by floats: from the farthest place on another side to X, and from X to the
 farthest place on the side.  scipy's differential evolution makes it large, the scene as it is among its first designs;
-what it ends with is proved, or not, by `limitsets.proofs`.
+a design that some starts leave comes after all that none leaves.  What it ends with is proved, or not, by
+`limitsets.proofs`.
 """
 
 from __future__ import annotations
@@ -20,12 +21,13 @@ import numpy as np
 from limitsets.errors import AnswerError, SceneError
 from limitsets.files import as_table, picked
 from limitsets.goals import OrientedBeyond, Reaches
+from limitsets.inverse.margin.bounds import Ends, bounds_of
 from limitsets.inverse.margin.model_validity import validity_slack
-from limitsets.inverse.margin.search import ASSUMPTION, LOST, NO_PART, Tell, bounds_of, said
+from limitsets.inverse.margin.search import ASSUMPTION, LEAVES, LOST, NO_PART, Tell, said
+from limitsets.maps import advance
 from limitsets.proofs.query import Query
-from limitsets.robust.margins.invariant_set import invariant_intervals
+from limitsets.robust.margins.invariant_set import invariant_intervals, least_slack
 from limitsets.scene import Scene, load
-from limitsets.scene.quantities import find
 from limitsets.scene.spelling import in_unit_of, in_units_of, unit_of
 from limitsets.tables import Column, Table, Tabled
 
@@ -33,6 +35,9 @@ __all__ = ["GoalDesign", "design_for_goal"]
 
 EARLY = "let another side get beyond X"
 SHORT = "do not reach X on the wanted side"
+
+# Starts that are sampled where parts leave, and throws of each.
+STARTS, THROWS = 2000, 2000
 
 # Designs of a population, and decimals of what is found.
 POPULATION, DECIMALS = 24, 4
@@ -55,6 +60,8 @@ class GoalDesign(Tabled):
         smaller of both, negative where the goal fails [length].
     room_before : float or None
         The same of the scene before; None where the part is lost.
+    leaving : float or None
+        Share of the starts on the arm from which parts leave it, sampled; None where a throw from anywhere stays on it.
     verdict : str
         "proved" or "undecided": of the goal in `scene`, with that parts get beyond X on its side.
     ruled_out : dict of str to int
@@ -70,6 +77,7 @@ class GoalDesign(Tabled):
     varied: dict[str, tuple[float, float]]
     room: float
     room_before: float | None
+    leaving: float | None
     verdict: str
     ruled_out: dict[str, int]
     evaluations: int
@@ -81,7 +89,8 @@ class GoalDesign(Tabled):
         unit, x = self.scene.unit, self.before.goal.x  # type: ignore[union-attr]  # it has one: `design_for_goal` asks
         if self.room > 0.0:
             proof = "proved" if self.verdict == "proved" else "sampled, not proved"
-            return f"the goal holds at X = {x:g} {unit} with {self.room:.3g} {unit} to spare ({proof})"
+            held = f"the goal holds of the limit set at X = {x:g} {unit} ({proof})"
+            return f"{held}, with {self.room:.3g} {unit} to spare (sampled)"
         why = said(self.ruled_out)
         return f"no design that meets the goal at X = {x:g} {unit} among {self.evaluations}: {why}"
 
@@ -96,74 +105,24 @@ class GoalDesign(Tabled):
             )
             for name in self.varied
         ]
-        numbers = [Column(head, show=".6g") for head in ("before", "design", "lowest", "highest")]
+        found = "design" if self.room > 0.0 else "nearest miss"
+        numbers = [Column("before", show=".6g"), Column(found, show=".6g")]
+        numbers += [Column(head, show=".4g") for head in ("lowest", "highest")]
         return (Table(("quantity", *numbers, "unit"), rows, f"{self.scene.name}: {self.message}"),)
 
     def to_json(self) -> dict[str, Any]:
         """Give it as plain tables for JSON."""
         return as_table(
             scene=self.scene.as_dict(),
-            **picked(self, "message", "room", "room_before", "verdict", "ruled_out", "evaluations"),
+            **picked(
+                self, "message", "room", "room_before", "leaving", "verdict", "ruled_out", "evaluations"
+            ),
             quantities={
                 name: {"before": self.before.value(name), "after": self.scene.value(name), "bounds": ends}
                 for name, ends in self.varied.items()
             },
             timings={"design": self.seconds},
         )
-
-
-def own_bounds(scene: Scene, names: Sequence[str] | None = None) -> dict[str, tuple[float, float]]:
-    """Give bounds about the values of a scene, wide enough for a search, which hold these values.
-
-    Parameters
-    ----------
-    scene : Scene
-        The scene.
-    names : sequence of str, optional
-        Quantities; default what the scene gives of the throw, the mass and the surface's height.
-
-    Examples
-    --------
-    >>> own_bounds(load("paper-designed"), ["throw.kappa"])
-    {'throw.kappa': (12.6889259, 50.7557036)}
-    """
-    return {name: _ends(scene, name) for name in (names or _usual(scene))}
-
-
-def _usual(scene: Scene) -> list[str]:
-    mass: Mapping[str, Any] = scene.text["part"]["mass"]
-    throw = "throw.speed" if "speed" in scene.text["throw"] else "throw.kappa"
-    if "center" in mass:
-        own = [f"part.mass.{word}" for word in ("center.along", "center.above", "radius_of_gyration")]
-    else:
-        own = [
-            f"part.mass.points[{k}].{word}"
-            for k in range(len(mass.get("points", ())))
-            for word in ("x", "y", "mass")
-        ]
-    return [*own, throw, "arm.surface_height"]
-
-
-def _ends(scene: Scene, name: str) -> tuple[float, float]:
-    """Give bounds of one quantity."""
-    dimension, value = find(name).dimension, scene.value(name)
-    corners, size = scene.vertices, float(scene.sides.length.mean())
-    if name.startswith("part.mass.center.") or name in ("part.mass.radius_of_gyration", "arm.surface_height"):
-        lo, hi = bounds_of(scene, [name])[name]
-    elif name.startswith("part.mass.points") and name[-1] in "xy":
-        axis = "xy".index(name[-1])
-        lo, hi = float(corners[:, axis].min()), float(corners[:, axis].max())
-    elif name.startswith("part.vertices"):
-        lo, hi = value - 0.2 * size, value + 0.2 * size
-    elif name == "arm.length":
-        lo, hi = value, 1.5 * value
-    elif dimension == "angle":
-        lo, hi = 0.5 * value, min(1.5 * value, math.pi / 2)
-    elif name.startswith("part.sides"):
-        lo, hi = 0.7 * value, 1.4 * value
-    else:
-        lo, hi = 0.5 * value, 2.0 * value
-    return min(lo, value), max(hi, value)
 
 
 class _GoalSearch:
@@ -174,10 +133,21 @@ class _GoalSearch:
         self.scene, self.bounds, self.tell, self.of = scene, dict(bounds), tell, of
         self.x, self.side = scene.goal.x, scene.goal.side
         self.ruled_out, self.evaluations = Counter[str](), 0
-        self.best: tuple[float, Scene] = (-math.inf, scene)
+        self.best: tuple[float, float, Scene] = (-math.inf, -math.inf, scene)
 
-    def room(self, scene: Scene | None) -> tuple[float, str]:
-        """Rate a scene: the room it has, and below 0 why it has none."""
+    def rated(self, scene: Scene | None) -> tuple[float, float, str]:
+        """Rate a scene: a number, the room it has, and what rules it out."""
+        end = self.scene.arm_length
+        room, why = self._room(scene)
+        if scene is None or why:
+            return room, room, why
+        slack = least_slack(scene.bare_map)
+        if slack < 0.0:  # after all designs that none leaves, and before those that do not meet the goal
+            return end + max(slack, -end), room, LEAVES
+        return end + room, room, ""
+
+    def _room(self, scene: Scene | None) -> tuple[float, str]:
+        """Give the room of a scene, and below 0 why it has none."""
         if scene is None:
             return -4.0 * self.scene.arm_length, NO_PART
         end = scene.arm_length
@@ -207,19 +177,19 @@ class _GoalSearch:
         self.tell("designs", min(self.evaluations, self.of), self.of)
         self.evaluations += 1
         scene = self.made(shares)
-        room, why = self.room(scene)
+        rating, room, why = self.rated(scene)
         if why:
             self.ruled_out[why] += 1
-        if scene is not None and room > self.best[0]:
-            self.best = room, scene
-        return -room
+        if scene is not None and rating > self.best[0]:
+            self.best = rating, room, scene
+        return -rating
 
 
 def design_for_goal(
     scene: Scene | str | Path,
     *,
     vary: Sequence[str] | None = None,
-    bounds: Mapping[str, tuple[float, float]] | None = None,
+    bounds: Mapping[str, Ends] | None = None,
     evaluations: int = 600,
     seed: int = 0,
     progress: Tell | None = None,
@@ -232,8 +202,8 @@ def design_for_goal(
         Where to begin, in the minimal model, with a goal `oriented_beyond` or `reaches`.
     vary : sequence of str, optional
         Quantities to vary; default the throw, the mass and the surface's height, as the scene gives them.
-    bounds : mapping of str to (float, float), optional
-        Bounds of some of them [scene's units]; the others have bounds about the scene's own values.
+    bounds : mapping of str to (float or None, float or None), optional
+        Bounds of some of them [scene's units]; what is left out has usual ones, which hold the scene's own value.
     evaluations : int
         Designs to look at.
     seed : int
@@ -270,12 +240,10 @@ def design_for_goal(
         raise AnswerError("the scene", "with effects on", "the minimal model", "switch its effects off")
     if evaluations < 1:
         raise AnswerError("the evaluations", evaluations, "1 or more", "allow for some designs")
-    given = dict(bounds or {})
-    names = list(dict.fromkeys([*(vary or ([] if given else _usual(start))), *given]))
-    ends = {name: given.get(name) or _ends(start, name) for name in names}
+    ends = bounds_of(start, vary, bounds)
     search = _GoalSearch(start, ends, progress or (lambda what, done, of: None), evaluations)
-    room_before, why = search.room(start)
-    search.best = room_before, start
+    rating, room_before, why = search.rated(start)
+    search.best = rating, room_before, start
     random = np.random.default_rng(seed)
     population = random.random((min(POPULATION, max(evaluations, 5)), len(ends)))
     population[0] = [_share(start.value(name), *pair) for name, pair in ends.items()]
@@ -288,7 +256,7 @@ def design_for_goal(
         tol=0.0,
         seed=seed,
     )
-    room, made = search.best
+    _, room, made = search.best
     name = start.name if start.name.endswith("-design") else f"{start.name}-design"
     found = load(made.as_dict() | {"name": name})
     asked = (
@@ -298,9 +266,20 @@ def design_for_goal(
     verdict = Query.of(found, asked).prove().verdict if room > 0.0 else "undecided"
     lost = why in (LOST, NO_PART)
     return GoalDesign(
-        found, start, ends, room, None if lost else room_before, verdict, dict(search.ruled_out),
+        found, start, ends, room, None if lost else room_before, _leaving(found), verdict, dict(search.ruled_out),
         search.evaluations, time.perf_counter() - begin,
     )  # fmt: skip
+
+
+def _leaving(scene: Scene) -> float | None:
+    """Give the share of random starts from which parts leave the arm; None where no throw from anywhere does."""
+    if least_slack(scene.bare_map) >= 0.0:
+        return None
+    rng, a = np.random.default_rng(0), scene.sides.a
+    room = scene.arm_length - a
+    sides = rng.choice(a.size, STARTS, p=room / room.sum())
+    code = advance(scene.bare_map, a[sides] + rng.random(STARTS) * room[sides], sides, THROWS)[2]
+    return float((code < 0).mean())
 
 
 def _share(value: float, lo: float, hi: float) -> float:

@@ -16,16 +16,19 @@ from itertools import permutations
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from limitsets.arguments import arguments_checked
 from limitsets.errors import AnswerError
+from limitsets.geometry import triangle
 from limitsets.goals import Goal, OrientedBeyond, Reaches
+from limitsets.inverse.margin.bounds import Ends, bounds_of
 from limitsets.inverse.margin.counterweight import counterweight_of
 from limitsets.inverse.margin.design_result import RobustDesign
 from limitsets.inverse.margin.feeding import throws_to_feed
 from limitsets.inverse.margin.front import Option, front_of
 from limitsets.inverse.margin.polishing import polished
-from limitsets.inverse.margin.search import POPULATION, Candidate, DesignSearch, Tell, bounds_of, said
+from limitsets.inverse.margin.search import POPULATION, Candidate, DesignSearch, Tell, said
 from limitsets.progress import shown_in_notebooks
 from limitsets.robust import Margin
 from limitsets.robust.margins.estimate import Estimate, on_all_corners
@@ -45,7 +48,7 @@ TOLERANCE = {
     "arm.surface_height": "0.01 in",
     "landing.x": "0.01 in",
 }
-"""The tolerance of a scene that gives none; part.sides stands for every side."""
+"""The tolerance of a scene that gives none; part.sides stands for every side, places and masses of points as these."""
 
 # Decimals to which a design is rounded, X more coarsely: a workshop has no more.
 DECIMALS, DECIMALS_OF_X = 4, 3
@@ -64,10 +67,17 @@ def fed_at(x: float, side: int) -> tuple[Goal, Goal]:
 
 def tolerance_of(scene: Scene, tolerance: Mapping[str, str] | None) -> dict[str, str]:
     """Give a tolerance by quantity: the one asked for, the scene's, or `TOLERANCE`."""
-    texts = dict(tolerance or scene.text.get("tolerance") or TOLERANCE)
+    given = tolerance or scene.text.get("tolerance")
+    texts = dict(given or TOLERANCE)
     share = texts.pop("part.sides", None)
     if share is not None and "sides" in scene.text["part"]:
         texts |= {f"part.sides[{k}]": share for k in range(len(scene.sides))}
+    mass = scene.text["part"]["mass"]
+    if not given and "center" not in mass:  # its points instead
+        sizes = {"x": "0.01 in", "y": "0.01 in", "mass": "1 %"}
+        points = [f"part.mass.points[{k}]" for k in range(len(mass.get("points", ())))]
+        texts = {name: text for name, text in texts.items() if not name.startswith("part.mass")}
+        texts |= {f"{point}.{word}": text for point in points for word, text in sizes.items()}
     return texts
 
 
@@ -82,12 +92,25 @@ def orders_of(scene: Scene) -> list[Scene]:
         tree["part"]["sides"] = [sides[k] for k in order]
         # the old centre of mass need not lie in it: the search begins elsewhere
         left, right = (float(scene.sides.length[order[k]]) for k in (2, 0))
-        centre = tree["part"].get("mass", {}).get("center")
-        if order != (0, 1, 2) and isinstance(centre, dict):
-            centre["along"] = f"{0.6 * left:.4f} {scene.unit}"
-            centre["above"] = f"{0.15 * min(left, right):.4f} {scene.unit}"
+        mass = tree["part"]["mass"]
+        if order != (0, 1, 2) and "center" in mass:
+            mass["center"]["along"] = f"{0.6 * left:.4f} {scene.unit}"
+            mass["center"]["above"] = f"{0.15 * min(left, right):.4f} {scene.unit}"
+        elif order != (0, 1, 2):
+            # as far along each edge: what lies on the part lies on it
+            moved = np.linalg.solve(_edges(scene.vertices), _edges(triangle(scene.sides.length[list(order)])))
+            for k, point in enumerate(mass.get("points", ())):
+                own = np.array([scene.value(f"part.mass.points[{k}].{word}") for word in "xy"])
+                x, y = (own - scene.vertices[0]) @ moved
+                point["x"], point["y"] = f"{x:.6f} {scene.unit}", f"{y:.6f} {scene.unit}"
         found.append(load(tree))
     return found
+
+
+def _edges(corners: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Give the two edges of a triangle from its first corner."""
+    edges: NDArray[np.float64] = corners[1:] - corners[0]
+    return edges
 
 
 def _searched(
@@ -95,13 +118,18 @@ def _searched(
 ) -> tuple[DesignSearch, list[list[float]]]:
     """Draw in every order, go on in the best, and give the best search with the unknowns of its best design."""
     rng = np.random.default_rng(seed)
-    drawn = []
-    for number, search in enumerate(searches):
-        tell("orders of the sides", number, len(searches))
-        unknowns, ratings = search.drawn(rng, max(POPULATION, min(DRAWN, evaluations)))
-        best = np.argsort(-ratings)[:POPULATION]
-        drawn.append((float(ratings[best[0]]), number, unknowns[best]))
-    drawn.sort(key=lambda row: -row[0])
+    drawn: list[tuple[float, int, NDArray[np.float64]]] = []
+    for strict in (False, True):
+        if drawn and drawn[0][0] > 0.0:
+            break
+        drawn = []
+        for number, search in enumerate(searches):
+            tell("orders of the sides", number, len(searches))
+            search.strict = strict  # once nothing that is drawn feeds
+            unknowns, ratings = search.drawn(rng, max(POPULATION, min(DRAWN, evaluations)))
+            best = np.argsort(-ratings)[:POPULATION]
+            drawn.append((float(ratings[best[0]]), number, unknowns[best]))
+        drawn.sort(key=lambda row: -row[0])
     first = []
     for _, number, population in drawn[:ORDERS_KEPT]:
         share = evaluations // (2 * min(ORDERS_KEPT, len(drawn)))
@@ -131,7 +159,7 @@ def robust_design(
     scene: Scene | str | Path,
     *,
     side: int | None = None,
-    vary: Mapping[str, tuple[float, float]] | Sequence[str] | None = None,
+    vary: Mapping[str, Ends] | Sequence[str] | None = None,
     tolerance: Mapping[str, str] | None = None,
     orders: bool = True,
     everywhere: bool = True,
@@ -149,9 +177,9 @@ def robust_design(
         Where to begin: what is not varied is kept, in the minimal model.
     side : int, optional
         The side on which parts are to be fed; default that of the scene's goal, else the last.
-    vary : mapping of str to (float, float), or sequence of str, optional
-        Quantities, with bounds in the scene's units or without; default centre of mass, radius of gyration, kappa and
-        the surface's height.
+    vary : mapping of str to (float or None, float or None), or sequence of str, optional
+        Quantities, with bounds in the scene's units or without; default the mass, the throw and the surface's height,
+        as the scene gives them.  Bounds left out are usual ones, which hold the scene's own value.
     tolerance : mapping of str to str, optional
         What the margin multiplies, ``{"throw.speed": "1 %", "landing.x": "0.01 in"}``; default the scene's, or
         `TOLERANCE`.  landing.x is noise at every throw, all else fixed but unknown.
@@ -196,8 +224,11 @@ def robust_design(
     tell: Tell = progress if progress is not None else lambda what, done, of: None
     texts, begin = tolerance_of(start, tolerance), time.perf_counter()
     vector = Tolerance.of(start, texts)
+    names, given = (None, vary) if isinstance(vary, Mapping) else (vary, None)
+    # a part whose masses are given is made as it is written
+    lead = "center" in start.text["part"]["mass"]
     searches = [
-        DesignSearch(one, vector, on, bounds_of(one, vary), number, everywhere=everywhere)
+        DesignSearch(one, vector, on, bounds_of(one, names, given), number, lead, everywhere)
         for number, one in enumerate(orders_of(start) if orders else [start])
     ]
     if keep is not None:
@@ -218,7 +249,8 @@ def robust_design(
             "the design",
             f"none that feeds among {sum(each.evaluations for each in searches)}",
             "one at least",
-            f"{said(sum((each.ruled_out for each in searches), Counter()))}; widen the bounds, or look at more designs",
+            f"{said(sum((each.ruled_out for each in searches), Counter()))}; "
+            "widen the bounds, look at more designs, or ask the goal of another side",
         )
     made, found = best
     x = round(found.x, DECIMALS_OF_X)

@@ -12,30 +12,19 @@ import math
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from limitsets.errors import AnswerError, SceneError
+from limitsets.errors import SceneError
 from limitsets.inverse.margin.counterweight import counterweight_of
 from limitsets.inverse.margin.model_validity import validity_slack
 from limitsets.robust.margins.estimate import Estimate, estimated, failing
 from limitsets.robust.margins.invariant_set import least_slack
 from limitsets.robust.margins.vector import Signs, Tolerance
 from limitsets.scene import Scene
-from limitsets.scene.quantities import find
 
-__all__ = ["VARY", "Candidate", "DesignSearch", "said"]
-
-VARY: dict[str, tuple[str, str]] = {
-    "part.mass.center.along": ("0.05", "0.95"),
-    "part.mass.center.above": ("0.05", "0.6"),
-    "part.mass.radius_of_gyration": ("0.12", "0.4"),
-    "throw.kappa": ("2.2", "8"),
-    "arm.surface_height": ("-0.2", "-0.005"),
-}
-"""What is varied unless something else is asked for, and between what, in mean side lengths (along: of its side)."""
+__all__ = ["Candidate", "DesignSearch", "said"]
 
 # Designs in the population, generations between two looks at all corners, and corners kept as hard.
 POPULATION, GENERATIONS, MOST_HARD = 24, 4, 24
@@ -95,6 +84,9 @@ class DesignSearch:
         Whether the part has to be a uniform plate with one point mass on it.
     everywhere : bool
         Whether no start on the arm may be lost, in the scene as it is.
+    strict : bool
+        Whether every design that feeds, and breaks a condition, rates above all that do not feed.  Else how far it is
+        from being a design decides: a search ends there where few designs feed.
     """
 
     scene: Scene
@@ -104,6 +96,7 @@ class DesignSearch:
     order: int = 0
     lead: bool = True
     everywhere: bool = True
+    strict: bool = False
     hard: list[Signs] = field(default_factory=list)
     history: list[Candidate] = field(default_factory=list)
     evaluations: int = 0
@@ -146,11 +139,11 @@ class DesignSearch:
         found = estimate(scene)
         if found is None or not found.margin > 0.0:
             self.ruled_out[LOST if found is None else OTHER_SIDE] += 1
-            return (-10.0 if found is None else found.margin), None
+            return (-10.0 if found is None else found.margin - self.strict), None
         lacking = self.broken(scene, found)
         if lacking < 0.0:
             self.ruled_out[LEAVES if validity_slack(scene, found.invariant) >= 0.0 else ASSUMPTION] += 1
-            return lacking, None
+            return max(lacking, -1.0) if self.strict else lacking, None
         return found.margin, found
 
     def lacking(self, scene: Scene) -> float:
@@ -229,35 +222,3 @@ def _scaled(share: float, lo: float, hi: float) -> float:
     if lo * hi > 0.0:
         return math.copysign(math.exp(math.log(abs(lo)) + share * math.log(hi / lo)), lo)
     return lo + share * (hi - lo)
-
-
-def bounds_of(
-    scene: Scene, vary: Mapping[str, tuple[float, float]] | Sequence[str] | None
-) -> dict[str, tuple[float, float]]:
-    """Give the bounds of what is varied [scene's units]."""
-    if isinstance(vary, Mapping):
-        return {name: (float(lo), float(hi)) for name, (lo, hi) in vary.items()}
-    names = list(VARY) if vary is None else list(vary)
-    if vary is None and "speed" in scene.text["throw"]:  # the throw stays written as it is
-        names[names.index("throw.kappa")] = "throw.speed"
-    size = float(scene.sides.length.mean())
-    found = {}
-    for name in names:
-        find(name)
-        if name == "throw.speed" and scene.gravity is not None:
-            slow, fast = (
-                math.sqrt(scene.gravity / (float(text) * size)) for text in reversed(VARY["throw.kappa"])
-            )
-            found[name] = (slow, fast)
-            continue
-        if name not in VARY:
-            raise AnswerError("the bounds", name, "a lower and an upper one", "give bounds for this quantity")
-        lo, hi = (float(text) for text in VARY[name])
-        own = float(scene.sides.length[_side_of_centre(scene)]) if name.endswith("along") else size
-        found[name] = (lo * own, hi * own)
-    return found
-
-
-def _side_of_centre(scene: Scene) -> int:
-    centre: Any = scene.text["part"].get("mass", {}).get("center", {})
-    return int(centre.get("side", 0)) if isinstance(centre, Mapping) else 0

@@ -148,6 +148,7 @@ def _single(query: Query, one: DeviationScale, width: Fraction, tell: Callable[[
         *_texts(one, found.proved),
         tuple(found.pieces),
         found.against,
+        None if one.reading != "fixed" or not found.refuted else "more" if found.sign > 0 else "less",
     )
 
 
@@ -172,4 +173,4 @@ def _of_none(query: Query, nominal: Outcome) -> Bracket:
     if against.verdict == "refuted":
         reason = f"the goal fails in the scene as it is: {against.reason}"
         return Bracket(Fraction(0), Fraction(0), [], against, reason)
-    return Bracket(reason=f"the goal is not proved of the scene as it is: {nominal.reason}")
+    return Bracket(reason=f"the goal is not proved of every start of the scene as it is: {nominal.reason}")

@@ -59,6 +59,9 @@ class Margin(Tabled):
         What proves it.
     against : Outcome or None
         What refutes it.
+    direction : str or None
+        "more" or "less": whether the value at which it is refuted is greater or smaller than the scene's; None where a
+        deviation is no single value, or none is refuted.
     """
 
     quantity: str
@@ -77,6 +80,7 @@ class Margin(Tabled):
     noise: dict[str, str]
     pieces: tuple[Outcome, ...] = field(repr=False)
     against: Outcome | None = field(repr=False)
+    direction: str | None = None
 
     @property
     def counterexample(self) -> tuple[State, ...]:
@@ -86,9 +90,9 @@ class Margin(Tabled):
     def tables(self) -> tuple[Table, ...]:
         """Give the tables that show it, the one that is saved as CSV first."""
         shown = Column("proved safe up to", show=bound), Column("shown to fail from", show=bound_above)
-        columns = ("quantity", "reading", *shown, "unit", Column("value", show=".6g"))
+        columns = ("quantity", "reading", *shown, "unit", Column("value", show=".6g"), "direction")
         unit = self.unit or "times the tolerance"
-        row = (self.quantity, self.reading, self.proved, self.refuted, unit, self.nominal)
+        row = (self.quantity, self.reading, self.proved, self.refuted, unit, self.nominal, self.direction)
         how = "brackets: proved below, refuted above"
         return (Table(columns, [row], f"{self.scene.name}: margins", how),)
 
@@ -98,7 +102,7 @@ class Margin(Tabled):
         return as_table(
             **picked(self, "quantity", "reading"),
             goal=goals[0] if len(goals) == 1 else goals,
-            **picked(self, "proved", "refuted"),
+            **picked(self, "proved", "refuted", "direction"),
             unit=self.unit or None,
             **picked(self, "nominal", "closed"),
             reason=self.reason or None,
@@ -143,8 +147,11 @@ class Margin(Tabled):
         folder.mkdir(parents=True, exist_ok=True)
         stem, written = self.stem, []
         for number, goal in enumerate(self.goals if self.pieces else ()):
+            answers = [piece.answers[number] for piece in self.pieces]
+            # pieces may be proved for different starts: all together for the fewest
             claims = [
-                Claim("goal", "proved", "", dict(piece.answers[number].section)) for piece in self.pieces
+                Claim("goal", "proved", "", dict(one.section), starts=one.starts, shares=dict(one.shares))
+                for one in answers
             ]
             found = tuple(piece.found for piece in self.pieces if piece.found is not None)
             proof = Proof(self.scene, self.noise, self.deviations, found, (weakest_of(claims),), self.seconds)

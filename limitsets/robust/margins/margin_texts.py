@@ -8,7 +8,7 @@ from decimal import ROUND_CEILING, ROUND_FLOOR, Context, Decimal
 from limitsets.goals import Goal, OrientedBeyond
 from limitsets.proofs.query import Outcome
 
-__all__ = ["bound", "bound_above", "reach_of", "void_of"]
+__all__ = ["bound", "bound_above", "failing", "reach_of", "void_of"]
 
 
 def bound(value: float | None, unit: str = "", *, up: bool = False) -> str:
@@ -25,6 +25,17 @@ def bound(value: float | None, unit: str = "", *, up: bool = False) -> str:
         return f"0 {unit}".rstrip()
     context = Context(prec=4, rounding=ROUND_CEILING if up else ROUND_FLOOR)
     return f"{context.create_decimal(Decimal(repr(value))):f} {unit}".rstrip()
+
+
+def failing(value: float | None, unit: str, direction: str | None) -> str:
+    """Write from where on a goal is shown to fail, and whether at a greater or a smaller value of the quantity.
+
+    Examples
+    --------
+    >>> failing(0.733543, "%", "less"), failing(0.107, "in", None), failing(None, "in", None)
+    ('0.7336 % less', '0.107 in', '-')
+    """
+    return f"{bound(value, unit, up=True)} {direction or ''}".rstrip()
 
 
 def bound_above(value: float) -> str:

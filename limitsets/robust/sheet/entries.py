@@ -31,6 +31,7 @@ SAME = (
     "refuted",
     "nominal",
     "nominal_unit",
+    "direction",
     "closed",
     "violated",
     "pieces",
@@ -75,6 +76,8 @@ class Entry:
         Boxes that the proof took.
     seconds : float
         Time it took.
+    direction : str or None
+        "more" or "less", as of a `Margin`.
     """
 
     quantity: str
@@ -93,6 +96,7 @@ class Entry:
     against: str | None
     pieces: int
     seconds: float
+    direction: str | None
 
     @property
     def key(self) -> str:

@@ -117,6 +117,7 @@ class Robustness(Tabled):
             {},
             (),
             None,
+            entry.direction,
         )
 
     def tables(self) -> tuple[Table, ...]:
