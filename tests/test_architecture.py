@@ -74,6 +74,17 @@ def test_every_name_of_the_checker_is_defined_once():
     assert "PRECISION" in defined
 
 
+def test_no_result_of_a_run_is_kept_at_the_top():
+    """Figures and reports of a trial were committed once, by `git add` in the checkout."""
+    kept = subprocess.run(["git", "ls-files"], cwd=ROOT, capture_output=True, text=True, check=True).stdout
+    top = {line.split("/")[0] for line in kept.splitlines() if not line.startswith(".")}
+    pages = {"README.md", "CHANGELOG.md", "CONTRIBUTING.md", "LICENSE", "CITATION.cff"}
+    assert top == pages | {
+        *("Makefile", "constraints.txt", "pyproject.toml"),
+        *("docs", "limitsets", "notebooks", "studies", "tests"),
+    }
+
+
 @pytest.mark.parametrize("source", SOURCES, ids=lambda path: str(path.relative_to(PACKAGE)))
 def test_only_the_engine_room_imports_pymunk(source):
     assert "pymunk" not in imported_names(source) or source.parent == PACKAGE / "engine"
