@@ -413,8 +413,9 @@ def _halved(
         else:
             # a narrower box of parameters is worth finer cells
             waiting += [(half, min(cells * 6 // 5, LADDER[-1])) for half in part.halves(scales)]
-    joined = tuple(weakest_of([answers[k] for _, answers in proved]) for k in range(len(wanted)))
-    return tuple(one for one, _ in proved), joined
+    found = tuple(one for one, _ in proved)
+    joined = tuple(weakest_of([answers[k] for _, answers in proved], found) for k in range(len(wanted)))
+    return found, joined
 
 
 def _settled(claim: Claim) -> bool:
@@ -422,8 +423,8 @@ def _settled(claim: Claim) -> bool:
     return claim.verdict == "proved" or (claim.written and claim.shares["leaves"] > 0.0)
 
 
-def weakest_of(claims: Sequence[Claim]) -> Claim:
-    """Join one claim, proved on every piece: with the weakest of the numbers, and for the fewest starts."""
+def weakest_of(claims: Sequence[Claim], found: Sequence[Attraction]) -> Claim:
+    """Join one claim, proved on every piece by its cells: with the weakest of the numbers, for the fewest starts."""
     sections = [claim.section for claim in claims]
     section = dict(sections[0])
     near = [other["near_joint"] for other in sections if "near_joint" in other]
@@ -445,10 +446,13 @@ def weakest_of(claims: Sequence[Claim]) -> Claim:
     section.pop("lost", None)
     if isinstance(starts, dict):
         given = [claim.starts["from"] for claim in claims if isinstance(claim.starts, dict)]
+        if len(near) < len(sections):  # of starts before the cells nothing is claimed then
+            first = [[float(edges[0]) for (edges,) in one.cover.grid.edges] for one in found]
+            given += [{side: cells[int(side)] for side in given[0]} for cells in first]
         starts = {"from": {side: max(each[side] for each in given) for side in given[0]}}
         section["starts"] = {"from": {side: x.hex() for side, x in starts["from"].items()}}
         lost = [other["lost"] for other in sections if "lost" in other]
-        if len(lost) == len(given) and lost:
+        if len(lost) == len(claims):
             section["lost"] = {
                 side: min((each[side] for each in lost), key=float.fromhex) for side in lost[0]
             }

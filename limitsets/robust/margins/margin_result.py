@@ -154,7 +154,9 @@ class Margin(Tabled):
                 for one in answers
             ]
             found = tuple(piece.found for piece in self.pieces if piece.found is not None)
-            proof = Proof(self.scene, self.noise, self.deviations, found, (weakest_of(claims),), self.seconds)
+            proof = Proof(
+                self.scene, self.noise, self.deviations, found, (weakest_of(claims, found),), self.seconds
+            )
             last = f"-{goal.kind.replace('_', '-')}" if len(self.goals) > 1 else ""
             written.append(proof.save(folder / f"{stem}{last}.proof.zip", recheck=recheck))
         against = self.against
