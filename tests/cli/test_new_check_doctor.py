@@ -15,9 +15,8 @@ from limitsets.scene.checking import examined
 from limitsets.scene.schema import Table, scene_table
 from limitsets.scene.starting import starting_text
 from limitsets.scene.validation import refusals
-from tests.cli.command import run
+from tests.cli.command import documented, run
 
-PAGE = (Path(__file__).resolve().parents[2] / "docs" / "json.md").read_text(encoding="utf-8")
 LEAD = """
 [part]
 vertices = [["0 mm", "0 mm"], ["146 mm", "0 mm"], ["100 mm", "90 mm"]]
@@ -39,13 +38,6 @@ def problems(source):
 
 
 SWITCH = re.compile(r'^# (?=\[|[a-z_]+ = |"[a-z.]+" = )', re.M)
-
-
-def documented(section):
-    """Keys in the first column of a section's table."""
-    text = PAGE.split(f"## {section}\n", 1)[1].split("\n## ", 1)[0]
-    cells = re.findall(r"^\| (`[^|]*`) \|", text, re.M)
-    return {name for cell in cells for name in re.findall(r"`(\w+)`", cell)}
 
 
 def keys_of(table, path=()):
@@ -385,6 +377,8 @@ def test_a_new_scene_in_millimetres_is_the_same_feeder(capfd, tmp_path):
     ("words", "said"),
     [
         (("throw", "paper-designed", "--x", "8", "--side", "two"), "'two' is not a whole number"),
+        (("margin", "paper-designed", "--sped", "1"), "; limitsets margin --help lists what there is"),
+        (("analyze", "paper-designed"), "; limitsets --help lists what there is"),
         (("plot", "paper-designed", "limitset"), "did you mean 'limit-set'?"),
         (("analyse", "paper-designed", "throw.speed=150"), "scene.with_values({'throw.speed': '150 UNIT'})"),
         (("analyse", "paper-designed", "--set", "throw.speed=150 deg/s"), "write it into the scene's file"),
