@@ -65,7 +65,7 @@ def examined(source: str | Path | Mapping[str, Any]) -> tuple[tuple[SceneError, 
     found += refused
     blamed = {_path_of(error) for error in refused}
     looked_at = _mended(tree, blamed)
-    if looked_at is None or refusals(looked_at, file)[1]:
+    if looked_at is None:
         return tuple(found), ()
     while (wrong := _first(looked_at, file)) is not None:
         path = _path_of(wrong)

@@ -268,6 +268,19 @@ GOAL_TOO_FAR = {"oriented_beyond": {"x": "200 in", "side": 2}}
         ({"arm": {"lenght": "28 in", "surface_height": "0 in"}}, ["arm.lenght"]),
         ({"arm": {"lenght": 28, "surface_height": "0 in"}}, ["arm.lenght", "arm.length"]),
         ({"throw": {"kapa": "25 in"}, "goal": GOAL_TOO_FAR}, ["throw.kapa", "goal.oriented_beyond.x"]),
+        (
+            {"arm": {"length": "28 in", "lenght": 5, "surface_height": "0 in"}},
+            ["arm.lenght"],
+        ),
+        # what stands in for a refused value is not blamed: a place of 20 in, and no arm at all
+        (
+            {
+                "arm": {"length": "15 in", "surface_height": "0 in"},
+                "goal": {"oriented_beyond": {"x": 20, "side": 2}},
+            },
+            ["goal.oriented_beyond.x"],
+        ),
+        ({"arm": {"length": 28, "surface_height": "0 in"}, "goal": GOAL_TOO_FAR}, ["arm.length"]),
         # nothing is missing that is only wrong
         ({"throw": AT_158, "gravity": {"acceleration": "9 m"}}, ["gravity.acceleration"]),
         ({"throw": AT_158, "gravity": {"acceleration": "-9 m/s^2"}}, ["gravity.acceleration"]),
@@ -344,6 +357,14 @@ def test_a_mistake_beside_the_throw_hides_nothing_improbable():
     assert [doubt.key for doubt in doubts] == ["throw.speed"]
     # of a throw in the place of a wrong one nothing is said
     assert examined(with_tables(throw={"speed": "215 rad"}))[1] == ()
+
+
+def test_a_length_that_is_in_the_way_twice_is_told_once():
+    tree = with_tables(arm={"length": "0 in", "surface_height": "0 in"})  # 1 in in its place is too short
+    tree["part"]["mass"]["radius_of_gyration"] = "-1 in"
+    wrong, doubts = examined(tree)
+    assert [error.key for error in wrong] == ["arm.length", "part.mass.radius_of_gyration"]
+    assert doubts == ()  # of what stands in its place
 
 
 @pytest.mark.parametrize("density", ["78.5 kg/m^2", "7850 kg/m^3", "0.5 kg/m^2"])
