@@ -8,9 +8,10 @@ from __future__ import annotations
 import csv
 import io
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Mapping, Sequence, Sized
+from dataclasses import dataclass, fields, is_dataclass
 from html import escape
+from itertools import accumulate
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
 
@@ -23,6 +24,9 @@ __all__ = ["BY_CELLS", "Column", "Table", "Tabled", "aligned", "bands_of", "fact
 
 # Of answers made of cells, which do not know their transitions.
 BY_CELLS = "cells: proved where the transitions are, by the method boxes; else sampled"
+
+# Characters of the line that names an answer.
+SHORT = 110
 
 # Rows that a notebook shows at both ends of a long table.
 SHOWN = 20
@@ -230,8 +234,21 @@ class Tabled:
 
     def __init_subclass__(cls, **words: Any) -> None:
         super().__init_subclass__(**words)
-        # IPython takes what stands in the class itself, where a dataclass has a __repr__ of all its numbers
+        # IPython takes what stands in the class itself, and a dataclass makes no __repr__ where one stands
         cls._repr_pretty_ = Tabled._repr_pretty_  # type: ignore[method-assign]
+        if "__repr__" not in vars(cls):
+            cls.__repr__ = Tabled.__repr__  # type: ignore[method-assign]
+
+    def __repr__(self) -> str:
+        """Name it in a line, with as much of its fields as fits; its tables show all."""
+        if not is_dataclass(self):
+            return _in_short(self)
+        names = [each.name for each in fields(self) if each.repr]
+        words = [f"{name}={_in_short(getattr(self, name))}" for name in names]
+        ends = accumulate(len(word) + 2 for word in words)
+        kept = [word for word, end in zip(words, ends, strict=True) if end <= SHORT]
+        more = ["..."] if len(kept) < len(words) else []
+        return f"{type(self).__name__}({', '.join([*kept, *more])})"
 
     def tables(self) -> tuple[Table, ...]:
         """Give the tables that show it, the one that is saved as CSV first."""
@@ -259,6 +276,15 @@ class Tabled:
         with replaced(place.parent) as draft:
             (draft / place.name).write_text(self.table().csv(), encoding="utf-8", newline="")
         return place
+
+
+def _in_short(value: Any) -> str:
+    """Write a value as it is where it is short, else its kind and size."""
+    text = "" if isinstance(value, Tabled) else repr(value)
+    if not text or len(text) > SHORT // 4 or "\n" in text:
+        size = f" of {len(value)}" if isinstance(value, Sized) else ""
+        return f"<{type(value).__name__}{size}>"
+    return text
 
 
 def aligned(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:

@@ -52,6 +52,13 @@ CELLS = 4096
 # Where random starts go astray, so many times as many cells are tried, up to the last, as long as that helps.
 FINER, MOST_CELLS = 4, 65_536
 
+# Finer cells do not help against it.
+ABOVE = (
+    "the arm's surface is above the joint, and starts near the joint creep to it for ever, which more cells do not "
+    "change; is arm.surface_height meant to be negative, which is below? "
+    "If not, limitsets certify says which starts these are"
+)
+
 
 @dataclass(frozen=True, eq=False)
 class Analysis(Tabled):
@@ -110,6 +117,12 @@ class Analysis(Tabled):
     timings: dict[str, float]
     accuracy: Accuracy | None = None
 
+    def __repr__(self) -> str:
+        """Name its scene, with what was found."""
+        found = f"{self.grid.n_cells} cells, limit sets: {len(self.attractors)}"
+        goal = "" if self.goal is None else f", {self.goal.goal.kind} holds: {self.goal.holds}"
+        return f"Analysis({self.scene.name}: {found}{goal}; sampled, not proved)"
+
     @property
     def second_pass(self) -> float:
         """Share of the sampled throws that went to the slow, sure search for the impact."""
@@ -129,7 +142,8 @@ class Analysis(Tabled):
     def advice(self) -> tuple[str, ...]:
         """What cells have not settled, and what to do."""
         said = (self.basins.advice, None if self.starts is None else self.starts.advice)
-        return tuple(text for text in said if text is not None)
+        found = tuple(text for text in said if text is not None)
+        return (ABOVE,) if found and self.scene.surface_height > 0.0 else found
 
     def tables(self) -> tuple[Table, ...]:
         """Give the tables that show it, the one that is saved as CSV first."""

@@ -97,9 +97,9 @@ class Report:
     open: float | None = None
     fed: dict[str, float] | None = None
     area: dict[str, float] | None = None
-    statement: list[str] = field(default_factory=list)
-    parameters: dict[str, str] = field(default_factory=dict)
-    relied_on: list[str] = field(default_factory=list)
+    statement: list[str] = field(default_factory=list, repr=False)
+    parameters: dict[str, str] = field(default_factory=dict, repr=False)
+    relied_on: list[str] = field(default_factory=list, repr=False)
     reason: str = ""
     seconds: float = 0.0
     cells: int = 0

@@ -253,6 +253,12 @@ def _orbit(proof: Proof, claim: Claim) -> None:
         row = [str(k), f"{0.5 * (state.lo + state.hi):.6f}", str(state.side)]
         rows.append(row + (_thrown(proof, state) if state.kappa is not None else [""] * (len(heads) - 3)))
     table(heads, rows)
+    shape = {name: lo for name, (lo, _) in claim.fixed.items() if name.startswith(("part.", "arm."))}
+    last, thrown = states[-1], scene.with_values(shape)
+    nearest, farthest = float(thrown.sides.a[last.side]), thrown.arm_length
+    if not (nearest < last.hi and last.lo <= farthest):
+        ends = f"on side {last.side} it rests from x = {nearest:.6g} to {farthest:.6g} {scene.unit}"
+        typer.echo(f"  There the part has left the arm: {ends}.")
 
 
 def _heads(proof: Proof) -> list[str]:

@@ -97,7 +97,9 @@ def _run(arguments: Sequence[str] | None) -> int:
     except typer.Abort:
         raise KeyboardInterrupt from None
     except refused as error:
-        hint = "" if not isinstance(error, usage_error) else "; limitsets --help lists what there is"
+        usage: Any = error
+        of = usage.ctx.command_path if isinstance(error, usage_error) and usage.ctx else "limitsets"
+        hint = f"; {of} --help lists what there is" if isinstance(error, usage_error) else ""
         return _end(f"{_plain(error.format_message().rstrip('.'), words)}{hint}", BAD_INPUT)
     if code == INTERRUPTED:  # typer's word for Ctrl-C
         raise KeyboardInterrupt

@@ -109,20 +109,28 @@ def refused_part(found: Sketch, why: str) -> Figure:
     size = max(float(np.ptp(corners, axis=0).max()), 1e-300)
     figure, (axes,) = style.canvas(7.6, 6.0)
     axes.set_aspect("equal")
-    axes.margins(0.25)
+    lo, hi = corners.min(axis=0), corners.max(axis=0)
+    beside = size * np.array([0.4, 0.25])
+    room = np.stack([lo - beside, hi + beside])
+    axes.set(xlim=room[:, 0], ylim=room[:, 1])
     axes.add_patch(Polygon(corners, closed=True, zorder=2, gid="part", **(OUTLINE | {"ls": "--"})))
     axes.plot(*corners.T, ls="", marker="o", ms=4, color=style.INK, zorder=3)
     middle = corners.mean(axis=0)
     for k, corner in enumerate(corners):
-        away = (corner - middle) / size
-        shift = (28.0 * float(away[0]), 28.0 * float(away[1]))
-        style.note(axes, f"P{k}", tuple(corner.tolist()), shift, ha="center", va="center", gid="corner")
+        way = middle - corner  # the names of sides are outside
+        shift = tuple((16.0 * way / max(float(np.hypot(*way)), 1e-300)).tolist())
+        at = tuple(corner.tolist())
+        style.note(axes, f"P{k}", at, shift, ha="center", va="center", gid="corner")
+    ahead = np.roll(corners, -1, axis=0)
+    turn = 1.0 if float(np.sum(corners[:, 0] * ahead[:, 1] - corners[:, 1] * ahead[:, 0])) >= 0.0 else -1.0
     for side in range(count):
         left, right = (corners[k] for k in side_ends(count, side))
-        words = f"side {side}: {float(np.hypot(*(right - left))):.5g} {found.unit}"
-        place = tuple((0.5 * (left + right)).tolist())
-        box = {"boxstyle": "square,pad=0.2", "fc": "white", "ec": "none"}
-        style.note(axes, words, place, (0, 0), ha="center", va="center", bbox=box, zorder=4, gid="side")
+        length = float(np.hypot(*(right - left)))
+        outward = turn * np.array([right[1] - left[1], left[0] - right[0]]) / max(length, 1e-300)
+        words = f"side {side}: {length:.5g} {found.unit}"
+        away = _clear(words, style.SMALL, outward) * outward
+        halfway = tuple((0.5 * (left + right)).tolist())
+        style.note(axes, words, halfway, tuple(away.tolist()), ha="center", va="center", zorder=4, gid="side")
     if found.centre is not None:
         axes.plot(*found.centre, zorder=5, gid="centre of mass", **CENTRE)
         style.note(axes, "centre of mass", found.centre, (9, 0), va="center", zorder=5)
@@ -131,6 +139,11 @@ def refused_part(found: Sketch, why: str) -> Figure:
     axes.set_ylabel(f"y [{found.unit}]")
     style.title(figure, f"{found.name}: the part as it is written, which is refused")
     return figure
+
+
+def _clear(words: str, size: float, way: Array) -> float:
+    """Say how far the middle of words has to be from a side, for them to be clear of it [points]."""
+    return CLEAR + float(np.abs(way) @ (0.31 * size * len(words), 0.5 * size))
 
 
 def _centre_at(scene: Scene) -> Array:
@@ -147,8 +160,7 @@ def _sides(axes: Axes, scene: Scene, corners: Array, resting: list[bool]) -> Non
         along = (right - left) / np.hypot(*(right - left))
         outward = np.array([along[1], -along[0]])
         words = f"side {side}: {float(scene.sides.length[side]):.5g} {scene.unit}"
-        half = np.array([0.31 * style.TEXT * len(words), 0.5 * style.TEXT])  # of the words [points]
-        away = CLEAR + float(np.abs(outward) @ half) + (10 if side == 0 else 0)
+        away = _clear(words, style.TEXT, outward) + (10 if side == 0 else 0)
         shift = away * outward
         leader = None
         if outward[1] < -0.1 and side != 0:  # an edge that overhangs: beside it, and not down on the arm

@@ -120,6 +120,12 @@ class Proof(Tabled):
     claims: tuple[Claim, ...]
     seconds: float
 
+    def __repr__(self) -> str:
+        """Name its scene, and each claim with its verdict."""
+        return (
+            f"Proof({self.scene.name}: {', '.join(f'{each.claim} {each.verdict}' for each in self.claims)})"
+        )
+
     @property
     def proved(self) -> bool:
         """Whether every claim is proved."""

@@ -113,7 +113,7 @@ def next_command(analysis: Analysis) -> str:
 
 
 def after_undecided(analysis: Analysis) -> str:
-    """Name the command that decides more starts; empty where none is undecided, or there is no room for more cells.
+    """Name the command that decides more starts; empty where none is undecided, or more cells do not help.
 
     Examples
     --------
@@ -122,7 +122,8 @@ def after_undecided(analysis: Analysis) -> str:
     'limitsets analyse paper-designed --cells 64 (finer cells)'
     """
     cells = FINER * int(analysis.grid.shape[:, 0].max())
-    if analysis.basins.undecided_between == 0.0 or cells > MOST_CELLS:
+    creeping = analysis.scene.surface_height > 0.0  # to the joint, for ever
+    if analysis.basins.undecided_between == 0.0 or cells > MOST_CELLS or creeping:
         return ""
     return f"limitsets analyse {_source(analysis.scene)} --cells {cells} (finer cells)"
 

@@ -26,7 +26,6 @@ from limitsets.scene.facts import TIPPING
 from limitsets.scene.numbers import Numbers
 from limitsets.scene.quantities import find, text_at
 from limitsets.scene.resolve import LEAST, Resolver
-from limitsets.scene.units import density_dimension
 
 __all__ = ["Body", "Floats"]
 
@@ -114,7 +113,6 @@ class Floats(Numbers):
     @cached_property
     def body(self) -> Body:
         """The part, refused where it cannot rest on each of its sides; with `landing` and `roll` it tips there."""
-        self._require_words_of_part()
         pairs, centre, lengths, radius = self.shape
         vertices: Array = np.array(pairs)
         sides = resting_sides(vertices, centre, lengths)
@@ -125,48 +123,11 @@ class Floats(Numbers):
         x, y = centre.in_frame(pairs) if isinstance(centre, OnSide) else centre
         return Body(vertices, (x, y), radius, sides)
 
-    def _require_words_of_part(self) -> None:
-        """Refuse two descriptions of shape or mass, half a one, or none."""
-        shapes = "sides = [three lengths] or vertices = [[x, y], ...]"
-        self._require_one("part", "the shape", "sides", "vertices", shapes)
-        mass: Mapping[str, Any] = self.tree["part"]["mass"]
-        measured = [name for name in ("center", "radius_of_gyration") if name in mass]
-        made = [name for name in ("plate_density", "plate_thickness", "points") if name in mass]
-        allowed = "center and radius_of_gyration, or plate_density and points"
-        if measured and made:
-            found = " and ".join(measured + made)
-            raise self.refusal("part.mass", "the mass", found, allowed, "give one of the two, not both")
-        if len(measured) == 1 or (not measured and "plate_density" not in made):
-            found = f"only {' and '.join(measured + made)}" if measured or made else "empty"
-            raise self.refusal("part.mass", "the mass", found, allowed, "add what is missing")
-        if made:
-            self._require_thickness(mass["plate_density"], mass.get("plate_thickness"))
-
-    def _require_thickness(self, density: str, thickness: str | None) -> None:
-        """Refuse a mass per volume without a thickness, and a mass per area with one."""
-        key, keys = "part.mass.plate_density", "part.mass.plate_thickness"
-        volume = density_dimension(density) == "mass per volume"
-        if volume and thickness is None:
-            allowed = "a mass per area, or a mass per volume with plate_thickness"
-            raise self.refusal(key, "this density", density, allowed, f'add {keys}, like "2 mm"')
-        if not volume and thickness is not None:
-            remedy = f"{density} holds the thickness already: leave it out, or give the density in kg/m^3 or g/cm^3"
-            raise self.refusal(keys, "the thickness", thickness, "one beside a mass per volume", remedy)
-
-    def _require_one(self, key: str, thing: str, one: str, other: str, allowed: str = "") -> None:
-        """Refuse a table with both of two words that exclude each other, or with neither."""
-        given = [word for word in (one, other) if word in self.tree[key]]
-        if len(given) != 1:
-            found = " and ".join(given) or f"neither {one} nor {other}"
-            remedy = "give one of them, not both" if given else "give one of them"
-            raise self.refusal(key, thing, found, allowed or f"{one} or {other}", remedy)
-
     @cached_property
     def gravity(self) -> float | None:
         """Gravity in the plane of the motion [unit/s^2]; None where it is not given."""
         if "gravity" not in self.tree:
             return None
-        self._require_one("gravity", "gravity", "acceleration", "tilt")
         found: float = super().gravity
         return found
 
@@ -174,11 +135,6 @@ class Floats(Numbers):
     def kappa(self) -> float:
         """Gravity over the squared angular speed of the throw [length]."""
         throw = self.tree["throw"]
-        self._require_one("throw", "the throw", "kappa", "speed")
-        if "speed" in throw and self.gravity is None:
-            remedy = "a throw given by its speed needs it; add [gravity], or give throw.kappa"
-            allowed = "acceleration or tilt in [gravity]"
-            raise self.refusal("throw.speed", "gravity", "missing", allowed, remedy)
         found: float = super().kappa
         if "speed" in throw and not LEAST <= found <= 1 / LEAST:
             allowed = f"gravity/speed^2 from {LEAST:g} to {1 / LEAST:g} {self.resolver.unit}"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import math
+import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -26,13 +27,21 @@ if TYPE_CHECKING:
     from limitsets.thrower import Throw
     from limitsets.thrower.motion import FullThrow
 
-__all__ = ["Scene", "resting_places"]
+__all__ = ["MOST_TURNS", "Scene", "resting_places", "turns"]
 
 # below this share of the way from a_i to the arm's end the number of throws needed to get away is unbounded
 _NEAREST = 1e-6
 
-# Turns of a part thrown from the arm's end, R/(pi kappa), beyond which a bare number for the speed is not believed.
-_MOST_TURNS = 100
+# Turns of a part thrown from the arm's end beyond which a bare number for the speed is not believed.
+MOST_TURNS = 100
+
+# A gravity that differs by less is the same in other words: the paper's 193.045 in/s^2 are those of a tilt of 30 deg.
+_SAME = 1e-4
+
+
+def turns(arm_length: float, kappa: float) -> float:
+    """Say how often a part thrown from the arm's end turns before it lands, by the small-angle model with a = 0."""
+    return arm_length / (math.pi * kappa)
 
 
 def resting_places(a: Any, arm_length: Any) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
@@ -292,7 +301,8 @@ class Scene(Tabled):
         values : mapping of str to float or str
             By name of the quantity, text with a unit (``"150 deg/s"``), or numbers in the scene's units: lengths in
             `unit`, but angles in rad and speeds in rad/s.  A bare speed at which a part thrown from the arm's end
-            would turn more than 100 times is refused: it is meant in deg/s; as text it is taken.
+            would turn more than 100 times is refused: it is meant in deg/s; as text it is taken.  Another gravity
+            beside throw.kappa changes no throw; a warning says so where neither kappa nor speed is named with it.
 
         Returns
         -------
@@ -313,18 +323,31 @@ class Scene(Tabled):
 
         made = Scene.of(replaced(self.text, self.unit, self.file, values), self.file)
         speed = values.get("throw.speed")
-        turns = made.arm_length / (math.pi * made.kappa)
-        if isinstance(speed, str | None) or turns <= _MOST_TURNS:
+        found = turns(made.arm_length, made.kappa)
+        if not values.keys() & {"throw.speed", "throw.kappa"} and "kappa" in made.text["throw"]:
+            self._warn_of_gravity(made)
+        if isinstance(speed, str | None) or found <= MOST_TURNS:
             return made
         # a number of deg/s, most often: no throw from the outer half of the arm lands within a turn
         raise SceneError(
             "this angular speed",
             f"{float(speed):g} rad/s",
-            f"a speed whose throws land: a part thrown from the arm's end would turn {turns:.0f} times",
+            f"a speed whose throws land: a part thrown from the arm's end would turn {found:.0f} times",
             f'a bare number is read in rad/s: write "{float(speed):g} deg/s", or the text "{float(speed):g} rad/s"',
             key="throw.speed",
             file=self.file,
         )
+
+    def _warn_of_gravity(self, made: Scene) -> None:
+        """Say that another gravity changes no throw where it is given by kappa."""
+        if self.gravity is None or made.gravity is None:
+            return
+        if not math.isclose(self.gravity, made.gravity, rel_tol=_SAME):
+            warnings.warn(
+                "[gravity] changes no throw beside throw.kappa, only the speed that it stands for: "
+                "give throw.speed, too, for other throws, or throw.kappa to keep them without this warning",
+                stacklevel=3,
+            )
 
     def as_dict(self) -> dict[str, Any]:
         """Give the scene as it was written, as plain tables and lists that `limitsets.load` reads again."""

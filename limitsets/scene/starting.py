@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from limitsets.scene.schema import Table
 
-__all__ = ["new_scene", "starting_text"]
+__all__ = ["example_at", "new_scene", "starting_text"]
 
 # The scene that it is, as it stands, under another name.
 LIKE = "paper-designed"
@@ -100,6 +100,26 @@ def new_scene(file: str | Path, unit: str = "in") -> Path:
     name = path.stem if can_name(path.stem) else "mine"
     replace_file(path, starting_text(name, path.name, unit))
     return path
+
+
+def example_at(path: tuple[str | int, ...]) -> tuple[tuple[str | int, ...], Any]:
+    """Give the example of a key, and the key; of a number in a list those of the list.
+
+    Examples
+    --------
+    >>> example_at(("goal", "flip_order", 1))
+    (('goal', 'flip_order'), [0, 1, 2])
+    """
+    from limitsets.scene.schema import scene_table
+
+    table: Any = scene_table(with_effects=path[0] == "effects")
+    for k, word in enumerate(path):
+        if isinstance(word, str):
+            field, end = table.model_fields[word], k + 1
+            table = _model(field.annotation)
+            if table is None:
+                break
+    return path[:end], _example(field)
 
 
 def _table(path: str, table: type[Table], given: Mapping[str, Any] | None) -> Iterator[str]:

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import copy
 import difflib
 import math
+from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any, TypeAlias, get_args
 
 from limitsets.errors import SceneError, shown
+from limitsets.scene.units import UNITS
 
 if TYPE_CHECKING:
     from limitsets.scene.schema import SceneTable, Table
 
-__all__ = ["Tree", "plain", "refusals", "validate"]
+__all__ = ["Tree", "plain", "refusals", "respelled", "validate"]
 
 Tree: TypeAlias = dict[str, Any]
 """A scene as TOML holds it: tables, lists, text, switches and numbers."""
@@ -62,6 +65,7 @@ def _joined(key: str, word: object) -> str:
         coordinate = key.startswith("part.vertices[") and word < 2
         return f"{key}.{'xy'[word]}" if coordinate else f"{key}[{word}]"
     text = str(shown(word))
+    text = f'"{text}"' if "." in text else text  # the name of a quantity
     return f"{key}.{text}" if key else text
 
 
@@ -71,30 +75,105 @@ def validate(tree: Tree, file: str | None) -> SceneTable:
     Raises
     ------
     SceneError
-        For the first thing wrong: unknown keys before values, values before missing keys.
+        For the first thing wrong, in the order of `refusals`.
     """
     table, found = refusals(tree, file)
-    if table is None:
+    if table is None or found:
         raise found[0]
     return table
 
 
 def refusals(tree: Tree, file: str | None) -> tuple[SceneTable | None, list[SceneError]]:
-    """Check a scene's words: its tables, or all that is wrong: unknown keys, then values, then missing keys."""
+    """Check a scene's words: its tables, and all that is wrong.
+
+    Unknown keys come first, then values, missing keys, and words that exclude or lack each other.
+    """
+    model, table, wrong = _read(tree)
+    rank = {"extra_forbidden": 0, "missing": 2}
+    wrong.sort(key=lambda problem: rank.get(problem["type"], 1))
+    found = [_refusal(problem, model, file) for problem in wrong]
+    return table, [*found, *_contradictions(tree, file)]
+
+
+def respelled(tree: Tree, file: str | None) -> tuple[Tree, list[SceneError]]:
+    """Tell of all unknown keys, each under the name that it is like, where that is free, or else left out."""
+    model, _, wrong = _read(tree)
+    unknown = [problem for problem in wrong if problem["type"] == "extra_forbidden"]
+    tree = copy.deepcopy(tree)
+    for problem in unknown:
+        *path, word = problem["loc"]
+        node: Any = tree
+        for each in path:
+            node = node[each]
+        value = node.pop(word)
+        free = [name for name in _names_beside(problem["loc"], model) if name not in node]
+        for near in difflib.get_close_matches(word[:64], free, n=1):
+            node[near] = value
+    return tree, [_refusal(problem, model, file) for problem in unknown]
+
+
+def _read(tree: Tree) -> tuple[type[SceneTable], SceneTable | None, list[Any]]:
+    """Read a scene by the schema: the schema, the tables or None, and what is wrong in pydantic's words."""
     # pydantic takes 0.1 s to import
     from pydantic import ValidationError
 
     from limitsets.scene.schema import scene_table
 
     on = tree.get("effects")
-    table = scene_table(with_effects=isinstance(on, dict) and bool(on.keys() - {"auto", "contact"}))
+    model = scene_table(with_effects=isinstance(on, dict) and bool(on.keys() - {"auto", "contact"}))
     try:
-        return table.model_validate(tree), []
+        return model, model.model_validate(tree), []
     except ValidationError as error:
-        wrong = error.errors(include_url=False)
-    rank = {"extra_forbidden": 0, "missing": 2}
-    wrong.sort(key=lambda problem: rank.get(problem["type"], 1))
-    return None, [_refusal(problem, table, file) for problem in wrong]
+        return model, None, list(error.errors(include_url=False))
+
+
+# Tables with one of two words each, and what they are about.
+_ONE_OF = {
+    "part": ("the shape", "sides", "vertices", "sides = [three lengths] or vertices = [[x, y], ...]"),
+    "gravity": ("gravity", "acceleration", "tilt", "acceleration or tilt"),
+    "throw": ("the throw", "kappa", "speed", "kappa or speed"),
+}
+
+
+def _contradictions(tree: Tree, file: str | None) -> Iterator[SceneError]:
+    """Refuse words that exclude each other, half a description, or none; for this no value has to be right."""
+
+    def refusal(key: str, thing: str, value: object, allowed: str, remedy: str) -> SceneError:
+        return SceneError(thing, shown(value), allowed, remedy, key=key, file=file)
+
+    for key, (thing, one, other, allowed) in _ONE_OF.items():
+        if not isinstance(tree.get(key), dict):
+            continue
+        given = [word for word in (one, other) if word in tree[key]]
+        if len(given) != 1:
+            found = " and ".join(given) or f"neither {one} nor {other}"
+            remedy = "give one of them, not both" if given else "give one of them"
+            yield refusal(key, thing, found, allowed, remedy)
+        elif given == ["speed"] and "gravity" not in tree:
+            remedy = "a throw given by its speed needs it; add [gravity], or give throw.kappa"
+            yield refusal("throw.speed", "gravity", "missing", "acceleration or tilt in [gravity]", remedy)
+    mass = tree["part"].get("mass") if isinstance(tree.get("part"), dict) else None
+    if not isinstance(mass, dict):
+        return
+    measured = [name for name in ("center", "radius_of_gyration") if name in mass]
+    made = [name for name in ("plate_density", "plate_thickness", "points") if name in mass]
+    allowed = "center and radius_of_gyration, or plate_density and points"
+    if measured and made:
+        found = " and ".join(measured + made)
+        yield refusal("part.mass", "the mass", found, allowed, "give one of the two, not both")
+    elif len(measured) == 1 or (not measured and "plate_density" not in made):
+        found = f"only {' and '.join(measured + made)}" if measured or made else "empty"
+        yield refusal("part.mass", "the mass", found, allowed, "add what is missing")
+    elif made:
+        density, thickness = mass["plate_density"], mass.get("plate_thickness")
+        key, keys = "part.mass.plate_density", "part.mass.plate_thickness"
+        unit = str(density).strip(" ").rpartition(" ")[2]
+        if unit in UNITS["mass per volume"] and thickness is None:
+            allowed = "a mass per area, or a mass per volume with plate_thickness"
+            yield refusal(key, "this density", density, allowed, f'add {keys}, like "2 mm"')
+        if unit in UNITS["mass per area"] and thickness is not None:
+            remedy = f"{density} holds the thickness already: leave it out, or give the density in kg/m^3 or g/cm^3"
+            yield refusal(keys, "the thickness", thickness, "one beside a mass per volume", remedy)
 
 
 def _refusal(problem: Any, table: type[SceneTable], file: str | None) -> SceneError:

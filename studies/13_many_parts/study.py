@@ -138,6 +138,8 @@ def draw(numbers: dict[str, Any]) -> Figure:
     rates.legend(loc="upper left", fontsize=8)
     rates.set_ylim(4e-3, 10.0)
     cost.set(xscale="log", yscale="log", xlabel="parts given", ylabel="time per part and throw [ms]")
+    cost.set_yticks([0.5, 1.0, 2.0, 5.0], ["0.5", "1", "2", "5"])
+    cost.set_yticks([], minor=True)
     for panel in (rates, cost):
         panel.set_xticks([int(each) for each in numbers["pushing"]], list(numbers["pushing"]))
         panel.set_xticks([], minor=True)
@@ -161,7 +163,7 @@ def draw(numbers: dict[str, Any]) -> Figure:
             list(rows), high, bottom=below, color=shade, edgecolor="0.2", hatch=hatches.get(fate), label=fate
         )
         below = [low + more for low, more in zip(below, high, strict=True)]
-    fates.set(xlabel="parts given, that push each other", ylabel="share")
+    fates.set(xlabel="parts given, that push each other", ylabel="share", ylim=(0.0, 1.0))
     fates.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=6, fontsize=8, columnspacing=1.0)
     return figure
 

@@ -322,3 +322,45 @@ def test_a_goal_that_fails_comes_with_the_x_from_which_it_holds(capfd, tmp_path)
     farthest = max(hi for side in (0, 1) for _, hi in ls.analyse(slow, 1024).extents[0][side])
     _, out, _ = run(capfd, "analyse", str(own), "--cells", "1024", "-o", str(tmp_path / "found"))
     assert f"The sentence is true from x = {farthest:.3f} in on." in out
+
+
+@pytest.mark.parametrize(
+    ("tables", "options", "words"),
+    [
+        # a_2 and the arm's length are in the scene; kappa = 15 in throws parts in, an arm of 23 in is too short
+        ({"throw": {"kappa": "15 in"}}, (), "on side 2 it rests from x = 4.22558 to 28 in"),
+        (
+            {"arm": {"surface_height": "-0.2 in", "length": "23 in"}},
+            (),
+            "on side 2 it rests from x = 4.22558 to 23 in",
+        ),
+        (
+            {"arm": {"surface_height": "-0.2 in", "length": "23 in"}},
+            ("--tolerance", "arm.length=1 %"),
+            "on side 2 it rests from x = 4.22558 to 22.77 in",
+        ),
+    ],
+)
+def test_an_orbit_that_leaves_is_said_to(capfd, tables, options, words):
+    tree = own(**tables, goal={"stays_on_arm": True})
+    ls.dump(ls.load(tree), "short.toml")
+    code, out, _ = run(capfd, "certify", "short.toml", "--claim", "goal", *options)
+    assert code == 1
+    assert f"There the part has left the arm: {words}" in " ".join(out.split())
+
+
+def test_an_orbit_that_stays_is_not_said_to_leave(capfd):
+    ls.dump(ls.load(own(goal={"oriented_beyond": {"x": "12 in", "side": 2}})), "near.toml")
+    code, out, _ = run(capfd, "certify", "near.toml", "--claim", "goal")
+    assert code == 1
+    assert "This orbit shows it" in out
+    assert "left the arm" not in out
+
+
+def test_a_surface_above_the_joint_is_not_answered_with_finer_cells(capfd):
+    ls.dump(ls.load(own(arm={"surface_height": "0.2 in", "length": "28 in"})), "above.toml")
+    code, out, _ = run(capfd, "analyse", "above.toml", "--cells", "512")
+    assert code == 0
+    assert "is arm.surface_height meant to be negative" in out
+    assert "finer cells" not in out
+    assert "ask for more cells" not in out

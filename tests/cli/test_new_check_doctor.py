@@ -11,21 +11,33 @@ import pytest
 
 import limitsets as ls
 from limitsets.errors import SceneError
-from limitsets.scene.checking import problems
+from limitsets.scene.checking import examined
 from limitsets.scene.schema import Table, scene_table
 from limitsets.scene.starting import starting_text
 from limitsets.scene.validation import refusals
-from tests.cli.command import run
+from tests.cli.command import documented, run
 
-PAGE = (Path(__file__).resolve().parents[2] / "docs" / "json.md").read_text(encoding="utf-8")
+LEAD = """
+[part]
+vertices = [["0 mm", "0 mm"], ["146 mm", "0 mm"], ["100 mm", "90 mm"]]
+[part.mass]
+plate_density = "3.805 kg/m^2"
+points = [{ x = "80 mm", y = "20 mm", mass = "40 kg" }]
+[arm]
+surface_height = "-5 mm"
+length = "700 mm"
+[throw]
+speed = "158 deg/s"
+[gravity]
+tilt = "30 deg"
+"""
+
+
+def problems(source):
+    return examined(source)[0]
+
+
 SWITCH = re.compile(r'^# (?=\[|[a-z_]+ = |"[a-z.]+" = )', re.M)
-
-
-def documented(section):
-    """Keys in the first column of a section's table."""
-    text = PAGE.split(f"## {section}\n", 1)[1].split("\n## ", 1)[0]
-    cells = re.findall(r"^\| (`[^|]*`) \|", text, re.M)
-    return {name for cell in cells for name in re.findall(r"`(\w+)`", cell)}
 
 
 def keys_of(table, path=()):
@@ -66,7 +78,8 @@ def test_a_name_that_cannot_be(name, capfd, tmp_path):
 def test_every_key_of_the_schema_stands_in_it_with_its_words_and_an_example_that_fits():
     text = starting_text("all", "all.toml")
     tree = tomllib.loads(SWITCH.sub("", text))
-    assert refusals(tree, None)[1] == []  # contradictions, as sides beside vertices, are looked at later
+    # it has both of each two words that exclude each other
+    assert {error.key for error in refusals(tree, None)[1]} == {"part", "part.mass", "gravity", "throw"}
     table = scene_table(with_effects=True)
     for path in keys_of(table):
         assert re.search(rf"\b{path[-1]}\b", text), path
@@ -118,13 +131,13 @@ def test_all_errors_of_a_file_are_told_at_once(capfd):
         "part.mass.radius_of_gyration",
         "goal.oriented_beyond.side",
     ]
-    for key in [*keys, "arm.length"]:
+    for key in keys:
         assert sum(line.startswith(f"wrong.toml: {key}: ") for line in told) == 1, key
-    assert told[-1] == "wrong.toml: 5 things are wrong"
+    assert told[-1] == "wrong.toml: 4 things are wrong"
     code, out, _ = run(capfd, "check", "wrong.toml", "--json", "--csv", "wrong.csv")
     records = json.loads(out)
     assert code == 2
-    assert {record["key"] for record in records} == {*keys, "arm.length"}
+    assert {record["key"] for record in records} == set(keys)
     assert all(set(record) == documented("check") for record in records)
     rows = list(csv.DictReader(Path("wrong.csv").read_text(encoding="utf-8").splitlines()))
     assert [row["key"] for row in rows] == [record["key"] for record in records]
@@ -156,7 +169,13 @@ def test_the_first_error_of_load_is_among_them(text, tmp_path):
 
 
 def test_a_scene_that_is_right(capfd):
-    assert run(capfd, "check", "paper-designed")[:2] == (0, "paper-designed: nothing is wrong\n")
+    code, out, _ = run(capfd, "check", "paper-designed")
+    told = out.splitlines()
+    assert (code, told[0]) == (0, "paper-designed: nothing is wrong")
+    # sqrt(193.045 / 25.3778518) rad/s
+    assert told[1:] == [
+        "paper-designed: throw.kappa gives the throw, and gravity changes none: it tells which speed that is, 158 deg/s"
+    ]
     assert json.loads(run(capfd, "check", "paper-designed", "--json")[1]) == []
 
 
@@ -225,6 +244,142 @@ def test_all_contradictions_of_one_table_are_told():
     }
 
 
+def with_tables(**tables):
+    return ls.load("paper-designed").as_dict() | tables
+
+
+AT_158 = {"speed": "158 deg/s"}
+GOAL_TOO_FAR = {"oriented_beyond": {"x": "200 in", "side": 2}}
+
+
+@pytest.mark.parametrize(
+    ("tables", "keys"),
+    [
+        # what is wrong in [tolerance] hides nothing beside it, in it neither
+        (
+            {"tolerance": {"throw": {"speed": "1 %"}, "arm.lenght": "1 %", "arm.length": "-1 in"}},
+            ["tolerance.throw", 'tolerance."arm.lenght"', 'tolerance."arm.length"'],
+        ),
+        (
+            {"tolerance": {"throw.speed": 1, "arm.length": "200 %"}, "goal": GOAL_TOO_FAR},
+            ['tolerance."throw.speed"', 'tolerance."arm.length"', "goal.oriented_beyond.x"],
+        ),
+        # a misspelt key is not missing, and what stands there is looked at
+        ({"arm": {"lenght": "28 in", "surface_height": "0 in"}}, ["arm.lenght"]),
+        ({"arm": {"lenght": 28, "surface_height": "0 in"}}, ["arm.lenght", "arm.length"]),
+        ({"throw": {"kapa": "25 in"}, "goal": GOAL_TOO_FAR}, ["throw.kapa", "goal.oriented_beyond.x"]),
+        (
+            {"arm": {"length": "28 in", "lenght": 5, "surface_height": "0 in"}},
+            ["arm.lenght"],
+        ),
+        # what stands in for a refused value is not blamed: a place of 20 in, and no arm at all
+        (
+            {
+                "arm": {"length": "15 in", "surface_height": "0 in"},
+                "goal": {"oriented_beyond": {"x": 20, "side": 2}},
+            },
+            ["goal.oriented_beyond.x"],
+        ),
+        ({"arm": {"length": 28, "surface_height": "0 in"}, "goal": GOAL_TOO_FAR}, ["arm.length"]),
+        # nothing is missing that is only wrong
+        ({"throw": AT_158, "gravity": {"acceleration": "9 m"}}, ["gravity.acceleration"]),
+        ({"throw": AT_158, "gravity": {"acceleration": "-9 m/s^2"}}, ["gravity.acceleration"]),
+        ({"throw": AT_158, "gravity": {"acceleration": "9 m/s^2", "tilt": "3 deg"}}, ["gravity"]),
+        ({"world": {"friction": -1}, "effects": {"slip": True}}, ["world.friction"]),
+        # contradictions of words stand beside all others
+        (
+            {"throw": AT_158 | {"kappa": "25 in"}, "arm": {"length": 28}, "tolerance": {"x": 1}},
+            ["throw", "arm.length", "arm.surface_height", "tolerance.x"],
+        ),
+        ({"throw": AT_158 | {"kappa": "25 in"}, "goal": GOAL_TOO_FAR}, ["throw", "goal.oriented_beyond.x"]),
+        # two in one table, one of its words and one of its values
+        (
+            {"goal": {"oriented_beyond": {"x": "200 in", "side": "two"}}},
+            ["goal.oriented_beyond.side", "goal.oriented_beyond.x"],
+        ),
+    ],
+)
+def test_all_mistakes_are_told_once(tables, keys):
+    assert sorted(error.key for error in problems(with_tables(**tables))) == sorted(keys)
+
+
+PLATE_OF_25_G = tomllib.loads(LEAD)
+
+
+@pytest.mark.parametrize(
+    ("tables", "key", "words"),
+    [
+        # 0.146 m * 0.09 m / 2 * 3.805 kg/m^2 = 25.0 g; 40 kg / 25 g = 1600
+        (PLATE_OF_25_G, "part.mass.points[0].mass", ("'40 kg'", "1600 times the plate, which weighs 25 g")),
+        # 28 in w^2 / (pi 193.045 in/s^2) turns; one turn is at 267 deg/s
+        ({"throw": {"speed": "215 rad/s"}}, "throw.speed", ("'215 rad/s'", "2134 times", "to 267 deg/s")),
+        ({"throw": {"speed": "2.758 deg/s"}}, "throw.speed", ("turns 0.000107 times",)),
+        ({"throw": {"kappa": "25 um"}}, "throw.kappa", ("9055 times", "8.91 in")),
+        ({"arm": {"length": "28 m", "surface_height": "0 in"}}, "arm.length", ("28 m long",)),
+        (
+            {"arm": {"length": "2.8 m", "surface_height": "7 in"}},
+            "arm.surface_height",
+            ("1.04 times the part",),
+        ),
+        ({"gravity": {"acceleration": "193.045 m/s^2"}}, "gravity.acceleration", ("193 m/s^2",)),
+        ({"world": {"throw_rate": "120 Hz"}}, "world.throw_rate", ("120 throws a second",)),
+    ],
+)
+def test_improbable_values_are_told_and_not_refused(capfd, tables, key, words):
+    tree = with_tables(**tables)
+    wrong, doubts = examined(tree)
+    assert not wrong
+    assert [doubt.key for doubt in doubts] == [key]
+    assert all(word in str(doubts[0]) for word in (*words, "usual: ", "has it the right unit?"))
+    ls.dump(ls.load(tree), "odd.toml")
+    code, out, _ = run(capfd, "check", "odd.toml")
+    assert (code, out.splitlines()[0]) == (0, str(doubts[0]._replace(file="odd.toml")))
+    assert out.splitlines()[1] == "odd.toml: nothing is wrong, 1 thing is improbable"
+    code, out, _ = run(capfd, "check", "odd.toml", "--json")
+    (record,) = json.loads(out)
+    assert (code, set(record), record["improbable"]) == (0, documented("check"), True)
+
+
+def test_sizes_in_metres_are_improbable():
+    tree = with_tables(arm={"length": "28 m", "surface_height": "-0.2 m"})
+    tree["part"]["sides"] = ["5.75 m", "3.6 m", "6.75 m"]
+    tree["part"]["mass"]["center"] |= {"along": "4.2 m", "above": "0.7 m"}
+    tree["throw"] = {"kappa": "25 m"}
+    tree["goal"]["oriented_beyond"]["x"] = "20 m"
+    keys = ["part.sides", "arm.length", "part.mass.radius_of_gyration"]  # that one is in inches still
+    assert [doubt.key for doubt in examined(tree)[1]] == keys
+
+
+def test_a_mistake_beside_the_throw_hides_nothing_improbable():
+    tree = with_tables(throw={"speed": "215 rad/s"}, tolerance={"throw.sped": "1 %"})
+    wrong, doubts = examined(tree)
+    assert [error.key for error in wrong] == ['tolerance."throw.sped"']
+    assert [doubt.key for doubt in doubts] == ["throw.speed"]
+    # of a throw in the place of a wrong one nothing is said
+    assert examined(with_tables(throw={"speed": "215 rad"}))[1] == ()
+
+
+def test_a_length_that_is_in_the_way_twice_is_told_once():
+    tree = with_tables(arm={"length": "0 in", "surface_height": "0 in"})  # 1 in in its place is too short
+    tree["part"]["mass"]["radius_of_gyration"] = "-1 in"
+    wrong, doubts = examined(tree)
+    assert [error.key for error in wrong] == ["arm.length", "part.mass.radius_of_gyration"]
+    assert doubts == ()  # of what stands in its place
+
+
+@pytest.mark.parametrize("density", ["78.5 kg/m^2", "7850 kg/m^3", "0.5 kg/m^2"])
+def test_usual_plates_are_not_improbable(density):
+    tree = tomllib.loads(LEAD.replace('mass = "40 kg"', 'mass = "40 g"').replace("3.805 kg/m^2", density))
+    if density.endswith("3"):
+        tree["part"]["mass"]["plate_thickness"] = "1 mm"
+    assert examined(tree) == ((), ())
+
+
+@pytest.mark.parametrize("name", ls.scenes())
+def test_built_in_scenes_are_neither_wrong_nor_improbable(name):
+    assert examined(name) == ((), ())
+
+
 def test_a_new_scene_in_millimetres_is_the_same_feeder(capfd, tmp_path):
     file = tmp_path / "mine.toml"
     assert run(capfd, "new", str(file), "--unit", "mm")[0] == 0
@@ -243,6 +398,8 @@ def test_a_new_scene_in_millimetres_is_the_same_feeder(capfd, tmp_path):
     ("words", "said"),
     [
         (("throw", "paper-designed", "--x", "8", "--side", "two"), "'two' is not a whole number"),
+        (("margin", "paper-designed", "--sped", "1"), "; limitsets margin --help lists what there is"),
+        (("analyze", "paper-designed"), "; limitsets --help lists what there is"),
         (("plot", "paper-designed", "limitset"), "did you mean 'limit-set'?"),
         (("analyse", "paper-designed", "throw.speed=150"), "scene.with_values({'throw.speed': '150 UNIT'})"),
         (("analyse", "paper-designed", "--set", "throw.speed=150 deg/s"), "write it into the scene's file"),

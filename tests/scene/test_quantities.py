@@ -54,6 +54,7 @@ SETTABLE = {
 }
 
 
+@pytest.mark.filterwarnings("ignore:.gravity. changes no throw")  # of a scene that is given by kappa
 @given(st.data(), st.sampled_from(sorted(SETTABLE)))
 def test_what_is_set_is_what_is_read(data: st.DataObject, name: str) -> None:
     # 0, or a size that a scene may hold: below 1e-300 it says so
@@ -95,10 +96,22 @@ def test_speed_and_kappa_replace_each_other() -> None:
 
 
 def test_tilt_and_acceleration_replace_each_other() -> None:
-    tilted = DESIGNED.with_values({"gravity.tilt": "90 deg"})
+    with pytest.warns(UserWarning, match="changes no throw beside throw.kappa"):
+        tilted = DESIGNED.with_values({"gravity.tilt": "90 deg"})
     assert tilted.gravity == 9.80665 / 0.0254
     assert tilted.as_dict()["gravity"] == {"tilt": "90 deg"}
     assert tilted.kappa == DESIGNED.kappa  # the scene is given by kappa
+
+
+def test_another_gravity_is_told_of_only_where_it_is_without_effect() -> None:
+    # the same, in other words
+    assert DESIGNED.with_values({"gravity.tilt": "30 deg"}).kappa == DESIGNED.kappa
+    assert DESIGNED.with_values({"gravity.tilt": "90 deg", "throw.kappa": "25 in"}).kappa == 25.0
+    by_speed = DESIGNED.with_values({"throw.speed": "158 deg/s"})
+    assert by_speed.with_values({"gravity.tilt": "90 deg"}).kappa > 1.9 * by_speed.kappa
+    without = DESIGNED.as_dict()
+    del without["gravity"]
+    assert load(without).with_values({"gravity.tilt": "30 deg"}).kappa == DESIGNED.kappa
 
 
 def test_text_keeps_its_unit_and_the_scene_its_own() -> None:

@@ -352,6 +352,18 @@ def test_events_as_json():
     assert event["kind"] == "border collision"
     assert event["collision"]["itinerary"] == ["right"] or event["collision"]["itinerary"] == ["left"]
     assert event["collision"]["start"] is None
+    assert "words" not in event
+
+
+@pytest.mark.parametrize(
+    ("unit", "per_degree"), [("deg/s", 1.0), ("rad/s", np.pi / 180.0), ("rpm", 1.0 / 6.0)]
+)
+def test_events_are_told_in_the_units_of_the_scene(unit, per_degree):
+    scene = ls.load("paper-designed").with_values({"throw.speed": f"{158.0 * per_degree!r} {unit}"})
+    found = ls.continuation(scene, {"throw.speed": ("150 deg/s", "190 deg/s")}, steps=2)
+    event = found.events[0]
+    value = np.degrees(event.values[0]["throw.speed"]) * per_degree
+    assert f"at throw.speed = {value:.10g} {unit}" in str(event)
 
 
 def test_progress_is_told():

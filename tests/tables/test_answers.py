@@ -23,7 +23,9 @@ def found(graph):
 
 
 def shown(answer):
-    """Tables of an answer as texts, from its HTML."""
+    """Tables of an answer as texts, from its HTML; its name is a line."""
+    assert "\n" not in repr(answer)
+    assert len(repr(answer)) <= 250
     tree = ET.fromstring(f"<div>{answer._repr_html_()}</div>")
     tables = tree.findall("table")
     assert tables

@@ -59,7 +59,8 @@ class _Between(NamedTuple):
         values = self.before.place.values, self.after.place.values
         before = tuple(self.old[position] for position in group.before)
         after = tuple(self.new[position] for position in group.after)
-        return Event(kind, t, values, before, after, change, jump, None if met is None else met.collision)
+        collision = None if met is None else met.collision
+        return Event(kind, t, values, before, after, change, jump, collision, self.before.place.words)
 
     def of_group(self, group: Group, met: Met | None) -> Event | None:
         """Tell what happens to one group of attractors, None for nothing."""
@@ -103,6 +104,7 @@ def events_of(follower: Follower, numbers: list[list[int]]) -> tuple[Event, ...]
     for met in follower.met:
         if place_of[met.t[1]] != place_of[met.t[0]] + 1:  # a touch, with steps in its bracket
             number = numbers[place_of[met.owner[0]]][met.owner[1]]
-            values = follower.at(met.t[0]).place.values, follower.at(met.t[1]).place.values
-            found.append(Event(met.kind, met.t, values, (number,), (number,), "", 0.0, met.collision))
+            one, other = (follower.at(t).place for t in met.t)
+            values, words = (one.values, other.values), one.words
+            found.append(Event(met.kind, met.t, values, (number,), (number,), "", 0.0, met.collision, words))
     return tuple(sorted(found, key=lambda event: event.t))

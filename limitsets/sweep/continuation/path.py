@@ -16,6 +16,7 @@ from limitsets.maps import coerce, domain_of, has_slope, kind_of
 from limitsets.maps.contract import require_dimension
 from limitsets.scene import Scene
 from limitsets.scene.quantities import in_units
+from limitsets.scene.spelling import in_unit_of, unit_of
 from limitsets.sets.interval_map import IntervalMap
 
 __all__ = ["LEAVING", "Border", "Curve", "Path", "Place", "read_path"]
@@ -58,6 +59,8 @@ class Place:
         Where on the path.
     values : dict of str to float
         The values that the path sets.
+    words : str
+        Likewise, as people read them: a scene's in the units of its text.
     params : NamedTuple
         The map.
     domain : Domain
@@ -66,6 +69,7 @@ class Place:
 
     t: float
     values: dict[str, float]
+    words: str
     params: Any
     domain: Domain
 
@@ -137,6 +141,10 @@ def _straight(ends: Mapping[str, tuple[float, float]]) -> Callable[[float], dict
     return values
 
 
+def _words(values: Mapping[str, str]) -> str:
+    return ", ".join(f"{name} = {value}" for name, value in values.items())
+
+
 def _ends(path: Curve) -> dict[str, tuple[Any, Any]] | None:
     """Read first and last values of a straight path; None for a function."""
     if callable(path):
@@ -164,7 +172,11 @@ def _of_scene(scene: Scene, path: Curve) -> Path:
     def at(t: float) -> Place:
         values = read(curve(t))
         there = scene.with_values(values)
-        return Place(t, values, there.map, there.domain)
+        written = {
+            name: f"{in_unit_of(scene, name, value):.10g} {unit_of(scene, name)}"
+            for name, value in values.items()
+        }
+        return Place(t, values, _words(written), there.map, there.domain)
 
     return Path(scene.name, scene.unit, at)
 
@@ -190,7 +202,7 @@ def _of_map(params: Any, path: Curve, domain: Any) -> Path:
         there = coerce(there)
         kept = given if isinstance(given, Mapping) else there._asdict()
         values = {name: float(value) for name, value in kept.items() if np.ndim(value) == 0}
-        return Place(t, values, there, box)
+        return Place(t, values, _words({name: f"{value:.10g}" for name, value in values.items()}), there, box)
 
     return Path(kind_of(params).name, None, at)
 

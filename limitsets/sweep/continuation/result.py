@@ -117,6 +117,8 @@ class Event:
         gained; None where more than one attractor is concerned.
     collision : Collision or None
         Of a border collision or a touch, and of a birth or death at which an end leaves the domain.
+    words : str
+        The values at the lower end, as people read them: a scene's in the units of its text.
     """
 
     kind: str
@@ -127,12 +129,12 @@ class Event:
     change: str
     jump: float | None
     collision: Collision | None
+    words: str
 
     def __str__(self) -> str:
-        at = ", ".join(f"{name} = {value:.10g}" for name, value in self.values[0].items())
         told = [self.change] if self.change else []
         told += [str(self.collision)] if self.collision else []
-        return f"{self.kind} at {at}" + (f": {'; '.join(told)}" if told else "")
+        return f"{self.kind} at {self.words}" + (f": {'; '.join(told)}" if told else "")
 
 
 @dataclass(frozen=True, eq=False)
@@ -185,7 +187,9 @@ class Continuation(Tabled):
             for k, t in enumerate(self.t.tolist())
         ]
         events = [
-            picked(e, *Event.__dataclass_fields__) | {"collision": _table(e.collision)} for e in self.events
+            picked(e, "kind", "t", "values", "before", "after", "change", "jump")
+            | {"collision": _table(e.collision)}
+            for e in self.events
         ]
         return as_table(**picked(self, "name", "unit", "evaluations"), steps=steps, events=events)
 

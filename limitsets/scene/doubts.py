@@ -1,0 +1,131 @@
+"""What is improbable in a scene: values that most often have a wrong unit.  They are told, and not refused."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from typing import Any, NamedTuple, TypeAlias
+
+from limitsets.geometry.mass import mass_of
+from limitsets.scene.scene import MOST_TURNS, Scene, turns
+from limitsets.scene.units import convert, density_dimension, exact_factor, parse
+
+__all__ = ["Doubt", "doubts"]
+
+# As MOST_TURNS on the other side: a speed in deg/s that was meant in rad/s turns a part by 1/3000 of what is usual.
+LEAST_TURNS = 0.005
+USUAL_TURNS = (0.05, 1)
+
+
+class Doubt(NamedTuple):
+    """An improbable value, in the words of an error.
+
+    Parameters
+    ----------
+    key : str
+        Where it stands.
+    thing, value : str
+        What it comes to, and how it is written.
+    allowed, remedy : str
+        What is usual, and what to look at.
+    file : str or None
+        The file.
+    """
+
+    key: str
+    thing: str
+    value: str
+    allowed: str
+    remedy: str
+    file: str | None
+
+    def __str__(self) -> str:
+        place = f"{self.file}: {self.key}" if self.file else self.key
+        return f"{place}: careful, {self.value!r}: {self.thing}; usual: {self.allowed}; {self.remedy}"
+
+
+# Key, value as written, what is measured of it, least and largest that is believed, what it comes to, what is usual.
+Row: TypeAlias = tuple[str, str, float, float, float, str, str]
+
+
+def doubts(scene: Scene) -> tuple[Doubt, ...]:
+    """Find what is improbable in a scene: the first of each key.
+
+    Examples
+    --------
+    >>> from limitsets.scene import load
+    >>> doubts(load("paper-designed"))
+    ()
+    >>> doubts(load("paper-designed").with_values({"arm.surface_height": "-0.2 m"}))[0].thing
+    "1.17 times the part's longest side"
+    """
+    found: dict[str, Doubt] = {}
+    for key, value, measured, least, most, thing, usual in _rows(scene):
+        if not least <= measured <= most:
+            thing = thing.format(f"{measured:.3g}" if measured < 1000 else f"{measured:.0f}")
+            found.setdefault(key, Doubt(key, thing, value, usual, "has it the right unit?", scene.file))
+    return tuple(found.values())
+
+
+def _rows(scene: Scene) -> Iterator[Row]:
+    """Give what is measured of a scene."""
+    text, unit, metre = scene.text, scene.unit, float(exact_factor(scene.unit, "m"))
+    part, throw, mass = text["part"], text["throw"], text["part"]["mass"]
+    arm, size, over = scene.arm_length, float(scene.sides.length.max()), "{} times the part's longest side"
+    shape = "part.sides" if "sides" in part else "part.vertices"
+    yield shape, f"{size:.4g} {unit}", size * metre, 1e-4, 1.0, "the longest side is {} m", "1 mm to 0.5 m"
+    yield "arm.length", text["arm"]["length"], arm * metre, 1e-3, 3.0, "the arm is {} m long", "1 cm to 2 m"
+    yield "arm.length", text["arm"]["length"], arm / size, 0.0, 40.0, over, "2 to 10 times"
+    height = abs(scene.surface_height) / size
+    yield "arm.surface_height", text["arm"]["surface_height"], height, 0.0, 1.0, over, "below 0.5 times"
+    if "center" in mass:
+        reach = max(math.dist(scene.centre, vertex) for vertex in scene.vertices.tolist())
+        key, radius = "part.mass.radius_of_gyration", scene.radius_of_gyration / reach
+        said = "{} times the way from the centre of mass to the farthest vertex"
+        yield key, mass["radius_of_gyration"], radius, 0.02, 1.0, said, "0.2 to 0.7 times"
+    else:
+        yield from _rows_of_plate(mass, (scene.vertices * metre).tolist(), size * metre)
+    if scene.gravity is not None:
+        ((word, given),) = text["gravity"].items()
+        pull = scene.gravity * metre
+        said = "gravity in the plane of the motion is {} m/s^2"
+        yield f"gravity.{word}", given, pull, 0.3, 11.0, said, "0.5 to 9.81 m/s^2"
+    ((word, given),) = throw.items()
+    speeds = [f"{_in_words(scene, word, share):.3g}" for share in USUAL_TURNS]
+    here = f"{USUAL_TURNS[0]} to {USUAL_TURNS[1]} times, here {' to '.join(speeds)}"
+    unit_of_throw = "deg/s" if word == "speed" else unit
+    said = "a part thrown from the arm's end turns {} times before it lands"
+    turned = turns(arm, scene.kappa)
+    yield f"throw.{word}", given, turned, LEAST_TURNS, MOST_TURNS, said, f"{here} {unit_of_throw}"
+    if "throw_rate" in text.get("world", {}):
+        rate = scene.world.more["throw_rate"]
+        given, said = text["world"]["throw_rate"], "{} throws a second"
+        yield "world.throw_rate", given, rate, 0.01, 20.0, said, "0.1 to 10"
+
+
+def _in_words(scene: Scene, word: str, turned: float) -> float:
+    """Give kappa [length], or the speed [deg/s], with which a part thrown from the arm's end turns so often."""
+    kappa = scene.kappa * turns(scene.arm_length, scene.kappa) / turned
+    if word == "kappa" or scene.gravity is None:
+        return kappa
+    return math.degrees(math.sqrt(scene.gravity / kappa))
+
+
+def _rows_of_plate(mass: Mapping[str, Any], vertices: list[Any], size: float) -> Iterator[Row]:
+    """Give what is measured of a plate with point masses; vertices and size in metres."""
+    text, thickness = mass["plate_density"], 1.0
+    volume = density_dimension(text) == "mass per volume"
+    unit = "kg/m^3" if volume else "kg/m^2"
+    density = convert(parse(text, density_dimension(text)), unit)
+    least, most, usual = (10.0, 25e3, "500 to 8000 kg/m^3") if volume else (0.02, 1e3, "0.5 to 80 kg/m^2")
+    yield "part.mass.plate_density", text, density, least, most, f"the plate has {{}} {unit}", usual
+    if volume:
+        thickness = convert(parse(mass["plate_thickness"], "length"), "m")
+        said = "{} times the part's longest side"
+        key = "part.mass.plate_thickness"
+        yield key, mass["plate_thickness"], thickness / size, 0.0, 1.0, said, "below 0.2 times"
+    plate = mass_of(vertices, density * thickness).mass
+    said = f"{{}} times the plate, which weighs {1000.0 * plate:.3g} g"
+    for k, point in enumerate(mass.get("points", ())):
+        given, key = point["mass"], f"part.mass.points[{k}].mass"
+        yield key, given, convert(parse(given, "mass"), "kg") / plate, 0.0, 30.0, said, "up to a few times it"
