@@ -4,7 +4,9 @@ paper-designed, X = 20 in.  The highest place off side 2 is that of a jog from j
 side 0.  Fixed but unknown, both throws have one speed; at every throw another, each the worst it can have.
 """
 
+import json
 import math
+import zipfile
 from functools import cache
 
 import numpy as np
@@ -390,3 +392,19 @@ def test_a_scene_whose_starts_need_more_cells_has_a_margin():
     (speed,) = ls.margin(FROM_AFAR, "throw.speed", reading="fixed", width=0.5)
     assert speed.proved > 0.02
     assert speed.refuted > speed.proved
+
+
+@pytest.mark.sweep
+def test_pieces_below_and_above_the_joint_claim_no_start_before_the_cells(tmp_path):
+    """Across the joint nothing is proved of the starts before the cells: then nothing is claimed of them above it."""
+    tree = ls.load("paper-designed").as_dict()
+    tree["arm"]["surface_height"], tree["goal"]["oriented_beyond"]["x"] = "-0.02 in", "22 in"
+    (found,) = ls.margin(ls.load(tree), "arm.surface_height", width=0.2)
+    near = ["near_joint" in piece.answers[0].section for piece in found.pieces]
+    assert True in near
+    assert False in near
+    header = json.loads(zipfile.ZipFile(found.save(tmp_path, recheck=False)[0]).read("header.json"))
+    starts = header["claims"][0]["section"]["starts"]["from"]
+    for piece in found.pieces:
+        first = [float(edges[0]) for (edges,) in piece.found.cover.grid.edges]
+        assert all(float.fromhex(x) >= first[int(side)] for side, x in starts.items())
