@@ -267,6 +267,14 @@ def test_a_stored_atlas_is_shown_and_a_point_of_it_opened(tmp_path):
     page.close()
 
 
+def test_the_address_is_printed(monkeypatch, capsys):
+    monkeypatch.setattr(
+        "limitsets.explorer.visits.serve", lambda page, title, ready, **_: ready("http://127.0.0.1:7")
+    )
+    ls.explore(ls.maps.Henon()).show(show=False)
+    assert capsys.readouterr().out == "explorer: http://127.0.0.1:7 (Ctrl-C ends it)\n"
+
+
 def test_any_other_address_needs_the_names_of_who_may_come():
     with pytest.raises(LimitsetsError, match="allowed origins"):
         ls.explore(ls.maps.Henon()).show(address="0.0.0.0", show=False)
