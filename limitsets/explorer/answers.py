@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from html import escape
 from typing import Any
 
-from limitsets.explorer.estimates import CELLS, Estimate
+from limitsets.explorer.estimates import CELLS, Estimate, Points
 from limitsets.explorer.knobs import Knob
 from limitsets.explorer.pictures import look_of
 from limitsets.goals import Goal
@@ -14,7 +14,7 @@ from limitsets.maps import codes
 from limitsets.plot.style import interval_text
 from limitsets.report.goals import goal_sentence
 
-__all__ = ["KEY", "careful_line", "error_line", "estimate_words", "proof_words"]
+__all__ = ["KEY", "careful_line", "error_line", "estimate_words", "points_words", "proof_words"]
 
 KEY = (
     '<p class="how">Bars: limit sets. Strips: where starts lead, hatched unless to limit set 0. Strokes r: critical '
@@ -66,6 +66,14 @@ def estimate_words(found: Estimate, goal: Goal | None, unit: str) -> str:
         rows.append((f"goal: {escape(goal_sentence(goal, unit))}", _goal_words(found, unit)))
     how = f"from {CELLS} cells a side" + (", ends from the compiled loop of the atlas" if found.sharp else "")
     return _table("Estimated (follows the sliders, proves nothing)", rows, how)
+
+
+def points_words(found: Points) -> str:
+    """Say how many orbits of a map of two or three dimensions stay, and where the others go."""
+    stay = found.starts - sum(found.gone.values())
+    rows = [("stay", f"{stay} of {found.starts} orbits")]
+    rows += [("leave", f"{count} of {found.starts} orbits {where}") for where, count in found.gone.items()]
+    return _table("Estimated (follows the sliders, proves nothing)", rows, "from a few starts")
 
 
 def _goal_words(found: Estimate, unit: str) -> str:

@@ -5,6 +5,7 @@ import math
 import subprocess
 import sys
 import time
+from typing import NamedTuple
 
 import pytest
 
@@ -225,6 +226,58 @@ def test_a_map_of_two_dimensions_is_its_points_and_a_bad_parameter_a_line():
     assert len(page.points._points.data["x"]) == 0
     page.sliders._typed(page.sliders.knobs[0], "much")
     assert "wrong" in page._error.object
+
+
+class Spot(NamedTuple):
+    at: float
+
+
+def spot(params, x, side):  # the fixed point is (at, -at)
+    return (0.5 * (x[0] + params.at), 0.5 * (x[1] - params.at)), side, 0
+
+
+class Wide(NamedTuple):
+    a: float
+
+
+def wide(params, x, side):  # nearly |x_0| = |a|: its cycle of two
+    return (-params.a if x[0] > 0 else params.a, 0.5 * x[1]), side, 0
+
+
+def test_the_window_follows_the_points_of_a_plane_map():
+    ls.register(Spot, image=spot, dimension=2)
+    page = ls.explore(Spot(1.0), domain=[(-2, 2), (-2, 2)]).page()
+    for at, there in ((1.0, 0), (1.01, 0), (7.0, 1), (7.02, 1), (-40.0, 2)):
+        page.sliders.put({"at": at})
+        page.beat()
+        (x0, x1), (y0, y1) = page.points.canvas.view["x"], page.points.canvas.view["y"]
+        assert x0 < at < x1
+        assert y0 < -at < y1
+        if there == 0:
+            first = x0, x1
+            continue
+        kept, first = first, (x0, x1)
+        assert (kept == first) == (at == 7.02)  # a small move does not move the window
+
+
+def test_the_window_shrinks_to_points_that_would_be_lost_in_it():
+    ls.register(Wide, image=wide, dimension=2)
+    page = ls.explore(Wide(100.0), domain=[(-2, 2), (-2, 2)]).page()
+    assert page.points.canvas.view["x"] == [-200.0, 200.0]
+    for a, shown in ((60.0, 200.0), (20.0, 40.0)):
+        page.sliders.put({"a": a})
+        page.beat()
+        assert page.points.canvas.view["x"] == [-shown, shown]
+
+
+def test_where_orbits_go_that_do_not_stay_is_said():
+    page = ls.explore(ls.maps.Henon()).page()
+    page.sliders.put({"a": 5.0})
+    page.beat()
+    page._wrote = -1.0  # text is written a few times a second
+    page.beat()
+    assert "0 of 8 orbits" in page._said.object
+    assert "8 of 8 orbits pass x_0 = -" in page._said.object
 
 
 def test_a_map_of_one_dimension_has_lanes():
