@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from html import escape
 from typing import Any
 
+from limitsets.analysis import in_limit_sets, other_vertex_first
 from limitsets.explorer.estimates import CELLS, Estimate, Points
 from limitsets.explorer.knobs import Knob
 from limitsets.explorer.pictures import look_of
@@ -13,6 +14,7 @@ from limitsets.goals import Goal
 from limitsets.maps import codes
 from limitsets.plot.style import interval_text
 from limitsets.report.goals import goal_sentence
+from limitsets.scene import Scene
 
 __all__ = ["KEY", "careful_line", "error_line", "estimate_words", "points_words", "proof_words"]
 
@@ -34,15 +36,22 @@ def error_line(error: object) -> str:
     return f'<p role="alert" class="wrong">{escape(str(error))}</p>' if error else '<p role="alert"></p>'
 
 
-def careful_line(found: Estimate) -> str:
-    """Say from how many starts a throw is outside the model, if from any."""
+def careful_line(found: Estimate, scene: Scene) -> str:
+    """Say from how many starts a throw is outside the model, and of which throws of the limit sets the model is wrong."""
+    lines = []
     share = dict(found.shares).get(codes.OUTSIDE_MODEL, 0.0)
-    if not share:
-        return ""
-    return (
-        f'<p class="wrong">careful: from {100 * share:.3g} % of the starts the part comes to a throw that is outside '
-        "the model: it has not landed within a full turn</p>"
-    )
+    if share:
+        lines.append(
+            f"from {100 * share:.3g} % of the starts the part comes to a throw that is outside the model: it has not "
+            "landed within a full turn"
+        )
+    broken = ", ".join(map(str, in_limit_sets(other_vertex_first(scene), found.sets)))
+    if broken:
+        lines.append(
+            f"of some throws of the limit set from side {broken} another vertex lands first, and the model does not "
+            "describe them"
+        )
+    return "".join(f'<p class="wrong">careful: {line}</p>' for line in lines)
 
 
 def estimate_words(found: Estimate, goal: Goal | None, unit: str) -> str:

@@ -157,7 +157,7 @@ class ScenePage:
         if not self._told and time.monotonic() - self._wrote > WORDS:
             self._told, self._wrote = True, time.monotonic()
             self.sliders.tell()
-            self._careful.object = careful_line(self._found)
+            self._careful.object = careful_line(self._found, self.scene)
             self._estimated.object = estimate_words(self._found, self.scene.goal, self.scene.unit)
         for picture in (self.lanes, self.part, self.arm):
             picture.canvas.send()

@@ -149,6 +149,26 @@ def test_throws_outside_the_model_are_said(page):
     assert "careful: from 100 % of the starts" in page._careful.object
 
 
+def test_throws_of_the_limit_set_that_land_on_another_vertex_are_said(page):
+    assert page._careful.object == ""
+    page._wrote = -1.0
+    page.sliders.put({"throw.speed": 170.0})
+    page.beat()
+    _, reach = page._found.sets[0][0][-1]
+    assert ls.analysis.other_vertex_first(page.scene)[0][0][0] < reach  # on side 0 alone
+    assert "careful: of some throws of the limit set from side 0 another vertex lands first" in page._careful.object
+
+
+def test_a_point_mass_has_a_slider(page):
+    page.open(ls.load(LEAD))
+    page.sliders.put({"part.mass.points[0].mass": 16.0})
+    page.beat()
+    assert page.part._heavy.data["words"] == ["16 g"]
+    plate, lead = 3.0 * 0.03 * 0.02 / 2, 0.016  # kg; the plate's centroid is at (10, 20/3) mm
+    x = (plate * 10.0 + lead * 20.0) / (plate + lead)
+    assert page.scene.centre[0] == pytest.approx(x)
+
+
 def test_what_a_browser_sends_as_a_place_may_be_anything(page):
     for sent in (
         None,
