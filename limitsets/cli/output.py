@@ -110,6 +110,9 @@ Csv = Annotated[
 ]
 
 
+# Columns of a line in a pipe: more than any table has.
+LONGEST = 100_000
+
 # A longer table is printed by ourselves: rich takes a second for four thousand rows.
 LONG = 500
 
@@ -125,13 +128,13 @@ def table(heads: Sequence[str], rows: Sequence[Sequence[object]]) -> None:
     from rich.table import Table
 
     # rich asks the terminal, or COLUMNS; where neither says anything lines are as long as they are
-    wide = None if sys.stdout.isatty() or os.environ.get("COLUMNS") else 200
+    told = sys.stdout.isatty() or bool(os.environ.get("COLUMNS"))
     grid = Table(box=SIMPLE_HEAD, pad_edge=False)
     for head in heads:
-        grid.add_column(escape(head), no_wrap=wide is not None)
+        grid.add_column(escape(head), no_wrap=not told)
     for row in rows:
         grid.add_row(*(escape(str(cell)) for cell in row))
-    Console(width=wide).print(grid)
+    Console(width=None if told else LONGEST).print(grid)
 
 
 def show(found: Table) -> None:
