@@ -290,6 +290,15 @@ def test_the_window_shrinks_to_points_that_would_be_lost_in_it():
         assert page.points.canvas.view["x"] == [-shown, shown]
 
 
+def test_a_cycle_is_drawn_so_that_it_is_seen():
+    page = ls.explore(ls.maps.Henon(0.3, 0.3)).page()
+    x = ((0.3 - 1) + math.sqrt(0.49 + 4 * 0.3)) / (2 * 0.3)  # Henon's fixed point
+    assert page.points._spots.data["x"] == [pytest.approx(x)]
+    page.sliders.put({"a": 1.4})
+    page.beat()
+    assert page.points._spots.data["x"] == []
+
+
 def test_where_orbits_go_that_do_not_stay_is_said():
     page = ls.explore(ls.maps.Henon()).page()
     page.sliders.put({"a": 5.0})
