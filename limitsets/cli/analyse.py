@@ -65,8 +65,8 @@ def _announce(plan: Plan) -> None:
 
 
 def _text(analysis: Analysis, page: Path) -> None:
-    from limitsets.report.goals import after_undecided, next_command, verdict_of, void_of
     from limitsets.analysis import in_limit_sets
+    from limitsets.report.goals import after_undecided, next_command, verdict_of, void_of
     from limitsets.report.tables import count, intervals, percent
 
     unit = analysis.scene.unit

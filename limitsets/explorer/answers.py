@@ -37,7 +37,7 @@ def error_line(error: object) -> str:
 
 
 def careful_line(found: Estimate, scene: Scene) -> str:
-    """Say from how many starts a throw is outside the model, and of which throws of the limit sets the model is wrong."""
+    """Say from how many starts a throw is outside the model, and for which throws of a limit set the model is wrong."""
     lines = []
     share = dict(found.shares).get(codes.OUTSIDE_MODEL, 0.0)
     if share:

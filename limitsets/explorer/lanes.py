@@ -117,11 +117,13 @@ class PointsPicture:
         self.canvas.view |= dict(zip("xy", ends.T.tolist(), strict=True))
 
     def show(self, points: Array) -> None:
-        """Draw them; each axis follows them once they come to its end, or fill less than a quarter of what they could."""
+        """Draw them; an axis follows once they come to its end, or fill less than a quarter of what they could."""
         if len(points):
             lo, hi = points[:, :2].min(axis=0), points[:, :2].max(axis=0)
             room = 0.5 * np.maximum(hi - lo, 0.1 * self._size)
-            for axis, (first, last), *ends in zip("xy", self._seen(), lo, hi, lo - room, hi + room, strict=True):
+            for axis, (first, last), *ends in zip(
+                "xy", self._seen(), lo, hi, lo - room, hi + room, strict=True
+            ):
                 low, high, fresh_low, fresh_high = ends
                 if low < first or high > last or last - first > 4.0 * (fresh_high - fresh_low):
                     self.canvas.view[axis] = [float(fresh_low), float(fresh_high)]

@@ -89,7 +89,7 @@ class Explorer(pn.viewable.Viewer):  # type: ignore[misc]  # panel is not follow
         """Show it in a notebook, where Panel is not loaded yet with scripts that come from no other server."""
         if not in_notebook():
             return None
-        if not pn.extension._loaded:
+        if not pn.extension._loaded:  # noqa: SLF001 - Panel says it nowhere else
             pn.extension(inline=True)
         self._compile()
         return super()._repr_mimebundle_(include, exclude)
@@ -135,9 +135,7 @@ class Explorer(pn.viewable.Viewer):  # type: ignore[misc]  # panel is not follow
             The port is taken, or nobody is allowed to come.
         """
         self._compile()
-        serve(
-            self.__panel__, self.title, address=address, port=port, origins=origins, show=show, ready=ready
-        )
+        serve(self.__panel__, self.title, address=address, port=port, origins=origins, show=show, ready=ready)
 
 
 def _beating(beat: Callable[[], None]) -> None:

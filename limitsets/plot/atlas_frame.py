@@ -85,19 +85,22 @@ def hatched(
 
 
 def goal_line(axes: Axes, found: Atlas) -> list[Any]:
-    """Draw where the scene's goal begins or ceases to hold, with ticks on the side where it fails; its entry of a legend."""
+    """Draw where the scene's goal begins or ceases to hold, ticks where it fails; the entry of a legend."""
     data = found.dataset
     if "threshold" not in data:
         return []
-    from limitsets.goals import OrientedBeyond
+    from limitsets.goals import OrientedBeyond, Reaches
     from limitsets.scene import load
 
     goal = load(data.attrs["scene"]).goal
+    assert isinstance(goal, OrientedBeyond | Reaches)  # the others have no threshold
     over = (data["threshold"].values - goal.x) * (1 if isinstance(goal, OrientedBeyond) else -1)
     fails = over[np.isfinite(over)] > 0.0
     if fails.all() or not fails.any():
         word = "fails" if fails.any() else "holds"
-        return [Patch(label=f"the goal {word} wherever there is a limit set", alpha=0.0)] if fails.size else []
+        return (
+            [Patch(label=f"the goal {word} wherever there is a limit set", alpha=0.0)] if fails.size else []
+        )
     ticks: dict[str, Any] = {"spacing": 8.0, "length": 0.6}
     looks = [Stroke(linewidth=3.2, foreground="white"), Normal()]
     names = found.axes
@@ -117,7 +120,9 @@ def goal_line(axes: Axes, found: Atlas) -> list[Any]:
             effects = [*looks, withTickedStroke(angle=angle, **ticks)]
             axes.axvline(at, color=style.GOAL, lw=1.6, zorder=4, gid="goal", path_effects=effects)
     ticked = [withTickedStroke(angle=-90, **ticks)]
-    return [style.key("the goal fails on the side of the ticks", color=style.GOAL, lw=1.6, path_effects=ticked)]
+    return [
+        style.key("the goal fails on the side of the ticks", color=style.GOAL, lw=1.6, path_effects=ticked)
+    ]
 
 
 def mark(axes: Axes, found: Atlas) -> list[Any]:

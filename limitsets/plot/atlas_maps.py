@@ -22,7 +22,15 @@ from limitsets.arguments import arguments_checked
 from limitsets.errors import AnswerError
 from limitsets.plot import style
 from limitsets.plot.atlas_frame import frame, goal_line, hatched, mark, pixels, title_of
-from limitsets.sweep.classes import UNDECIDED, AttractorKind, Entry, is_classified, legend, named_class, numbers_of
+from limitsets.sweep.classes import (
+    UNDECIDED,
+    AttractorKind,
+    Entry,
+    is_classified,
+    legend,
+    named_class,
+    numbers_of,
+)
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -69,9 +77,9 @@ def look_of(number: int, name: str) -> dict[str, Any]:
         return {"facecolor": face, "hatch": hatch}
     parts = sum(sum(each.bands) for each in found.attractors)
     share = 0.0 if any(each.period for each in found.attractors) else DARKER
-    lap, face = divmod(parts + 2 * len(found.attractors) - 3, len(FACES))
+    lap, hue = divmod(parts + 2 * len(found.attractors) - 3, len(FACES))
     light = LIGHTER[(lap + sum(map(_spread, found.attractors))) % len(LIGHTER)]
-    colour = (1.0 - share) * np.array(to_rgb(FACES[face])) + share * np.array(to_rgb(style.INK))
+    colour = (1.0 - share) * np.array(to_rgb(FACES[hue])) + share * np.array(to_rgb(style.INK))
     mixed = (1.0 - light) * colour + light
     return {"facecolor": tuple(round(each, 4) for each in mixed.tolist()), "hatch": hatch}
 

@@ -156,7 +156,10 @@ def test_throws_of_the_limit_set_that_land_on_another_vertex_are_said(page):
     page.beat()
     _, reach = page._found.sets[0][0][-1]
     assert ls.analysis.other_vertex_first(page.scene)[0][0][0] < reach  # on side 0 alone
-    assert "careful: of some throws of the limit set from side 0 another vertex lands first" in page._careful.object
+    assert (
+        "careful: of some throws of the limit set from side 0 another vertex lands first"
+        in page._careful.object
+    )
 
 
 def test_a_point_mass_has_a_slider(page):

@@ -1,6 +1,7 @@
 """Maps and surfaces of an atlas: pixels, colours, words and marks against the numbers."""
 
 import math
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -161,15 +162,17 @@ def test_the_map_has_a_line_where_the_goal_ends_with_ticks_where_it_fails(goal):
     checked = 0
     for path in line.get_paths():
         shown = figure.axes[0].transData.transform(path.vertices)
-        for (x0, y0), (x1, y1) in zip(shown[:-1], shown[1:], strict=True):
+        for (x0, y0), (x1, y1) in pairwise(shown):
             size = math.hypot(x1 - x0, y1 - y0)
             if size < 1.0:
                 continue
             turned = complex(x1 - x0, y1 - y0) / size * complex(math.cos(angle), math.sin(angle))
             for side, inside in ((1, True), (-1, False)):  # two pixels of the atlas off
                 off = 40.0 * side
-                x, y = figure.axes[0].transData.inverted().transform(
-                    (0.5 * (x0 + x1) + off * turned.real, 0.5 * (y0 + y1) + off * turned.imag)
+                x, y = (
+                    figure.axes[0]
+                    .transData.inverted()
+                    .transform((0.5 * (x0 + x1) + off * turned.real, 0.5 * (y0 + y1) + off * turned.imag))
                 )
                 near = float(threshold.sel({"throw.speed": x, "arm.surface_height": y}, method="nearest"))
                 if not math.isnan(near):
