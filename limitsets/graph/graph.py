@@ -152,7 +152,9 @@ class TransitionGraph(Tabled):
         parts = self.components()
         ends = np.concatenate([[0], np.cumsum(parts.size)])
         chosen = np.flatnonzero(parts.recurrent)
-        found = [parts.order[a:b] for a, b in zip(ends[chosen].tolist(), ends[chosen + 1].tolist(), strict=True)]
+        found = [
+            parts.order[a:b] for a, b in zip(ends[chosen].tolist(), ends[chosen + 1].tolist(), strict=True)
+        ]
         return [np.sort(cells) if cells.size > 1 else cells for cells in found]
 
     def recurrent_components(self) -> list[NDArray[np.int32]]:

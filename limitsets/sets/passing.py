@@ -128,9 +128,8 @@ def _finer(graph: TransitionGraph, cells: Integers, component: Integers, parts: 
                 sources.append(begun + some[source[inside]])
                 targets.append(rank[coarse[inside]] * of_each + within)
         begun += whole.size
-    none = np.empty(0, np.int64)
-    ends = (np.concatenate([*found, none]) for found in (sources, targets))
-    return _Fine(np.concatenate(owner), *ends, np.concatenate(unclear))
+    source, target = (np.concatenate([*found, rank[:0]]) for found in (sources, targets))
+    return _Fine(np.concatenate(owner), source, target, np.concatenate(unclear))
 
 
 def _hulls(graph: TransitionGraph, fine: Any, place: list[Integers], side: int) -> tuple[list[Any], Any]:
