@@ -5,7 +5,7 @@ scene's goal and writes JSON.
 """
 
 from limitsets.analysis.accuracy import Accuracy, Plan, plan_for
-from limitsets.analysis.flags import other_vertex_first, overlap
+from limitsets.analysis.flags import in_limit_sets, other_vertex_first
 from limitsets.analysis.goal import GoalOutcome
 from limitsets.analysis.run import Analysis, analyse
 from limitsets.analysis.starts import Starts
@@ -17,7 +17,7 @@ __all__ = [
     "Plan",
     "Starts",
     "analyse",
+    "in_limit_sets",
     "other_vertex_first",
-    "overlap",
     "plan_for",
 ]

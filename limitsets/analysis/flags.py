@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 if TYPE_CHECKING:
     from limitsets.scene import Scene
 
-__all__ = ["other_vertex_first", "overlap"]
+__all__ = ["in_limit_sets", "other_vertex_first"]
 
 Array = NDArray[np.float64]
 Interval = tuple[float, float]
@@ -63,23 +63,22 @@ def other_vertex_first(scene: Scene) -> dict[int, list[tuple[float, float]]]:
     return found
 
 
-def overlap(some: Extents, others: Extents) -> dict[int, list[tuple[float, float]]]:
-    """Intersect two sets of intervals per side; sides without any are left out.
+def in_limit_sets(flags: Extents, sets: Iterable[Extents]) -> dict[int, list[Interval]]:
+    """Give, per side, where in a limit set a flag is [length]; sides without any are left out.
 
     Examples
     --------
-    >>> from limitsets.analysis import overlap
-    >>> overlap({0: [(1.0, 3.0)]}, {0: [(2.0, 5.0)], 1: [(0.0, 1.0)]})
+    >>> from limitsets.analysis import in_limit_sets
+    >>> in_limit_sets({0: [(1.0, 3.0)]}, [{0: [(2.0, 5.0)]}, {1: [(0.0, 1.0)]}])
     {0: [(2.0, 3.0)]}
     """
-    found = {}
-    for side, intervals in some.items():
-        parts = [
-            (max(a, lo), min(b, hi))
-            for a, b in intervals
-            for lo, hi in others.get(side, ())
-            if max(a, lo) <= min(b, hi)
-        ]
-        if parts:
-            found[side] = parts
-    return found
+    found: dict[int, list[Interval]] = {}
+    for extents in sets:
+        for side, parts in extents.items():
+            found.setdefault(side, []).extend(
+                (max(a, lo), min(b, hi))
+                for a, b in flags.get(side, ())
+                for lo, hi in parts
+                if max(a, lo) <= min(b, hi)
+            )
+    return {side: sorted(parts) for side, parts in sorted(found.items()) if parts}

@@ -64,8 +64,8 @@ def _announce(plan: Plan) -> None:
 
 
 def _text(analysis: Analysis, page: Path) -> None:
+    from limitsets.analysis import in_limit_sets
     from limitsets.report.goals import after_undecided, next_command, verdict_of, void_of
-    from limitsets.report.pages import other_vertex_in_limit_sets
     from limitsets.report.tables import count, intervals, percent
 
     unit = analysis.scene.unit
@@ -91,7 +91,7 @@ def _text(analysis: Analysis, page: Path) -> None:
     exits = ", ".join(f"{name} {percent(share)}" for name, share in analysis.basins.exits.items() if share)
     if exits:
         typer.echo(f"of all starts leave: {exits}")
-    broken = ", ".join(str(side) for side in sorted(other_vertex_in_limit_sets(analysis)))
+    broken = ", ".join(str(side) for side in in_limit_sets(analysis.other_vertex_first, analysis.extents))
     if broken:
         typer.echo(
             f"careful: of some throws of the limit set from side {broken} another vertex lands first, and the model "

@@ -44,5 +44,4 @@ def explore(
         port=port,
         origins=allow_origin or (),
         show=not no_show,
-        ready=lambda url: typer.echo(f"explorer: {url} (Ctrl-C ends it)"),
     )

@@ -115,6 +115,9 @@ Csv = Annotated[
 ]
 
 
+# Columns of a line in a pipe: more than any table has.
+LONGEST = 100_000
+
 # A longer table is printed by ourselves: rich takes a second for four thousand rows.
 LONG = 500
 
@@ -130,15 +133,15 @@ def table(heads: Sequence[str], rows: Sequence[Sequence[object]]) -> None:
     from rich.table import Table
 
     # rich asks the terminal, or COLUMNS; where neither says anything lines are as long as they are
-    wide = None if sys.stdout.isatty() or os.environ.get("COLUMNS") else 200
+    told = sys.stdout.isatty() or bool(os.environ.get("COLUMNS"))
     grid = Table(box=SIMPLE_HEAD, pad_edge=False)
     for number, head in enumerate(heads):
         # names stay whole as long as others can be broken: a name that is cut could be another's
         names = number == 0 and not any(" " in str(row[0]) for row in rows)
-        grid.add_column(escape(head), no_wrap=names or wide is not None, overflow="fold")
+        grid.add_column(escape(head), no_wrap=names or not told, overflow="fold")
     for row in rows:
         grid.add_row(*(escape(str(cell)) for cell in row))
-    Console(width=wide).print(grid)
+    Console(width=None if told else LONGEST).print(grid)
 
 
 def show(found: Table) -> None:

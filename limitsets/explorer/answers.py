@@ -6,15 +6,17 @@ from collections.abc import Mapping, Sequence
 from html import escape
 from typing import Any
 
-from limitsets.explorer.estimates import CELLS, Estimate
+from limitsets.analysis import in_limit_sets, other_vertex_first
+from limitsets.explorer.estimates import CELLS, Estimate, Points
 from limitsets.explorer.knobs import Knob
 from limitsets.explorer.pictures import look_of
 from limitsets.goals import Goal
 from limitsets.maps import codes
 from limitsets.plot.style import interval_text
 from limitsets.report.goals import goal_sentence, starts_words, verdict_words
+from limitsets.scene import Scene
 
-__all__ = ["KEY", "careful_line", "error_line", "estimate_words", "proof_words"]
+__all__ = ["KEY", "careful_line", "error_line", "estimate_words", "points_words", "proof_words"]
 
 KEY = (
     '<p class="how">Bars: limit sets. Strips: where starts lead, hatched unless to limit set 0. Strokes r: critical '
@@ -34,15 +36,22 @@ def error_line(error: object) -> str:
     return f'<p role="alert" class="wrong">{escape(str(error))}</p>' if error else '<p role="alert"></p>'
 
 
-def careful_line(found: Estimate) -> str:
-    """Say from how many starts a throw is outside the model, if from any."""
+def careful_line(found: Estimate, scene: Scene) -> str:
+    """Say from how many starts a throw is outside the model, and for which throws of a limit set the model is wrong."""
+    lines = []
     share = dict(found.shares).get(codes.OUTSIDE_MODEL, 0.0)
-    if not share:
-        return ""
-    return (
-        f'<p class="wrong">careful: from {100 * share:.3g} % of the starts the part comes to a throw that is outside '
-        "the model: it has not landed within a full turn</p>"
-    )
+    if share:
+        lines.append(
+            f"from {100 * share:.3g} % of the starts the part comes to a throw that is outside the model: it has not "
+            "landed within a full turn"
+        )
+    broken = ", ".join(map(str, in_limit_sets(other_vertex_first(scene), found.sets)))
+    if broken:
+        lines.append(
+            f"of some throws of the limit set from side {broken} another vertex lands first, and the model does not "
+            "describe them"
+        )
+    return "".join(f'<p class="wrong">careful: {line}</p>' for line in lines)
 
 
 def estimate_words(found: Estimate, goal: Goal | None, unit: str) -> str:
@@ -66,6 +75,14 @@ def estimate_words(found: Estimate, goal: Goal | None, unit: str) -> str:
         rows.append((f"goal: {escape(goal_sentence(goal, unit))}", _goal_words(found, goal, unit)))
     how = f"from {CELLS} cells a side" + (", ends from the compiled loop of the atlas" if found.sharp else "")
     return _table("Estimated (follows the sliders, proves nothing)", rows, how)
+
+
+def points_words(found: Points) -> str:
+    """Say how many orbits of a map of two or three dimensions stay, and where the others go."""
+    stay = found.starts - sum(found.gone.values())
+    rows = [("stay", f"{stay} of {found.starts} orbits")]
+    rows += [("leave", f"{count} of {found.starts} orbits {where}") for where, count in found.gone.items()]
+    return _table("Estimated (follows the sliders, proves nothing)", rows, "from a few starts")
 
 
 def _goal_words(found: Estimate, goal: Goal, unit: str) -> str:

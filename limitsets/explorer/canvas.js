@@ -193,6 +193,7 @@ export function render({ model, el }) {
   read()
   const watch = new ResizeObserver(ask)
   watch.observe(canvas)
+  model.send_msg("seen")
   model.on("remove", () => watch.disconnect())
 
   // ---------------------------------------------------------------- a hand

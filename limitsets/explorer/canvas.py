@@ -63,7 +63,7 @@ class Layer:
 
 
 class Canvas(JSComponent):  # type: ignore[misc]  # panel is not followed
-    """A picture: layers of shapes in coordinates of its own, drawn by the browser.
+    """A picture: layers of shapes in coordinates of its own, drawn by the browser, which then says so (`seen`).
 
     Parameters
     ----------
@@ -95,7 +95,7 @@ class Canvas(JSComponent):  # type: ignore[misc]  # panel is not followed
         stylesheets: Sequence[str] = (),
         **view: Any,
     ) -> None:
-        self.layers, self.heading, self._touched = layers, "", touched
+        self.layers, self.heading, self._touched, self.seen = layers, "", touched, False
         self.view: dict[str, Any] = {"x": [0.0, 1.0], "y": [0.0, 1.0], **view}
         options = {"height": height, "sizing_mode": "stretch_width", "stylesheets": list(stylesheets)}
         super().__init__(called=called, drawn=self._written(), **options)
@@ -123,6 +123,7 @@ class Canvas(JSComponent):  # type: ignore[misc]  # panel is not followed
 
     def _handle_msg(self, data: Any) -> None:
         """Take what the browser says, which may be anything."""
+        self.seen = True
         if self._touched is None or not isinstance(data, dict):
             return
         what, at = data.get("what"), [data.get(axis, math.nan) for axis in "xy"]

@@ -7,23 +7,24 @@ last digits, where it can decide them.  Both are estimates: no rounding is enclo
 from __future__ import annotations
 
 import math
+from collections import Counter
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from limitsets.cells import Domain, grid
 from limitsets.graph import transitions
-from limitsets.maps import critical_points, has_slope, kind_of, orbit
+from limitsets.maps import Orbit, critical_points, has_slope, kind_of, orbit
 from limitsets.maps.stacks import stacked
 from limitsets.scene import Scene
 from limitsets.sets import Attractor, Basins, attractors, basins
 from limitsets.topology import topologies
 from limitsets.topology.records import DECIDED
 
-__all__ = ["CELLS", "Estimate", "estimate", "estimate_of_map", "points_of_map"]
+__all__ = ["CELLS", "Estimate", "Points", "estimate", "estimate_of_map", "points_of_map"]
 
 CELLS = 2048
 """Cells per side."""
@@ -32,6 +33,8 @@ CELLS = 2048
 THROWS, SAMPLES = 2000, 512
 # Points of a map in the plane, from so many starts; what an orbit runs through first is left out.
 POINTS, STARTS, SKIP = 12_000, 8, 500
+# An orbit is gone that is so many sizes of the domain from its middle.
+FAR = 100.0
 
 Extents = dict[int, list[tuple[float, float]]]
 
@@ -176,26 +179,64 @@ def _runs(split: Basins) -> list[tuple[int, float, float, int]]:
     return found
 
 
-def points_of_map(params: Any, domain: Domain) -> npt.NDArray[np.float64]:
-    """Sample the attractors of a map of two or three dimensions by orbits from a few starts; shape (n, dimension).
+class Points(NamedTuple):
+    """Points of the attractors of a map of two or three dimensions.
 
-    Orbits that leave or are no numbers any more are left out: no points where all of them do.
+    Attributes
+    ----------
+    x : ndarray of shape (n, dimension)
+        Of the orbits that stay.
+    starts : int
+        How many orbits there were.
+    gone : dict of str to int
+        Where the others went, in words, and how many of them.
+    """
+
+    x: npt.NDArray[np.float64]
+    starts: int
+    gone: dict[str, int]
+
+
+def points_of_map(params: Any, domain: Domain) -> Points:
+    """Sample the attractors of a map of two or three dimensions by orbits from a few starts.
+
+    Orbits that leave are left out: no points where all of them do.
 
     Examples
     --------
     >>> from limitsets import maps
     >>> from limitsets.cells import as_domain
-    >>> points_of_map(maps.Henon(), as_domain(maps.domain_of(maps.Henon()))).shape[1]
+    >>> domain = as_domain(maps.domain_of(maps.Henon()))
+    >>> points_of_map(maps.Henon(), domain).x.shape[1]
     2
+    >>> points_of_map(maps.Henon(2.0, 0.3), domain).gone
+    {'pass x_0 = -400': 8}
     """
     share = np.array([0.5 + 0.5 * math.cos(2.4 * k) * math.sqrt((k + 0.5) / STARTS) for k in range(STARTS)])
     other = np.roll(share, 3)
-    found = []
+    found, gone = [np.empty((0, kind_of(params).dimension))], Counter[str]()
     for side in range(domain.sides):
         lo, hi = domain.lo[side], domain.hi[side]
         for k in range(STARTS):
             at = np.array([share[k], other[k], share[k]])[: domain.dimension]
             path = orbit(params, lo + at * (hi - lo), side, SKIP + POINTS // STARTS)
-            if path.stopped is None and bool(np.isfinite(path.x).all()):
+            fate = _fate(path, lo, hi)
+            if fate:
+                gone[fate] += 1
+            else:
                 found.append(path.x[SKIP:])
-    return np.concatenate(found) if found else np.empty((0, kind_of(params).dimension))
+    return Points(np.concatenate(found), STARTS * domain.sides, dict(gone))
+
+
+def _fate(path: Orbit, lo: npt.NDArray[np.float64], hi: npt.NDArray[np.float64]) -> str:
+    """Say where an orbit goes that does not stay within many times the size of where the map is looked at."""
+    far = (path.x - 0.5 * (lo + hi)) / (hi - lo)
+    gone = np.flatnonzero(~(np.abs(far) <= FAR).all(axis=1))
+    if not gone.size:
+        return "leave by an exit of the map" if path.stopped else ""
+    at = far[gone[0]]
+    if np.isnan(at).any():
+        return "come to an image that is no number"
+    axis = int(np.abs(at).argmax())
+    limit = 0.5 * (lo + hi)[axis] + math.copysign(FAR, at[axis]) * (hi - lo)[axis]
+    return f"pass x_{axis} = {limit:.6g}"

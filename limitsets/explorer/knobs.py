@@ -12,7 +12,7 @@ from limitsets.errors import LimitsetsError, shown
 from limitsets.geometry import side_ends
 from limitsets.geometry.polygon import above_side
 from limitsets.scene import Scene
-from limitsets.scene.quantities import STANDARD_GRAVITY, find, text_at
+from limitsets.scene.quantities import STANDARD_GRAVITY, find, text_at, unit_read
 from limitsets.scene.units import convert, parse, written
 
 __all__ = ["Knob", "centre_at", "knobs_of", "knobs_of_map", "map_with", "scene_with", "texts_of"]
@@ -20,6 +20,8 @@ __all__ = ["Knob", "centre_at", "knobs_of", "knobs_of_map", "map_with", "scene_w
 # Point masses that get sliders; more would be a table, not a picture.
 MOST_POINTS = 3
 STEPS = 400
+# Ends of the slider of a point mass, which cannot be 0.
+LIGHTEST, HEAVIEST = 0.1, 3.0
 
 
 class Knob(NamedTuple):
@@ -121,6 +123,10 @@ def _of_mass(scene: Scene) -> list[Knob]:
             name = f"part.mass.points[{k}].{word}"
             ends = float(lo[axis]), float(hi[axis])
             found.append(Knob(name, f"point mass {k}, {word}", unit, scene.value(name), *ends))
+        name = f"part.mass.points[{k}].mass"
+        text, own = text_at(tree, name), unit_read(tree, unit, name)
+        mass = convert(parse(text, "mass"), own)
+        found.append(Knob(name, f"point mass {k}, mass", own, mass, LIGHTEST * mass, HEAVIEST * mass))
     return found
 
 

@@ -23,6 +23,9 @@ Array = npt.NDArray[np.float64]
 MARGINS = (52, 12, 24, 38)
 """Left, right, above and below the frame, where axes and words are [pixel]."""
 
+PIXELS, FEW = 500, 40
+"""Points of a plane map at so few places, in a picture so wide, are a cycle: they are drawn so that they are seen."""
+
 WRITTEN = ("x", "y", "words", "align")
 
 
@@ -106,23 +109,35 @@ class PointsPicture:
 
     def __init__(self, lo: Sequence[float], hi: Sequence[float]) -> None:
         self._points = Layer("dots", "points", colour=style.JOG)
-        self.canvas = Canvas("map", [self._points], 460, margins=MARGINS, across="x_0", up="x_1")
-        self._ends = np.array([lo[:2], hi[:2]])
-        self.canvas.view |= dict(zip("xy", self._ends.T.tolist(), strict=True))
-
-    def frame(self, points: Array) -> None:
-        """Choose what is in sight: points and as much around them, within where the map is looked at."""
-        if len(points):
-            lo, hi = points[:, :2].min(axis=0), points[:, :2].max(axis=0)
-            room = 0.5 * np.maximum(hi - lo, 0.1 * (self._ends[1] - self._ends[0]))
-            ends = np.clip([lo - room, hi + room], *self._ends)
-            self.canvas.view |= dict(zip("xy", ends.T.tolist(), strict=True))
+        spot: dict[str, Any] = {"shape": "circle", "size": 8, "line": style.INK, "width": 1}
+        self._spots = Layer("marks", "few points", fill=style.JOG, **spot)
+        self.canvas = Canvas("map", [self._points, self._spots], 460, margins=MARGINS, across="x_0", up="x_1")
+        ends = np.array([lo[:2], hi[:2]])
+        self._size = ends[1] - ends[0]
+        self.canvas.view |= dict(zip("xy", ends.T.tolist(), strict=True))
 
     def show(self, points: Array) -> None:
-        """Draw them."""
+        """Draw them; an axis follows once they come to its end, or fill less than a quarter of what they could."""
+        if len(points):
+            lo, hi = points[:, :2].min(axis=0), points[:, :2].max(axis=0)
+            room = 0.5 * np.maximum(hi - lo, 0.1 * self._size)
+            for axis, (first, last), *ends in zip(
+                "xy", self._seen(), lo, hi, lo - room, hi + room, strict=True
+            ):
+                low, high, fresh_low, fresh_high = ends
+                if low < first or high > last or last - first > 4.0 * (fresh_high - fresh_low):
+                    self.canvas.view[axis] = [float(fresh_low), float(fresh_high)]
         self._points.data = {"x": points[:, 0], "y": points[:, 1]}
+        (x0, x1), (y0, y1) = self._seen()
+        place = np.round((points[:, :2] - (x0, y0)) / (x1 - x0, y1 - y0) * PIXELS).astype(np.int64)
+        _, first = np.unique(place[:, 0] * (2 * PIXELS) + place[:, 1], return_index=True)
+        few = points[first if first.size <= FEW else first[:0]]
+        self._spots.data = {"x": few[:, 0].tolist(), "y": few[:, 1].tolist()}
         words = f"estimate: {len(points)} points of orbits that stay" if len(points) else "no orbit stays"
         self.canvas.heading = words
+
+    def _seen(self) -> list[list[float]]:
+        return [self.canvas.view[axis] for axis in "xy"]
 
 
 def _columns(rows: Sequence[Sequence[Any]], *names: str) -> dict[str, list[Any]]:

@@ -9,9 +9,9 @@ import panel as pn
 
 from limitsets.cells import Domain
 from limitsets.errors import LimitsetsError
-from limitsets.explorer.answers import error_line, estimate_words
+from limitsets.explorer.answers import error_line, estimate_words, points_words
 from limitsets.explorer.canvas import Words
-from limitsets.explorer.estimates import Estimate, estimate_of_map, points_of_map
+from limitsets.explorer.estimates import estimate_of_map, points_of_map
 from limitsets.explorer.knobs import knobs_of_map, map_with
 from limitsets.explorer.lanes import LanesPicture, PointsPicture
 from limitsets.explorer.look import SAID
@@ -45,8 +45,7 @@ class MapPage:
         shown = self.lanes or self.points
         assert shown is not None  # it is one of the two
         self._shown = shown
-        self._refit, self._told, self._wrote = True, False, -1.0
-        self._found: Estimate | None = None
+        self._refit, self._told, self._wrote, self._words = True, False, -1.0, ""
         self.beat()
         title = Words(f"<h1>limitsets: {type(params).__name__}</h1>", stylesheets=[SAID])
         controls = pn.Column(self.sliders.column, styles={"flex": "1 1 300px", "min-width": "0"}, **wide)
@@ -70,8 +69,7 @@ class MapPage:
         if not self._told and time.monotonic() - self._wrote > WORDS:
             self._told, self._wrote = True, time.monotonic()
             self.sliders.tell()
-            if self._found is not None:
-                self._said.object = estimate_words(self._found, None, "")
+            self._said.object = self._words
         if not self._dirty:
             return
         self._dirty, self._told = False, False
@@ -80,17 +78,15 @@ class MapPage:
             if self.lanes is None:
                 assert self.points is not None  # it is one of the two
                 points = points_of_map(params, self._domain)
-                if self._refit:
-                    self.points.frame(points)
-                    self._refit = False
-                self.points.show(points)
+                self.points.show(points.x)
+                self._words = points_words(points)
             else:
                 found = estimate_of_map(params, self._domain)
                 if self._refit:
                     self.lanes.frame(found, "")
                     self._refit = False
                 self.lanes.show(found)
-                self._found = found
+                self._words = estimate_words(found, None, "")
         except LimitsetsError as error:
             self.say(error)
         else:

@@ -106,7 +106,7 @@ class ScenePage:
             self._error,
             pn.FlexBox(
                 part(self.sliders.column, start, room="1 1 300px"),
-                part(self.lanes.canvas, self._careful, key, room="2 1 340px"),
+                part(self.lanes.canvas, key, room="2 1 340px"),
                 **wide,
             ),
             pn.FlexBox(
@@ -115,7 +115,11 @@ class ScenePage:
                 part(reset, self._toml, svg, self.opening.column, room="1 1 300px"),
                 **wide,
             ),
-            pn.FlexBox(part(self._estimated, room="1 1 330px"), part(self._proved, room="1 1 330px"), **wide),
+            pn.FlexBox(  # a line that comes or goes moves nothing that a hand may be on
+                part(self._careful, self._estimated, room="1 1 330px"),
+                part(self._proved, room="1 1 330px"),
+                **wide,
+            ),
             self.atlas.column,
             **wide,
         )
@@ -157,7 +161,7 @@ class ScenePage:
         if not self._told and time.monotonic() - self._wrote > WORDS:
             self._told, self._wrote = True, time.monotonic()
             self.sliders.tell()
-            self._careful.object = careful_line(self._found)
+            self._careful.object = careful_line(self._found, self.scene)
             self._estimated.object = estimate_words(self._found, self.scene.goal, self.scene.unit)
         for picture in (self.lanes, self.part, self.arm):
             picture.canvas.send()

@@ -14,6 +14,7 @@ from limitsets.explorer.canvas import Canvas, Hand, Layer
 from limitsets.plot import basin, style
 from limitsets.plot.poses import angle_on_side, turned
 from limitsets.scene import Scene
+from limitsets.scene.units import convert, parse
 
 __all__ = ["ArmPicture", "PartPicture", "look_of", "pattern"]
 
@@ -50,6 +51,12 @@ def _see(canvas: Canvas, corners: Array) -> None:
     lo, hi = corners.min(axis=0), corners.max(axis=0)
     room = PAD * (hi - lo)
     canvas.view["x"], canvas.view["y"] = np.stack([lo - room, hi + room]).T.tolist()
+
+
+def _short(mass: str) -> str:
+    """Write a mass with as many digits as a slider tells."""
+    given = parse(mass, "mass")
+    return f"{convert(given, given.unit):.4g} {given.unit}"
 
 
 def _words(colour: str = style.INK, size: int = 12, **look: Any) -> Layer:
@@ -106,7 +113,7 @@ class PartPicture:
         x, y = places
         self.canvas.heading = "the part; sliders move its masses" if x else "the part; drag the cross"
         self._masses.data = {"x": x, "y": y}
-        self._heavy.data = {"x": x, "y": y, "words": [str(point["mass"]) for point in points]}
+        self._heavy.data = {"x": x, "y": y, "words": [_short(point["mass"]) for point in points]}
         _see(self.canvas, scene.vertices)
 
     def is_at_mark(self, x: float, y: float) -> bool:

@@ -25,13 +25,15 @@ def serve(
     page: Callable[[], Any],
     title: str,
     *,
-    address: str = HERE,
-    port: int = 5006,
-    origins: Sequence[str] = (),
-    show: bool = True,
-    ready: Callable[[str], None] | None = None,
+    address: str,
+    port: int,
+    origins: Sequence[str],
+    show: bool,
+    ready: Callable[[str], None],
 ) -> None:
     """Serve the page until Ctrl-C; all that a browser asks for comes from this server.
+
+    What the other arguments are says `limitsets.explorer.visits.Explorer.show`.
 
     Parameters
     ----------
@@ -39,16 +41,6 @@ def serve(
         Makes the page of one visitor.
     title : str
         What is shown.
-    address : str
-        Where it listens.
-    port : int
-        0 for any that is free.
-    origins : sequence of str
-        Names, with ports, under which browsers may ask: needed for any address but this machine's own.
-    show : bool
-        Whether to open a browser.
-    ready : callable, optional
-        Told the page's address once it listens.
 
     Raises
     ------
@@ -80,8 +72,7 @@ def serve(
     logging.getLogger("bokeh").setLevel(logging.ERROR)  # a visitor who leaves is no warning
     server.io_loop.asyncio_loop.set_exception_handler(_gone)
     server.start()
-    if ready is not None:
-        ready(f"http://{address}:{chosen}")
+    ready(f"http://{address}:{chosen}")
     if show:
         server.io_loop.add_callback(server.show, "/")
     server.io_loop.start()

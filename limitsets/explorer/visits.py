@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -13,14 +13,15 @@ from panel.io.callbacks import PeriodicCallback
 
 from limitsets.cells import as_domain
 from limitsets.errors import AnswerError, LimitsetsError, MapError
+from limitsets.explorer.canvas import Canvas
 from limitsets.explorer.look import PAGE
 from limitsets.explorer.map_page import MapPage
 from limitsets.explorer.outside import within_reach
 from limitsets.explorer.page import ScenePage
-from limitsets.explorer.serving import serve
+from limitsets.explorer.serving import HERE, serve
 from limitsets.maps import coerce, domain_of, kind_of
 from limitsets.maps.contract import require_dimension
-from limitsets.progress import Progress, bar
+from limitsets.progress import Progress, bar, in_notebook
 from limitsets.scene import Scene, load
 
 __all__ = ["Explorer", "stored_atlas"]
@@ -30,6 +31,10 @@ COMPILING = "compiling, once: the throw, images of cells, attractors"
 
 BEAT = 30
 """Milliseconds from one beat to the next."""
+
+
+def _say(address: str) -> None:
+    print(f"explorer: {address} (Ctrl-C ends it)", flush=True)
 
 
 class Explorer(pn.viewable.Viewer):  # type: ignore[misc]  # panel is not followed
@@ -67,18 +72,30 @@ class Explorer(pn.viewable.Viewer):  # type: ignore[misc]  # panel is not follow
         require_dimension(chosen, "domain", where.dimension)
         return cls(lambda: MapPage(chosen, where), type(chosen).__name__)
 
+    def __repr__(self) -> str:
+        """Say how it is looked at."""
+        return f"<explorer of {self.title}: .show() serves it, a notebook shows it>"
+
     def __panel__(self) -> pn.viewable.Viewable:
         """Make the page of one visitor, and let it beat as long as he stays."""
         page = self.page()
         document = pn.state.curdoc
         if document is not None and document.session_context is not None:
             document.template = Template(PAGE)
-            # in the background: nobody is told that the server is busy, at each beat
-            PeriodicCallback(callback=page.beat, period=BEAT, background=True).start()
+            _beating(page.beat)
             pn.state.on_session_destroyed(lambda _: page.close())
-        elif _in_a_loop():  # a notebook
-            pn.state.add_periodic_callback(page.beat, BEAT)
+        elif in_notebook():
+            return _UnderACell(page)
         return page.layout
+
+    def _repr_mimebundle_(self, include: Any = None, exclude: Any = None) -> Any:
+        """Show it in a notebook, where Panel is not loaded yet with scripts that come from no other server."""
+        if not in_notebook():
+            return None
+        if not pn.extension._loaded:  # noqa: SLF001 - Panel says it nowhere else
+            pn.extension(inline=True)
+        self._compile()
+        return super()._repr_mimebundle_(include, exclude)
 
     def prepare(self, progress: Progress) -> None:
         """Make one page, so that what is not compiled yet is compiled before a visitor waits for it."""
@@ -86,20 +103,67 @@ class Explorer(pn.viewable.Viewer):  # type: ignore[misc]  # panel is not follow
         self.page().close()
         self._prepared = True
 
-    def show(self, **options: Any) -> None:
-        """Serve it until Ctrl-C; options of `limitsets.explorer.serving.serve`: port, address, origins, show."""
+    def _compile(self) -> None:
         if not self._prepared:
             with bar() as progress:
                 self.prepare(progress)
-        serve(self.__panel__, self.title, **options)
+
+    def show(
+        self,
+        *,
+        address: str = HERE,
+        port: int = 5006,
+        origins: Sequence[str] = (),
+        show: bool = True,
+        ready: Callable[[str], None] = _say,
+    ) -> None:
+        """Serve it until Ctrl-C.
+
+        Parameters
+        ----------
+        address : str
+            Where it listens: by default for this machine alone.
+        port : int
+            0 for any that is free.
+        origins : sequence of str
+            Names, with ports, under which browsers may ask: needed for any other address.
+        show : bool
+            Whether to open a browser.
+        ready : callable
+            Told the page's address once it listens; prints it by default.
+
+        Raises
+        ------
+        LimitsetsError
+            The port is taken, or nobody is allowed to come.
+        """
+        self._compile()
+        serve(self.__panel__, self.title, address=address, port=port, origins=origins, show=show, ready=ready)
 
 
-def _in_a_loop() -> bool:
-    try:
-        asyncio.get_running_loop()
-    except RuntimeError:
-        return False
-    return True
+def _beating(beat: Callable[[], None]) -> None:
+    """Beat, in the background: nobody is told that the server is busy, at each beat."""
+    PeriodicCallback(callback=beat, period=BEAT, background=True).start()
+
+
+class _UnderACell(pn.Column):  # type: ignore[misc]  # panel is not followed
+    """A page in a notebook, which beats once its pictures are on a screen.
+
+    News that come before would put Panel's messages out of step for good.
+    """
+
+    def __init__(self, page: ScenePage | MapPage) -> None:
+        super().__init__(page.layout, sizing_mode="stretch_width")
+        self._page, self._loop = page, asyncio.get_running_loop()
+        _beating(self._beat)
+
+    def _on_msg(self, *message: Any) -> None:
+        """Take what the browser says where the page beats; JupyterLab hands it over in a thread of its own."""
+        self._loop.call_soon_threadsafe(super()._on_msg, *message)
+
+    def _beat(self) -> None:
+        if any(picture.seen for picture in self.select(Canvas)):
+            self._page.beat()
 
 
 def stored_atlas(store: Path) -> tuple[Scene, dict[str, Any]]:

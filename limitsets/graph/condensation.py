@@ -123,7 +123,7 @@ class Condensation:
         return reached
 
 
-@kernel(entry=True, counting=False)
+@kernel(counting=False)
 def _leaves(r: Ranges, label: Any, cells: Any) -> bool:
     """Whether an edge leads out of the component that the given cells make up."""
     for cell in cells:
@@ -165,7 +165,21 @@ def _destinations(
     return merged
 
 
+@kernel(entry=True, counting=False)
+def _attracting(r: Ranges, label: Any, cells: Any, ends: Any, out: Any) -> None:
+    """Whether each component, whose cells end at these places, is attracting; thousands are of one cell each."""
+    begin = 0
+    for k in range(ends.size):
+        out[k] = not _leaves(r, label, cells[begin : ends[k]])
+        begin = ends[k]
+
+
 def attracting_of(r: Ranges, components: Components, sets: Sequence[NDArray[np.int32]]) -> NDArray[np.bool_]:
     """Whether each recurrent component is attracting: no edge and no way out leads from it; of any number of them."""
-    leads_out = segment_tree.leaves if segment_tree.is_wide(r) else _leaves
-    return np.array([not leads_out(r, components.label, cells) for cells in sets], dtype=bool)
+    if segment_tree.is_wide(r):
+        return np.array([not segment_tree.leaves(r, components.label, cells) for cells in sets], dtype=bool)
+    found = np.zeros(len(sets), dtype=np.bool_)
+    if sets:
+        ends = np.cumsum([cells.size for cells in sets])
+        _attracting(r, components.label, np.concatenate(sets), ends, found)
+    return found

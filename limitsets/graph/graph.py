@@ -151,7 +151,11 @@ class TransitionGraph(Tabled):
     def _recurrent_components(self) -> list[NDArray[np.int32]]:
         parts = self.components()
         ends = np.concatenate([[0], np.cumsum(parts.size)])
-        return [np.sort(parts.order[ends[c] : ends[c + 1]]) for c in np.flatnonzero(parts.recurrent)]
+        chosen = np.flatnonzero(parts.recurrent)
+        found = [
+            parts.order[a:b] for a, b in zip(ends[chosen].tolist(), ends[chosen + 1].tolist(), strict=True)
+        ]
+        return [np.sort(cells) if cells.size > 1 else cells for cells in found]
 
     def recurrent_components(self) -> list[NDArray[np.int32]]:
         """Cells of each recurrent component, ascending in topological number: attracting ones come early."""

@@ -6,8 +6,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
-from matplotlib.patches import PathPatch
+from matplotlib.patches import Patch, PathPatch
 from matplotlib.path import Path
+from matplotlib.patheffects import Normal, Stroke, withTickedStroke
 
 from limitsets.plot import style
 
@@ -17,7 +18,7 @@ if TYPE_CHECKING:
 
     from limitsets.sweep import Atlas
 
-__all__ = ["edges", "frame", "hatched", "mark", "pixels", "title_of"]
+__all__ = ["edges", "frame", "goal_line", "hatched", "mark", "pixels", "title_of"]
 
 
 def title_of(found: Atlas) -> str:
@@ -81,6 +82,47 @@ def hatched(
             hatch_linewidth=0.5,
         )
     )  # fmt: skip
+
+
+def goal_line(axes: Axes, found: Atlas) -> list[Any]:
+    """Draw where the scene's goal begins or ceases to hold, ticks where it fails; the entry of a legend."""
+    data = found.dataset
+    if "threshold" not in data:
+        return []
+    from limitsets.goals import OrientedBeyond, Reaches
+    from limitsets.scene import load
+
+    goal = load(data.attrs["scene"]).goal
+    assert isinstance(goal, OrientedBeyond | Reaches)  # the others have no threshold
+    over = (data["threshold"].values - goal.x) * (1 if isinstance(goal, OrientedBeyond) else -1)
+    fails = over[np.isfinite(over)] > 0.0
+    if fails.all() or not fails.any():
+        word = "fails" if fails.any() else "holds"
+        return (
+            [Patch(label=f"the goal {word} wherever there is a limit set", alpha=0.0)] if fails.size else []
+        )
+    ticks: dict[str, Any] = {"spacing": 8.0, "length": 0.6}
+    looks = [Stroke(linewidth=3.2, foreground="white"), Normal()]
+    names = found.axes
+    if len(names) == 2:
+        xs, ys = (data[name].values for name in reversed(names))
+        line = axes.contour(
+            xs, ys, np.ma.masked_invalid(over), [0.0], colors=style.GOAL, linewidths=1.6, zorder=4
+        )
+        # a contour has the higher values on its left
+        line.set(path_effects=[*looks, withTickedStroke(angle=90, **ticks)], gid="goal")
+    else:
+        x = data[names[0]].values
+        both = np.isfinite(over[1:]) & np.isfinite(over[:-1])
+        for k in np.flatnonzero(both & ((over[1:] > 0.0) != (over[:-1] > 0.0))).tolist():
+            at = x[k] - over[k] * (x[k + 1] - x[k]) / (over[k + 1] - over[k])
+            angle = -90 if over[k + 1] > over[k] else 90
+            effects = [*looks, withTickedStroke(angle=angle, **ticks)]
+            axes.axvline(at, color=style.GOAL, lw=1.6, zorder=4, gid="goal", path_effects=effects)
+    ticked = [withTickedStroke(angle=-90, **ticks)]
+    return [
+        style.key("the goal fails on the side of the ticks", color=style.GOAL, lw=1.6, path_effects=ticked)
+    ]
 
 
 def mark(axes: Axes, found: Atlas) -> list[Any]:

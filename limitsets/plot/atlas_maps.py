@@ -1,8 +1,8 @@
 """Maps of an atlas: the classes of its points, with a legend in words.
 
 The colour of a class comes from the class alone, so it is the same in every picture: the structure of the attractors
-gives the face, ways out a hatch.  Faces come back after seven; neighbours are told apart by a line and by the number of
-their line in the legend, which stands in the largest region of each class.
+gives the face, ways out a hatch.  Faces come back after seven, lighter; neighbours are told apart by a line and by the
+number of their line in the legend, which stands in the largest region of each class.
 """
 
 from __future__ import annotations
@@ -21,8 +21,16 @@ from scipy.ndimage import distance_transform_edt, label
 from limitsets.arguments import arguments_checked
 from limitsets.errors import AnswerError
 from limitsets.plot import style
-from limitsets.plot.atlas_frame import frame, hatched, mark, pixels, title_of
-from limitsets.sweep.classes import UNDECIDED, Entry, is_classified, legend, named_class, numbers_of
+from limitsets.plot.atlas_frame import frame, goal_line, hatched, mark, pixels, title_of
+from limitsets.sweep.classes import (
+    UNDECIDED,
+    AttractorKind,
+    Entry,
+    is_classified,
+    legend,
+    named_class,
+    numbers_of,
+)
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -36,10 +44,14 @@ __all__ = ["atlas", "look_of"]
 FACES = ("#EEDD88", "#44BB99", "#77AADD", "#FFAABB", "#99DDFF", "#BBCC33", "#AAAA00")
 # Bands that no cycle is are darker by this share of ink; without an attractor these, by what every start does.
 DARKER = 0.16
+# Shares of white of classes with the same face: other bands by side, another order, seven bands more.
+LIGHTER = (0.0, 0.32, 0.58)
 ALL_LEAVE, ALL_COLLAPSE, NEITHER_ALL = "#EE9A62", "#6A4C93", "#F6D9C4"
 DOUBT, DOUBT_HATCH = "#B4B4B4", "xxxx"
 LEAVE_HATCH, COLLAPSE_HATCH = "////", "...."
 MOST_LINES = 12
+# What a line of the legend, and the room below an entry, take [inches].
+LINE, GAP = 0.145, 0.13
 # Beyond so many edges between pixels lines would hide what they part.
 MOST_EDGES = 12_000
 # Least room around a number, as a share of the points along the shorter axis.
@@ -65,9 +77,18 @@ def look_of(number: int, name: str) -> dict[str, Any]:
         return {"facecolor": face, "hatch": hatch}
     parts = sum(sum(each.bands) for each in found.attractors)
     share = 0.0 if any(each.period for each in found.attractors) else DARKER
-    colour = np.array(to_rgb(FACES[(parts + 2 * len(found.attractors) - 3) % len(FACES)]))
-    mixed = (1.0 - share) * colour + share * np.array(to_rgb(style.INK))
+    lap, hue = divmod(parts + 2 * len(found.attractors) - 3, len(FACES))
+    light = LIGHTER[(lap + sum(map(_spread, found.attractors))) % len(LIGHTER)]
+    colour = (1.0 - share) * np.array(to_rgb(FACES[hue])) + share * np.array(to_rgb(style.INK))
+    mixed = (1.0 - light) * colour + light
     return {"facecolor": tuple(round(each, 4) for each in mixed.tolist()), "hatch": hatch}
+
+
+def _spread(kind: AttractorKind) -> int:
+    """Give a small number that tells attractors of as many bands apart: by sides, and by the order of these."""
+    order = kind.flip_order
+    turned = 2 if order is None else int(order != tuple(sorted(order)))
+    return turned + sum(side * bands for side, bands in enumerate(kind.bands))
 
 
 @arguments_checked
@@ -101,37 +122,44 @@ def atlas(found: Atlas) -> Figure:
     """
     data = found.dataset
     if not is_classified(data):
-        raise AnswerError("the atlas", ", ".join(map(str, data)), "one with class", "ask for this variable")
+        raise AnswerError(
+            "the atlas",
+            ", ".join(map(str, data)),
+            "one with the variable class, which the task of the topology gives",
+            "draw what a task of your own says with ls.plot.atlas_surface",
+        )
     numbers, _ = numbers_of(data)
     entries = legend(data)
     looks = {each.number: look_of(each.number, each.name) for each in entries}
-    figure, axes = frame(found, 0.8 + 0.3 * min(len(entries), MOST_LINES + 2))
+    doubt = [each for each in entries if each.number == UNDECIDED]
+    sure = entries[: len(entries) - len(doubt)]
+    lines, rest = sure[:MOST_LINES] + doubt, sure[MOST_LINES:]
+    words = [_words(k + 1, each) for k, each in enumerate(lines)]
+    figure, axes = frame(found, 1.1 + sum(LINE * (1 + text.count("\n")) + GAP for text in words))
     if len(found.axes) == 1:
         axes.set_yticks([])
     rows = np.atleast_2d(numbers)
     _paint(axes, found, rows, looks)
-    doubt = [each for each in entries if each.number == UNDECIDED]
-    sure = entries[: len(entries) - len(doubt)]
-    lines, rest = sure[:MOST_LINES] + doubt, sure[MOST_LINES:]
+    goal = goal_line(axes, found)
     for k, each in enumerate(lines):
         _label(axes, found, rows == each.number, str(k + 1))
     handles = [
-        Patch(label=_words(k + 1, each), edgecolor=style.INK, lw=0.5, **looks[each.number])
-        for k, each in enumerate(lines)
+        Patch(label=text, edgecolor=style.INK, lw=0.5, **looks[each.number])
+        for text, each in zip(words, lines, strict=True)
     ]
     if rest:
         share = _percent(sum(each.share for each in rest))
         handles.append(Patch(label=f"{len(rest)} other class{'es' * (len(rest) > 1)} ({share})", alpha=0.0))
-    handles += mark(axes, found)
+    handles += goal + mark(axes, found)
     figure.legend(
         handles=handles, loc="outside right upper", fontsize=style.SMALL, frameon=False, handlelength=2.4,
         handleheight=1.6, labelspacing=0.9, borderaxespad=0.8,
     )  # fmt: skip
-    words = ""
+    computed = ""
     if "level" in data:
-        words = f"; {_percent(float((data['level'].values >= 0).mean()))} of the points computed"
+        computed = f"; {_percent(float((data['level'].values >= 0).mean()))} of the points computed"
     axes.set_title(
-        f"{title_of(found)}: topology of the attractors{words}", loc="left", fontsize=style.TEXT + 1
+        f"{title_of(found)}: topology of the attractors{computed}", loc="left", fontsize=style.TEXT + 1
     )
     return figure
 

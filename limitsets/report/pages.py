@@ -12,7 +12,7 @@ from collections.abc import Mapping
 from functools import cache
 from typing import TYPE_CHECKING, Any
 
-from limitsets.analysis import overlap
+from limitsets.analysis import in_limit_sets
 from limitsets.goals import order_of
 from limitsets.report.goals import goal_sentence, next_command, verdict_of, void_of
 from limitsets.report.tables import bands, count, intervals, percent, table
@@ -113,14 +113,5 @@ def page(analysis: Analysis, figures: Mapping[str, str]) -> str:
     assumed = [each.lifts for name, each in EFFECTS.items() if name not in effects.words]
     # of the throw; no effect lifts this
     assumed.insert(0 if effects.drive else 1, "it does not tip the part")
-    broken = other_vertex_in_limit_sets(analysis)
+    broken = in_limit_sets(analysis.other_vertex_first, analysis.extents)
     return words("report", figures, analysis=analysis, broken=broken, assumed=assumed) + "\n"
-
-
-def other_vertex_in_limit_sets(analysis: Analysis) -> dict[int, list[tuple[float, float]]]:
-    """Give, per side, where in a limit set another vertex than the left one lands first [length]."""
-    everything: dict[int, list[tuple[float, float]]] = {}
-    for extents in analysis.extents:
-        for side, parts in extents.items():
-            everything.setdefault(side, []).extend(parts)
-    return overlap(analysis.other_vertex_first, everything)

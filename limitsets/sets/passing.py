@@ -57,7 +57,7 @@ def longest_stays(graph: TransitionGraph) -> Integers:
 
 
 class _Fine(NamedTuple):
-    """Fine cells by number, the component of each, and edges between those of one component, by place among them."""
+    """The component of each fine cell, cell by cell, and edges between those of one component, by place among them."""
 
     owners: Integers
     source: Integers
@@ -70,15 +70,14 @@ def _passed(graph: TransitionGraph) -> tuple[NDArray[np.bool_], _Fine | None]:
     sets, attracting = graph.recurrent_components(), graph.condensation().attracting
     found = np.zeros(len(sets), dtype=bool)
     chosen = np.flatnonzero(~attracting)
-    cells = np.sort(np.concatenate([np.empty(0, np.int64), *(sets[k] for k in chosen)]))
+    cells = np.concatenate([np.empty(0, np.int64), *(sets[k] for k in chosen)])
     dimension = graph.grid.dimension
     parts = next((p for p in PARTS if cells.size * p**dimension <= MOST_CELLS), 0)
     if not cells.size or not parts:
         return found, None
     component = np.full(graph.n_cells, -1)
-    for k in chosen:
-        component[sets[k]] = k
-    fine = _finer(graph, cells, component, parts)
+    component[cells] = np.repeat(chosen, [sets[k].size for k in chosen])
+    fine = _finer(graph, np.sort(cells), component, parts)
     found[chosen] = True
     found[_recurring(fine)] = False
     return found, fine
@@ -101,16 +100,16 @@ def _finer(graph: TransitionGraph, cells: Integers, component: Integers, parts: 
     """Cut the cells of components, and find which of their fine cells lead to which."""
     grid, fine = graph.grid, graph.grid.refine(parts)
     proved = graph.method == "boxes"
-    node, owner, sources, targets, unclear = [], [], [], [], []
+    owner, sources, targets, unclear = [], [], [], []
+    rank, begun, of_each = np.zeros(graph.n_cells, np.int64), 0, parts**grid.dimension
+    rank[cells] = np.arange(cells.size)
     for side in range(grid.sides):
         here = cells[(cells >= grid.offset[side]) & (cells < grid.offset[side + 1])]
         if not here.size:
             continue
         sub = np.indices((parts,) * grid.dimension).reshape(grid.dimension, -1)
         place = [(at[:, None] * parts + s).ravel() for at, s in zip(grid.axes(here, side), sub, strict=True)]
-        number = fine.offset[side] + np.ravel_multi_index(place, tuple(fine.shape[side]))
-        whole = component[np.repeat(here, parts**grid.dimension)]
-        node.append(number)
+        whole = component[np.repeat(here, of_each)]
         owner.append(whole)
         boxes, clear = (_enclosed if proved else _hulls)(graph, fine, place, side)
         unclear.append(whole[~clear])
@@ -121,17 +120,16 @@ def _finer(graph: TransitionGraph, cells: Integers, component: Integers, parts: 
                     fine, after, lo[some], hi[some], int(grid.dimension > 1 and not proved)
                 )
                 coarse = np.ravel_multi_index([at // parts for at in position], tuple(grid.shape[after]))
-                inside = component[grid.offset[after] + coarse] == whole[some][source]
-                met = fine.offset[after] + np.ravel_multi_index(position, tuple(fine.shape[after]))
-                sources.append(number[some][source[inside]])
-                targets.append(met[inside])
-    nodes, owners = np.concatenate(node), np.concatenate(owner)
-    order = np.argsort(nodes)
-    nodes, owners = nodes[order], owners[order]
-    source, target = (
-        np.searchsorted(nodes, np.concatenate([*ends, nodes[:0]])) for ends in (sources, targets)
-    )
-    return _Fine(owners, source, target, np.concatenate(unclear))
+                coarse += grid.offset[after]
+                inside = component[coarse] == whole[some][source]
+                within = np.ravel_multi_index(
+                    [at[inside] % parts for at in position], (parts,) * grid.dimension
+                )
+                sources.append(begun + some[source[inside]])
+                targets.append(rank[coarse[inside]] * of_each + within)
+        begun += whole.size
+    source, target = (np.concatenate([*found, rank[:0]]) for found in (sources, targets))
+    return _Fine(np.concatenate(owner), source, target, np.concatenate(unclear))
 
 
 def _hulls(graph: TransitionGraph, fine: Any, place: list[Integers], side: int) -> tuple[list[Any], Any]:

@@ -21,6 +21,7 @@ from limitsets.progress import shown_in_notebooks
 from limitsets.scene import Scene, load
 from limitsets.sweep.axes import Axis, axis_of
 from limitsets.sweep.boundaries import STEP
+from limitsets.sweep.classes import UNDECIDED_NAME
 from limitsets.sweep.driving import Progress, Work, drive
 from limitsets.sweep.executors import chosen_pool
 from limitsets.sweep.plan import Plan, chunk_shape, code_of
@@ -101,7 +102,11 @@ class Atlas(Tabled):
         values, attributes = np.asarray(variable.values), variable.attrs
         if "flag_meanings" in attributes:
             codes = zip(attributes["flag_meanings"].split(), attributes["flag_values"], strict=True)
-            counts = [(word, int((values == code).sum())) for word, code in codes]
+            counts = [(word.replace("_", " "), int((values == code).sum())) for word, code in codes]
+            if name == "class":  # their names are codes: the legend has words for them
+                met = {word: count for word, count in counts if count}
+                doubt = met.pop(UNDECIDED_NAME, 0)
+                counts = [("classes", len(met)), ("undecided", doubt)]
             return name, ", ".join(f"{count} {word}" for word, count in counts if count), ""
         good = values[np.isfinite(values) if values.dtype.kind == "f" else values >= 0]
         ends = [f"{end:.9g}" for end in dict.fromkeys((good.min(), good.max()))] if good.size else []

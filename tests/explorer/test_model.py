@@ -165,7 +165,7 @@ def test_the_logistic_band_is_its_critical_orbit():
 def test_points_of_henon_lie_on_a_cycle_where_one_attracts():
     one = ls.maps.Henon(0.3, 0.3)
     x = ((0.3 - 1) + math.sqrt(0.49 + 4 * 0.3)) / (2 * 0.3)  # Henon's fixed point
-    points = points_of_map(one, as_domain(ls.maps.domain_of(one)))
+    points = points_of_map(one, as_domain(ls.maps.domain_of(one))).x
     assert len(points) > 1000
     assert np.allclose(points, (x, 0.3 * x), atol=1e-9)
 

@@ -5,6 +5,7 @@ import math
 import subprocess
 import sys
 import time
+from typing import NamedTuple
 
 import pytest
 
@@ -148,6 +149,29 @@ def test_throws_outside_the_model_are_said(page):
     assert "careful: from 100 % of the starts" in page._careful.object
 
 
+def test_throws_of_the_limit_set_that_land_on_another_vertex_are_said(page):
+    assert page._careful.object == ""
+    page._wrote = -1.0
+    page.sliders.put({"throw.speed": 170.0})
+    page.beat()
+    _, reach = page._found.sets[0][0][-1]
+    assert ls.analysis.other_vertex_first(page.scene)[0][0][0] < reach  # on side 0 alone
+    assert (
+        "careful: of some throws of the limit set from side 0 another vertex lands first"
+        in page._careful.object
+    )
+
+
+def test_a_point_mass_has_a_slider(page):
+    page.open(ls.load(LEAD))
+    page.sliders.put({"part.mass.points[0].mass": 16.0})
+    page.beat()
+    assert page.part._heavy.data["words"] == ["16 g"]
+    plate, lead = 3.0 * 0.03 * 0.02 / 2, 0.016  # kg; the plate's centroid is at (10, 20/3) mm
+    x = (plate * 10.0 + lead * 20.0) / (plate + lead)
+    assert page.scene.centre[0] == pytest.approx(x)
+
+
 def test_what_a_browser_sends_as_a_place_may_be_anything(page):
     for sent in (
         None,
@@ -227,6 +251,67 @@ def test_a_map_of_two_dimensions_is_its_points_and_a_bad_parameter_a_line():
     assert "wrong" in page._error.object
 
 
+class Spot(NamedTuple):
+    at: float
+
+
+def spot(params, x, side):  # the fixed point is (at, -at)
+    return (0.5 * (x[0] + params.at), 0.5 * (x[1] - params.at)), side, 0
+
+
+class Wide(NamedTuple):
+    a: float
+
+
+def wide(params, x, side):  # nearly |x_0| = |a|: its cycle of two
+    return (-params.a if x[0] > 0 else params.a, 0.5 * x[1]), side, 0
+
+
+def test_the_window_follows_the_points_of_a_plane_map():
+    ls.register(Spot, image=spot, dimension=2)
+    page = ls.explore(Spot(1.0), domain=[(-2, 2), (-2, 2)]).page()
+    for at, there in ((1.0, 0), (1.01, 0), (7.0, 1), (7.02, 1), (-40.0, 2)):
+        page.sliders.put({"at": at})
+        page.beat()
+        (x0, x1), (y0, y1) = page.points.canvas.view["x"], page.points.canvas.view["y"]
+        assert x0 < at < x1
+        assert y0 < -at < y1
+        if there == 0:
+            first = x0, x1
+            continue
+        kept, first = first, (x0, x1)
+        assert (kept == first) == (at == 7.02)  # a small move does not move the window
+
+
+def test_the_window_shrinks_to_points_that_would_be_lost_in_it():
+    ls.register(Wide, image=wide, dimension=2)
+    page = ls.explore(Wide(100.0), domain=[(-2, 2), (-2, 2)]).page()
+    assert page.points.canvas.view["x"] == [-200.0, 200.0]
+    for a, shown in ((60.0, 200.0), (20.0, 40.0)):
+        page.sliders.put({"a": a})
+        page.beat()
+        assert page.points.canvas.view["x"] == [-shown, shown]
+
+
+def test_a_cycle_is_drawn_so_that_it_is_seen():
+    page = ls.explore(ls.maps.Henon(0.3, 0.3)).page()
+    x = ((0.3 - 1) + math.sqrt(0.49 + 4 * 0.3)) / (2 * 0.3)  # Henon's fixed point
+    assert page.points._spots.data["x"] == [pytest.approx(x)]
+    page.sliders.put({"a": 1.4})
+    page.beat()
+    assert page.points._spots.data["x"] == []
+
+
+def test_where_orbits_go_that_do_not_stay_is_said():
+    page = ls.explore(ls.maps.Henon()).page()
+    page.sliders.put({"a": 5.0})
+    page.beat()
+    page._wrote = -1.0  # text is written a few times a second
+    page.beat()
+    assert "0 of 8 orbits" in page._said.object
+    assert "8 of 8 orbits pass x_0 = -" in page._said.object
+
+
 def test_a_map_of_one_dimension_has_lanes():
     page = ls.explore(ls.maps.Logistic(3.9)).page()
     assert page.lanes._sets.data["right"] == [pytest.approx(0.975)]
@@ -265,6 +350,14 @@ def test_a_stored_atlas_is_shown_and_a_point_of_it_opened(tmp_path):
     assert math.degrees(page.scene.value("throw.speed")) == pytest.approx(160.0)
     assert page.scene.surface_height == pytest.approx(-0.2)
     page.close()
+
+
+def test_the_address_is_printed(monkeypatch, capsys):
+    monkeypatch.setattr(
+        "limitsets.explorer.visits.serve", lambda page, title, ready, **_: ready("http://127.0.0.1:7")
+    )
+    ls.explore(ls.maps.Henon()).show(show=False)
+    assert capsys.readouterr().out == "explorer: http://127.0.0.1:7 (Ctrl-C ends it)\n"
 
 
 def test_any_other_address_needs_the_names_of_who_may_come():

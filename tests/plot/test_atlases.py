@@ -1,6 +1,7 @@
 """Maps and surfaces of an atlas: pixels, colours, words and marks against the numbers."""
 
 import math
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -148,6 +149,77 @@ def test_the_line_of_the_goal_parts_what_holds_from_what_does_not(feeders):
         assert abs(float(near) - 20.0) < 0.5  # a pixel is 2 deg/s wide
 
 
+@pytest.mark.parametrize("goal", ["oriented_beyond", "reaches"])
+def test_the_map_has_a_line_where_the_goal_ends_with_ticks_where_it_fails(goal):
+    tree = ls.load("paper-designed").as_dict()
+    tree["goal"] = {goal: {"x": "20 in", "side": 2 if goal == "oriented_beyond" else 0}}
+    found = ls.atlas(ls.load(tree), X, Y, variables=["class", "threshold"])
+    figure = ls.plot.atlas(found)
+    (line,) = [each for each in figure.axes[0].collections if each.get_gid() == "goal"]
+    ticked = line.get_path_effects()[-1]
+    angle = math.radians(ticked._angle)
+    threshold = found.dataset["threshold"]
+    checked = 0
+    for path in line.get_paths():
+        shown = figure.axes[0].transData.transform(path.vertices)
+        for (x0, y0), (x1, y1) in pairwise(shown):
+            size = math.hypot(x1 - x0, y1 - y0)
+            if size < 1.0:
+                continue
+            turned = complex(x1 - x0, y1 - y0) / size * complex(math.cos(angle), math.sin(angle))
+            for side, inside in ((1, True), (-1, False)):  # two pixels of the atlas off
+                off = 40.0 * side
+                x, y = (
+                    figure.axes[0]
+                    .transData.inverted()
+                    .transform((0.5 * (x0 + x1) + off * turned.real, 0.5 * (y0 + y1) + off * turned.imag))
+                )
+                near = float(threshold.sel({"throw.speed": x, "arm.surface_height": y}, method="nearest"))
+                if not math.isnan(near):
+                    assert ((near > 20.0) if goal == "oriented_beyond" else (near < 20.0)) == inside
+                    checked += 1
+    assert checked > 20
+    assert "the goal fails on the side of the ticks" in [t.get_text() for t in figure.legends[0].get_texts()]
+
+
+def test_of_one_quantity_the_line_of_the_goal_stands_where_the_threshold_is_its_x():
+    found = ls.atlas("paper-designed", "throw.speed=150:165:7", variables=["threshold", "class"])
+    (line,) = [each for each in ls.plot.atlas(found).axes[0].lines if each.get_gid() == "goal"]
+    x, values = found.dataset["throw.speed"].values, found.dataset["threshold"].values
+    assert line.get_xdata()[0] == pytest.approx(np.interp(-20.0, -values, x))  # it falls with the speed
+    assert line.get_path_effects()[-1]._angle == 90  # to the left of a line upwards: slower
+
+
+def test_where_no_line_is_the_legend_says_whether_the_goal_holds():
+    for speeds, word in (("165:168:3", "holds"), ("150:152:3", "fails")):
+        found = ls.atlas("paper-designed", f"throw.speed={speeds}", variables=["threshold", "class"])
+        texts = [text.get_text() for text in ls.plot.atlas(found).legends[0].get_texts()]
+        assert f"the goal {word} wherever there is a limit set" in texts
+
+
+@pytest.mark.parametrize(
+    ("one", "other"),
+    [
+        ("bands:1+2+2,order:0-1-2,period:0", "bands:1+3+1,order:0-1-2,period:0"),
+        ("bands:1+3+1,order:0-1-2,period:0", "bands:1+3+1,order:0-2-1,period:0"),
+        ("bands:2,order:0,period:2", "bands:16,order:0,period:16"),
+    ],
+)
+def test_classes_with_as_many_bands_or_some_sevens_more_look_different(one, other):
+    faces = [look_of(1, f"{name};leaves:none;collapses:none")["facecolor"] for name in (one, other)]
+    assert abs(lightness(faces[0]) - lightness(faces[1])) > 3
+
+
+def test_a_long_legend_stays_in_the_picture():
+    found = ls.atlas("paper-initial", "throw.speed=120:200:20", "arm.surface_height=-1:0.4:20")
+    figure = ls.plot.atlas(found)
+    assert len(figure.legends[0].get_texts()) > 10
+    figure.canvas.draw()
+    box = figure.legends[0].get_window_extent()
+    assert box.y0 >= 0.0
+    assert box.y1 <= figure.bbox.height
+
+
 def test_one_quantity_is_a_line():
     found = ls.atlas("paper-designed", "throw.speed=150:165:7", variables=["threshold", "class"])
     figure = ls.plot.atlas_surface(found, "threshold")
@@ -175,7 +247,7 @@ def test_an_atlas_without_classes():
     found = ls.atlas(
         "paper-designed", "throw.kappa=25.3778518:26:2", task="limitsets.sweep.examples:critical_points"
     )
-    with pytest.raises(AnswerError, match="one with class"):
+    with pytest.raises(AnswerError, match=r"one with the variable class, .* with ls\.plot\.atlas_surface"):
         ls.plot.atlas(found)
 
 
