@@ -303,7 +303,8 @@ def orbit(params: Any, x: Any, side: int, count: int) -> Orbit:
     params : NamedTuple
         A map.
     x : float or sequence of float
-        Start, in the map's unit; the formulas of a map know no domain, so that of the throw it may lie beyond the arm's end.
+        Start, in the map's unit; the formulas of a map know no domain, so that of the throw it may lie beyond the arm's
+        end.
     side : int
         Side of the start.
     count : int
