@@ -4,6 +4,7 @@ Truths come from the formulas of docs/model.md, solved here with scipy, and from
 """
 
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -175,18 +176,27 @@ def test_pieces_of_a_tolerance_claim_the_fewest_starts():
         claim("every", 1.0, near_joint=near),
         claim("almost-every", 1.0, thinning=7, near_joint=far),
     )
-    joined = weakest_of([every, almost])
+
+    def cells(first):
+        return SimpleNamespace(cover=SimpleNamespace(grid=SimpleNamespace(edges=[(np.array([first, 9.0]),)])))
+
+    joined = weakest_of([every, almost], [cells(1.5), cells(3.5)])
     assert joined.starts == joined.section["starts"] == "almost-every"
     assert joined.section["thinning"] == 7
     assert joined.section["near_joint"] == far
     some = claim({"from": {"0": 2.0}}, 0.9, lost={"0": (1.9).hex()})
     more = claim({"from": {"0": 2.5}}, 0.8, lost={"0": (1.8).hex()})
-    joined = weakest_of([every, some, more])
+    joined = weakest_of([some, more], [cells(1.5), cells(2.0)])
     assert joined.starts == {"from": {"0": 2.5}}
     assert joined.section["starts"] == {"from": {"0": (2.5).hex()}}
     assert joined.section["lost"] == {"0": (1.8).hex()}
-    assert "near_joint" not in joined.section
     assert joined.shares["share"] == 0.8
+    joined = weakest_of([every, some], [cells(2.25), cells(1.5)])
+    assert joined.starts == {
+        "from": {"0": 2.25}
+    }  # before its cells nothing is claimed of the first piece any more
+    assert "near_joint" not in joined.section
+    assert "lost" not in joined.section  # of every start it is proved, there, that none is
 
 
 def test_starts_next_to_a_fixed_point_that_attracts_do_not_thin_out():

@@ -106,7 +106,10 @@ def breaks_at(name, sign, sizes):
 
 @pytest.mark.sweep
 def test_of_pieces_proved_for_different_starts_the_fewest_are_claimed(monkeypatch, tmp_path):
-    """Below the joint's height every start comes, above it those from R* on: the file claimed every start."""
+    """Below the joint's height every start comes, above it those from R* on: the file claimed every start.
+
+    Across it nothing is proved of starts before the cells: the starts claimed begin with the cells of all pieces.
+    """
     tree = left_by_some() | {"goal": {"oriented_beyond": {"x": "111.591 mm", "side": 2}}}
     tree["part"] |= {"sides": ["54 mm", "30 mm", "46 mm"]}
     tree["part"]["mass"]["points"] = [{"x": "9.5479 mm", "y": "11.3473 mm", "mass": "12.4147 g"}]
@@ -118,6 +121,9 @@ def test_of_pieces_proved_for_different_starts_the_fewest_are_claimed(monkeypatc
     claimed = []
     monkeypatch.setattr(Proof, "save", lambda proof, path, **_: claimed.append(proof.claims[0]))
     found.save(tmp_path)
+    froms += [
+        {side: piece.found.cover.grid.edges[int(side)][0][0] for side in froms[0]} for piece in found.pieces
+    ]
     assert claimed[0].starts["from"] == {side: max(each[side] for each in froms) for side in froms[0]}
 
 
