@@ -94,14 +94,16 @@ def surfaces(points: int, out: Path) -> dict[str, Any]:
 
 
 def logistic(points: int, out: Path) -> dict[str, Any]:
-    """Find the windows of the logistic map: the first and the last r with each short cycle."""
+    """Find windows of the logistic map: the first with each short cycle, its first and its last r."""
     found = ls.atlas(ls.maps.Logistic(3.83), f"r=2.9:4:{points}", domain=[(0, 1)])
     ls.plot.atlas(found).savefig(out / "logistic.png", dpi=110)
     data, windows = found.dataset, {}
     r = data["r"].values
     for period in (1, 2, 4, 3):
         here = data["period"].values[:, 0] == period
-        windows[str(period)] = [round(float(each), 6) for each in (r[here].min(), r[here].max())]
+        first = int(np.argmax(here))
+        window = r[first:][np.logical_and.accumulate(here[first:])]
+        windows[str(period)] = [round(float(each), 6) for each in (window[0], window[-1])]
     undecided = float((data["undecided"].values > 0).mean())
     return {"windows": windows, "step": float(r[1] - r[0]), "undecided": round(undecided, 4)}
 
