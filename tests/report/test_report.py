@@ -14,7 +14,7 @@ from limitsets.analysis import GoalOutcome
 from limitsets.errors import AnswerError, LimitsetsError
 from limitsets.goals import OrientedBeyond
 from limitsets.report.audit_pages import audit_page
-from limitsets.report.goals import verdict_of, void_of
+from limitsets.report.goals import starts_words, verdict_of, void_of
 from limitsets.report.pages import page, words
 from limitsets.report.tables import bands
 from limitsets.report.writing import write
@@ -311,3 +311,9 @@ def test_a_scene_whose_throws_all_leave_the_model_has_a_report_without_a_flight(
     assert "flight.png" not in text
     with pytest.raises(AnswerError, match=r"outside the model, from x = 15 on side 0.*right unit"):
         ls.plot.flight(wild, 15.0, 0)
+
+
+def test_a_proved_share_is_rounded_down():
+    """Not the doctest's: pytest takes 96.5 for 96.4 there."""
+    assert starts_words("cells", 0.96459) == "for 96.4 % of all starts"
+    assert starts_words("cells", 0.99999) == "for 99.9 % of all starts"
