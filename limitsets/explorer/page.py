@@ -190,10 +190,9 @@ class ScenePage:
         self.lanes.mark(*self.start)
         self.lanes.show(found, scene)
         self._found, self._told = found, False
-        if self._lines or not self._proved.object:
-            self._proofs.stop()
-            self._lines = []
-            self._proved.object = proof_words([], (), "waits until the sliders rest")
+        self._proofs.stop()  # also where nothing is answered yet: an answer would be of another scene
+        self._lines = []
+        self._proved.object = proof_words([], (), "waits until the sliders rest")
 
     def _startable(self, scene: Scene) -> bool:
         try:
