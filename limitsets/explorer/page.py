@@ -1,6 +1,6 @@
 """The page of a scene: one visitor's sliders, pictures and answers, and what happens when they are touched.
 
-Everything that moves is done by `beat`, some thirty times a second: slider events only say that something has changed,
+Everything that moves is done by `beat`, some sixty times a second: slider events only say that something has changed,
 so that a hand that is faster than the computation leaves no queue behind.
 """
 
