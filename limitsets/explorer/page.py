@@ -41,6 +41,7 @@ WORDS = 0.25
 
 THROWS, FPS, SLOW = 6, 20.0, 2.0
 BEING = "being computed; the first proof on a machine also compiles, for a minute or more"
+MARGINS = "margins are being computed"
 SAVE: dict[str, Any] = {"stylesheets": [SLIDER], "sizing_mode": "stretch_width"}
 
 
@@ -87,7 +88,7 @@ class ScenePage:
     # ------------------------------------------------------------ what is shown
 
     def _laid_out(self) -> pn.viewable.Viewable:
-        wide: dict[str, Any] = {"sizing_mode": "stretch_width"}
+        wide: dict[str, Any] = {"sizing_mode": "stretch_width", "gap": "0 18px"}
         throw = pn.widgets.Button(label="Throw", color="primary", width=80, align="end", stylesheets=[SLIDER])
         throw.on_click(lambda _: self.throw(self._x.value, self._side.value))
         reset = pn.widgets.Button(label="Back to the first scene", stylesheets=[SLIDER])
@@ -121,7 +122,7 @@ class ScenePage:
                 **wide,
             ),
             self.atlas.column,
-            **wide,
+            sizing_mode="stretch_width",
         )
 
     def say(self, error: object = "") -> None:
@@ -212,7 +213,8 @@ class ScenePage:
     def _tell(self, lines: list[dict[str, Any]]) -> None:
         if lines:
             self._lines += lines
-            state = "" if "done" in self._lines[-1] else BEING
+            claimed = any("claim" in line for line in self._lines)
+            state = "" if "done" in self._lines[-1] else MARGINS if claimed else BEING
             self._proved.object = proof_words(self._lines, self.sliders.knobs, state)
 
     def throw(self, x: float, side: int) -> None:
