@@ -40,5 +40,5 @@ def test_the_largest_source_of_each_run_and_branch_is_found(name, noise):
         got = _Largest(each, number.size)(values[number])
         begins = [*each.begins.tolist(), got.size]
         most = [got[one:two].max() for one, two in pairwise(begins)]
-        assert list(zip(each.target.tolist(), most, strict=True)) == by_definition(found, left, of, values)
+        assert list(zip(number[each.target].tolist(), most, strict=True)) == by_definition(found, left, of, values)
         assert bool(most) == (share > 0)
