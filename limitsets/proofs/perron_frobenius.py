@@ -113,7 +113,9 @@ def _rounds(found: Cover, left: Mask, steep: NDArray[np.float64], of: NDArray[np
         throws += 1
         bound = np.where(waiting[group], thrown(bound), 0.0)
         largest = largest_of(bound)
-        ends = np.where(largest < 1.0, throws, _ends(largest, largest_of(_share(bound, earlier)), throws, since))
+        ends = np.where(
+            largest < 1.0, throws, _ends(largest, largest_of(_share(bound, earlier)), throws, since)
+        )
         done = waiting & (ends <= MOST)
         last = max(last, int(ends[done].max(initial=0.0)))
         hopeless = waiting & ~done & ~(largest < HOPELESS)
@@ -136,15 +138,13 @@ def _share(bound: NDArray[np.float64], earlier: NDArray[np.float64]) -> NDArray[
 def _ends(
     largest: NDArray[np.float64], share: NDArray[np.float64], throws: int, since: int
 ) -> NDArray[np.float64]:
-    """Count the throws after which bounds are below 1 that are at most a share of themselves, `since` some throws ago."""
+    """Count the throws after which bounds are below 1 that are at most a share of those `since` some throw."""
     with np.errstate(divide="ignore", invalid="ignore"):
         again = np.floor(np.log(largest) / -np.log(share)) + 1.0
     return np.where(share < 1.0, throws + again * (throws - since), np.inf)
 
 
-def _keeping(
-    thrown: _Thrown, bound: NDArray[np.float64], share: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def _keeping(thrown: _Thrown, bound: NDArray[np.float64], share: NDArray[np.float64]) -> NDArray[np.float64]:
     """Find bounds that, with 0 for all others, keep a share of themselves after a throw; 0 where none are found."""
     for _ in range(TRIES):
         kept = np.where(thrown(bound) >= share * bound, bound, 0.0)
@@ -255,7 +255,7 @@ class _Thrown:
         if not self.each.begins.size:
             return np.zeros(bound.size)
         most = np.maximum.reduceat(self.largest(bound * self.factor), self.each.begins)
-        return np.bincount(self.each.target, most, minlength=bound.size)
+        return np.asarray(np.bincount(self.each.target, most, minlength=bound.size), dtype=np.float64)
 
 
 class _LargestOf:

@@ -43,13 +43,17 @@ def test_the_largest_source_of_each_run_and_branch_is_found(name, noise):
         got = _Largest(each, number.size)(values[number])
         begins = [*each.begins.tolist(), got.size]
         most = [got[one:two].max() for one, two in pairwise(begins)]
-        assert list(zip(number[each.target].tolist(), most, strict=True)) == by_definition(found, left, of, values)
+        assert list(zip(number[each.target].tolist(), most, strict=True)) == by_definition(
+            found, left, of, values
+        )
         assert bool(most) == (share > 0)
 
 
 def throws_by_definition(found, left, of, steep):
     """After each throw in turn: the bounds, from 1 everywhere, as number 8 of docs/certificates.md has them."""
-    runs = np.cumsum(left & ~np.append(False, left[:-1] & ~np.isin(np.arange(1, left.size), found.grid.offset)))
+    runs = np.cumsum(
+        left & ~np.append(False, left[:-1] & ~np.isin(np.arange(1, left.size), found.grid.offset))
+    )
     pairs = [
         (to, 2 * runs[cell] + branch, cell)
         for branch in (0, 1)
@@ -94,7 +98,7 @@ def test_bounds_that_fall_slowly_are_known_to_fall_before_they_are_below_1(asked
 def test_bounds_that_stay_are_given_up_soon(asked):
     """Beyond 22.7 in there are so few places that bounds by 1000 cells a side do not fall in 4000 throws."""
     found, left, steep = slowly_left(22.7)
-    throws, thick, reason = perron_frobenius_bound(found, left)
+    _, thick, reason = perron_frobenius_bound(found, left)
     assert (thick == left).all()
     assert "not proved to thin out" in reason
     assert len(asked) < 200

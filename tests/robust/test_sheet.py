@@ -312,6 +312,8 @@ def test_the_seconds_of_a_curve_are_shared_by_its_places(monkeypatch):
 class Later(Executor):
     """Computes here, what went through pickle, at the end of the time that each place takes."""
 
+    _max_workers = 2  # as executors of concurrent.futures name it
+
     def __init__(self, clock, seconds):
         self.clock, self.seconds, self.most, self.running = clock, iter(seconds), 0, {}
 
@@ -333,7 +335,7 @@ class Later(Executor):
 
 
 def test_places_are_asked_about_side_by_side_and_none_that_would_end_late(monkeypatch):
-    """On two cores, of places that take 2, 2, 5, 3, 4, 1, 1 s in turn and 12 s in all.
+    """In two processes, of places that take 2, 2, 5, 3, 4, 1, 1 s in turn and 12 s in all.
 
     The fifth begins at 5 s, where 7 are left and the dearest took 3; the sixth at 7 s, where 5 are left and the dearest
     took 5.  At 8 s only 4 are left, and the last is not begun.
@@ -343,7 +345,6 @@ def test_places_are_asked_about_side_by_side_and_none_that_would_end_late(monkey
     monkeypatch.setattr(margin_curve, "time", clock)
     monkeypatch.setattr(margin_curve, "wait", executor.wait)
     monkeypatch.setattr(margin_curve, "margins_beyond", tent_of)
-    monkeypatch.setattr(margin_curve.os, "cpu_count", lambda: 2)
     scene, told = ls.load("paper-designed"), {"tell": lambda *_: None, "keep": lambda _: None}
     found, left = margin_curve.curve(scene, 2, {}, None, seconds=12.0, executor=executor, **told)
     assert (executor.most, left, clock.now) == (2, 1, 9.0)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import time
 from collections.abc import Callable, Mapping
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
@@ -85,7 +84,7 @@ def curve(
         Shared by the proofs of all places; no place is begun for which less is left than the dearest took, but the
         middle one always is.
     executor : Executor, optional
-        Where places are asked about, as many at once as there are cores; default, here.
+        Where places are asked about, as many at once as it has workers; default, here.
     tell, keep : callable
         Called with what is done and its share, and with what is found so far.
 
@@ -108,7 +107,9 @@ def curve(
     found = None if known is None or known["side"] != side else curve_read(known, scene)
     done = set() if found is None else {round(x, 9) for x in found.x.tolist()}
     waiting = [x for x in places.tolist() if round(x, 9) not in done]
-    pool, at_once = (_Here(), 1) if executor is None else (executor, os.cpu_count() or 1)
+    pool = executor or _Here()
+    # concurrent.futures has no public word for it; of an executor of another kind it is not known
+    at_once = getattr(pool, "_max_workers", 1)
     begun: dict[Future[MarginsBeyond], float] = {}
     dearest = 0.0
     while True:
