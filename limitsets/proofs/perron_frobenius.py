@@ -138,7 +138,7 @@ def _share(bound: NDArray[np.float64], earlier: NDArray[np.float64]) -> NDArray[
 def _ends(
     largest: NDArray[np.float64], share: NDArray[np.float64], throws: int, since: int
 ) -> NDArray[np.float64]:
-    """Count the throws after which bounds are below 1 that are at most a share of those `since` some throw."""
+    """Count the throws after which bounds are below 1 that are at most a share of those after throw `since`."""
     with np.errstate(divide="ignore", invalid="ignore"):
         again = np.floor(np.log(largest) / -np.log(share)) + 1.0
     return np.where(share < 1.0, throws + again * (throws - since), np.inf)
