@@ -1,6 +1,6 @@
 """The page of a scene: one visitor's sliders, pictures and answers, and what happens when they are touched.
 
-Everything that moves is done by `beat`, some thirty times a second: slider events only say that something has changed,
+Everything that moves is done by `beat`, some sixty times a second: slider events only say that something has changed,
 so that a hand that is faster than the computation leaves no queue behind.
 """
 
@@ -190,10 +190,9 @@ class ScenePage:
         self.lanes.mark(*self.start)
         self.lanes.show(found, scene)
         self._found, self._told = found, False
-        if self._lines or not self._proved.object:
-            self._proofs.stop()
-            self._lines = []
-            self._proved.object = proof_words([], (), "waits until the sliders rest")
+        self._proofs.stop()  # also where nothing is answered yet: an answer would be of another scene
+        self._lines = []
+        self._proved.object = proof_words([], (), "waits until the sliders rest")
 
     def _startable(self, scene: Scene) -> bool:
         try:

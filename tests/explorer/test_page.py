@@ -240,6 +240,16 @@ def test_proofs_come_once_the_sliders_rest(page):
     assert "<b>proved</b>" not in page._proved.object  # what was proved was said of another scene
 
 
+def test_a_proof_that_has_said_nothing_yet_ends_when_a_slider_moves(page):
+    """Left running it takes a core from the pictures, and its answers would stand beside another scene."""
+    page._ask()
+    assert "being computed" in page._proved.object
+    page.sliders.put({"throw.speed": 150.0})
+    page.beat()
+    assert "waits until the sliders rest" in page._proved.object
+    assert page._proofs.wait() == []
+
+
 def test_a_map_of_two_dimensions_is_its_points_and_a_bad_parameter_a_line():
     page = ls.explore(ls.maps.Henon()).page()
     before = len(page.points._points.data["x"])
