@@ -94,10 +94,10 @@ class Atlas(Tabled):
         """Give what the answers range over."""
         rows = [self._range(str(name)) for name in sorted(self.dataset, key=str)]
         axes = " and ".join(self.axes)
-        return (Table(("variable", "values", "unit"), rows, f"Atlas over {axes}", "sampled, not proved"),)
+        return (Table(("variable", "values", "unit", "what"), rows, f"Atlas over {axes}", "sampled, not proved"),)
 
-    def _range(self, name: str) -> tuple[str, str, str]:
-        """Say what one variable ranges over, apart from where there is nothing; of codes how many there are of each."""
+    def _range(self, name: str) -> tuple[str, str, str, str]:
+        """Say what one variable ranges over, apart from where there is nothing; of codes how many points have each."""
         variable = self.dataset[name]
         values, attributes = np.asarray(variable.values), variable.attrs
         if "flag_meanings" in attributes:
@@ -107,11 +107,11 @@ class Atlas(Tabled):
                 met = {word: count for word, count in counts if count}
                 doubt = met.pop(UNDECIDED_NAME, 0)
                 counts = [("classes", len(met)), ("undecided", doubt)]
-            return name, ", ".join(f"{count} {word}" for word, count in counts if count), ""
+            return name, ", ".join(f"{word}: {count}" for word, count in counts if count), "", ""
         good = values[np.isfinite(values) if values.dtype.kind == "f" else values >= 0]
         ends = [f"{end:.9g}" for end in dict.fromkeys((good.min(), good.max()))] if good.size else []
         said = "none" if not ends or (name == "period" and ends == ["0"]) else " to ".join(ends)
-        return name, said, attributes.get("units", "")
+        return name, said, attributes.get("units", ""), attributes.get("long_name", "")
 
     def to_json(self) -> dict[str, Any]:
         """Give the document of docs/json.md: the scene, the axes, and every variable as nested lists."""

@@ -477,5 +477,5 @@ def test_without_the_extra_one_line_says_how_to_get_it(library):
 def test_its_table_has_words_and_no_codes():
     found = ls.atlas("paper-designed", "throw.speed=140:170:4")
     values = {row[0]: row[1] for row in found.tables()[0].rows}
-    assert values["class"] == "2 classes"  # every start leaves; one attractor
+    assert values["class"] == "classes: 2"  # every start leaves; one attractor
     assert "not checked" in values["checked"]
