@@ -68,9 +68,14 @@ class Atlas(Tabled):
         return tuple(axis["name"] for axis in self.dataset.attrs["plan"]["axes"])
 
     def to_dataframe(self) -> pd.DataFrame:
-        """Give a table with a row for each point, a column for each variable, and one for each entry of an array."""
+        """Give a table with a row for each point, a column for each variable, and one for each entry of an array.
+
+        Attractors beyond the most that a point has are left out.
+        """
         pd = imported("pandas")
         data, columns = self.dataset, {}
+        if "attractors" in data and "attractor" in data.sizes:
+            data = data.isel(attractor=slice(max(int(data["attractors"].max()), 1)))
         for name, variable in data.data_vars.items():
             more = [dim for dim in variable.dims if dim not in self.axes]
             for places in _entries([data.sizes[dim] for dim in more]):

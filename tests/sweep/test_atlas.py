@@ -405,6 +405,13 @@ def test_a_table_has_a_row_for_each_point():
     assert [row["kappa"], row["feet[1]"]] == [float(one.kappa), float(one.feet[1])]
 
 
+def test_a_table_has_columns_for_no_more_attractors_than_a_point_has():
+    one = ls.atlas("paper-designed", "throw.speed=150:160:3").to_dataframe()
+    assert [name for name in one.columns if name.startswith("share")] == ["share[0]"]
+    two = ls.atlas(ls.maps.Cubic(1.5), "r=1.3:1.6:3").to_dataframe()  # beside 0 there are two fixed points for r > 1
+    assert [name for name in two.columns if name.startswith("share")] == ["share[0]", "share[1]"]
+
+
 def test_json_has_everything_and_no_nan():
     import json
 
