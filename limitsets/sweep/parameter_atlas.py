@@ -99,7 +99,9 @@ class Atlas(Tabled):
         """Give what the answers range over."""
         rows = [self._range(str(name)) for name in sorted(self.dataset, key=str)]
         axes = " and ".join(self.axes)
-        return (Table(("variable", "values", "unit", "what"), rows, f"Atlas over {axes}", "sampled, not proved"),)
+        return (
+            Table(("variable", "values", "unit", "what"), rows, f"Atlas over {axes}", "sampled, not proved"),
+        )
 
     def _range(self, name: str) -> tuple[str, str, str, str]:
         """Say what one variable ranges over, apart from where there is nothing; of codes how many points have each."""

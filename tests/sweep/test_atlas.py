@@ -408,7 +408,9 @@ def test_a_table_has_a_row_for_each_point():
 def test_a_table_has_columns_for_no_more_attractors_than_a_point_has():
     one = ls.atlas("paper-designed", "throw.speed=150:160:3").to_dataframe()
     assert [name for name in one.columns if name.startswith("share")] == ["share[0]"]
-    two = ls.atlas(ls.maps.Cubic(1.5), "r=1.3:1.6:3", domain=[(-1.2, 1.2)]).to_dataframe()  # beside 0 two fixed points attract
+    two = ls.atlas(
+        ls.maps.Cubic(1.5), "r=1.3:1.6:3", domain=[(-1.2, 1.2)]
+    ).to_dataframe()  # beside 0 two fixed points attract
     assert [name for name in two.columns if name.startswith("share")] == ["share[0]", "share[1]"]
 
 
