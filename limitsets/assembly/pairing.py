@@ -20,6 +20,7 @@ from limitsets.robust.noise.laws import Gaussian, Uniform
 from limitsets.robust.noise.scattering import Scattering, scattering_of
 from limitsets.robust.sheet.noise_input import still
 from limitsets.scene import Scene, load
+from limitsets.scene.scene import require_rests
 
 __all__ = [
     "SHARED",
@@ -93,6 +94,7 @@ def pair_of(
             "effects.contact of the two scenes", values, "the same in both", "switch it in both"
         )
     for each in (one, two):
+        require_rests(each)
         others = sorted(set(each.effects.on()) - {"landing", "spread"})
         if others:
             remedy = "their motion after the impact is not followed here: switch them off"

@@ -28,6 +28,7 @@ from limitsets.maps import advance
 from limitsets.proofs.query import Query
 from limitsets.robust.margins.invariant_set import invariant_intervals, least_slack
 from limitsets.scene import Scene, load
+from limitsets.scene.scene import require_rests
 from limitsets.scene.spelling import in_unit_of, in_units_of, unit_of
 from limitsets.tables import Column, Table, Tabled
 
@@ -236,6 +237,7 @@ def design_for_goal(
         raise AnswerError(
             "the goal", kind, "oriented_beyond or reaches, with a side and an x", remedy, file=start.file
         )
+    require_rests(start)
     if start.effects.on():
         raise AnswerError("the scene", "with effects on", "the minimal model", "switch its effects off")
     if evaluations < 1:

@@ -35,6 +35,7 @@ from limitsets.robust.margins.estimate import Estimate, on_all_corners
 from limitsets.robust.margins.joint import joint_margin
 from limitsets.robust.margins.vector import Tolerance
 from limitsets.scene import Scene, load
+from limitsets.scene.scene import require_rests
 from limitsets.scene.spelling import in_units_of
 
 __all__ = ["TOLERANCE", "fed_at", "robust_design"]
@@ -309,6 +310,7 @@ def _proved(
 
 
 def _side(scene: Scene, side: int | None) -> int:
+    require_rests(scene)
     if scene.effects.on():
         raise AnswerError("the scene", "with effects on", "the minimal model", "switch its effects off")
     asked = side if side is not None else getattr(scene.goal, "side", len(scene.sides) - 1)
