@@ -170,7 +170,9 @@ def _cavity_of(scene: Scene) -> Cavity:
     if scene.cavity is None:
         require_rests(scene)
         at = f"{getattr(scene.goal, 'x', 0.7 * scene.arm_length):.6g} {scene.unit}"
-        remedy = f'add [cavity] with position, width, depth and angle: position = "{at}" is where the arm ends'
+        remedy = (
+            f'add [cavity] with position, width, depth and angle: position = "{at}" is where the arm ends'
+        )
         raise AnswerError("the scene", "without [cavity]", "one with a cavity", remedy)
     return scene.cavity
 

@@ -145,7 +145,10 @@ def test_points_beside_a_measured_mass_are_told_how_to_be_added() -> None:
         (("180 deg/s", "960 deg/s"), "throw.speed"),
         (('"-8 mm"', '"60 mm"'), "arm.surface_height"),
         (('thickness = "2 mm"', 'thickness = "0.06 m"'), "part.mass.plate_thickness"),
-        (('[tolerance]\n', '[tolerance]\n"arm.surface_height" = "50 mm"\n'), 'tolerance."arm.surface_height"'),
+        (
+            ("[tolerance]\n", '[tolerance]\n"arm.surface_height" = "50 mm"\n'),
+            'tolerance."arm.surface_height"',
+        ),
         (('"throw.speed" = "0.5 %"', '"throw.speed" = "90 deg/s"'), None),
         (('"throw.speed" = "0.5 %"', '"throw.speed" = "120 deg/s"'), 'tolerance."throw.speed"'),
     ],
