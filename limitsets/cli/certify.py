@@ -42,7 +42,8 @@ def certify(
     tolerance: Annotated[Words, option("--tolerance", "Q=DEV", HELP_TOLERANCE)] = None,
     noise: Annotated[Words, option("--noise", "Q=DEV", HELP_NOISE)] = None,
     out: Annotated[
-        Path | None, option("--out -o", "FILE", "The certificate, ./NAME.proof.zip by default.")
+        Path | None,
+        option("--out -o", "FILE", "The certificate, NAME.proof.zip; ./ and the scene's name by default."),
     ] = None,
     csv: Csv = None,
     json: Json = False,

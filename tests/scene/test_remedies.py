@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+import re
 import tomllib
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -119,10 +121,19 @@ def test_a_concave_part_is_told_its_hull_ready_to_paste() -> None:
 
 def test_the_worked_example_of_the_page_is_the_sum_of_its_pieces() -> None:
     """Two rectangles and a point: areas, centres, and moments by the parallel-axis rule, in mm and g."""
+    page = (Path(__file__).parents[2] / "docs" / "scene.md").read_text(encoding="utf-8")
+    lines = re.findall(
+        r"`((?:vertices|center|radius_of_gyration) = .*?)`", page.partition("**A concave part**")[2]
+    )
+    tree = plate() | {"tolerance": {}}
+    tree["part"] = tomllib.loads(lines[0]) | {"mass": tomllib.loads("\n".join(lines[1:3]))}
+    scene = ls.load(tree)
+    assert scene.sides.rests.all()
     by_area = 7850e-9 * 2.0 * 1e3  # g/mm^2
-    pieces = [(80 * 20, 40, 10, 80**2 + 20**2), (20 * 40, 10, 40, 20**2 + 40**2)]
-    parts = [(area * by_area, x, y, squares / 12) for area, x, y, squares in pieces] + [(18.0, 70, 10, 0.0)]
-    for count, centre, radius in ((2, (30.0, 20.0), 28.868), (3, (42.931, 16.767), 30.592)):
+    pieces = [(80 * 40, 40, 20, 80**2 + 40**2), (40 * 40, 20, 60, 40**2 + 40**2)]
+    parts = [(area * by_area, x, y, squares / 12) for area, x, y, squares in pieces] + [(18.0, 60, 20, 0.0)]
+    told = (2, (33.333, 33.333), 31.269), (3, scene.centre, scene.radius_of_gyration)
+    for count, centre, radius in told:
         mass, x, y, own = np.array(parts[:count]).T
         cx, cy = (mass @ x) / mass.sum(), (mass @ y) / mass.sum()
         assert (cx, cy) == pytest.approx(centre, abs=5e-4)
