@@ -20,6 +20,9 @@ from limitsets.tables import BY_CELLS, Column, Table, Tabled
 
 __all__ = ["Basins", "basins"]
 
+# A recurrent set of more cells is hardly one unstable cycle.
+MOST_OF_A_CYCLE = 64
+
 
 @dataclass(frozen=True, eq=False)
 class Basins(Tabled):
@@ -121,7 +124,11 @@ def _advice(graph: TransitionGraph, lasting: list[NDArray[np.int32]]) -> str | N
         marks[cells] = 1
     weight = graph.grid.measure
     share = float(weight[reach(graph.ranges, graph.components(), marks) > 0].sum() / weight.sum())
+    reached = f"from {100 * share:.3g} % of the starts a recurrent set that is not closed can be reached"
+    coarse = "an attractor in cells that are too coarse for it: they are undecided; ask for finer cells"
+    if max(map(len, lasting)) <= MOST_OF_A_CYCLE:
+        return f"{reached}, an unstable cycle or {coarse}"
     return (
-        f"from {100 * share:.3g} % of the starts a recurrent set that is not closed can be reached, an unstable cycle "
-        "or an attractor in cells that are too coarse for it: they are undecided; ask for finer cells"
+        f"{reached}, a chaotic repeller or {coarse}; near a repeller they decide few more starts, sample the shares: "
+        "limitsets.resilience.basin_stability(graph, found, starts=10000)"
     )
