@@ -62,8 +62,8 @@ def estimate_words(found: Estimate, goal: Goal | None, unit: str) -> str:
             f"side {side}: {escape(interval_text(parts)).replace(chr(10), ', ')}"
             for side, parts in sorted(extents.items())
         )
-        visits = "the order of sides changes" if order is None else f"sides {'-'.join(map(str, order))}"
-        rows.append((f"limit set {k}", f"{places} {unit}; {visits}"))
+        visits = "; the order of sides changes" if order is None else f"; sides {'-'.join(map(str, order))}"
+        rows.append((f"limit set {k}", f"{places} {unit}".rstrip() + (visits if len(found.lo) > 1 else "")))
     if not found.sets:
         rows.append(("limit set", "none: no start was found to stay"))
     shares = "; ".join(f"{look_of(label)[2]} {100 * share:.3g} %" for label, share in found.shares)

@@ -16,7 +16,7 @@ from limitsets.graph.components import reach
 from limitsets.maps import codes
 from limitsets.sets.attractors import Attractor
 from limitsets.sets.passing import passing
-from limitsets.tables import BY_CELLS, Column, Table, Tabled
+from limitsets.tables import Column, Table, Tabled, how_found
 
 __all__ = ["Basins", "basins"]
 
@@ -43,6 +43,8 @@ class Basins(Tabled):
         Share of the cells all of whose paths leave by that exit.
     advice : str or None
         What to do about recurrent sets that are not closed, where there are any.
+    how : str
+        "proved" where the transitions are (method "boxes"), "cells" where the images of cells are sampled.
     """
 
     grid: Grid
@@ -51,6 +53,7 @@ class Basins(Tabled):
     undecided_between: float
     exits: dict[str, float]
     advice: str | None = None
+    how: str = "cells"
 
     def tables(self) -> tuple[Table, ...]:
         """Give the tables that show it, the one that is saved as CSV first."""
@@ -59,7 +62,7 @@ class Basins(Tabled):
             *((f"leave: {name}", share) for name, share in self.exits.items()),
             ("undecided", self.undecided_between),
         ]
-        return (Table(("where paths end", Column("share", show=".6f")), rows, "Basins", BY_CELLS),)
+        return (Table(("where paths end", Column("share", show=".6f")), rows, "Basins", how_found(self.how)),)
 
 
 @arguments_checked
@@ -112,6 +115,7 @@ def basins(graph: TransitionGraph, found: tuple[Attractor, ...]) -> Basins:
         by_code[codes.UNDECIDED],
         {name: by_code[code] for name, code in graph.exits.items()},
         _advice(graph, list(itertools.compress(sets, ~(attracting | through)))),
+        graph.how,
     )
 
 
