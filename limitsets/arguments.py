@@ -17,7 +17,7 @@ from typing import Any, NamedTuple, NoReturn, ParamSpec, TypeVar
 
 from limitsets.errors import AnswerError, shown
 
-__all__ = ["arguments_checked"]
+__all__ = ["arguments_checked", "arguments_checked_as"]
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -152,13 +152,14 @@ def _asked_of(annotation: str) -> _Kind | None:
     return None if kind is None or {"Scene", "str"} <= set(annotation.split(" | ")) else kind
 
 
-def arguments_checked(function: Callable[P, R]) -> Callable[P, R]:
+def arguments_checked(function: Callable[P, R], public: str = "") -> Callable[P, R]:
     """Refuse arguments of another kind than the function's annotations say, before it begins.
 
     Raises
     ------
     AnswerError
-        By the function: the argument, what was given, what fits and what to pass.
+        By the function: the argument, what was given, what fits and what to pass.  The function goes by its own name,
+        or by `public`.
 
     Examples
     --------
@@ -178,14 +179,16 @@ def arguments_checked(function: Callable[P, R]) -> Callable[P, R]:
     named = [name for name, each in parameters.items() if each.kind is each.POSITIONAL_OR_KEYWORD]
     rest = next((name for name, each in parameters.items() if each.kind is each.VAR_POSITIONAL), "")
 
+    called = public or function.__name__
+
     def refuse(name: str, value: object, kind: _Kind) -> NoReturn:
         usual = parameters[name].default
-        remedy = f"help({function.__name__}) says more"
+        remedy = f"help({called}) says more"
         if kind.call:
             remedy = f"pass {kind.call}"
         elif isinstance(usual, int | str) or _is_number(usual):
             remedy = f"pass {name}={usual!r}"
-        raise AnswerError(f"the argument {name} of {function.__name__}", shown(value), kind.words, remedy)
+        raise AnswerError(f"the argument {name} of {called}", shown(value), kind.words, remedy)
 
     @wraps(function)
     def checked(*args: P.args, **kwargs: P.kwargs) -> R:
@@ -197,3 +200,8 @@ def arguments_checked(function: Callable[P, R]) -> Callable[P, R]:
         return function(*args, **kwargs)
 
     return checked
+
+
+def arguments_checked_as(public: str) -> Callable[[Callable[P, R]], Callable[P, R]]:
+    """Check as `arguments_checked`; an error says the name of the public function that hands its arguments on."""
+    return lambda function: arguments_checked(function, public)

@@ -176,7 +176,9 @@ def _goal(proof: Proof, claim: Claim) -> list[str]:
             (f"of {bound(100.0 * shares['open'], '%', up=True)} nothing is proved", shares["open"]),
         ]
         told = "; ".join(text for text, share in others if share > 0.0)
-        lines.append(f"These are {bound(100.0 * shares['share'], '%')} of all starts on the arm; {told}.")
+        lines.append(
+            f"It is proved for {bound(100.0 * shares['share'], '%')} of all starts on the arm; {told}."
+        )
     if "starts" in claim.section and proof.noise and "thinning" in claim.section:
         lines.append("Which starts are excepted may depend on the sequence of the noise.")
     if claim.verdict != "proved":
@@ -197,10 +199,10 @@ def _attraction(proof: Proof, claim: Claim) -> list[str]:
     growth = _down(bound["near_joint"], 6)
     starts = ", ".join(f"{_up(x, 6)} {unit} on side {side}" for side, x in bound["beyond"].items())
     first = "From every position on the arm and every side, a part comes into the attracting cells and stays there:"
-    near = f"Nearer to the joint more come before; each moves the part out, x - a by a factor of {growth} at least."
+    near = f"Nearer to the joint it takes more throws: each moves the part out, x - a by a factor of {growth} at least."
     if points is not None:
         first = "From every position on the arm beyond R*, a part comes into the attracting cells and stays there:"
-        near = f"Nearer to R* more come before; each moves the part out, x - R* by a factor of {growth} at least."
+        near = f"Nearer to R* it takes more throws: each moves the part out, x - R* by a factor of {growth} at least."
     return [
         *(_two_basins(proof, points) if points is not None else ()),
         first,

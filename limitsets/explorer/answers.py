@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from html import escape
+from itertools import chain
 from typing import Any
 
 from limitsets.analysis import in_limit_sets, other_vertex_first
 from limitsets.explorer.estimates import CELLS, Estimate, Points
 from limitsets.explorer.knobs import Knob
+from limitsets.explorer.look import swatch
 from limitsets.explorer.pictures import look_of
 from limitsets.goals import Goal
 from limitsets.maps import codes
@@ -22,6 +24,9 @@ KEY = (
     '<p class="how">Bars: limit sets. Strips: where starts lead, hatched unless to limit set 0. Strokes r: critical '
     "points. Dotted: the goal. Triangle: the part; click a lane to throw from there.</p>"
 )
+
+LISTED = 12
+"""Points of a cycle that are told one by one."""
 
 VERDICTS = {
     "proved": "&#10003; <b>proved</b>",
@@ -57,6 +62,7 @@ def careful_line(found: Estimate, scene: Scene) -> str:
 def estimate_words(found: Estimate, goal: Goal | None, unit: str) -> str:
     """Say what is estimated."""
     rows = []
+<<<<<<< HEAD
     for k, (extents, order) in enumerate(zip(found.sets, found.orders, strict=True)):
         places = "; ".join(
             f"side {side}: {escape(interval_text(parts)).replace(chr(10), ', ')}"
@@ -64,9 +70,25 @@ def estimate_words(found: Estimate, goal: Goal | None, unit: str) -> str:
         )
         visits = "; the order of sides changes" if order is None else f"; sides {'-'.join(map(str, order))}"
         rows.append((f"limit set {k}", f"{places} {unit}".rstrip() + (visits if len(found.lo) > 1 else "")))
+=======
+    for k, (extents, bands, order) in enumerate(zip(found.sets, found.bands, found.orders, strict=True)):
+        drawn = sum(map(len, extents.values()))
+        is_cycle = all(lo == hi for parts in extents.values() for lo, hi in parts)
+        if is_cycle and drawn > LISTED:
+            places = f"from {min(chain(*extents.values()))[0]:.6g} to {max(chain(*extents.values()))[0]:.6g}"
+        else:
+            places = "; ".join(f"side {side}: {_places(parts)}" for side, parts in sorted(extents.items()))
+        visits = "the order of sides changes" if order is None else f"sides {'-'.join(map(str, order))}"
+        kind = f"; a cycle of period {drawn}" if is_cycle else ""
+        joined = f"; {bands} intervals, which these cells join" if bands > drawn else ""
+        rows.append((f"limit set {k}", f"{places} {unit}; {visits}{kind}{joined}"))
+>>>>>>> main
     if not found.sets:
         rows.append(("limit set", "none: no start was found to stay"))
-    shares = "; ".join(f"{look_of(label)[2]} {100 * share:.3g} %" for label, share in found.shares)
+    looks = [(*look_of(label), share) for label, share in found.shares]
+    shares = "; ".join(
+        f"{swatch(face, hatch)}{words} {100 * share:.3g} %" for face, hatch, words, share in looks
+    )
     rows.append(("starts", shares))
     points = ", ".join(f"r{side}{chr(39) * number} = {x:.4f}" for side, number, x in found.critical)
     if points:
@@ -75,6 +97,13 @@ def estimate_words(found: Estimate, goal: Goal | None, unit: str) -> str:
         rows.append((f"goal: {escape(goal_sentence(goal, unit))}", _goal_words(found, goal, unit)))
     how = f"from {CELLS} cells a side" + (", ends from the compiled loop of the atlas" if found.sharp else "")
     return _table("Estimated (follows the sliders, proves nothing)", rows, how)
+
+
+def _places(parts: Sequence[tuple[float, float]]) -> str:
+    """Write points, or intervals."""
+    if all(lo == hi for lo, hi in parts):
+        return ", ".join(f"{x:.6g}" for x, _ in parts)
+    return escape(interval_text(parts)).replace("\n", ", ")
 
 
 def points_words(found: Points) -> str:
@@ -102,7 +131,8 @@ def proof_words(lines: Sequence[Mapping[str, Any]], knobs: Sequence[Knob], state
             written = verdict.startswith("proved") and line.get("starts")
             of = f", {escape(starts_words(line['starts'], line['share']))}" if written else ""
             left = "" if verdict == "proved" else reason
-            rows.append((escape(str(line["claim"])), f"{VERDICTS[verdict]}{of}{left}"))
+            note = f"; {escape(str(line['note']))}" if line.get("note") else ""
+            rows.append((escape(str(line["claim"])), f"{VERDICTS[verdict]}{of}{left}{note}"))
         elif "margin" in line and "proved" in line:
             limit = "" if line["refuted"] is None else f"; refuted at {escape(str(line['refuted']))}"
             held = line["proved"]

@@ -13,7 +13,7 @@ from scipy.ndimage import distance_transform_edt
 from limitsets.explorer.background import Background
 from limitsets.explorer.canvas import Canvas, Hand, Layer, Words
 from limitsets.explorer.knobs import Knob
-from limitsets.explorer.look import SAID, SLIDER
+from limitsets.explorer.look import SAID, SLIDER, swatch
 from limitsets.explorer.pictures import pattern
 from limitsets.plot import style
 from limitsets.plot.atlas_frame import edges
@@ -136,7 +136,7 @@ class AtlasPage:
         self._canvas.heading = "atlas: arrow keys choose a point, Enter opens it"
         self._canvas.visible = True
         rows = "".join(
-            f'<tr><td><span class="swatch" style="background:{_colour(each["facecolor"])}"></span>{k + 1}</td>'
+            f"<tr><td>{swatch(_colour(each['facecolor']), pattern(each['hatch']))}{k + 1}</td>"
             f"<td>{escape(each['words'])}</td><td>{100 * each['share']:.3g} %</td></tr>"
             for k, each in enumerate(table["classes"][:12])
         )

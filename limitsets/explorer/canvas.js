@@ -1,7 +1,7 @@
 // Draws what a `Canvas` of canvas.py lists, layer upon layer, once a frame of the screen at most.  Scripts of a reader, and
 // tests, find on the canvas itself what it shows (`shown`) and where (`frame`, and the `boxes` of words).
 const FACE = 'system-ui, -apple-system, "Segoe UI", "DejaVu Sans", sans-serif'
-const INK = "#222222", TILE = 8, NEAR = 24, MOVED = 4
+const INK = "#222222", TILE = 8, NEAR = 24, MOVED = 4, NARROW = 480
 
 export function render({ model, el }) {
   const canvas = document.createElement("canvas"), pen = canvas.getContext("2d"), tiles = new Map()
@@ -93,12 +93,13 @@ export function render({ model, el }) {
         pen.stroke()
       })
     },
-    // A word stays within the picture, and `apart` keeps it off the words before it.
-    words: ({ x, y, words, align, colour, size, plate, shift, apart, baseline }) => {
+    // A word stays within the picture, and `apart` keeps it off the words before it; a narrow picture has the `short` ones.
+    words: ({ x, y, words, short, align, colour, size, plate, shift, apart, baseline }) => {
       pen.font = `${size}px ${FACE}`
       pen.textBaseline = "middle"
       pen.textAlign = "left"
-      words.forEach((word, k) => {
+      const chosen = short && canvas.clientWidth < NARROW ? short : words
+      chosen.forEach((word, k) => {
         if (!word) return
         const wide = pen.measureText(word).width, high = size + 2
         const part = { left: 0, right: 1, center: 0.5 }[Array.isArray(align) ? align[k] : align]

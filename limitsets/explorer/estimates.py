@@ -21,7 +21,7 @@ from limitsets.maps import Orbit, critical_points, has_slope, kind_of, orbit
 from limitsets.maps.stacks import stacked
 from limitsets.scene import Scene
 from limitsets.sets import Attractor, Basins, attractors, basins
-from limitsets.topology import topologies
+from limitsets.topology import Topologies, topologies
 from limitsets.topology.records import DECIDED
 
 __all__ = ["CELLS", "Estimate", "Points", "estimate", "estimate_of_map", "points_of_map"]
@@ -49,8 +49,11 @@ class Estimate:
         Where a part can rest on each side [length].
     sets : tuple of dict
         Per attractor its intervals by side.
+    bands : tuple of int
+        Per attractor how many intervals the compiled loop tells apart; 0 where it does not decide.
     sharp : bool
-        Whether the outermost ends are those of the compiled loop; otherwise they are edges of cells.
+        Whether the points of cycles and the outermost ends of other attractors are those of the compiled loop;
+        otherwise ends are edges of cells.
     orders : tuple
         Per attractor the flip order, None where it changes.
     shares : tuple of (int, float)
@@ -70,6 +73,7 @@ class Estimate:
     lo: tuple[float, ...]
     hi: tuple[float, ...]
     sets: tuple[Extents, ...]
+    bands: tuple[int, ...]
     sharp: bool
     orders: tuple[tuple[int, ...] | None, ...]
     shares: tuple[tuple[int, float], ...]
@@ -111,8 +115,9 @@ def _estimated(params: Any, domain: Domain, scene: Scene | None) -> Estimate:
     graph = transitions(params, grid(domain, cells=CELLS))
     found = attractors(graph, throws=THROWS)
     split = basins(graph, found)
-    ends = _ends(params, domain, len(found))
-    sets = tuple(_sharpened(each, ends) for each in found)
+    told = _told(params, domain, len(found))
+    sharpened = [_sharpened(each, params, told) for each in found]
+    sets = tuple(extents for extents, _ in sharpened)
     goal: dict[str, Any] = {}
     if scene is not None and scene.goal is not None:
         from limitsets.analysis.goal import goal_outcome
@@ -125,7 +130,8 @@ def _estimated(params: Any, domain: Domain, scene: Scene | None) -> Estimate:
         tuple(domain.lo[:, 0].tolist()),
         tuple(domain.hi[:, 0].tolist()),
         sets,
-        ends is not None,
+        tuple(bands for _, bands in sharpened),
+        told is not None,
         tuple(each.flip_order for each in found),
         tuple(zip(labels.tolist(), weight.tolist(), strict=True)),
         tuple(_runs(split)),
@@ -138,32 +144,38 @@ def _estimated(params: Any, domain: Domain, scene: Scene | None) -> Estimate:
     )
 
 
-def _ends(params: Any, domain: Domain, count: int) -> tuple[npt.NDArray[np.float64], ...] | None:
-    """Least and largest x per attractor and side; None where the compiled loop does not decide, or counts others."""
+def _told(params: Any, domain: Domain, count: int) -> Topologies | None:
+    """Ask the compiled loop of the atlas; None where it does not decide, or counts other attractors."""
     if not has_slope(params) or not count:
         return None
     anchor = None if domain.anchor is None else domain.anchor[None]
     found = topologies(stacked([params]), domain.lo[:, 0][None], domain.hi[:, 0][None], anchor)
-    if found.undecided[0] != DECIDED or found.attractors[0] != count:
-        return None
-    return found.lowest[0, :count], found.reach[0, :count]
+    return found if found.undecided[0] == DECIDED and found.attractors[0] == count else None
 
 
-def _sharpened(attractor: Attractor, ends: tuple[npt.NDArray[np.float64], ...] | None) -> Extents:
-    """Move the outermost ends of an attractor's cells to its own ends, where these lie in them."""
+def _sharpened(attractor: Attractor, params: Any, told: Topologies | None) -> tuple[Extents, int]:
+    """Replace the cells of a cycle by its points, and move the outermost ends of other attractors to their own.
+
+    Both where they lie in the cells, which may join what are several intervals; how many these are, 0 if not known.
+    """
     found = {side: list(parts) for side, parts in attractor.extents.items()}
-    if ends is None:
-        return found
-    for lowest, reach in zip(*ends, strict=True):
+    for k in range(0 if told is None else int(told.attractors[0])):
+        assert told is not None  # the range is empty
+        lowest, reach, period = told.lowest[0, k], told.reach[0, k], int(told.period[0, k])
         sides = [int(side) for side in np.flatnonzero(np.isfinite(lowest))]
-        if sides == sorted(found) and all(
+        if sides != sorted(found) or not all(
             found[side][0][0] <= reach[side] and lowest[side] <= found[side][-1][1] for side in sides
         ):
-            for side in sides:
-                found[side][0] = float(lowest[side]), found[side][0][1]
-                found[side][-1] = found[side][-1][0], float(reach[side])
-            return found
-    return found
+            continue
+        if period:
+            cycle = orbit(params, float(told.start[0, k]), int(told.start_side[0, k]), period - 1)
+            points = {side: np.sort(cycle.x[cycle.side == side]).tolist() for side in sides}
+            return {side: [(x, x) for x in points[side]] for side in sides}, period
+        for side in sides:
+            found[side][0] = float(lowest[side]), found[side][0][1]
+            found[side][-1] = found[side][-1][0], float(reach[side])
+        return found, int(told.bands[0, k].sum())
+    return found, 0
 
 
 def _runs(split: Basins) -> list[tuple[int, float, float, int]]:

@@ -82,10 +82,10 @@ class LanesPicture:
         marks = [(x, -side - 0.3, -side + 0.3) for side, _, x in found.critical]
         self._critical.data = _columns(marks, "x", "y0", "y1")
         names = [
-            (x, -side - 0.3, f"r{side}{chr(39) * number} {x:.2f}", "center")
+            (x, -side - 0.3, f"r{side}{chr(39) * number} {x:.2f}", "center", f"r{side}{chr(39) * number}")
             for side, number, x in found.critical
         ]
-        self._points.data = _columns(names, *WRITTEN)
+        self._points.data = _columns(names, *WRITTEN, "short")
         goal = None if scene is None else scene.goal
         asked: list[tuple[Any, ...]] = []
         if scene is not None and isinstance(goal, OrientedBeyond | Reaches):
@@ -97,7 +97,7 @@ class LanesPicture:
         at = [] if found.threshold is None else [found.threshold]
         limits = [(x, low, f"threshold {x:.3f}", "right") for x in at]
         self._threshold.data = self._limit.data = _columns(limits, *WRITTEN)
-        self.canvas.heading = "estimate: limit sets, basins, critical points"
+        self.canvas.heading = f"estimate: limit sets, basins{', critical points' * bool(found.critical)}"
 
     def mark(self, x: float, side: float) -> None:
         """Show where the part is."""

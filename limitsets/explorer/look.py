@@ -2,13 +2,36 @@
 
 from __future__ import annotations
 
-__all__ = ["PAGE", "SAID", "SLIDER"]
+__all__ = ["PAGE", "SAID", "SLIDER", "swatch"]
 
 # Panel's own page, told that a phone is narrow; `base` is what Panel gives.
 PAGE = """{% extends base %}{% block preamble %}
 <meta name="viewport" content="width=device-width, initial-scale=1">
 <style>body { padding: 0 10px 10px !important; box-sizing: border-box; color: #222; }</style>
 {% endblock %}"""
+
+
+def swatch(face: str, hatch: str = " ") -> str:
+    """Draw a piece of a colour and, in lines or dots, its hatch, as the pictures have them (HTML)."""
+    marks = ", ".join(
+        "radial-gradient(#222 30%, transparent 35%) 0 0 / 5px 5px"
+        if angle is None
+        else f"repeating-linear-gradient({angle}deg, transparent 0 3px, #222 3px 4px)"
+        for angle in TURNED.get(hatch, ())
+    )
+    return f'<span class="swatch" style="background: {marks}{", " if marks else ""}{face}"></span>'
+
+
+LINES: dict[str, tuple[int | None, ...]] = {
+    "/": (135,),
+    "\\": (45,),
+    "x": (45, 135),
+    "|": (90,),
+    "-": (0,),
+    "+": (0, 90),
+}
+TURNED = {**LINES, "*": (0, 90), "o": (None,), ".": (None,)}
+"""Angles across the lines of each hatch, in the words of CSS; None for dots."""
 
 SAID = """
 :host, div { font-family: system-ui, -apple-system, "Segoe UI", "DejaVu Sans", sans-serif; color: #222; }

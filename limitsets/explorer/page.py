@@ -1,6 +1,6 @@
 """The page of a scene: one visitor's sliders, pictures and answers, and what happens when they are touched.
 
-Everything that moves is done by `beat`, some thirty times a second: slider events only say that something has changed,
+Everything that moves is done by `beat`, some sixty times a second: slider events only say that something has changed,
 so that a hand that is faster than the computation leaves no queue behind.
 """
 
@@ -41,6 +41,7 @@ WORDS = 0.25
 
 THROWS, FPS, SLOW = 6, 20.0, 2.0
 BEING = "being computed; the first proof on a machine also compiles, for a minute or more"
+MARGINS = "margins are being computed"
 SAVE: dict[str, Any] = {"stylesheets": [SLIDER], "sizing_mode": "stretch_width"}
 
 
@@ -87,7 +88,7 @@ class ScenePage:
     # ------------------------------------------------------------ what is shown
 
     def _laid_out(self) -> pn.viewable.Viewable:
-        wide: dict[str, Any] = {"sizing_mode": "stretch_width"}
+        wide: dict[str, Any] = {"sizing_mode": "stretch_width", "gap": "0 18px"}
         throw = pn.widgets.Button(label="Throw", color="primary", width=80, align="end", stylesheets=[SLIDER])
         throw.on_click(lambda _: self.throw(self._x.value, self._side.value))
         reset = pn.widgets.Button(label="Back to the first scene", stylesheets=[SLIDER])
@@ -121,7 +122,7 @@ class ScenePage:
                 **wide,
             ),
             self.atlas.column,
-            **wide,
+            sizing_mode="stretch_width",
         )
 
     def say(self, error: object = "") -> None:
@@ -190,10 +191,9 @@ class ScenePage:
         self.lanes.mark(*self.start)
         self.lanes.show(found, scene)
         self._found, self._told = found, False
-        if self._lines or not self._proved.object:
-            self._proofs.stop()
-            self._lines = []
-            self._proved.object = proof_words([], (), "waits until the sliders rest")
+        self._proofs.stop()  # also where nothing is answered yet: an answer would be of another scene
+        self._lines = []
+        self._proved.object = proof_words([], (), "waits until the sliders rest")
 
     def _startable(self, scene: Scene) -> bool:
         try:
@@ -213,7 +213,8 @@ class ScenePage:
     def _tell(self, lines: list[dict[str, Any]]) -> None:
         if lines:
             self._lines += lines
-            state = "" if "done" in self._lines[-1] else BEING
+            claimed = any("claim" in line for line in self._lines)
+            state = "" if "done" in self._lines[-1] else MARGINS if claimed else BEING
             self._proved.object = proof_words(self._lines, self.sliders.knobs, state)
 
     def throw(self, x: float, side: int) -> None:

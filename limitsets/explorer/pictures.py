@@ -91,6 +91,7 @@ class PartPicture:
             size=12,
             shift=10,
             plate=True,
+            apart=True,
         )
         shapes = [self._outline, self._labels, self.centre, self._masses, self._heavy]
         layers = [*shapes, self.corners, self._dots]

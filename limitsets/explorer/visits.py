@@ -29,8 +29,8 @@ __all__ = ["Explorer", "stored_atlas"]
 COMPILING = "compiling, once: the throw, images of cells, attractors"
 """Short enough for the bar of a narrow terminal."""
 
-BEAT = 30
-"""Milliseconds from one beat to the next."""
+BEAT = 15
+"""Milliseconds from one beat to the next: a slider waits for half of them, and a page at rest costs 1 % of a core."""
 
 
 def _say(address: str) -> None:

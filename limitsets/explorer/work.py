@@ -52,7 +52,7 @@ def _proofs(scene: Scene, margins: list[str]) -> Iterator[dict[str, Any]]:
 
     proof = certify(scene)
     for claim in proof.claims:
-        told = {"starts": claim.starts, "share": claim.shares.get("share")}
+        told = {"starts": claim.starts, "share": claim.shares.get("share"), "note": claim.note}
         yield {"claim": claim.claim, "verdict": claim.verdict, "reason": claim.reason, **told}
     if scene.goal is None or not proof.proved:
         return

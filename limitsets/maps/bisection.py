@@ -7,7 +7,6 @@ a pair of samples of one sign have an extremum towards zero between them: golden
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +22,7 @@ Flags = NDArray[np.bool_]
 # Golden section: 0.618^50 = 4e-11 of two sample spacings, where the top of a parabola is flat to rounding.
 NARROWINGS = 50
 GOLDEN = 0.5 * (5.0**0.5 - 1.0)
+SHARES = np.arange(1, 16)[:, None] / 16.0
 
 
 def sign_code(values: Array) -> Codes:
@@ -59,10 +59,20 @@ def bisected(lo: Array, hi: Array, is_above: Callable[[Array, Array, Array], Fla
         lo, hi = np.where(inside & above, middle, lo), np.where(inside & ~above, middle, hi)
 
 
-def _still(code_of: Callable[[Array], Codes], before: Codes, _lo: Array, middle: Array, _hi: Array) -> Flags:
-    """Whether the code in the middle is still the one below, so that its change lies above."""
-    flags: Flags = code_of(middle) == before
-    return flags
+def _first_change(
+    code_of: Callable[[Array], Codes], lo: Array, hi: Array, before: Codes
+) -> tuple[Array, Array]:
+    """Cut brackets until their ends are adjacent floats: 16 parts at a time, for a call of a map is dear by itself."""
+    at = np.arange(lo.size)
+    while True:
+        points = lo + SHARES * (hi - lo)
+        inside = (points > lo) & (points < hi)
+        if not inside.any():
+            return lo, hi
+        same = np.where(inside, code_of(points.ravel()).reshape(points.shape) == before, points <= lo)
+        count = np.logical_and.accumulate(same, axis=0).sum(axis=0)  # below the first change
+        ends = np.concatenate([lo[None], points, hi[None]])
+        lo, hi = ends[count, at], ends[count + 1, at]
 
 
 def located(code_of: Callable[[Array], Codes], x: Array) -> tuple[Array, Codes]:
@@ -72,7 +82,7 @@ def located(code_of: Callable[[Array], Codes], x: Array) -> tuple[Array, Codes]:
         k = np.flatnonzero((code[1:] != code[:-1]) & (np.nextafter(x[:-1], np.inf) < x[1:]))
         if k.size == 0:
             return x, code
-        lo, hi = bisected(x[k], x[k + 1], partial(_still, code_of, code[k]))
+        lo, hi = _first_change(code_of, x[k], x[k + 1], code[k])
         x = inserted(x, np.concatenate([lo, hi]))
         code = code_of(x)
 

@@ -10,7 +10,7 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any, overload
 
-from limitsets.arguments import arguments_checked
+from limitsets.arguments import arguments_checked_as
 from limitsets.cells import Grid
 from limitsets.errors import AnswerError, shown
 from limitsets.progress import shown_in_notebooks
@@ -27,11 +27,12 @@ from limitsets.proofs.proof import Claim, Proof
 from limitsets.proofs.simulated import joined, scattered
 from limitsets.proofs.tolerance import SceneBox, whole
 from limitsets.proofs.trapping import trapping
+from limitsets.proofs.weakest_claim import weakest_of
 from limitsets.scene import Scene, load
 from limitsets.scene.quantities import deviation, find
 from limitsets.scene.units import parse
 
-__all__ = ["CLAIMS", "certify", "spelled_deviations", "weakest_of"]
+__all__ = ["CLAIMS", "certify", "spelled_deviations"]
 
 # Cells per side, tried in turn until everything asked for is proved or refuted.
 LADDER = (2048, 8192, 32768, 131072)
@@ -41,9 +42,6 @@ MOST_PIECES, MOST_CELLS = 1024, 4_000_000
 
 # Of the pieces so many, the widest, are searched for an orbit that refutes the goal, besides the corners.
 MOST_SEARCHED = 8
-
-# For which starts a goal holds: the fewer the later.
-STARTS = ("every", "almost-every", "from", "cells")
 
 Progress = Callable[[str, int, int], None]
 
@@ -297,7 +295,7 @@ def _require_none(given: Mapping[str, Any], beside: str) -> None:
 
 
 @shown_in_notebooks
-@arguments_checked
+@arguments_checked_as("certify")
 def certify_scene(
     scene: Scene | str | Path,
     claims: Sequence[str] | None = None,
@@ -422,58 +420,3 @@ def _halved(
 def _settled(claim: Claim) -> bool:
     """Whether narrower pieces cannot bring a better verdict: where starts leave a goal holds on cells at best."""
     return claim.verdict == "proved" or (claim.written and claim.shares["leaves"] > 0.0)
-
-
-def weakest_of(claims: Sequence[Claim], found: Sequence[Attraction]) -> Claim:
-    """Join one claim, proved on every piece by its cells: with the weakest of the numbers, for the fewest starts."""
-    sections = [claim.section for claim in claims]
-    section = dict(sections[0])
-    near = [other["near_joint"] for other in sections if "near_joint" in other]
-    section.pop("near_joint", None)
-    if len(near) == len(sections):
-        section["near_joint"] = {side: _weakest([other[side] for other in near]) for side in near[0]}
-    for count in ("max_rank", "throws", "jogs", "thinning"):
-        counts = [other[count] for other in sections if count in other]
-        if counts:
-            section[count] = max(counts)
-    if "least_slope" in section:
-        section["least_slope"] = min((other["least_slope"] for other in sections), key=float.fromhex)
-    if claims[0].starts is None:
-        return Claim(claims[0].claim, "proved", "", section)
-    weakest = max(
-        claims, key=lambda claim: STARTS.index(claim.starts if isinstance(claim.starts, str) else "from")
-    )
-    starts = weakest.starts
-    section.pop("lost", None)
-    if isinstance(starts, dict):
-        given = [claim.starts["from"] for claim in claims if isinstance(claim.starts, dict)]
-        if len(near) < len(sections):  # of starts before the cells nothing is claimed then
-            first = [[float(edges[0]) for (edges,) in one.cover.grid.edges] for one in found]
-            given += [{side: cells[int(side)] for side in given[0]} for cells in first]
-        starts = {"from": {side: max(each[side] for each in given) for side in given[0]}}
-        section["starts"] = {"from": {side: x.hex() for side, x in starts["from"].items()}}
-        lost = [other["lost"] for other in sections if "lost" in other]
-        if len(lost) == len(claims):
-            section["lost"] = {
-                side: min((each[side] for each in lost), key=float.fromhex) for side in lost[0]
-            }
-    else:
-        section["starts"] = starts
-    least, most = (
-        {"share": min, "leaves": min, "creeps": min, "open": max},
-        [claim.shares for claim in claims],
-    )
-    shares = {key: pick(each[key] for each in most) for key, pick in least.items()}
-    notes = {claim.note for claim in claims}
-    note = notes.pop() if len(notes) == 1 else ""
-    return replace(weakest, section=section, counterexample=(), starts=starts, shares=shares, note=note)
-
-
-def _weakest(near: Sequence[dict[str, Any]]) -> dict[str, Any]:
-    """Near the joint on one side of every piece: the least factor, and a bracket of all fixed points."""
-    joined: dict[str, Any] = {"q": min((each["q"] for each in near), key=float.fromhex)}
-    if "fixed_point" in near[0]:  # or in none of them: h = 0 would lie in a piece between
-        ends = [each["fixed_point"] for each in near]
-        lowest, highest = (lo for lo, _ in ends), (hi for _, hi in ends)
-        joined["fixed_point"] = [min(lowest, key=float.fromhex), max(highest, key=float.fromhex)]
-    return joined

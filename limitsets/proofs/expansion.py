@@ -17,9 +17,10 @@ from limitsets.interval import Interval
 from limitsets.jit import entry_of, proof_kernel
 from limitsets.proofs.cover import Cover
 from limitsets.thrower.effects.landing import Landing
+from limitsets.thrower.flight_box import bracket
 from limitsets.thrower.motion import FullThrow
 from limitsets.thrower.side_box import gather_box
-from limitsets.thrower.throw_box import NOTHING, sure_throw_box, throw_box
+from limitsets.thrower.throw_box import slope_between, sure_slope_box
 
 __all__ = ["least_slope", "slopes"]
 
@@ -28,13 +29,18 @@ PIECES = 8
 
 
 @proof_kernel(entry=True)
-def _slopes(lo_map: Any, hi_map: Any, side: int, lo: Any, hi: Any, out: Any) -> None:
+def _slopes(lo_map: Any, hi_map: Any, side: int, cuts: Any, out: Any) -> None:
     b = gather_box(lo_map, hi_map, side)
-    for k in range(lo.size):
-        state, _, _, slope, _ = throw_box(b, Interval(lo[k], hi[k]))
-        if state == NOTHING:  # parameters so wide that the fast bracket of the impact angle is not confirmed
-            state, _, _, slope, _ = sure_throw_box(b, Interval(lo[k], hi[k]))
-        out[k] = slope.lo if state != NOTHING else -1.0
+    for k in range(out.shape[0]):
+        last, fine = bracket(b.flight, b, cuts[k, 0])
+        for j in range(out.shape[1]):
+            first, good = last, fine
+            last, fine = bracket(b.flight, b, cuts[k, j + 1])
+            x = Interval(cuts[k, j], cuts[k, j + 1])
+            slope, proved = slope_between(b, x, first, last, good & fine)
+            if not proved:  # parameters so wide that the fast bracket of the impact angle is not confirmed
+                slope, proved = sure_slope_box(b, x)
+            out[k, j] = slope.lo if proved else -1.0
 
 
 def least_slope(found: Cover, cells: CellSet) -> tuple[float, str]:
@@ -48,23 +54,23 @@ def least_slope(found: Cover, cells: CellSet) -> tuple[float, str]:
         The side and cell of the least slope.
     """
     least, place = np.inf, ""
-    for side, _, lo, hi, out in _pieces(found, cells):
-        worst = int(out.argmin())
-        if out[worst] < least:
-            least, place = float(out[worst]), f"side {side}, x in [{lo[worst]:.6g}, {hi[worst]:.6g}]"
+    for side, _, cuts, out in _pieces(found, cells):
+        k, j = divmod(int(out.argmin()), PIECES)
+        if out[k, j] < least:
+            least, place = float(out[k, j]), f"side {side}, x in [{cuts[k, j]:.6g}, {cuts[k, j + 1]:.6g}]"
     return least, place
 
 
 def slopes(found: Cover, cells: CellSet) -> NDArray[np.float64]:
     """Lower bounds of the slope on each of the given cells; nan on the others, -1 where nothing is proved."""
     least = np.full(found.grid.n_cells, np.nan)
-    for side, k, _, _, out in _pieces(found, cells):
-        least[found.grid.offset[side] + k] = out.reshape(k.size, PIECES).min(axis=1)
+    for side, k, _, out in _pieces(found, cells):
+        least[found.grid.offset[side] + k] = out.min(axis=1)
     return least
 
 
-def _pieces(found: Cover, cells: CellSet) -> Iterator[tuple[int, Any, Any, Any, Any]]:
-    """Per side: the cells, both ends of their pieces, and a lower bound of the slope on each piece."""
+def _pieces(found: Cover, cells: CellSet) -> Iterator[tuple[int, Any, Any, Any]]:
+    """Per side: the cells, the cuts between their pieces, and a lower bound of the slope on each piece."""
     for side, (edges,) in enumerate(found.grid.edges):
         k = np.flatnonzero(cells.mask[found.grid.of_side(side)])
         if not k.size:
@@ -72,12 +78,11 @@ def _pieces(found: Cover, cells: CellSet) -> Iterator[tuple[int, Any, Any, Any, 
         weights = np.arange(PIECES + 1) / PIECES
         cuts = edges[k][:, None] + weights * (edges[k + 1] - edges[k])[:, None]
         cuts[:, -1] = edges[k + 1]
-        out = np.empty(k.size * PIECES)
-        lo, hi = np.ascontiguousarray(cuts[:, :-1].ravel()), np.ascontiguousarray(cuts[:, 1:].ravel())
-        _slopes(*found.box.bare, side, lo, hi, out)
+        out = np.empty((k.size, PIECES))
+        _slopes(*found.box.bare, side, cuts, out)
         lowest = found.box.lo
         if isinstance(lowest, FullThrow) and entry_of(lowest.effects, Landing) is not None:
             # where another vertex may land the displacement is another function
             late = ~(found.images[side].witness[1, k] <= lowest.bare.corner[side])
-            out.reshape(k.size, PIECES)[late] = -1.0
-        yield side, k, lo, hi, out
+            out[late] = -1.0
+        yield side, k, cuts, out

@@ -27,7 +27,7 @@ from typing import Any, NoReturn, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from limitsets.arguments import arguments_checked
+from limitsets.arguments import arguments_checked_as
 from limitsets.cells import CellSet, Grid
 from limitsets.errors import AnswerError
 from limitsets.graph import TransitionGraph, transitions
@@ -455,7 +455,7 @@ CLAIMS_OF_MAP = (*PROVERS, "cycles")
 
 
 @shown_in_notebooks
-@arguments_checked
+@arguments_checked_as("certify")
 def certify_map(
     map: Any,  # noqa: A002  # the field's word
     grid: Grid | None = None,

@@ -10,12 +10,16 @@ most for each run and branch.  So with a bound b(c) of the density on every cell
 Where the largest bound falls below 1 after n throws it is below its k-th power after k n: the starts that never leave
 have length zero.  With noise the same holds of every sequence of throws, each of which is one map.
 
+These bounds are monotone and proportional to those before (Collatz and Wielandt's inequalities): where each bound is at
+most a share below 1 of what it was m throws ago, it is at most that share again after m more, and so on; where some
+bounds, all others left out, keep a share of themselves after one throw, they keep it after each.  So it is known long
+before whether bounds fall below 1.
+
 Cells of different groups are told apart: an orbit that goes from one group to another has left the first.
 """
 
 from __future__ import annotations
 
-import math
 from typing import NamedTuple
 
 import numpy as np
@@ -29,11 +33,14 @@ __all__ = ["DensityBound", "perron_frobenius_bound"]
 
 Mask = NDArray[np.bool_]
 
-# Throws after which it is given up.
+# Throws after which bounds have to be below 1.
 MOST = 4000
 
-# After so many, and each time twice as many, a group is given up where at the pace since half of them it would not do.
-PACE = 512
+# After so many, and each time twice as many, bounds are kept to be compared with later ones.
+FIRST = 32
+
+# Tries to find bounds that keep a share of themselves.
+TRIES = 8
 
 # It is given up, too, where a bound has grown so large.
 HOPELESS = 1e100
@@ -48,7 +55,7 @@ class DensityBound(NamedTuple):
     Attributes
     ----------
     throws : int
-        After so many the bounds of every group that thins out have been below 1.
+        After so many, or fewer, the bounds of every group that thins out are below 1.
     thick : ndarray of bool, shape (n_cells,)
         Cells of the groups of which it is not proved.
     reason : str
@@ -97,39 +104,54 @@ def perron_frobenius_bound(found: Cover, cells: Mask, group: NDArray[np.int32] |
 def _rounds(found: Cover, left: Mask, steep: NDArray[np.float64], of: NDArray[np.int64], thick: Mask) -> int:
     """Bound the densities throw by throw; mark the groups that do not thin out, and count the throws of the others."""
     number = np.flatnonzero(left)
-    each = _stretches(found, left, number, of)
-    largest_on = _Largest(each, number.size)
-    factor = (1.0 + SLACK) / steep[number]
-    bound = np.where(left, 1.0, 0.0)
-    waiting = np.zeros(thick.size, dtype=bool)
-    waiting[of[left]] = True
-    half, check = np.full(thick.size, math.inf), PACE
-    last = 0
-    for throws in range(1, MOST + 1):
-        if each.begins.size:
-            most = np.maximum.reduceat(largest_on(bound[number] * factor), each.begins)
-            bound = np.bincount(each.target, most, minlength=left.size)
-        else:
-            bound = np.zeros(left.size)
-        largest = np.zeros(thick.size)
-        np.maximum.at(largest, of[left], bound[left])
-        done = waiting & (largest < 1.0)
-        if done.any():
-            last, waiting = throws, waiting & ~done
-        if not waiting.any():
-            break
-        if 2 * throws == check:
-            half = largest
-        hopeless = waiting & ~(largest < HOPELESS)
-        if throws == check:
-            with np.errstate(divide="ignore", invalid="ignore"):
-                pace = np.log(half / largest) / (check / 2)
-                hopeless |= waiting & ~(np.log(largest) <= pace * (MOST - throws))
-            half, check = largest, 2 * check
-        thick |= hopeless
-        waiting &= ~hopeless
-    thick |= waiting
+    thrown = _Thrown(_stretches(found, left, number, of), (1.0 + SLACK) / steep[number])
+    names, group = np.unique(of[number], return_inverse=True)
+    waiting, largest_of = np.ones(names.size, dtype=bool), _LargestOf(group)
+    bound, earlier, since = np.ones(number.size), np.zeros(number.size), 0
+    last = throws = 0
+    while waiting.any() and throws < MOST:
+        throws += 1
+        bound = np.where(waiting[group], thrown(bound), 0.0)
+        largest = largest_of(bound)
+        ends = np.where(
+            largest < 1.0, throws, _ends(largest, largest_of(_share(bound, earlier)), throws, since)
+        )
+        done = waiting & (ends <= MOST)
+        last = max(last, int(ends[done].max(initial=0.0)))
+        hopeless = waiting & ~done & ~(largest < HOPELESS)
+        if throws >= FIRST and throws & (throws - 1) == 0:
+            # what keeps this share at every throw is not below 1 after the last
+            share = np.maximum(largest, 1.0) ** (-1.0 / max(MOST - throws, 1))
+            hopeless |= waiting & ~done & (largest_of(_keeping(thrown, bound, share[group])) >= largest)
+            earlier, since = bound, throws
+        thick[names[hopeless]] = True
+        waiting &= ~(done | hopeless)
+    thick[names[waiting]] = True
     return last if last else throws
+
+
+def _share(bound: NDArray[np.float64], earlier: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Divide bounds by earlier ones: what was 0 and is not has grown without limit."""
+    return np.divide(bound, earlier, out=np.where(bound > 0.0, np.inf, 0.0), where=earlier > 0.0)
+
+
+def _ends(
+    largest: NDArray[np.float64], share: NDArray[np.float64], throws: int, since: int
+) -> NDArray[np.float64]:
+    """Count the throws after which bounds are below 1 that are at most a share of those after throw `since`."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        again = np.floor(np.log(largest) / -np.log(share)) + 1.0
+    return np.where(share < 1.0, throws + again * (throws - since), np.inf)
+
+
+def _keeping(thrown: _Thrown, bound: NDArray[np.float64], share: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Find bounds that, with 0 for all others, keep a share of themselves after a throw; 0 where none are found."""
+    for _ in range(TRIES):
+        kept = np.where(thrown(bound) >= share * bound, bound, 0.0)
+        if (kept == bound).all():
+            return kept
+        bound = kept
+    return np.zeros(bound.size)
 
 
 class _Stretches(NamedTuple):
@@ -142,7 +164,7 @@ class _Stretches(NamedTuple):
     begins : ndarray of int, shape (m,)
         Where the stretches of a target, run and branch begin.
     target : ndarray of int, shape (m,)
-        The target of each of these groups.
+        The target of each of these groups, among the cells left.
     """
 
     first: NDArray[np.int64]
@@ -178,7 +200,7 @@ def _stretches(found: Cover, left: Mask, number: NDArray[np.int64], of: NDArray[
     first, last, to, key = first[order], last[order], to[order], key[order]
     begins = np.ones(to.size, dtype=bool)
     begins[1:] = (np.diff(to) != 0) | (np.diff(key) != 0)
-    return _Stretches(first, last, np.flatnonzero(begins), to[begins])
+    return _Stretches(first, last, np.flatnonzero(begins), np.searchsorted(number, to[begins]))
 
 
 def _only_here(
@@ -219,4 +241,31 @@ class _Largest:
             np.maximum(table[level - 1, :end], table[level - 1, half : half + end], out=table[level, :end])
         flat = table.reshape(-1)
         most: NDArray[np.float64] = np.maximum(flat[self.one], flat[self.other])
+        return most
+
+
+class _Thrown:
+    """Bounds of the densities on the cells left, after one more throw."""
+
+    def __init__(self, each: _Stretches, factor: NDArray[np.float64]) -> None:
+        self.each, self.factor, self.largest = each, factor, _Largest(each, factor.size)
+
+    def __call__(self, bound: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return them for bounds before it."""
+        if not self.each.begins.size:
+            return np.zeros(bound.size)
+        most = np.maximum.reduceat(self.largest(bound * self.factor), self.each.begins)
+        return np.asarray(np.bincount(self.each.target, most, minlength=bound.size), dtype=np.float64)
+
+
+class _LargestOf:
+    """The largest of some values in each group."""
+
+    def __init__(self, group: NDArray[np.int64]) -> None:
+        self.order = np.argsort(group, kind="stable")
+        self.begins = np.flatnonzero(np.diff(group[self.order], prepend=-1))
+
+    def __call__(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return it for values of the cells left."""
+        most: NDArray[np.float64] = np.maximum.reduceat(values[self.order], self.begins)
         return most

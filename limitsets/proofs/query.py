@@ -17,7 +17,8 @@ from limitsets.goals import Goal, Reaches
 from limitsets.proofs.attraction import Attraction, attraction
 from limitsets.proofs.cover import cover
 from limitsets.proofs.goals import Answer, borders, prove, prove_or_refute
-from limitsets.proofs.goals.kind import against
+from limitsets.proofs.goals.kind import against, undecided
+from limitsets.proofs.goals.reaches import falls_short
 from limitsets.proofs.parameters import ParameterBox, parameter_box
 from limitsets.proofs.simulated import scattered
 from limitsets.proofs.tolerance import SceneBox
@@ -250,7 +251,7 @@ class Query:
         wrong = goal.wrong()
         if isinstance(goal, Reaches) and not goal.every_orbit:
             # refuted by where attracting cells end; a periodic orbit that attracts is not looked for each time
-            return prove(self._finer(found, found.cover.box, 2), self.scene, goal)
+            return falls_short(self._finer(found, found.cover.box, 2), goal) or undecided("")
         if wrong is None or not found.cover.box.noise or goal.from_anywhere:
             return prove_or_refute(found, self.scene, goal)
         answer = prove(found, self.scene, goal)

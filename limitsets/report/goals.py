@@ -107,9 +107,20 @@ def next_command(analysis: Analysis) -> str:
         )
     if outcome.holds and not outcome.vacuous:
         return f"limitsets certify {source} (a proof), limitsets margin {source} (how much each quantity may deviate)"
+    if outcome.holds is None and not analysis.attractors and (speeds := _speeds(scene)):
+        return f"limitsets atlas {source} {speeds} (at which speeds of the throw parts stay)"
     if outcome.holds is None:
         return f"limitsets certify {source} (whether it can be proved)"
     return design_command(scene, [outcome.goal]) or f"limitsets audit {source} (which assumptions it breaks)"
+
+
+def _speeds(scene: Scene) -> str:
+    """Write an axis of an atlas from half to twice the speed that a scene gives; empty where it gives none."""
+    given = scene.text["throw"].get("speed")
+    if given is None:
+        return ""
+    value = float(given.split()[0])
+    return f"--x throw.speed={0.5 * value:g}:{2.0 * value:g}:100"
 
 
 def after_undecided(analysis: Analysis) -> str:

@@ -13,16 +13,23 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from limitsets.cells import Grid
 from limitsets.graph import TransitionGraph
 from limitsets.graph.images.hulls import BOTH, NOTHING, BoxImages
+from limitsets.jit import kernel
 from limitsets.maps import images
 
 __all__ = ["longest_stays", "passing"]
 
-# Fine cells in all, beyond which nothing is looked at; parts of a cell along an axis, as many as these allow.
-MOST_CELLS, PARTS = 100_000, (64, 32, 16, 8, 4, 2)
+# Parts of a cell along an axis, step by step: few sets need the finest ones.  A step ends the search that would take
+# more fine cells than this.
+PARTS, MOST_CELLS = (2, 4, 16, 64), 100_000
+
+# More steps than there are fine cells: of an orbit that can come back to a cell.
+ENDLESS = 1 << 40
 
 Integers = NDArray[np.int64]
+Floats = NDArray[np.float64]
 
 
 def passing(graph: TransitionGraph) -> NDArray[np.bool_]:
@@ -33,124 +40,186 @@ def passing(graph: TransitionGraph) -> NDArray[np.bool_]:
     ndarray of bool, shape (k,)
         For each of `graph.recurrent_components()`; an attracting one is none.
     """
-    return _passed(graph)[0]
+    return _stays(graph) > 0
 
 
 def longest_stays(graph: TransitionGraph) -> Integers:
     """Most steps that an orbit stays in each recurrent component that it passes through; 0 for the others."""
-    found, fine = _passed(graph)
-    stays = np.zeros(found.size, dtype=np.int64)
-    if fine is None:
-        return stays
-    on = found[fine.owners]
-    source, target = fine.source[on[fine.source]], fine.target[on[fine.source]]
-    steps = 0
-    while on.any():  # take away the cells from which nothing is left to go to, again and again
-        steps += 1
-        stays[fine.owners[on]] = steps
-        goes = np.zeros(on.size, dtype=bool)
-        goes[source] = True
-        on &= goes
-        kept = on[target]
-        source, target = source[kept], target[kept]
+    stays, parts = _stays(graph), PARTS[-1]
+    component = _components(graph, stays > 0)
+    while np.count_nonzero(component >= 0) * parts**graph.grid.dimension > MOST_CELLS:
+        parts //= 2
+    return np.minimum(stays, _refined(graph, component, parts)) if parts > 1 else stays
+
+
+def _stays(graph: TransitionGraph) -> Integers:
+    """Bound the stays in components through which orbits are seen to pass, each by the first step that shows it."""
+    left = ~graph.condensation().attracting
+    stays = np.zeros(left.size, dtype=np.int64)
+    for parts in PARTS:
+        component = _components(graph, left)
+        count = np.count_nonzero(component >= 0)
+        if not count or count * parts**graph.grid.dimension > MOST_CELLS:
+            break
+        found = _refined(graph, component, parts)
+        stays += np.where(found < ENDLESS, found, 0)
+        left &= stays == 0
     return stays
 
 
-class _Fine(NamedTuple):
-    """The component of each fine cell, cell by cell, and edges between those of one component, by place among them."""
-
-    owners: Integers
-    source: Integers
-    target: Integers
-    unclear: Integers
-
-
-def _passed(graph: TransitionGraph) -> tuple[NDArray[np.bool_], _Fine | None]:
-    """Tell the components that orbits pass through, and give the finer graph that says so."""
-    sets, attracting = graph.recurrent_components(), graph.condensation().attracting
-    found = np.zeros(len(sets), dtype=bool)
-    chosen = np.flatnonzero(~attracting)
-    cells = np.concatenate([np.empty(0, np.int64), *(sets[k] for k in chosen)])
-    dimension = graph.grid.dimension
-    parts = next((p for p in PARTS if cells.size * p**dimension <= MOST_CELLS), 0)
-    if not cells.size or not parts:
-        return found, None
-    component = np.full(graph.n_cells, -1)
-    component[cells] = np.repeat(chosen, [sets[k].size for k in chosen])
-    fine = _finer(graph, np.sort(cells), component, parts)
-    found[chosen] = True
-    found[_recurring(fine)] = False
-    return found, fine
+def _components(graph: TransitionGraph, chosen: NDArray[np.bool_]) -> Integers:
+    """Recurrent component of each cell, -1 in all that are not chosen."""
+    parts = graph.components()
+    number = np.full(parts.count, -1)
+    number[np.flatnonzero(parts.recurrent)[chosen]] = np.flatnonzero(chosen)
+    return number[parts.label]
 
 
-def _recurring(fine: _Fine) -> Integers:
-    """Components with a fine cell that can come back to itself, or of which the images do not tell."""
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
+@kernel(entry=True, counting=False)
+def _fill_longest(
+    source: Any, target: Any, first: Any, after: Any, path: Any, done: Any, longest: Any
+) -> None:
+    """Cells on the longest path from each cell, ENDLESS where a path comes back: depth first, by an explicit stack.
 
-    n = fine.owners.size
-    edges = coo_array((np.ones(fine.source.size), (fine.source, fine.target)), shape=(n, n))
-    _, label = connected_components(edges.tocsr(), directed=True, connection="strong")
-    several = np.bincount(label)[label] > 1
-    several[fine.source[fine.source == fine.target]] = True
-    return np.unique(np.concatenate([fine.owners[several], fine.unclear]))
+    `first` (-1) and `after` become the lists of edges of each cell, `longest` is 0 until a cell is met.
+    """
+    for edge in range(source.size):
+        after[edge] = first[source[edge]]
+        first[source[edge]] = edge
+    for root in range(longest.size):
+        depth = 0 if longest[root] == 0 else -1
+        path[0] = root
+        while depth >= 0:
+            cell = path[depth]
+            longest[cell] = max(longest[cell], 1)
+            edge = first[cell]
+            if edge < 0:
+                done[cell] = True
+                depth -= 1
+                continue
+            to = target[edge]
+            if longest[to] == 0:  # the edge stays in the list until the cell it leads to is done
+                depth += 1
+                path[depth] = to
+                continue
+            beyond = longest[to] + 1 if done[to] else ENDLESS
+            longest[cell] = min(max(longest[cell], beyond), ENDLESS)
+            first[cell] = after[edge]
 
 
-def _finer(graph: TransitionGraph, cells: Integers, component: Integers, parts: int) -> _Fine:
-    """Cut the cells of components, and find which of their fine cells lead to which."""
-    grid, fine = graph.grid, graph.grid.refine(parts)
-    proved = graph.method == "boxes"
-    owner, sources, targets, unclear = [], [], [], []
-    rank, begun, of_each = np.zeros(graph.n_cells, np.int64), 0, parts**grid.dimension
+@kernel(entry=True, counting=False)
+def _link(
+    box: Any,
+    of: Any,
+    first: Any,
+    count: Any,
+    axes: Any,
+    shape: Any,
+    offset: int,
+    parts: int,
+    component: Any,
+    rank: Any,
+    source: Any,
+    target: Any,
+) -> Any:
+    """Fill the edges from fine cells to the fine cells of their own component that their boxes meet; how many."""
+    made = 0
+    each = parts ** len(axes)
+    for k in range(box.size):
+        total = 1
+        for axis in range(len(axes)):
+            total *= count[axis][k]
+        for place in range(total):
+            rest, coarse, within = place, 0, 0
+            for axis in range(len(axes)):
+                at = first[axis][k] + rest % count[axis][k]
+                rest //= count[axis][k]
+                coarse = coarse * shape[axis] + axes[axis][at // parts]
+                within = within * parts + at % parts
+            coarse += offset
+            if component[coarse] == of[k]:
+                source[made] = box[k]
+                target[made] = rank[coarse] * each + within
+                made += 1
+    return made
+
+
+class _Axis(NamedTuple):
+    """Fine cells along one axis of a side: their ends, and the cells they are parts of, those that are looked at."""
+
+    lower: Floats
+    upper: Floats
+    cells: Integers
+
+
+def _refined(graph: TransitionGraph, component: Integers, parts: int) -> Integers:
+    """Cut the cells of components: most steps that an orbit stays in each, 0 where a component has no cell here.
+
+    They are ENDLESS where it may come back to a fine cell, and where the images do not tell.
+    """
+    grid, proved, cells = graph.grid, graph.method == "boxes", np.flatnonzero(component >= 0)
+    rank = np.zeros(graph.n_cells, np.int64)
     rank[cells] = np.arange(cells.size)
-    for side in range(grid.sides):
-        here = cells[(cells >= grid.offset[side]) & (cells < grid.offset[side + 1])]
+    owners = np.repeat(component[cells], parts**grid.dimension)
+    longest, begun, sources, targets = np.zeros_like(owners), 0, [rank[:0]], [rank[:0]]
+    of_side = np.split(cells, np.searchsorted(cells, grid.offset[1 : grid.sides]))
+    axes = [_axes(grid, here, side, parts) for side, here in enumerate(of_side)]
+    for side, here in enumerate(of_side):
         if not here.size:
             continue
         sub = np.indices((parts,) * grid.dimension).reshape(grid.dimension, -1)
-        place = [(at[:, None] * parts + s).ravel() for at, s in zip(grid.axes(here, side), sub, strict=True)]
-        whole = component[np.repeat(here, of_each)]
-        owner.append(whole)
-        boxes, clear = (_enclosed if proved else _hulls)(graph, fine, place, side)
-        unclear.append(whole[~clear])
-        for lo, hi, to, given in boxes:
-            for after in np.unique(to[given]).tolist():
+        place = [
+            (np.searchsorted(axis.cells, at)[:, None] * parts + s).ravel()
+            for axis, at, s in zip(axes[side], grid.axes(here, side), sub, strict=True)
+        ]
+        lo, hi = (tuple(axis[end][at] for axis, at in zip(axes[side], place, strict=True)) for end in (0, 1))
+        boxes, clear = (_enclosed if proved else _hulls)(graph, lo, hi, side)
+        longest[begun : begun + clear.size][~clear] = ENDLESS
+        for least, most, to, given in boxes:
+            for after in range(grid.sides):
                 some = np.flatnonzero(given & (to == after))
-                source, position = _met(
-                    fine, after, lo[some], hi[some], int(grid.dimension > 1 and not proved)
-                )
-                coarse = np.ravel_multi_index([at // parts for at in position], tuple(grid.shape[after]))
-                coarse += grid.offset[after]
-                inside = component[coarse] == whole[some][source]
-                within = np.ravel_multi_index(
-                    [at[inside] % parts for at in position], (parts,) * grid.dimension
-                )
-                sources.append(begun + some[source[inside]])
-                targets.append(rank[coarse[inside]] * of_each + within)
-        begun += whole.size
-    source, target = (np.concatenate([*found, rank[:0]]) for found in (sources, targets))
-    return _Fine(np.concatenate(owner), source, target, np.concatenate(unclear))
+                first, count = _met(axes[after], least, most, some, int(grid.dimension > 1 and not proved))
+                source, target = np.empty((2, int(np.prod(count, axis=0).sum())), np.int64)
+                among = tuple(axis.cells for axis in axes[after]), tuple(map(int, grid.shape[after]))
+                where = *among, int(grid.offset[after]), parts, component, rank
+                made = _link(begun + some, owners[begun + some], first, count, *where, source, target)
+                sources.append(source[:made])
+                targets.append(target[:made])
+        begun += clear.size
+    source, target = np.concatenate(sources), np.concatenate(targets)
+    lists = np.full(owners.size, -1), np.empty_like(source), np.empty_like(owners)
+    _fill_longest(source, target, *lists, longest > 0, longest)
+    most = np.zeros(graph.condensation().attracting.size, dtype=np.int64)
+    np.maximum.at(most, owners, longest)
+    return most
 
 
-def _hulls(graph: TransitionGraph, fine: Any, place: list[Integers], side: int) -> tuple[list[Any], Any]:
-    """Boxes around the images of the corners of fine cells, their sides, where they say; whether all corners agree."""
+def _axes(grid: Grid, here: Integers, side: int, parts: int) -> list[_Axis]:
+    """Cut the axes of a side; in one dimension, where an axis is as long as the side, but for the cells looked at."""
     found = []
-    for corner in product((0, 1), repeat=len(place)):
-        points = [edges[at + c] for edges, at, c in zip(fine.edges[side], place, corner, strict=True)]
-        found.append(images(graph.map, np.stack(points, axis=1), side))
-    x = np.stack([there.x.reshape(-1, len(place)) for there in found])
-    code, to = (np.stack([getattr(there, name) for there in found]) for name in ("code", "side"))
-    clear = (code == code[0]).all(axis=0) & (to == to[0]).all(axis=0) & (code[0] >= 0)
-    clear &= np.isfinite(x).all(axis=(0, 2))
-    return [(x.min(axis=0), x.max(axis=0), to[0], clear)], clear
+    for edges in grid.edges[side]:
+        cells = here - grid.offset[side] if grid.dimension == 1 else np.arange(edges.size - 1)
+        ends = edges[cells, None] + np.arange(parts + 1) / parts * (edges[cells + 1] - edges[cells])[:, None]
+        ends[:, -1] = edges[cells + 1]
+        found.append(_Axis(ends[:, :-1].ravel(), ends[:, 1:].ravel(), cells))
+    return found
 
 
-def _enclosed(graph: TransitionGraph, fine: Any, place: list[Integers], side: int) -> tuple[list[Any], Any]:
+def _hulls(graph: TransitionGraph, lo: Any, hi: Any, side: int) -> tuple[list[Any], Any]:
+    """Boxes around the images of the corners of fine cells, their sides, where they say; whether all corners agree."""
+    found = [
+        images(graph.map, np.stack(corner, axis=1), side) for corner in product(*zip(lo, hi, strict=True))
+    ]
+    x, first = [there.x.reshape(-1, len(lo)) for there in found], found[0]
+    least, most = np.minimum.reduce(x), np.maximum.reduce(x)
+    clear = (first.code >= 0) & (np.isfinite(least) & np.isfinite(most)).all(axis=1)
+    for there in found[1:]:
+        clear &= (there.code == first.code) & (there.side == first.side)
+    return [(least, most, first.side, clear)], clear
+
+
+def _enclosed(graph: TransitionGraph, lo: Any, hi: Any, side: int) -> tuple[list[Any], Any]:
     """Proved boxes of the images of fine cells, one or two each, their sides, where they are; whether one is proved."""
-    lo, hi = (
-        tuple(np.ascontiguousarray(edges[at + c]) for edges, at in zip(fine.edges[side], place, strict=True))
-        for c in (0, 1)
-    )
     found = BoxImages(graph.map, graph.map if graph.upper is None else graph.upper, side, lo, hi)
     boxes = [
         (*(np.stack(corner, axis=1) for corner in found.slots[slot]), found.to[2 * slot], given)
@@ -159,19 +228,12 @@ def _enclosed(graph: TransitionGraph, fine: Any, place: list[Integers], side: in
     return boxes, found.count != NOTHING
 
 
-def _met(fine: Any, side: int, lo: Any, hi: Any, pad: int) -> tuple[Integers, list[Integers]]:
-    """Fine cells of one side that boxes meet, and so many more around: which box, position on each axis."""
+def _met(axes: list[_Axis], lo: Floats, hi: Floats, some: Integers, pad: int) -> tuple[Any, Any]:
+    """Fine cells of one side that some boxes meet, and so many more around: the first on each axis, and how many."""
     first, count = [], []
-    for axis, edges in enumerate(fine.edges[side]):
-        one = np.searchsorted(edges, lo[:, axis], side="left") - 1 - pad
-        last = np.searchsorted(edges, hi[:, axis], side="right") - 1 + pad
-        first.append(np.clip(one, 0, edges.size - 2))
-        count.append(np.clip(last, 0, edges.size - 2) - first[-1] + 1)
-    total = np.prod(count, axis=0)
-    box = np.repeat(np.arange(len(lo)), total)
-    rest = np.arange(box.size) - np.repeat(np.cumsum(total) - total, total)
-    position = []
-    for begin, size in zip(first, count, strict=True):
-        position.append(begin[box] + rest % size[box])
-        rest = rest // size[box]
-    return box, position
+    for k, axis in enumerate(axes):
+        begin = np.maximum(np.searchsorted(axis.upper, lo[some, k], side="left") - pad, 0)
+        end = np.minimum(np.searchsorted(axis.lower, hi[some, k], side="right") + pad, axis.lower.size)
+        first.append(begin)
+        count.append(np.maximum(end - begin, 0))
+    return tuple(first), tuple(count)

@@ -19,7 +19,7 @@ from limitsets.thrower.params import Throw
 from limitsets.thrower.side_box import SideBox, gather_box
 from limitsets.thrower.turn_box import turn_box, turn_point
 
-__all__ = ["gather_pair", "side_image_box", "throw_box", "throw_image_box"]
+__all__ = ["gather_pair", "side_image_box", "slope_between", "sure_slope_box", "throw_box", "throw_image_box"]
 
 NOTHING, DECIDED, BOTH = -1, 1, 2
 
@@ -45,6 +45,25 @@ def sure_throw_box(b: SideBox, x: Interval) -> tuple[int, Interval, Interval, In
     first, good = sure_bracket(b.flight, b, x.lo)
     last, fine = sure_bracket(b.flight, b, x.hi)
     return _between(b, x, first, last, good & fine)
+
+
+@proof_kernel
+def sure_slope_box(b: SideBox, x: Interval) -> tuple[Interval, bool]:
+    """As `slope_between`, with the smallest root found by a march where there may be several."""
+    first, good = sure_bracket(b.flight, b, x.lo)
+    last, fine = sure_bracket(b.flight, b, x.hi)
+    return slope_between(b, x, first, last, good & fine)
+
+
+@proof_kernel
+def slope_between(
+    b: SideBox, x: Interval, first: Interval, last: Interval, proved: bool
+) -> tuple[Interval, bool]:
+    """Enclose the slope of x' against x from the brackets at the ends of x, and say whether it is proved."""
+    at = turn_box(Interval(first.lo, last.hi))
+    _, shift_slope = jog_displacement(b.flight, b, at)
+    slope = 1.0 + shift_slope * angle_slope(b.flight, b, x, at)
+    return slope, proved & (slope.hi - slope.lo < math.inf)
 
 
 @proof_kernel

@@ -3,6 +3,7 @@
 import math
 import os
 import time
+from typing import NamedTuple
 
 import pytest
 
@@ -11,10 +12,23 @@ from tests.explorer.served import Visitor, browser, running, served
 pytestmark = pytest.mark.bench
 
 SECONDS = 5.0
-HENON = """
+EXPLORED = """
 import limitsets as ls
-ls.explore(ls.maps.Henon()).show(port=0, show=False, ready=lambda url: print(url, flush=True))
+ls.explore({}).show(port=0, show=False, ready=lambda url: print(url, flush=True))
 """
+HENON = EXPLORED.format("ls.maps.Henon()")
+# With the surface at the joint the displacement is small beside a cell, in thousands of them.
+AT_JOINT = EXPLORED.format('ls.load("paper-designed").with_values({"arm.surface_height": 0.05})')
+
+
+class Hand(NamedTuple):
+    """How a slider is dragged: so many pixels to either side, so many radians a second, about a place further on."""
+
+    pixels: float = 60.0
+    speed: float = 2.0
+    back: float = 0.0
+
+
 # A picture counts when the canvas has been painted with other data than at the last count, and the screen has come to
 # the next frame.
 COUNT = """(canvas, name) => {
@@ -30,7 +44,7 @@ COUNT = """(canvas, name) => {
 }"""
 
 
-def frames_a_second(address: str, layer: str, picture: str, slider: int, back: float = 0.0) -> float:
+def frames_a_second(address: str, layer: str, picture: str, slider: int, hand: Hand) -> float:
     with browser() as chromium:
         visitor = Visitor(chromium, address)
         visitor.page.wait_for_timeout(3000)
@@ -40,22 +54,26 @@ def frames_a_second(address: str, layer: str, picture: str, slider: int, back: f
         mouse.down()
         begin = time.perf_counter()
         while (past := time.perf_counter() - begin) < SECONDS:
-            mouse.move(x + 60 * (math.sin(2 * past) - back), y)
+            mouse.move(x + hand.pixels * (math.sin(hand.speed * past) - hand.back), y)
             time.sleep(0.014)  # a hand's mouse says where it is some sixty times a second
         painted: int = visitor.page.evaluate("painted")
         mouse.up()
         return painted / past
 
 
-@pytest.mark.parametrize("case", ["throw", "henon"])
+@pytest.mark.parametrize("case", ["throw", "at the joint", "henon"])
 def test_the_picture_follows_the_slider(case):
     if case == "throw":
         with served() as address:
-            found = frames_a_second(address, "limit sets", "lanes", 2)
+            found = frames_a_second(address, "limit sets", "lanes", 2, Hand())
+    elif case == "at the joint":
+        with running("-c", AT_JOINT) as address:
+            # 24 steps of the slider, from -0.035 to 0.135 in: a slow hand would be counted, not the computation
+            found = frames_a_second(address, "limit sets", "lanes", 3, Hand(pixels=12.0, speed=6.0))
     else:
         with running("-c", HENON) as address:
             # to values below the first: beyond a = 1.43 all orbits leave, and pictures without points are the same
-            found = frames_a_second(address, "points", "map", 0, back=1.0)
+            found = frames_a_second(address, "points", "map", 0, Hand(back=1.0))
     load = os.getloadavg()[0]
     print(f"{case}: {found:.1f} frames a second (load of the machine {load:.1f}, {os.cpu_count()} cores)")
     if load < 1.5 * (os.cpu_count() or 1):  # a browser, a server and nobody else

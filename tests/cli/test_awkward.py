@@ -1,5 +1,6 @@
 """What a fresh user stumbled over at the command line: widths, cut summaries, lost reports, wrong places, seeds."""
 
+import csv
 import json
 import re
 import subprocess
@@ -366,3 +367,43 @@ def test_a_surface_above_the_joint_is_not_answered_with_finer_cells(capfd):
     assert "is arm.surface_height meant to be negative" in out
     assert "finer cells" not in out
     assert "ask for more cells" not in out
+
+
+# A pentagon whose parts all come back to the joint at this speed, with the surface below it.
+LOST = """
+name = "lost"
+[part]
+vertices = [["0 in", "0 in"], ["6 in", "0 in"], ["6.5 in", "2.2 in"], ["3.2 in", "4 in"], ["-0.3 in", "2.4 in"]]
+[part.mass]
+plate_density = "2.7 g/cm^3"
+plate_thickness = "0.125 in"
+points = [{ x = "5 in", y = "1 in", mass = "56.7 g" }]
+[arm]
+surface_height = "-0.5 in"
+length = "30 in"
+[throw]
+speed = "160 deg/s"
+[gravity]
+tilt = "20 deg"
+[goal]
+oriented_beyond = { x = "20 in", side = 0 }
+"""
+
+
+def test_a_report_without_limit_sets_speaks_of_none_and_looks_for_a_speed(capfd):
+    Path("lost.toml").write_text(LOST, encoding="utf-8")
+    code, out, _ = run(capfd, "analyse", "lost.toml", "--cells", "512")
+    assert code == 0
+    assert "no start was found to stay on the arm" in out
+    page = Path("lost-analysis/report.md").read_text(encoding="utf-8")
+    assert "**Another vertex lands first**" in page
+    assert "No throw from the limit set" not in page
+    assert "of the orbit" not in page
+    assert "shown here" not in page
+    (found,) = re.findall(r"next: limitsets (atlas lost.toml .*) \(at which speeds", out)
+    assert found == "atlas lost.toml --x throw.speed=80:320:100"
+    code, out, _ = run(capfd, *found.replace(":100", ":9").split(), "--csv", "speeds.csv")
+    assert code == 0
+    with Path("speeds.csv").open(encoding="utf-8", newline="") as file:
+        count = {row["attractors"] for row in csv.DictReader(file)}
+    assert {"0", "1"} <= count

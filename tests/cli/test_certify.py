@@ -41,9 +41,7 @@ def test_shares_of_the_starts_are_rounded_to_the_safe_side(capfd):
     (record,) = json.loads(out)
     code, out, _ = run(capfd, "certify", "left.toml", "--claim", "goal")
     assert code == 1
-    words = (
-        r"These are ([\d.]+) % .*; ([\d.]+) % are proved to leave the arm; of ([\d.e-]+) % nothing is proved"
-    )
+    words = r"It is proved for ([\d.]+) % .*; ([\d.]+) % are proved to leave the arm; of ([\d.e-]+) % nothing is proved"
     share, leaves, rest = (float(word) for word in re.search(words, out).groups())
     assert share <= 100.0 * record["share"] < share + 0.01
     assert leaves <= 100.0 * record["leaves"] < leaves + 0.001

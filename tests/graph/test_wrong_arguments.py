@@ -176,10 +176,12 @@ def test_an_argument_of_the_wrong_kind_is_named(name, function, asked, fitting):
         several = parameters[asked].kind == inspect.Parameter.VAR_POSITIONAL
         with pytest.raises(LimitsetsError) as error:
             function(*given.values(), wrong) if several else function(**{**given, asked: wrong})
-        named = (f"the argument {asked} of", "the source of a scene", *NAMED.get(asked, ()))
+        public = {"certify_map": "certify"}.get(name, name.rpartition(".")[2])
+        named = (f"the argument {asked} of {public} is", "the source of a scene", *NAMED.get(asked, ()))
         assert any(words in str(error.value) for words in named), (word, str(error.value))
         assert error.value.allowed
         assert error.value.remedy
+        assert f"help({public})" in error.value.remedy or "help(" not in error.value.remedy
 
 
 # How an argument is named by a check that says more of it than its kind.
@@ -226,7 +228,11 @@ NAMED = {
         (lambda: ls.orbit(SCENE.map, "8 in", 0, 3), MapError, "start x is '8 in'.*in the map's own unit"),
         (lambda: ls.plot.flight(SCENE, 30.0, 0), AnswerError, "start x is 30.0.*at most 28 in"),
         (lambda: ls.attractors(GRAPH, throws=1e5), AnswerError, "pass throws=200000"),
-        (lambda: ls.certify("paper-designed", "goal"), AnswerError, "argument claims of .* is 'goal'"),
+        (
+            lambda: ls.certify("paper-designed", "goal"),
+            AnswerError,
+            r"claims of certify is 'goal'.*; help\(certify\) says",
+        ),
         (
             lambda: ls.certify(SCENE, GRID),
             AnswerError,

@@ -16,11 +16,11 @@ from limitsets.graph.images.enclosed import enclosures
 from limitsets.proofs import cover as covers
 from limitsets.proofs import goals
 from limitsets.proofs.attraction import attraction
-from limitsets.proofs.certify import weakest_of
 from limitsets.proofs.cover import Cover, cover
 from limitsets.proofs.parameters import parameter_box
 from limitsets.proofs.perron_frobenius import perron_frobenius_bound
 from limitsets.proofs.proof import Claim
+from limitsets.proofs.weakest_claim import weakest_of
 from tests.scene.four_gon import FOUR_GON
 
 

@@ -76,6 +76,24 @@ def test_recurrent_cells_beside_a_fixed_point_are_proved_to_be_passed_through():
     assert (found.attractors[0].lo, found.undecided) == (1.0, 0.0)
 
 
+@pytest.mark.parametrize("method", ["corners", "boxes"])
+@pytest.mark.parametrize("share", [0.4, 0.2, 1 / 40, 1 / 100])
+def test_a_shift_passes_through_every_cell_that_it_moves_by_a_fine_one(method, share):
+    """x' = x + c meets its own cell of width w while c < w, and not its own 64th part where c > w / 64."""
+    cover = ls.grid([(0.0, 1.0)], cells=100)
+    graph = ls.transitions(Contraction(1.0, 0.01 * share), cover, method)
+    assert len(graph.recurrent_components()) == 100
+    assert passing(graph).all() == (share > 1 / 64)
+    if (
+        share > 1 / 64
+    ):  # an image begins in the fine cell so many further on, and the slowest path goes on from there
+        assert (longest_stays(graph) == np.ceil(64 / np.floor(64 * share))).all()
+    else:
+        assert not longest_stays(graph).any()
+    expected = 0.0 if share > 1 / 64 else 1.0
+    assert ls.basins(graph, ls.attractors(graph)).undecided_between == pytest.approx(expected)
+
+
 @pytest.mark.sweep
 def test_what_is_passed_through_is_so_for_every_parameter():
     """For slopes from 0.5 to 1.2 no orbit need leave the cells beside 0, for the lower corner alone all do."""

@@ -17,6 +17,7 @@ import limitsets as ls
 from limitsets.errors import LimitsetsError
 from limitsets.goals import AttractsAll, OrientedBeyond, Predicate, Reaches
 from limitsets.proofs import Proof
+from limitsets.proofs.goals import reaches
 from limitsets.proofs.query import Query
 from limitsets.robust.margins.deviations import deviation_scale, deviation_scales, given
 from tests.lead_triangle import left_by_some
@@ -414,3 +415,11 @@ def test_pieces_below_and_above_the_joint_claim_no_start_before_the_cells(tmp_pa
     for piece in found.pieces:
         first = [float(edges[0]) for (edges,) in piece.found.cover.grid.edges]
         assert all(float.fromhex(x) >= first[int(side)] for side, x in starts.items())
+
+
+def test_that_no_part_gets_there_is_found_without_a_bound_of_densities(monkeypatch):
+    """The limit set ends at 23.383 in on side 2 (tests/test_paper.py); the bound took most of the time of a curve."""
+    monkeypatch.setattr(reaches, "perron_frobenius_bound", None)
+    scene = ls.load("paper-designed")
+    assert Query.of(scene, (Reaches(23.5, 2),)).refute().verdict == "refuted"
+    assert Query.of(scene, (Reaches(23.0, 2),)).refute().verdict == "undecided"

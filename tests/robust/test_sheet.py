@@ -8,8 +8,9 @@ import json
 import math
 import pickle
 import re
-from concurrent.futures import Executor
+from concurrent.futures import Executor, Future
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -283,7 +284,10 @@ def test_margins_against_x_begin_in_the_middle_and_go_on_where_they_stopped(monk
 
 
 def test_the_seconds_of_a_curve_are_shared_by_its_places(monkeypatch):
-    """Of 14 s for seven places that take 3 s each: a seventh for the first one, then less, a second at least."""
+    """Of 14 s for seven places that take 3 s each: a seventh for the first one, then less.
+
+    With 2 s left no place is begun: it would end after them.
+    """
     given, took = [], 3.0
 
     class Clock:
@@ -301,10 +305,51 @@ def test_the_seconds_of_a_curve_are_shared_by_its_places(monkeypatch):
     _, left = margin_curve.curve(
         ls.load("paper-designed"), 2, {"throw.speed": "1 %"}, None, seconds=14.0, **told
     )
-    assert given == pytest.approx(
-        [14 / 7, 11 / 6, 8 / 5, 5 / 4, 1.0]
-    )  # of the last 2 s a third would be too little
-    assert left == 2
+    assert given == pytest.approx([14 / 7, 11 / 6, 8 / 5, 5 / 4])
+    assert left == 3
+
+
+class Later(Executor):
+    """Computes here, what went through pickle, at the end of the time that each place takes."""
+
+    _max_workers = 2  # as executors of concurrent.futures name it
+
+    def __init__(self, clock, seconds):
+        self.clock, self.seconds, self.most, self.running = clock, iter(seconds), 0, {}
+
+    def submit(self, function, *arguments):
+        done = Future()
+        function_there, arguments_there = pickle.loads(pickle.dumps((function, arguments)))
+        answer = pickle.loads(pickle.dumps(function_there(*arguments_there)))
+        self.running[done] = self.clock.now + next(self.seconds), answer
+        self.most = max(self.most, len(self.running))
+        return done
+
+    def wait(self, begun, **_):
+        """Let the first of them end."""
+        assert set(begun) == set(self.running)
+        one = min(self.running, key=lambda each: self.running[each][0])
+        self.clock.now, answer = self.running.pop(one)
+        one.set_result(answer)
+        return SimpleNamespace(done={one})
+
+
+def test_places_are_asked_about_side_by_side_and_none_that_would_end_late(monkeypatch):
+    """In two processes, of places that take 2, 2, 5, 3, 4, 1, 1 s in turn and 12 s in all.
+
+    The fifth begins at 5 s, where 7 are left and the dearest took 3; the sixth at 7 s, where 5 are left and the dearest
+    took 5.  At 8 s only 4 are left, and the last is not begun.
+    """
+    clock = SimpleNamespace(now=0.0, perf_counter=lambda: clock.now)
+    executor = Later(clock, [2.0, 2.0, 5.0, 3.0, 4.0, 1.0, 1.0])
+    monkeypatch.setattr(margin_curve, "time", clock)
+    monkeypatch.setattr(margin_curve, "wait", executor.wait)
+    monkeypatch.setattr(margin_curve, "margins_beyond", tent_of)
+    scene, told = ls.load("paper-designed"), {"tell": lambda *_: None, "keep": lambda _: None}
+    found, left = margin_curve.curve(scene, 2, {}, None, seconds=12.0, executor=executor, **told)
+    assert (executor.most, left, clock.now) == (2, 1, 9.0)
+    assert (found.x.size, found.x.tolist()) == (6, sorted(found.x.tolist()))
+    assert found.proved[:, 0] == pytest.approx(1.0 - np.abs(found.x - 21.5))
 
 
 @pytest.mark.sweep

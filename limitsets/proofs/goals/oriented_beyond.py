@@ -52,16 +52,16 @@ def _prove(found: Attraction, scene: Scene, goal: OrientedBeyond) -> Answer:
         reason = missing if found.cover.points else reason or missing
     else:
         bad &= found.component >= 0
-        beyond = f"{bad.sum()} attracting cells reach beyond x = {goal.x:g} on other sides than {goal.side}"
+        cells = "1 attracting cell reaches" if bad.sum() == 1 else f"{bad.sum()} attracting cells reach"
+        beyond = f"{cells} beyond x = {goal.x:g} {scene.unit} on other sides than {goal.side}"
         reason = missing or (beyond if bad.any() else "")
         if reason and not missing and stays_below(found, scene, bad, below(goal.x)):
             reason, more = "", {"throws": 2}
     if reason:
         return undecided(reason)
     ends = max(hi for parts in found.cells.extents().values() for _, hi in parts)
-    vacuous = (
-        f"the attracting cells end at x = {ends:.6g}, before x = {goal.x:g}: the goal asks nothing of them"
-    )
+    before = f"the attracting cells end at x = {ends:.6g} {scene.unit}, before x = {goal.x:g}"
+    vacuous = f"{before}: the goal asks nothing of them"
     note = vacuous if ends <= goal.x and not goal.from_anywhere else ""
     return Answer("proved", "", section_of(goal, scene) | more, note=note)
 

@@ -28,7 +28,7 @@ from limitsets.proofs.goals.violating_orbits import sample_passage
 from limitsets.proofs.perron_frobenius import perron_frobenius_bound
 from limitsets.scene import Scene
 
-__all__ = ["KIND", "not_null"]
+__all__ = ["KIND", "falls_short", "not_null"]
 
 
 def _wanted(found: Attraction, goal: Reaches) -> Mask:
@@ -46,7 +46,7 @@ def _refute(found: Attraction, scene: Scene, goal: Reaches) -> Answer:
         return (every or loop.attracts) and not _arrives(loop, goal)
 
     never = cycle_that(found, scene, refutes, attracting=not every)
-    short = _falls_short(found, goal)
+    short = falls_short(found, goal)
     if short is None:
         return against(never)
     return short._replace(counterexample=never.states) if never.states else short
@@ -57,7 +57,7 @@ def _prove(found: Attraction, scene: Scene, goal: Reaches) -> Answer:
     if missing:
         return undecided(missing)
     wanted, inside = _wanted(found, goal), found.component >= 0
-    short = _falls_short(found, goal)
+    short = falls_short(found, goal)
     if short is not None:
         return short
     if goal.every_orbit:
@@ -113,7 +113,7 @@ def _arrives(loop: Loop, goal: Reaches) -> bool:
     return bool(((loop.side == goal.side) & (loop.hi >= below(goal.x))).any())
 
 
-def _falls_short(found: Attraction, goal: Reaches) -> Answer | None:
+def falls_short(found: Attraction, goal: Reaches) -> Answer | None:
     """Refute the goal by an attracting component that ends below x: no orbit in it gets there.
 
     It is mapped into itself and has an interior: so many starts never get there.  The orbit is shown, not needed.

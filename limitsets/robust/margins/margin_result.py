@@ -10,12 +10,12 @@ from typing import Any
 from limitsets.errors import AnswerError
 from limitsets.files import as_table, picked
 from limitsets.goals import Goal, Predicate, as_written
-from limitsets.proofs.certify import weakest_of
 from limitsets.proofs.confirm import DeniedError
 from limitsets.proofs.goals import State, rechecked
 from limitsets.proofs.proof import Claim, Proof
 from limitsets.proofs.query import Outcome
 from limitsets.proofs.refutation import KINDS, write_refutation
+from limitsets.proofs.weakest_claim import weakest_of
 from limitsets.robust.margins.margin_texts import bound, bound_above
 from limitsets.scene import Scene
 from limitsets.tables import Column, Table, Tabled

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping
+from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
 from dataclasses import replace
 from typing import Any
 
@@ -38,6 +39,24 @@ def _joined(one: MarginsBeyond | None, other: MarginsBeyond) -> MarginsBeyond:
     return replace(one, **columns, margins=())
 
 
+class _Here(Executor):
+    """Computes in this process."""
+
+    def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
+        """Compute at once."""
+        done: Future[Any] = Future()
+        done.set_result(fn(*args, **kwargs))
+        return done
+
+
+def _place(
+    scene: Scene, side: int, names: tuple[str, ...], x: float, tolerance: Mapping[str, str], seconds: float
+) -> MarginsBeyond:
+    """Ask about one place; without the proofs, which would go from process to process."""
+    words: dict[str, Any] = {"tolerance": tolerance, "width": COARSE, "seconds": seconds}
+    return replace(margins_beyond(scene, side, names, x=[x], **words), margins=())
+
+
 def curve(
     scene: Scene,
     side: int,
@@ -45,6 +64,7 @@ def curve(
     known: Mapping[str, Any] | None,
     *,
     seconds: float = SECONDS,
+    executor: Executor | None = None,
     tell: Callable[[str, float], None],
     keep: Callable[[dict[str, Any]], None],
 ) -> tuple[MarginsBeyond, int]:
@@ -61,7 +81,10 @@ def curve(
     known : mapping or None
         What an earlier run kept.
     seconds : float
-        Shared by the proofs of all places; after it no further place is begun, but the middle one always is.
+        Shared by the proofs of all places; no place is begun for which less is left than the dearest took, but the
+        middle one always is.
+    executor : Executor, optional
+        Where places are asked about, as many at once as it has workers; default, here.
     tell, keep : callable
         Called with what is done and its share, and with what is found so far.
 
@@ -77,22 +100,35 @@ def curve(
     AnswerError
         The limit set gets farther on another side than on this one.
     """
-    begin = time.perf_counter()
+    end = time.perf_counter() + seconds
     names = ("joint",) if tolerance else ("throw.speed",)
     places = places_beyond(scene, side, PLACES)
     places = places[np.argsort(np.abs(places - places.mean()), kind="stable")]
     found = None if known is None or known["side"] != side else curve_read(known, scene)
     done = set() if found is None else {round(x, 9) for x in found.x.tolist()}
-    for number, x in enumerate(places.tolist()):
-        if round(x, 9) in done:
-            continue
-        left = begin + seconds - time.perf_counter()
-        if found is not None and left < 0.0:
-            return found, len(places) - found.x.size
-        each = min(EACH, max(left / (len(places) - number), LEAST))
-        tell(f"margin beyond x = {x:.4g}", number / PLACES)
-        one = margins_beyond(scene, side, names, x=[x], tolerance=tolerance, width=COARSE, seconds=each)
-        found = _joined(found, one)
-        keep(found.to_json())
+    waiting = [x for x in places.tolist() if round(x, 9) not in done]
+    pool = executor or _Here()
+    # concurrent.futures has no public word for it; of an executor of another kind it is not known
+    at_once = getattr(pool, "_max_workers", 1)
+    begun: dict[Future[MarginsBeyond], float] = {}
+    dearest = 0.0
+    while True:
+        while waiting and len(begun) < at_once:
+            now = time.perf_counter()
+            dearest = max([dearest, *(now - since for since in begun.values())])
+            # what would not end in time is left to a later run
+            if (found is not None or begun) and end - now < dearest:
+                break
+            x, each = waiting[0], at_once * (end - now) / len(waiting)
+            tell(f"margin beyond x = {x:.4g}", 1.0 - len(waiting) / PLACES)
+            one = pool.submit(_place, scene, side, names, x, tolerance, min(EACH, max(each, LEAST)))
+            begun[one] = now
+            del waiting[0]
+        if not begun:
+            break
+        for one in wait(begun, return_when=FIRST_COMPLETED).done:
+            dearest = max(dearest, time.perf_counter() - begun.pop(one))
+            found = _joined(found, one.result())
+            keep(found.to_json())
     assert found is not None
-    return found, 0
+    return found, len(waiting)

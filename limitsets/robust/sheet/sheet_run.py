@@ -132,6 +132,7 @@ class _SheetRun:
     def curve(self, side: int) -> MarginsBeyond | None:
         """Find margins against X; None where the part gets farther out on another side."""
         told: dict[str, Any] = {"tell": self.tell, "keep": self.checkpoint.add_curve, "seconds": self.left()}
+        told["executor"] = self.executor
         with self.step("margins against X"):
             try:
                 found, left = curve(self.scene, side, self.tolerance, self.checkpoint.curve, **told)
@@ -259,7 +260,8 @@ def robustness(
     recheck : bool
         Whether certificates are checked before they get their names.
     executor : Executor, optional
-        Where the margins of single quantities are searched for; default, here.  Goals that are functions stay here.
+        Where the margins of single quantities and those against X are searched for; default, here.  Goals that are
+        functions stay here.
     progress : callable, optional
         Called with what is done, how much of it, and of how much.
 
