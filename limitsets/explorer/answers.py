@@ -62,15 +62,6 @@ def careful_line(found: Estimate, scene: Scene) -> str:
 def estimate_words(found: Estimate, goal: Goal | None, unit: str) -> str:
     """Say what is estimated."""
     rows = []
-<<<<<<< HEAD
-    for k, (extents, order) in enumerate(zip(found.sets, found.orders, strict=True)):
-        places = "; ".join(
-            f"side {side}: {escape(interval_text(parts)).replace(chr(10), ', ')}"
-            for side, parts in sorted(extents.items())
-        )
-        visits = "; the order of sides changes" if order is None else f"; sides {'-'.join(map(str, order))}"
-        rows.append((f"limit set {k}", f"{places} {unit}".rstrip() + (visits if len(found.lo) > 1 else "")))
-=======
     for k, (extents, bands, order) in enumerate(zip(found.sets, found.bands, found.orders, strict=True)):
         drawn = sum(map(len, extents.values()))
         is_cycle = all(lo == hi for parts in extents.values() for lo, hi in parts)
@@ -78,11 +69,11 @@ def estimate_words(found: Estimate, goal: Goal | None, unit: str) -> str:
             places = f"from {min(chain(*extents.values()))[0]:.6g} to {max(chain(*extents.values()))[0]:.6g}"
         else:
             places = "; ".join(f"side {side}: {_places(parts)}" for side, parts in sorted(extents.items()))
-        visits = "the order of sides changes" if order is None else f"sides {'-'.join(map(str, order))}"
+        visits = "; the order of sides changes" if order is None else f"; sides {'-'.join(map(str, order))}"
+        visits = visits if len(found.lo) > 1 else ""
         kind = f"; a cycle of period {drawn}" if is_cycle else ""
         joined = f"; {bands} intervals, which these cells join" if bands > drawn else ""
-        rows.append((f"limit set {k}", f"{places} {unit}; {visits}{kind}{joined}"))
->>>>>>> main
+        rows.append((f"limit set {k}", f"{places} {unit}".rstrip() + f"{visits}{kind}{joined}"))
     if not found.sets:
         rows.append(("limit set", "none: no start was found to stay"))
     looks = [(*look_of(label), share) for label, share in found.shares]
