@@ -177,9 +177,13 @@ class Atlas(Tabled):
         from limitsets.regions import certified, evenly  # lazily: an atlas without proofs does not load them
 
         plan = self.dataset.attrs["plan"]
-        if "scene" not in plan or len(self.axes) != 2:
+        if "scene" not in plan:
+            name = plan["map"].rpartition(":")[2]
+            remedy = "limitsets.certify(map, grid, claims, upper=...) proves claims for a box of parameters"
+            raise LimitsetsError("the atlas to certify", f"of the map {name}", "an atlas of a scene", remedy)
+        if len(self.axes) != 2:
             raise LimitsetsError(
-                "the atlas", f"of {len(self.axes)} axes", "an atlas of a scene with two axes", "give x and y"
+                "the atlas", f"of {len(self.axes)} axes", "one with two axes", "give x and y"
             )
         axes = []
         for name in reversed(self.axes):  # x first
