@@ -20,6 +20,7 @@ from limitsets.robust.noise.laws import Gaussian, Uniform
 from limitsets.robust.noise.scattering import Scattering, scattering_of
 from limitsets.robust.sheet.noise_input import still
 from limitsets.scene import Scene, load
+from limitsets.scene.scene import require_rests
 
 __all__ = [
     "SHARED",
@@ -86,13 +87,15 @@ def pair_of(
             remedy = (
                 "two parts on one arm share it, its throw and its cavity: write them alike in both scenes"
             )
-            raise AnswerError(f"{name} of the two scenes", values, "the same in both", remedy)
+            said = " and ".join(_said(each, name) for each in (one, two))
+            raise AnswerError(f"{name} of the two scenes", said, "the same in both", remedy)
     if one.effects.contact != two.effects.contact:
         values = one.effects.contact, two.effects.contact
         raise AnswerError(
             "effects.contact of the two scenes", values, "the same in both", "switch it in both"
         )
     for each in (one, two):
+        require_rests(each)
         others = sorted(set(each.effects.on()) - {"landing", "spread"})
         if others:
             remedy = "their motion after the impact is not followed here: switch them off"
@@ -114,6 +117,15 @@ def pair_of(
         allowed = "Gaussian or Uniform, of speed and landing"
         raise AnswerError("the noise to throw with", scatter.words(), allowed, "choose one of these")
     return Pair((arm_end_of(still(one)), arm_end_of(still(two))), scatter)
+
+
+def _said(scene: Scene, name: str) -> str:
+    """Put what two parts have in common in words, with units."""
+    value = getattr(scene, name)
+    if name == "cavity" and value is not None:
+        return ", ".join(f"{key} {text}" for key, text in scene.text["cavity"].items())
+    unit = f"{scene.unit}/s^2" if name == "gravity" else scene.unit
+    return f"{value:.9g} {unit}" if isinstance(value, float) else str(value)
 
 
 def seats_of(pair: Pair) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

@@ -47,6 +47,7 @@ def analyse(
     """Find limit sets, basins and critical points, and write report.md, analysis.json and figures."""
     with progress() as tell:
         from limitsets.scene import load_to_analyse
+        from limitsets.scene.doubts import doubts
 
         _, folder = opened(scene, out, "analysis", lambda source: load_to_analyse(source)[0])
         from limitsets.analysis import analyse as run
@@ -54,8 +55,10 @@ def analyse(
 
         analysis = run(scene, cells, error=error, progress=tell, announce=_announce)
         files = write(analysis, folder, form=form, html=html, progress=tell)
-    if json and analysis.choice.notice:
-        print(f"limitsets: {analysis.choice.notice}", file=sys.stderr, flush=True)
+    if json:
+        for note in (analysis.choice.notice, *map(str, doubts(analysis.scene))):
+            if note:
+                print(f"limitsets: {note}", file=sys.stderr, flush=True)
     answer(analysis, json, lambda: _text(analysis, files[0]), csv=(csv, analysis.table))
 
 
@@ -67,10 +70,13 @@ def _text(analysis: Analysis, page: Path) -> None:
     from limitsets.analysis import in_limit_sets
     from limitsets.report.goals import after_undecided, next_command, verdict_of, void_of
     from limitsets.report.tables import count, intervals, percent
+    from limitsets.scene.doubts import doubts
 
     unit = analysis.scene.unit
     if analysis.choice.notice:
         typer.echo(analysis.choice.notice)
+    for doubt in doubts(analysis.scene):
+        typer.echo(str(doubt))
     if not analysis.attractors:
         undecided = analysis.basins.undecided_between
         left = f"no limit set was found, and {percent(undecided)} of all starts are undecided"

@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
-from limitsets.cli.arguments import position
+from limitsets.cli.arguments import place
 from limitsets.cli.output import Json, Scene, answer, option, progress
 from limitsets.errors import LimitsetsError
 
@@ -93,7 +93,7 @@ def _start(scene: Any, text: str) -> tuple[float, int]:
     x, comma, side = text.rpartition(",")
     if not comma or not side.strip().isdigit():
         raise LimitsetsError("the start", text, "X,SIDE, as in 15,2", "name both", key="--start")
-    return position(scene, x), int(side)
+    return place(scene, x, "--start"), int(side)
 
 
 def _shown(

@@ -25,12 +25,12 @@ def number(word: str) -> float | str:
     return float(word) if _BARE.fullmatch(word.strip()) else word.strip()
 
 
-def place(scene: Scene, text: str) -> float:
-    """Read --x: with a unit, or a bare number in the scene's unit."""
+def place(scene: Scene, text: str, option: str = "--x") -> float:
+    """Read a place: with a unit, or a bare number in the scene's unit."""
     from limitsets.scene.units import convert, parse
 
     word = number(text)
-    return word if isinstance(word, float) else convert(parse(text, "length", key="--x"), scene.unit)
+    return word if isinstance(word, float) else convert(parse(text, "length", key=option), scene.unit)
 
 
 def places_of(scene: Scene, text: str, option: str) -> list[float]:

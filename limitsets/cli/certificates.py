@@ -8,7 +8,12 @@ from typing import Any
 
 from limitsets.cli.output import saved
 
-__all__ = ["certified", "said_of"]
+__all__ = ["certified", "said_of", "with_ending"]
+
+
+def with_ending(file: Path) -> Path:
+    """Give a certificate its ending where its name has none."""
+    return file if file.suffix else file.with_name(f"{file.name}.proof.zip")
 
 
 def certified(
@@ -19,7 +24,7 @@ def certified(
 
     if not proved:
         return found, {"file": None, "denied": False, "recheck": None}
-    begin = time.perf_counter()
+    begin, file = time.perf_counter(), with_ending(file)
     with saved(file) as draft:
         try:
             found.save(draft, recheck=recheck, workers=None)

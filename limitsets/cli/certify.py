@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from limitsets.cli.arguments import HELP_NO_RECHECK, deviations
+from limitsets.cli.certificates import with_ending
 from limitsets.cli.output import Csv, Json, Scene, Words, answer, option, progress, saved, table
 
 if TYPE_CHECKING:
@@ -41,7 +42,8 @@ def certify(
     tolerance: Annotated[Words, option("--tolerance", "Q=DEV", HELP_TOLERANCE)] = None,
     noise: Annotated[Words, option("--noise", "Q=DEV", HELP_NOISE)] = None,
     out: Annotated[
-        Path | None, option("--out -o", "FILE", "The certificate, ./NAME.proof.zip by default.")
+        Path | None,
+        option("--out -o", "FILE", "The certificate, NAME.proof.zip; ./ and the scene's name by default."),
     ] = None,
     csv: Csv = None,
     json: Json = False,
@@ -56,7 +58,7 @@ def certify(
         from limitsets.scene import load
 
         chosen = load(scene)
-        file = out if out is not None else Path(f"{chosen.name}.proof.zip")
+        file = Path(f"{chosen.name}.proof.zip") if out is None else with_ending(out)
         from limitsets.proofs import certify as run
         from limitsets.proofs.confirm import DeniedError
 

@@ -38,7 +38,7 @@ def run_goal(
         given = bounds_of(scene, bounds)
         found = design_for_goal(scene, vary=vary, bounds=given, evaluations=evaluations, progress=tell)
         files = [] if out is None else _written(found, out, form)
-    answer(found, json, lambda: _text(found, files), csv=(csv, found.table))
+    answer(found, json, lambda: _text(found, files, evaluations), csv=(csv, found.table))
     return 0 if found.verdict == "proved" else 1
 
 
@@ -55,9 +55,16 @@ def _written(found: GoalDesign, out: Path, form: str) -> list[Path]:
     return laid(out, [("part", plot.part(found.scene))], lambda _: texts, form)
 
 
-def _text(found: GoalDesign, files: list[Path]) -> None:
+def _text(found: GoalDesign, files: list[Path], asked: int) -> None:
+    from limitsets.inverse.margin.for_goal import POPULATION
+
     show(found.table())
     typer.echo(found.message[:1].upper() + found.message[1:] + ".")
+    typer.echo(found.itself)
+    if found.evaluations < asked:
+        whole = asked - found.evaluations < POPULATION
+        why = f"only whole generations of {POPULATION} are" if whole else "all designs came to rate alike"
+        typer.echo(f"{found.evaluations} of {asked} designs were looked at: {why}")
     met = found.room > 0.0
     if met and found.ruled_out:
         from limitsets.inverse.margin.search import said

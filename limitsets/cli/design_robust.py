@@ -10,11 +10,13 @@ import typer
 
 from limitsets.cli.arguments import bounds_of
 from limitsets.cli.output import answer, opened, progress, save_scene, show, show_scene
+from limitsets.files import as_json, picked
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from limitsets.inverse import RobustDesign
+    from limitsets.inverse.margin.for_margin import NoDesignError
     from limitsets.scene import Scene
 
 __all__ = ["run_robust"]
@@ -36,17 +38,23 @@ def run_robust(
     """Search, prove, write and print; the exit code."""
     with progress() as tell:
         from limitsets.inverse import robust_design
+        from limitsets.inverse.margin.for_margin import NoDesignError
 
         scene, _ = opened(name, None if out and out.suffix == ".toml" else out)
         so_far = None if out is None else out if out.suffix == ".toml" else out / f"{scene.name}-so-far.toml"
-        found = robust_design(
-            scene,
-            vary=(dict.fromkeys(vary, (None, None)) | bounds_of(scene, bounds)) or None,
-            evaluations=evaluations,
-            prove=seconds,
-            progress=tell,
-            keep=None if so_far is None else lambda best: _kept(best, so_far),
-        )
+        try:
+            found = robust_design(
+                scene,
+                vary=(dict.fromkeys(vary, (None, None)) | bounds_of(scene, bounds)) or None,
+                evaluations=evaluations,
+                prove=seconds,
+                progress=tell,
+                keep=None if so_far is None else lambda best: _kept(best, so_far),
+            )
+        except NoDesignError as none:
+            if none.miss is None:
+                raise
+            return _missed(none, scene, none.miss, out, form, csv, json=json)
         found, files = (found, []) if out is None else _written(found, out, form, recheck=recheck)
         if so_far is not None and so_far != out:
             so_far.unlink(missing_ok=True)
@@ -58,6 +66,48 @@ def _kept(best: Scene, file: Path) -> None:
     """Write the best design so far: a search that is ended has it."""
     file.parent.mkdir(parents=True, exist_ok=True)
     save_scene(best, file)
+
+
+def _missed(
+    none: NoDesignError,
+    scene: Scene,
+    miss: Scene,
+    out: Path | None,
+    form: str,
+    csv: Path | None,
+    *,
+    json: bool,
+) -> int:
+    """Write and print the nearest miss, and what ruled designs out."""
+    from limitsets.scene.spelling import in_unit_of, unit_of
+    from limitsets.tables import Column, Table
+
+    values = {
+        name: [in_unit_of(scene, name, one.value(name)) for one in (scene, miss)] for name in none.varied
+    }
+    rows = [(name, *pair, unit_of(scene, name)) for name, pair in values.items()]
+    heads = ("quantity", Column("before", show=".6g"), Column("nearest miss", show=".6g"), "unit")
+    table = Table(heads, rows, f"{scene.name}: no design that feeds")
+    record = {"scene": miss.as_dict(), "message": str(none), **picked(none, "ruled_out", "evaluations")}
+    if out is None:
+        files = []
+    elif out.suffix == ".toml":
+        files = save_scene(miss, out)
+    else:
+        from limitsets import plot
+        from limitsets.report.writing import laid
+        from limitsets.scene import dump
+
+        texts = {f"{miss.name}.toml": dump(miss), "design.json": as_json(record)}
+        files = laid(out, [("part", plot.part(miss))], lambda _: texts, form)
+
+    def text() -> None:
+        show(table)
+        typer.echo(str(none))
+        show_scene(miss, files, met=False)
+
+    answer(record, json, text, csv=(csv, lambda: table))
+    return 1
 
 
 def _written(found: RobustDesign, out: Path, form: str, *, recheck: bool) -> tuple[RobustDesign, list[Path]]:

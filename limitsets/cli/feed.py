@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -19,8 +20,10 @@ if TYPE_CHECKING:
 __all__ = ["feed"]
 
 HELP_SCATTER = (
-    "Random noise at every throw, like throw.speed='0.5 %'; repeatable. Default: that of the scene, if any."
+    "Random noise at every throw, like throw.speed='0.5 %'; repeatable. "
+    "Default: the scene's [world] scatter where [effects] has spread, else none."
 )
+HELP_NO_LEVEL = "Do not look for the noise at which 95 % are fed: most of the time that noise takes."
 HELP_NOISE = "What may differ at every throw in the proofs, like throw.speed='0.3 %'; repeatable."
 
 
@@ -51,6 +54,7 @@ def feed(
     ] = None,
     batches: Annotated[int, option("--batches", "N", "How often --parts are thrown.", min=1)] = 20,
     no_proof: Annotated[bool, typer.Option("--no-proof", help="Probabilities and trials only.")] = False,
+    no_level: Annotated[bool, typer.Option("--no-level", help=HELP_NO_LEVEL)] = False,
     out: Annotated[Path | None, option("--out -o", "DIR", "Write feeding.json and figures there.")] = None,
     certificate: Annotated[
         Path | None, option("--certificate", "FILE", "Write the proofs' certificate, NAME.proof.zip.")
@@ -76,6 +80,7 @@ def feed(
             side=side,
             noise=deviations("--noise", noise),
             prove=not no_proof,
+            level=not no_level,
             trials=trials,
             seed=seed,
             cells=cells,
@@ -98,15 +103,26 @@ def feed(
 
             drawn = [("part", plot.part(chosen)), ("feeding", plot.feeding(found))]
             files = laid(out, drawn, lambda _: {"feeding.json": as_json(record)}, form)
+    if json and (note := _unused(found)):
+        print(f"limitsets: {note}", file=sys.stderr, flush=True)
     answer(record, json, lambda: _text(found, files, written), csv=(csv, found.table))
     raise typer.Exit(0 if no_proof or found.proved else 1)
+
+
+def _unused(found: Feeding) -> str:
+    """Say that the scene's scatter is not used, and what uses it."""
+    scene = found.end.scene
+    if scene.world.scatter is None or scene.effects.spread is not None or found.scatter.given():
+        return ""
+    return '[world] scatter is not used: --scatter Q=DEV is, or spread = "gaussian" or "bounded" in [effects]'
 
 
 def _text(found: Feeding, files: list[Path], written: dict[str, Any] | None) -> None:
     from limitsets.report.tables import in_time
 
     end, unit = found.end, found.end.scene.unit
-    typer.echo(f"{end.scene.name}: the arm ends at x = {end.x:g} {unit}, side {end.side} is wanted")
+    note = "".join(f"; {said}" for said in [_unused(found)] if said)
+    typer.echo(f"{end.scene.name}: the arm ends at x = {end.x:g} {unit}, side {end.side} is wanted{note}")
     parts = ", ".join(f"{lo:.4g} to {hi:.4g} {unit}" for lo, hi in end.clear) or "nowhere"
     typer.echo(f"clear of the wall beyond the end: {parts}")
     if found.safe is not None and found.fed is not None:

@@ -190,6 +190,11 @@ def _text(
         )
     typer.echo(f"question: {found.question}")
     typer.echo(_verdict(found))
+    if found.found.verdict == "not-solved":
+        typer.echo(
+            "next: more --throws or --cells, --sweep LO:HI:N for another place of the sensor, or another throw in"
+            " [[feedback.throws]]"
+        )
     policy = found.found.policy
     if written is not None:
         typer.echo(said_of(written, "there is no policy"))

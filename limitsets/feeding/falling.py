@@ -26,6 +26,7 @@ from limitsets.errors import AnswerError
 from limitsets.geometry.polygon import above_side, side_ends
 from limitsets.goals import OrientedBeyond, Reaches
 from limitsets.robust.noise.chain_solution import starts_from
+from limitsets.scene.scene import require_rests
 
 if TYPE_CHECKING:
     from limitsets.scene import Cavity, Scene
@@ -167,8 +168,10 @@ def clear_beyond(scene: Scene, side: int) -> tuple[tuple[float, float], ...]:
 
 def _cavity_of(scene: Scene) -> Cavity:
     if scene.cavity is None:
+        require_rests(scene)
+        at = f"{getattr(scene.goal, 'x', 0.7 * scene.arm_length):.6g} {scene.unit}"
         remedy = (
-            'add [cavity] with position, width, depth and angle: position = "20 in" is where the arm ends'
+            f'add [cavity] with position, width, depth and angle: position = "{at}" is where the arm ends'
         )
         raise AnswerError("the scene", "without [cavity]", "one with a cavity", remedy)
     return scene.cavity

@@ -216,6 +216,6 @@ def require_rest(sides: RestingSides, unit: str = "", *, tips: bool = False) -> 
             f"{a:.6g} {unit}".strip(),
             f"between 0 and {f'{length:.6g} {unit}'.strip()}",
             f"the part cannot rest on side {side}: it tips over the {end} end by {f'{excess:.3g} {unit}'.strip()}; "
-            "move the centre of mass, change the shape, or simulate it: "
-            "add landing = true and roll = true to [effects]",
+            "move the centre of mass, draw the part without this edge, or simulate it: add landing = true and "
+            "roll = true to [effects], which design, feed, assemble, tray and feedback do not take",
         )

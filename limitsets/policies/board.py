@@ -19,6 +19,7 @@ from limitsets.proofs.cover import Cover, cover_on
 from limitsets.proofs.parameters import ParameterBox, parameter_box
 from limitsets.proofs.simulated import joined, scattered
 from limitsets.scene import Scene
+from limitsets.scene.scene import require_rests
 
 __all__ = ["MODES", "Board", "Progress", "Starts", "board_of"]
 
@@ -100,6 +101,7 @@ def board_of(
     if mode not in MODES:
         raise AnswerError("the mode", mode, " or ".join(MODES), "correct the word")
     if scene.feedback is None:
+        require_rests(scene)
         remedy = "add [[feedback.throws]] to the scene, each with name and kappa or speed"
         raise AnswerError("the throws to choose from", "none", "one at least", remedy)
     x, side = _goal_of(scene, goal, mode)

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from limitsets.geometry import RestingSides
 from limitsets.scene.cavity import resolve_cavity
-from limitsets.scene.facts import NOT_TIPPING, Deviation, Effects
+from limitsets.scene.facts import NOT_TIPPING, WITHOUT_EDGE, Deviation, Effects
 from limitsets.scene.floats import Floats
 from limitsets.scene.purpose import resolve_effects, resolve_goal, resolve_world
 from limitsets.scene.quantities import deviation, require
@@ -109,7 +109,7 @@ def _require_tipping(sides: RestingSides, effects: Effects, table: SceneTable, r
     for key, given in (("cavity", table.cavity), ("tray", table.tray), ("feedback", table.feedback)):
         if given is not None:
             allowed = "a part that rests on each of its sides"
-            raise resolver.refusal(key, "the part", where, allowed, f"leave [{key}] out, or change the shape")
+            raise resolver.refusal(key, "the part", where, allowed, f"leave [{key}] out, or, {WITHOUT_EDGE}")
 
 
 def _tolerance(tree: Tree, table: SceneTable, resolver: Resolver) -> dict[str, Deviation]:

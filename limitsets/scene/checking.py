@@ -8,11 +8,16 @@ from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any, TypeAlias
 
-from limitsets.errors import SceneError
+import numpy as np
+
+from limitsets.errors import SceneError, TipsError
 from limitsets.scene.doubts import Doubt, doubts
+from limitsets.scene.facts import TIPPING
+from limitsets.scene.floats import hull_of
 from limitsets.scene.reading import structure_of
 from limitsets.scene.scene import Scene
 from limitsets.scene.starting import example_at
+from limitsets.scene.units import convert, parse
 from limitsets.scene.validation import Tree, plain, refusals, respelled
 
 __all__ = ["examined"]
@@ -36,8 +41,8 @@ def examined(source: str | Path | Mapping[str, Any]) -> tuple[tuple[SceneError, 
     """Find all that is wrong with a scene, and what is improbable in it.
 
     Words, values and units are looked at all together.  Contradictions are met one after another, each with another
-    value in place of the one before and of what was refused; no shape is invented, so that a part whose words are
-    wrong hides them.  A wrong number of a list hides those after it.
+    value in place of the one before and of what was refused; of vertices that are not convex the hull stands in, and a
+    part whose words are wrong hides them.  A wrong number of a list hides those after it.
 
     Parameters
     ----------
@@ -59,6 +64,8 @@ def examined(source: str | Path | Mapping[str, Any]) -> tuple[tuple[SceneError, 
     try:
         structure, file = structure_of(source)
         tree, found = respelled(plain(structure, file), file)
+        while inner := respelled(tree, file)[1]:  # in a table whose own name was misspelt
+            tree, found = respelled(tree, file)[0], found + inner
     except SceneError as error:  # no file, no TOML: there is nothing more to look at
         return (error,), ()
     refused = refusals(tree, file)[1]
@@ -67,23 +74,40 @@ def examined(source: str | Path | Mapping[str, Any]) -> tuple[tuple[SceneError, 
     looked_at = _mended(tree, blamed)
     if looked_at is None:
         return tuple(found), ()
+    instead: set[Words] = set()
     while (wrong := _first(looked_at, file)) is not None:
         path = _path_of(wrong)
-        if not any(path[: len(each)] == each for each in blamed):
+        # a tolerance of what is blamed already is not given only because something stands in for that
+        about = {path, _words_of(str(path[1]))} if path[0] == "tolerance" and len(path) == 2 else {path}
+        if not any(each[: len(one)] == one for each in about for one in (*blamed, *instead)):
             found.append(wrong)
             blamed.add(path)
+            instead |= _hanging_on(wrong)
         after = _passed(looked_at, wrong, file)
         if after is None:
             return tuple(found), ()
         looked_at = after
-    if any(path[0] in ("part", "arm", "throw", "gravity") for path in blamed):
+    # the masses by which a part tips over are looked at, what stands in for another value is not
+    tips = {_path_of(error) for error in found if isinstance(error, TipsError)}
+    if any(path[0] in ("part", "arm", "throw", "gravity") for path in blamed - tips):
         return tuple(found), ()
     return tuple(found), doubts(Scene.of(looked_at, file))
 
 
 def _path_of(error: SceneError) -> Words:
+    return _words_of(error.key or "")
+
+
+def _words_of(key: str) -> Words:
     """Take a key apart."""
-    return tuple(part[0] or part[2] or int(part[1]) for part in _WORDS.findall(error.key or ""))
+    return tuple(part[0] or part[2] or int(part[1]) for part in _WORDS.findall(key))
+
+
+def _hanging_on(error: SceneError) -> set[Words]:
+    """Say of what nothing is told where another shape stands in for the vertices."""
+    if error.key != "part.vertices" or error.value == "clockwise":
+        return set()
+    return {("part",), ("cavity",), ("tray",)}
 
 
 def _mended(tree: Tree, blamed: Iterable[Words]) -> Tree | None:
@@ -118,8 +142,11 @@ def _passed(tree: Tree, error: SceneError, file: str | None) -> Tree | None:
     Another value stands in for what is wrong, or nothing; where neither helps, the whole table is left out.
     """
     path = _path_of(error)
+    if isinstance(error, TipsError):
+        on = tree.get("effects", {}) | dict.fromkeys(TIPPING, True)
+        return None if on == tree.get("effects") else tree | {"model": {}, "effects": on}
     usable: list[Tree] = []
-    for stand_in in _stand_ins(_at(tree, path)):
+    for stand_in in _shapes(tree, error) if path == ("part", "vertices") else _stand_ins(_at(tree, path)):
         other = copy.deepcopy(tree)
         node = _at(other, path[:-1])
         if stand_in is not None:
@@ -148,6 +175,16 @@ def _at(tree: Any, path: Words) -> Any:
         except (KeyError, IndexError, TypeError):
             return None
     return tree
+
+
+def _shapes(tree: Tree, error: SceneError) -> Iterator[Any]:
+    """Give vertices in the place of those that are no convex part: the other way round, or of the convex hull."""
+    given = tree["part"]["vertices"]
+    if error.value == "clockwise":
+        yield given[::-1]
+    else:
+        numbers = [[convert(parse(text, "length"), "m") for text in pair] for pair in given]
+        yield hull_of(given, np.array(numbers))
 
 
 def _stand_ins(value: Any) -> Iterator[Any]:

@@ -7,13 +7,14 @@ from collections.abc import Iterator, Mapping
 from typing import Any, NamedTuple, TypeAlias
 
 from limitsets.geometry.mass import mass_of
-from limitsets.scene.scene import MOST_TURNS, Scene, turns
+from limitsets.scene.quantities import find
+from limitsets.scene.scene import Scene, turns
 from limitsets.scene.units import convert, density_dimension, exact_factor, parse
 
 __all__ = ["Doubt", "doubts"]
 
-# As MOST_TURNS on the other side: a speed in deg/s that was meant in rad/s turns a part by 1/3000 of what is usual.
-LEAST_TURNS = 0.005
+# A speed in deg/s for rad/s turns a part by 1/3000 of what is usual, one in rpm for deg/s 36 times as far.
+LEAST_TURNS, MOST_TURNS = 0.005, 4
 USUAL_TURNS = (0.05, 1)
 
 
@@ -61,7 +62,7 @@ def doubts(scene: Scene) -> tuple[Doubt, ...]:
     """
     found: dict[str, Doubt] = {}
     for key, value, measured, least, most, thing, usual in _rows(scene):
-        if not least <= measured <= most:
+        if not least <= measured <= most and not (key.startswith("throw.") and "arm.length" in found):
             thing = thing.format(f"{measured:.3g}" if measured < 1000 else f"{measured:.0f}")
             found.setdefault(key, Doubt(key, thing, value, usual, "has it the right unit?", scene.file))
     return tuple(found.values())
@@ -77,7 +78,7 @@ def _rows(scene: Scene) -> Iterator[Row]:
     yield "arm.length", text["arm"]["length"], arm * metre, 1e-3, 3.0, "the arm is {} m long", "1 cm to 2 m"
     yield "arm.length", text["arm"]["length"], arm / size, 0.0, 40.0, over, "2 to 10 times"
     height = abs(scene.surface_height) / size
-    yield "arm.surface_height", text["arm"]["surface_height"], height, 0.0, 1.0, over, "below 0.5 times"
+    yield "arm.surface_height", text["arm"]["surface_height"], height, 0.0, 0.5, over, "below 0.5 times"
     if "center" in mass:
         reach = max(math.dist(scene.centre, vertex) for vertex in scene.vertices.tolist())
         key, radius = "part.mass.radius_of_gyration", scene.radius_of_gyration / reach
@@ -97,6 +98,13 @@ def _rows(scene: Scene) -> Iterator[Row]:
     said = "a part thrown from the arm's end turns {} times before it lands"
     turned = turns(arm, scene.kappa)
     yield f"throw.{word}", given, turned, LEAST_TURNS, MOST_TURNS, said, f"{here} {unit_of_throw}"
+    for name, deviation in scene.tolerance.items():
+        key, given = f'tolerance."{name}"', text["tolerance"][name]
+        if find(name).dimension == "length" and not deviation.relative and name != "throw.kappa":
+            yield key, given, deviation.value / size, 0.0, 0.25, over, "below 0.05 times"
+        elif deviation.relative or name != "gravity.tilt" or "tilt" in text["gravity"]:
+            share = deviation.value if deviation.relative else deviation.value / abs(scene.value(name))
+            yield key, given, share, 0.0, 0.5, "{} times the value itself", "below 0.1 times"
     if "throw_rate" in text.get("world", {}):
         rate = scene.world.more["throw_rate"]
         given, said = text["world"]["throw_rate"], "{} throws a second"
@@ -123,7 +131,7 @@ def _rows_of_plate(mass: Mapping[str, Any], vertices: list[Any], size: float) ->
         thickness = convert(parse(mass["plate_thickness"], "length"), "m")
         said = "{} times the part's longest side"
         key = "part.mass.plate_thickness"
-        yield key, mass["plate_thickness"], thickness / size, 0.0, 1.0, said, "below 0.2 times"
+        yield key, mass["plate_thickness"], thickness / size, 0.0, 0.5, said, "below 0.2 times"
     plate = mass_of(vertices, density * thickness).mass
     said = f"{{}} times the plate, which weighs {1000.0 * plate:.3g} g"
     for k, point in enumerate(mass.get("points", ())):

@@ -7,13 +7,26 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-__all__ = ["FACTS", "NOT_TIPPING", "TIPPING", "Deviation", "Effects", "Fact", "Scatter", "World"]
+__all__ = [
+    "FACTS",
+    "NOT_TIPPING",
+    "TIPPING",
+    "WITHOUT_EDGE",
+    "Deviation",
+    "Effects",
+    "Fact",
+    "Scatter",
+    "World",
+]
 
 TIPPING = ("landing", "roll")
 """Effects by which a part that comes down on a side on which it cannot rest goes on to the next."""
 
 NOT_TIPPING = ("drive",)
 """Effects that do not know such a side."""
+
+WITHOUT_EDGE = "if it is a chamfer, draw the part without it: lengthen the edges beside it until they meet"
+"""What to do where nothing is known of such a side."""
 
 
 @dataclass(frozen=True)

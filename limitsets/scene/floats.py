@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Mapping, Sequence
 from functools import cached_property
@@ -10,6 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from limitsets.errors import GeometryError
 from limitsets.geometry import (
     Mass,
     OnSide,
@@ -27,7 +29,7 @@ from limitsets.scene.numbers import Numbers
 from limitsets.scene.quantities import find, text_at
 from limitsets.scene.resolve import LEAST, Resolver
 
-__all__ = ["Body", "Floats"]
+__all__ = ["Body", "Floats", "hull_of"]
 
 # Quantities that may be 0 or below; of the others so small a number is refused that its square is none.
 SIGNED = ("part.vertices", "part.mass.center", "arm.surface_height", "gravity.tilt")
@@ -91,8 +93,18 @@ class Floats(Numbers):
         if len(given) and np.ptp(given, axis=0).max() < LEAST:
             allowed = f"at least {LEAST:g} {self.resolver.unit} across"
             raise self.refusal("part.vertices", "the part", "smaller", allowed, "correct the vertices")
-        with self.at("part.vertices"):
-            return _pairs(convex_polygon(given))
+        try:
+            with self.at("part.vertices"):
+                return _pairs(convex_polygon(given))
+        except GeometryError as error:
+            if error.thing != "the polygon":
+                raise
+            corners = json.dumps(hull_of(self.tree["part"]["vertices"], given))
+            remedy = (
+                f"{error.remedy}: a concave part rests on its convex hull; give it that outline, vertices = {corners}, "
+                "and center and radius_of_gyration of the real part (docs/scene.md)"
+            )
+            raise self.refusal("part.vertices", error.thing, error.value, error.allowed, remedy) from None
 
     def on_side(self, vertices: Sequence[Vector]) -> OnSide:
         """Return the centre of mass where it is measured on a side."""
@@ -144,3 +156,19 @@ class Floats(Numbers):
 
 def _pairs(vertices: Array) -> list[Vector]:
     return [(x, y) for x, y in vertices.tolist()]
+
+
+def hull_of(texts: Sequence[Any], vertices: Array) -> list[Any]:
+    """Give the corners of the convex hull as they are written, counterclockwise; of no area all of them.
+
+    Examples
+    --------
+    >>> hull_of("abcd", np.array([[0.0, 0.0], [0.0, 4.0], [1.0, 1.0], [4.0, 0.0]]))
+    ['d', 'b', 'a']
+    """
+    from scipy.spatial import ConvexHull, QhullError  # lazily: 0.1 s
+
+    try:
+        return [texts[corner] for corner in ConvexHull(vertices).vertices]
+    except QhullError:
+        return list(texts)

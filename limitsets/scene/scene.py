@@ -13,11 +13,11 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 import numpy.typing as npt
 
-from limitsets.errors import SceneError
+from limitsets.errors import AnswerError, SceneError
 from limitsets.geometry import RestingSides
 from limitsets.goals import Goal
 from limitsets.scene.cavity import Cavity
-from limitsets.scene.facts import Deviation, Effects, World
+from limitsets.scene.facts import WITHOUT_EDGE, Deviation, Effects, World
 from limitsets.scene.sensing import Feedback
 from limitsets.scene.tray import Tray
 from limitsets.tables import Column, Table, Tabled, facts
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from limitsets.thrower import Throw
     from limitsets.thrower.motion import FullThrow
 
-__all__ = ["MOST_TURNS", "Scene", "resting_places", "turns"]
+__all__ = ["MOST_TURNS", "Scene", "require_rests", "resting_places", "turns"]
 
 # below this share of the way from a_i to the arm's end the number of throws needed to get away is unbounded
 _NEAREST = 1e-6
@@ -352,3 +352,18 @@ class Scene(Tabled):
     def as_dict(self) -> dict[str, Any]:
         """Give the scene as it was written, as plain tables and lists that `limitsets.load` reads again."""
         return copy.deepcopy(dict(self.text))
+
+
+def require_rests(scene: Scene) -> None:
+    """Refuse a part with a side on which it cannot rest, where nothing is known of what it does there.
+
+    Raises
+    ------
+    AnswerError
+        With the side, and the way out.
+    """
+    tips = np.flatnonzero(~scene.sides.rests).tolist()
+    if tips:
+        where = f"one that cannot rest on side {' and '.join(map(str, tips))}"
+        allowed = "a part that rests on each of its sides"
+        raise AnswerError("the part", where, allowed, f"{WITHOUT_EDGE}, without [effects]", file=scene.file)

@@ -96,7 +96,7 @@ _OTHER_NAMES = {
     **dict.fromkeys(("gram", "grams"), "1 g"),
     **dict.fromkeys(("lbs", "pound", "pounds"), "1 lb"),
     **dict.fromkeys(("tonne", "tonnes", "Mg"), "1 t"),
-    **dict.fromkeys(("g/ml", "kg/l", "kg/dm^3"), "1 g/cm^3"),
+    **dict.fromkeys(("g/cc", "g/ml", "kg/l", "kg/dm^3"), "1 g/cm^3"),
 }
 _NUMBER = r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]{1,3})?"
 _QUANTITY = re.compile(rf"({_NUMBER})(?: +|(?=[%\u00b0]))([^\s].*)")
@@ -292,7 +292,8 @@ def density_dimension(text: object) -> str:
     >>> density_dimension("7850 kg/m^3"), density_dimension("3 kg/m^2")
     ('mass per volume', 'mass per area')
     """
-    volume = isinstance(text, str) and text.rstrip(" ").endswith(("3", "\u00b3"))
+    unit = text.rstrip(" ").rpartition(" ")[2] if isinstance(text, str) else ""
+    volume = unit.endswith(("3", "\u00b3")) or _in_known_unit(unit)[1] in UNITS["mass per volume"]
     return "mass per volume" if volume else "mass per area"
 
 

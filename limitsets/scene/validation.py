@@ -91,7 +91,7 @@ def refusals(tree: Tree, file: str | None) -> tuple[SceneTable | None, list[Scen
     model, table, wrong = _read(tree)
     rank = {"extra_forbidden": 0, "missing": 2}
     wrong.sort(key=lambda problem: rank.get(problem["type"], 1))
-    found = [_refusal(problem, model, file) for problem in wrong]
+    found = [_refusal(problem, model, tree, file) for problem in wrong]
     return table, [*found, *_contradictions(tree, file)]
 
 
@@ -99,17 +99,31 @@ def respelled(tree: Tree, file: str | None) -> tuple[Tree, list[SceneError]]:
     """Tell of all unknown keys, each under the name that it is like, where that is free, or else left out."""
     model, _, wrong = _read(tree)
     unknown = [problem for problem in wrong if problem["type"] == "extra_forbidden"]
+    told = [_refusal(problem, model, tree, file) for problem in unknown]
     tree = copy.deepcopy(tree)
     for problem in unknown:
-        *path, word = problem["loc"]
-        node: Any = tree
-        for each in path:
-            node = node[each]
-        value = node.pop(word)
-        free = [name for name in _names_beside(problem["loc"], model) if name not in node]
-        for near in difflib.get_close_matches(word[:64], free, n=1):
-            node[near] = value
-    return tree, [_refusal(problem, model, file) for problem in unknown]
+        meant = _meant(problem["loc"], model, tree)
+        node = _table_of(problem["loc"], tree)
+        value = node.pop(problem["loc"][-1])
+        if meant:
+            node[meant] = value
+    return tree, told
+
+
+def _table_of(path: tuple[str | int, ...], tree: Tree) -> Any:
+    node: Any = tree
+    for word in path[:-1]:
+        node = node[word]
+    return node
+
+
+def _meant(path: tuple[str | int, ...], model: type[SceneTable], tree: Tree) -> str | None:
+    """Say which free key an unknown one may stand for: one that is like it, else the only one that is missing."""
+    node, table = _table_of(path, tree), _table_beside(path, model)
+    free = [name for name in sorted(table.model_fields) if name not in node]
+    missing = [name for name in free if table.model_fields[name].is_required()]
+    near = difflib.get_close_matches(str(path[-1])[:64], free, n=1)
+    return near[0] if near else missing[0] if len(missing) == 1 and len(path) > 1 else None
 
 
 def _read(tree: Tree) -> tuple[type[SceneTable], SceneTable | None, list[Any]]:
@@ -160,7 +174,9 @@ def _contradictions(tree: Tree, file: str | None) -> Iterator[SceneError]:
     allowed = "center and radius_of_gyration, or plate_density and points"
     if measured and made:
         found = " and ".join(measured + made)
-        yield refusal("part.mass", "the mass", found, allowed, "give one of the two, not both")
+        remedy = "give one of the two, not both: a point mass beside a measured part is added to it by hand, by the "
+        remedy += "parallel-axis rule (docs/scene.md)"
+        yield refusal("part.mass", "the mass", found, allowed, remedy)
     elif len(measured) == 1 or (not measured and "plate_density" not in made):
         found = f"only {' and '.join(measured + made)}" if measured or made else "empty"
         yield refusal("part.mass", "the mass", found, allowed, "add what is missing")
@@ -176,7 +192,7 @@ def _contradictions(tree: Tree, file: str | None) -> Iterator[SceneError]:
             yield refusal(keys, "the thickness", thickness, "one beside a mass per volume", remedy)
 
 
-def _refusal(problem: Any, table: type[SceneTable], file: str | None) -> SceneError:
+def _refusal(problem: Any, table: type[SceneTable], tree: Tree, file: str | None) -> SceneError:
     kind, path = problem["type"], problem["loc"]
     key = ""
     for word in path:
@@ -186,7 +202,7 @@ def _refusal(problem: Any, table: type[SceneTable], file: str | None) -> SceneEr
     if kind == "refused":
         return SceneError(context["thing"], value, context["allowed"], context["remedy"], key=key, file=file)
     if kind == "extra_forbidden":
-        return _unknown(path, key, table, file)
+        return _unknown(path, key, table, tree, file)
     if kind == "missing":
         return SceneError("a required key", "missing", "a value for it", "add it", key=key, file=file)
     if kind in ("too_short", "too_long"):
@@ -200,10 +216,13 @@ def _refusal(problem: Any, table: type[SceneTable], file: str | None) -> SceneEr
     )
 
 
-def _unknown(path: tuple[str | int, ...], key: str, table: type[SceneTable], file: str | None) -> SceneError:
-    names = _names_beside(path, table)
+def _unknown(
+    path: tuple[str | int, ...], key: str, table: type[SceneTable], tree: Tree, file: str | None
+) -> SceneError:
+    names = sorted(_table_beside(path, table).model_fields)
     word = str(path[-1])
-    near = difflib.get_close_matches(word[:64], names, n=1, cutoff=0.0)
+    meant = _meant(path, table, tree)
+    near = [meant] if meant else difflib.get_close_matches(word[:64], names, n=1, cutoff=0.0)
     return SceneError(
         "the key",
         shown(word),
@@ -214,12 +233,12 @@ def _unknown(path: tuple[str | int, ...], key: str, table: type[SceneTable], fil
     )
 
 
-def _names_beside(path: tuple[str | int, ...], table: type[Table]) -> list[str]:
-    """Give the keys that the table of an unknown key may have."""
+def _table_beside(path: tuple[str | int, ...], table: type[Table]) -> type[Table]:
+    """Give the table in which an unknown key stands."""
     for word in path[:-1]:
         if isinstance(word, str):
             table = next(model for model in _models_in(table.model_fields[word].annotation))
-    return sorted(table.model_fields)
+    return table
 
 
 def _models_in(annotation: Any) -> list[Any]:

@@ -11,6 +11,7 @@ import numpy as np
 from limitsets.engine.depression import Motion, Plate, Pose, fall_speed
 from limitsets.errors import AnswerError
 from limitsets.files import as_table
+from limitsets.scene.scene import require_rests
 from limitsets.scene.tray import heights_over_sides
 
 if TYPE_CHECKING:
@@ -109,6 +110,7 @@ def passes_of(scene: Scene, side: int | None, step: float) -> Passes:
 
     tray = scene.tray
     if tray is None:
+        require_rests(scene)
         remedy = "add [tray] with depression_width, depression_depth, pitch, agitation and wash"
         raise refuse("the scene", "without [tray]", "one with a tray", remedy, "tray")
     if not scene.effects.contact:

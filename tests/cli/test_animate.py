@@ -47,7 +47,8 @@ def test_a_margin(capfd):
 def test_what_cannot_be_is_one_line_and_exit_2(capfd):
     for words, expected in (
         (("-o", "run.avi"), ".gif, .mp4, .html"),
-        (("--start", "40,2"), "a place on the arm"),
+        (("--start", "40,2"), "x of the start is 40.0; allowed: more than 4.22558 and up to 28 in on side 2"),
+        (("--start", "40 kg,2"), "--start: "),
         (("--start", "15"), "X,SIDE"),
         (("--start", "15,7"), "the side of the start is 7"),
         (("--feed", "--feedback"), "one of them"),

@@ -216,6 +216,7 @@ def test_design_for_the_goal(capfd):
     assert "name = " not in out  # it printed a scene that looked like the answer
     assert "nearest miss" in out
     assert "audit" not in out
+    assert "the scene as it is is ruled out, as one of those that let another side" in out
     words = ("--bounds", "throw.kappa=33 in:33.5 in", "--evaluations", "10", "-o", "found", "--json")
     code, out, _ = run(capfd, "design", "paper-initial", "--goal", *words)
     assert code == 1
@@ -240,6 +241,7 @@ def test_a_design_that_parts_leave_says_so(capfd):
     share = re.search(r"careful: from (\S+) % of all starts \(sampled\) parts leave the arm", out)[1]
     assert float(share) == pytest.approx(3.5, abs=1.0)
     assert "limitsets audit found.toml" in out
+    assert "the scene as it is is ruled out, as one of those that lose parts from some starts" in out
     assert out.splitlines()[-1] == "scene: found.toml"
 
 

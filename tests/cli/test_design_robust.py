@@ -65,3 +65,18 @@ def test_what_it_refuses(here, capfd, words, says):
     code, _, err = run(capfd, "design", "paper-designed", *words)
     assert code == 2
     assert says in err
+
+
+def test_where_nothing_is_found_the_nearest_miss_is_written(capfd):
+    words = ("--robust", "--bounds", "part.mass.center.along=0.1:0.2", "--evaluations", "20")
+    code, out, _ = run(capfd, "design", "paper-designed", *words, "-o", "missed")
+    assert code == 1
+    assert "nearest miss" in out
+    assert "none that feeds among" in out
+    assert out.splitlines()[-1] == "scene: missed/paper-designed-robust.toml (the nearest miss, no answer)"
+    record = json.loads(Path("missed/design.json").read_text(encoding="utf-8"))
+    assert sum(record["ruled_out"].values()) == record["evaluations"]
+    assert ls.load(record["scene"]) == ls.load("missed/paper-designed-robust.toml")
+    code, out, _ = run(capfd, "design", "paper-designed", *words, "--json", "--csv", "missed.csv")
+    assert (code, set(json.loads(out))) == (1, set(record))
+    assert "nearest miss" in Path("missed.csv").read_text(encoding="utf-8")

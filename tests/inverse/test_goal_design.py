@@ -1,6 +1,7 @@
 """Design for the scene's own goal: X and side stay, bounds come by themselves, and what ruled designs out is said."""
 
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -39,6 +40,20 @@ def test_a_scene_whose_goal_is_proved_has_a_design():
     # the threshold of paper-designed is 19.753 (tests/test_paper.py)
     assert found.room_before == pytest.approx(20.0 - 19.753, abs=1e-3)
     assert found.room >= found.room_before
+
+
+def test_the_scene_itself_is_told_of():
+    found = design_for_goal("paper-designed", evaluations=5)
+    assert found.itself.startswith(
+        f"the scene as it is meets the goal, with {found.room_before:.3g} in to spare"
+    )
+    own = ls.load(found.before.as_dict() | {"name": found.scene.name})
+    assert replace(found, scene=own).itself.endswith("so that paper-designed-design has its values")
+    found = design_for_goal("paper-initial", evaluations=5)
+    assert found.itself.startswith(
+        f"the scene as it is is ruled out, as one of those that {found.lacking_before}"
+    )
+    assert found.lacking_before
 
 
 def test_quantities_stay_in_the_units_of_the_file():

@@ -28,6 +28,7 @@ from limitsets.maps import advance
 from limitsets.proofs.query import Query
 from limitsets.robust.margins.invariant_set import invariant_intervals, least_slack
 from limitsets.scene import Scene, load
+from limitsets.scene.scene import require_rests
 from limitsets.scene.spelling import in_unit_of, in_units_of, unit_of
 from limitsets.tables import Column, Table, Tabled
 
@@ -60,6 +61,8 @@ class GoalDesign(Tabled):
         smaller of both, negative where the goal fails [length].
     room_before : float or None
         The same of the scene before; None where the part is lost.
+    lacking_before : str
+        The condition that rules the scene before out, "break an assumption ..."; empty where none does.
     leaving : float or None
         Share of the starts on the arm from which parts leave it, sampled; None where a throw from anywhere stays on it.
     verdict : str
@@ -77,6 +80,7 @@ class GoalDesign(Tabled):
     varied: dict[str, tuple[float, float]]
     room: float
     room_before: float | None
+    lacking_before: str
     leaving: float | None
     verdict: str
     ruled_out: dict[str, int]
@@ -93,6 +97,18 @@ class GoalDesign(Tabled):
             return f"{held}, with {self.room:.3g} {unit} to spare (sampled)"
         why = said(self.ruled_out)
         return f"no design that meets the goal at X = {x:g} {unit} among {self.evaluations}: {why}"
+
+    @property
+    def itself(self) -> str:
+        """One sentence: how the scene before stands, and whether it is the design."""
+        if self.lacking_before:
+            said = f"the scene as it is is ruled out, as one of those that {self.lacking_before}"
+        else:
+            said = (
+                f"the scene as it is meets the goal, with {self.room_before:.3g} {self.scene.unit} to spare"
+            )
+        same = load(self.before.as_dict() | {"name": self.scene.name}) == self.scene
+        return f"{said}; no other is better, so that {self.scene.name} has its values" if same else said
 
     def tables(self) -> tuple[Table, ...]:
         """Give the tables that show it, the one that is saved as CSV first."""
@@ -115,7 +131,15 @@ class GoalDesign(Tabled):
         return as_table(
             scene=self.scene.as_dict(),
             **picked(
-                self, "message", "room", "room_before", "leaving", "verdict", "ruled_out", "evaluations"
+                self,
+                "message",
+                "room",
+                "room_before",
+                "lacking_before",
+                "leaving",
+                "verdict",
+                "ruled_out",
+                "evaluations",
             ),
             quantities={
                 name: {"before": self.before.value(name), "after": self.scene.value(name), "bounds": ends}
@@ -236,6 +260,7 @@ def design_for_goal(
         raise AnswerError(
             "the goal", kind, "oriented_beyond or reaches, with a side and an x", remedy, file=start.file
         )
+    require_rests(start)
     if start.effects.on():
         raise AnswerError("the scene", "with effects on", "the minimal model", "switch its effects off")
     if evaluations < 1:
@@ -266,7 +291,7 @@ def design_for_goal(
     verdict = Query.of(found, asked).prove().verdict if room > 0.0 else "undecided"
     lost = why in (LOST, NO_PART)
     return GoalDesign(
-        found, start, ends, room, None if lost else room_before, _leaving(found), verdict, dict(search.ruled_out),
+        found, start, ends, room, None if lost else room_before, why, _leaving(found), verdict, dict(search.ruled_out),
         search.evaluations, time.perf_counter() - begin,
     )  # fmt: skip
 

@@ -11,7 +11,7 @@ import copy
 import math
 import time
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from itertools import permutations
 from pathlib import Path
 
@@ -35,9 +35,10 @@ from limitsets.robust.margins.estimate import Estimate, on_all_corners
 from limitsets.robust.margins.joint import joint_margin
 from limitsets.robust.margins.vector import Tolerance
 from limitsets.scene import Scene, load
+from limitsets.scene.scene import require_rests
 from limitsets.scene.spelling import in_units_of
 
-__all__ = ["TOLERANCE", "fed_at", "robust_design"]
+__all__ = ["TOLERANCE", "NoDesignError", "fed_at", "robust_design"]
 
 TOLERANCE = {
     "throw.speed": "1 %",
@@ -153,6 +154,18 @@ def _with_purpose(scene: Scene, x: float, side: int, tolerance: Mapping[str, str
     return load(tree)
 
 
+class NoDesignError(AnswerError):
+    """No design that feeds: with the nearest miss, if one can be built, what was varied, and what ruled designs out."""
+
+    def __init__(
+        self, evaluations: int, ruled_out: Mapping[str, int], miss: Scene | None, varied: Iterable[str]
+    ) -> None:
+        remedy = "widen the bounds, look at more designs, or ask the goal of another side"
+        found = f"none that feeds among {evaluations}"
+        super().__init__("the design", found, "one at least", f"{said(ruled_out)}; {remedy}")
+        self.evaluations, self.ruled_out, self.miss, self.varied = evaluations, ruled_out, miss, tuple(varied)
+
+
 @shown_in_notebooks
 @arguments_checked
 def robust_design(
@@ -245,13 +258,11 @@ def robust_design(
     polish = max(evaluations // POLISH, 1)
     best = polished(search, population[:POLISHED], lambda made: _rounded(made, search), polish, tell)
     if best is None:
-        raise AnswerError(
-            "the design",
-            f"none that feeds among {sum(each.evaluations for each in searches)}",
-            "one at least",
-            f"{said(sum((each.ruled_out for each in searches), Counter()))}; "
-            "widen the bounds, look at more designs, or ask the goal of another side",
-        )
+        ruled_out = sum((each.ruled_out for each in searches), Counter[str]())
+        count, miss = sum(each.evaluations for each in searches), search.scene_of(population[0])
+        if miss is not None:
+            miss = load(_rounded(miss, search).as_dict() | {"name": f"{start.name}-robust"})
+        raise NoDesignError(count, ruled_out, miss, search.bounds)
     made, found = best
     x = round(found.x, DECIMALS_OF_X)
     design = _with_purpose(made, x, on, texts, f"{start.name}-robust")
@@ -309,6 +320,7 @@ def _proved(
 
 
 def _side(scene: Scene, side: int | None) -> int:
+    require_rests(scene)
     if scene.effects.on():
         raise AnswerError("the scene", "with effects on", "the minimal model", "switch its effects off")
     asked = side if side is not None else getattr(scene.goal, "side", len(scene.sides) - 1)
