@@ -269,7 +269,7 @@ def _stepped(proof: ProofOfMap, lo: Floats, hi: Floats, cycle: Cycle) -> tuple[I
         here = np.flatnonzero((cycle.side == side) & (cycle.branches == branch))
         found = branch_boxes(proof.map, proof.upper, side, branch, lo[here], hi[here])
         if (found.state == UNKNOWN).any():
-            return "its images are not bounded on a box that Newton's operator contracts"
+            return "its images are not bounded on the boxes that are tried"
         if (found.state != SURE).any():
             return f"the branch of point {here[np.argmax(found.state != SURE)]} is not proved"
         if (cycle.side[(here + 1) % cycle.period] != found.side).any():
