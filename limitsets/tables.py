@@ -20,10 +20,7 @@ from limitsets.files import replaced
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = ["BY_CELLS", "Column", "Table", "Tabled", "aligned", "bands_of", "facts", "how_found", "joined"]
-
-# Of answers made of cells, which do not know their transitions.
-BY_CELLS = "cells: proved where the transitions are, by the method boxes; else sampled"
+__all__ = ["Column", "Table", "Tabled", "aligned", "bands_of", "facts", "how_found", "joined"]
 
 # Characters of the line that names an answer.
 SHORT = 110

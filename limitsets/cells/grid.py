@@ -214,8 +214,8 @@ def _counts(cells: Any, depth: int | None, dimension: int) -> tuple[int, ...]:
         raise GridError(
             "the number of cells",
             cells,
-            f"an integer from 1, or {dimension} of them",
-            "pass cells=1024, or one per axis",
+            "an integer from 1" + (f", or {dimension} of them" if dimension > 1 else ""),
+            "pass cells=1024" + (", or one per axis" if dimension > 1 else ""),
         )
     return tuple(int(n) for n in counts)
 

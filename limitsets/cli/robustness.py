@@ -71,7 +71,7 @@ def robustness(
 ) -> None:
     """Say how far each quantity may drift before the goal fails, and write report.md, figures and certificates.
 
-    Exit 1 where the goal is not proved of the scene as it is.
+    Exit 1 where the goal is not proved of the scene as it is, or the search for a margin ends with an error.
     """
     with progress() as tell, processes(workers) as pool:
         chosen, folder = opened(scene, out, "robustness")
@@ -99,7 +99,7 @@ def robustness(
         tell("files", len(found.entries), len(found.entries) + 1)
         files = write_robustness(found, folder, form, html=html)
     answer(found, json, lambda: _text(chosen, found, files), csv=(csv, found.table))
-    raise typer.Exit(0 if found.verdict == "proved" else 1)
+    raise typer.Exit(0 if found.verdict == "proved" and not found.failed else 1)
 
 
 def _text(given: SceneOf, found: Robustness, files: list[Any]) -> None:
@@ -113,7 +113,7 @@ def _text(given: SceneOf, found: Robustness, files: list[Any]) -> None:
     elif found.singles:
         typer.echo(none_holds(found))
         typer.echo(f"next: {without_margin(given, found.goals, fails=found.verdict == 'refuted')}")
-    for part in ("joint", "curve", "noise"):
+    for part in dict.fromkeys(("joint", "curve", "noise", *found.failed)):
         reason = found.left_out.get(part)
         if reason and reason != "it was not asked for":
             typer.echo(f"no {part}: {reason}")

@@ -69,10 +69,11 @@ def estimate_words(found: Estimate, goal: Goal | None, unit: str) -> str:
             places = f"from {min(chain(*extents.values()))[0]:.6g} to {max(chain(*extents.values()))[0]:.6g}"
         else:
             places = "; ".join(f"side {side}: {_places(parts)}" for side, parts in sorted(extents.items()))
-        visits = "the order of sides changes" if order is None else f"sides {'-'.join(map(str, order))}"
+        visits = "; the order of sides changes" if order is None else f"; sides {'-'.join(map(str, order))}"
+        visits = visits if len(found.lo) > 1 else ""
         kind = f"; a cycle of period {drawn}" if is_cycle else ""
         joined = f"; {bands} intervals, which these cells join" if bands > drawn else ""
-        rows.append((f"limit set {k}", f"{places} {unit}; {visits}{kind}{joined}"))
+        rows.append((f"limit set {k}", f"{places} {unit}".rstrip() + f"{visits}{kind}{joined}"))
     if not found.sets:
         rows.append(("limit set", "none: no start was found to stay"))
     looks = [(*look_of(label), share) for label, share in found.shares]

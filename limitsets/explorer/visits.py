@@ -30,7 +30,7 @@ COMPILING = "compiling, once: the throw, images of cells, attractors"
 """Short enough for the bar of a narrow terminal."""
 
 BEAT = 15
-"""Milliseconds from one beat to the next: a slider waits for half of them, and a page at rest costs 1 % of a core."""
+"""Milliseconds from one beat to the next: a slider waits for half of them, and a page at rest costs 3 % of a core."""
 
 
 def _say(address: str) -> None:

@@ -11,6 +11,7 @@ It is a sample, not a proof: a contradiction that no sample meets passes.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from itertools import product
 from typing import Any
@@ -137,12 +138,15 @@ def require_agreement(params: Any, domain: Domain, boxes: bool, upper: Any = Non
     Raises
     ------
     MapError
-        They contradict each other.
+        They contradict each other, or a parameter is nan.
     """
     cls, kind = type(params), kind_of(params)
+    corners = [params, coerce(upper)] if type(upper) is cls and upper is not params else [params]
+    for name, value in ((name, value) for corner in corners for name, value in corner._asdict().items()):
+        if isinstance(value, float | int) and math.isnan(value):
+            raise MapError(f"the field {name} of {kind.name}", value, "a number", "give it a value")
     if cls.__module__.split(".")[0] == "limitsets":
         return
-    corners = [params, coerce(upper)] if type(upper) is cls and upper is not params else [params]
     for corner, side in product(corners, np.flatnonzero(domain.inhabited).tolist()):
         points, count = _points(corner, domain, side)
         found = images(corner, points, side)

@@ -63,6 +63,11 @@ class TransitionGraph(Tabled):
     __networkx_backend__ = "limitsets"
 
     @property
+    def how(self) -> str:
+        """How what follows from the cells alone is found: "proved" by boxes, else "cells", of sampled images."""
+        return "proved" if self.method == "boxes" else "cells"
+
+    @property
     def exits(self) -> dict[str, int]:
         """Names and codes of the ways out, in the order of the sinks."""
         return kind_of(self.map).exits

@@ -6,6 +6,7 @@ of the same component only; neither needs the map to be continuous.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -15,7 +16,7 @@ from numpy.typing import NDArray
 
 from limitsets.cells import CellSet
 from limitsets.graph.condensation import attracting_of
-from limitsets.proofs.basin import ROUNDING, Basin, basin
+from limitsets.proofs.basin import ROUNDING, Basin, basin, shares_of
 from limitsets.proofs.cover import Cover
 from limitsets.proofs.near_hinge import NearHinge, near_hinge
 
@@ -76,6 +77,27 @@ class Attraction:
         share = max(0.0, inside - ROUNDING)
         others = self.basin.leaves + self.basin.creeps
         return self.basin.shares | {"share": share, "open": max(0.0, 1.0 - share - others) + ROUNDING}
+
+    def shares_from(self, section: Mapping[str, Any]) -> tuple[dict[str, float], bool]:
+        """Shares of the arm for the starts of a goal's section, and whether it counts as proved of them.
+
+        The section may be that of several boxes of parameters: its starts begin where those of the last of them do,
+        and only what lies before the first of their fixed points, or is lost in all of them, is explained.
+        """
+        arm, near = self.cover.box.bare[0], section.get("near_joint")
+        ends = {side: each["fixed_point"][0] for side, each in (near or {}).items() if "fixed_point" in each}
+        ends |= section.get("lost", {})
+        sides = [str(side) for side in range(arm.a.size)]
+        start = np.array([float.fromhex(section["starts"]["from"].get(side, "inf")) for side in sides])
+        explained = np.array(
+            [
+                float.fromhex(ends[side]) if side in ends else foot
+                for side, foot in zip(sides, arm.a, strict=True)
+            ]
+        )
+        shut = self.basin.rank < 0
+        *shares, whole = shares_of(self.cover, self.joint, shut, near is not None, start, explained)
+        return dict(zip(self.basin.shares, shares, strict=True)), whole
 
     @property
     def max_rank(self) -> int:

@@ -38,7 +38,7 @@ from limitsets.thrower.side_box import gather_box, with_kappa
 from limitsets.thrower.throw_box import throw_box
 from limitsets.thrower.turn_box import turn_box, turn_point
 
-__all__ = ["ROUNDING", "Basin", "basin"]
+__all__ = ["ROUNDING", "Basin", "basin", "shares_of"]
 
 Mask = NDArray[np.bool_]
 Floats = NDArray[np.float64]
@@ -214,7 +214,7 @@ def basin(found: Cover, component: NDArray[np.int32], joint: Sequence[NearHinge]
     # a little more, so that other arithmetic can confirm it
     throws = throws + throws // 8 + 1 if thin.any() else 0
     return Basin(
-        rank, throws, near, start, explained, *_shares(found, joint, shut, near, start, explained), missing
+        rank, throws, near, start, explained, *shares_of(found, joint, shut, near, start, explained), missing
     )
 
 
@@ -271,10 +271,13 @@ def _start(found: Cover, joint: Sequence[NearHinge], shut: Mask, near: bool) -> 
     return np.array(start), np.array(explained)
 
 
-def _shares(
+def shares_of(
     found: Cover, joint: Sequence[NearHinge], shut: Mask, near: bool, start: Floats, explained: Floats
 ) -> tuple[float, float, float, float, bool]:
-    """Shares of the arm that are claimed, leave, creep and are open; whether all beyond `start` is claimed."""
+    """Shares of the arm that are claimed, leave, creep and are open; whether all beyond `start` is claimed.
+
+    `start` and `explained` may be those of several boxes of parameters together, as of a joined claim.
+    """
     (lo, hi), rests = found.box.bare, found.box.rests
     total = float((lo.arm_length - hi.a)[rests].sum())
     wide = float((hi.arm_length - lo.a)[rests].sum())
@@ -286,7 +289,8 @@ def _shares(
         claimed += float(np.diff(edges)[good].sum())
         if near and rests[side]:
             point = joint[side].fixed_point
-            claimed += float(edges[0]) - (float(hi.a[side]) if point is None else point[1])
+            below = float(hi.a[side]) if point is None else point[1]
+            claimed += max(0.0, float(edges[0]) - (max(below, float(start[side])) if from_start else below))
     explains = float((explained - lo.a)[rests].sum())
     creeps = explains if near and any(each.fixed_point is not None for each in joint) else 0.0
     if found.box.landing > 0.0:

@@ -214,6 +214,7 @@ def certify(
     claims: Sequence[str] | None = None,
     *,
     upper: Any = None,
+    progress: Progress | None = None,
 ) -> ProofOfMap: ...
 def certify(
     scene: Any,
@@ -250,7 +251,7 @@ def certify(
         Of a map alone: the upper corner of a box of parameters, whose lower corner is `scene`; the claims are then
         proved for every map between.
     progress : callable, optional
-        Of a scene alone: called with what is tried, how much of it is done, and of how much, before each attempt.
+        Called with what is tried, how much of it is done, and of how much, before each attempt.
 
     Returns
     -------
@@ -276,8 +277,8 @@ def certify(
     'proved'
     """
     if isinstance(scene, tuple | type):
-        _require_none({"noise": noise, "tolerance": tolerance, "progress": progress}, "beside a map")
-        return certify_map(scene, grid, claims, upper=upper)
+        _require_none({"noise": noise, "tolerance": tolerance}, "beside a map")
+        return certify_map(scene, grid, claims, upper=upper, progress=progress)
     twice = isinstance(grid, Grid) or claims is not None  # else the claims stand in its place
     _require_none({"upper": upper, "grid": grid if twice else None}, "beside a scene")
     return certify_scene(

@@ -5,9 +5,11 @@ the interior of the component, relative to the domain.
 *Attracts all*: besides, no image leaves the domain and every recurrent component attracts: then the rank of a cell, the
 longest path to an attracting cell, falls along every orbit outside.
 *Expanding*, in one dimension: |dx'/dx| > 1 on every attracting cell, on every branch that is possible there.
-*Cycles*: for the iterate G = F^p along an itinerary and a box X, K(X) = m - C (G(m) - m) + (1 - C (DG(X) - 1)) (X - m)
-lies in the interior of X.  Then G has one fixed point in X, whatever the matrix C, and it is no multiple one (Krawczyk;
-Neumaier, "Interval Methods for Systems of Equations", 1990, section 5.1).  Along X every branch is proved to be taken.
+*Cycles*: for the points x_0 .. x_p-1 of an orbit along an itinerary, F_k = f(x_k) - x_k+1 and boxes X_k around them,
+K(X) = m - C F(m) + (1 - C DF(X)) (X - m) lies in the interior of X.  Then F has one root in X, whatever the matrix C,
+and it is no multiple one (Krawczyk; Neumaier, "Interval Methods for Systems of Equations", 1990, section 5.1).  All
+points at once, and not the first one under f^p: so images of a box of parameters do not grow along the orbit.  On X
+every branch is proved to be taken.
 
 For two corners of parameters all of it holds for each of the maps between.  No certificate is written: the independent
 checker knows the throw only.
@@ -19,7 +21,6 @@ import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import reduce
-from itertools import product
 from operator import add, mul
 from typing import Any, NoReturn, TypeAlias
 
@@ -34,10 +35,12 @@ from limitsets.graph.components import ranks
 from limitsets.graph.condensation import attracting_of
 from limitsets.interval import guard
 from limitsets.maps import coerce, has_slope, kind_of
-from limitsets.maps.derived import NEVER, SURE, UNKNOWN, BranchBoxes, branch_boxes
+from limitsets.maps.derived import NEVER, SURE, UNKNOWN, branch_boxes
+from limitsets.progress import Progress, shown_in_notebooks
 from limitsets.proofs.intervals import Intervals
 from limitsets.proofs.proof import Claim
-from limitsets.sets import Cycle, cycles
+from limitsets.sets import Cycle, Cycles, cycles, cycles_of
+from limitsets.sets.passing import passing
 from limitsets.tables import Column, Table, Tabled, bands_of
 
 __all__ = ["CLAIMS_OF_MAP", "CycleOfMap", "ProofOfMap", "certify_map"]
@@ -48,8 +51,11 @@ Matrix: TypeAlias = list[list[Intervals]]
 # Largest period of the search for cycles.
 UP_TO = 16
 
-# Half widths of X that are tried, relative to the extent of the orbit.
-FIRST, GROWTH, TRIES = 2.0**-40, 8.0, 8
+# X is K(X) of the step before and so much more of its width, until it holds its own; relative to the point at first.
+MORE, FIRST, TRIES = 0.125, 2.0**-40, 24
+
+# Itineraries of one length (in the plane: starts) beyond which no longer cycles are looked for.
+MOST_WORDS = 2000
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,8 +129,7 @@ class ProofOfMap(Tabled):
     @property
     def enters(self) -> CellSet:
         """The cells all of whose points are proved to enter the attracting cells."""
-        destination = self.graph.condensation().destination
-        return CellSet(self.graph.grid, destination >= 0)
+        return CellSet(self.graph.grid, self.graph.condensation().destinations(passing(self.graph)) >= 0)
 
     def save(self, path: object = None, **_: object) -> NoReturn:
         """Refuse: there are certificates of scenes alone (`Proof.save`).
@@ -143,7 +148,7 @@ class ProofOfMap(Tabled):
 
     def tables(self) -> tuple[Table, ...]:
         """Give the tables that show it, the one that is saved as CSV first."""
-        rows = [(each.claim, each.verdict, each.reason or None) for each in self.claims]
+        rows = [(each.claim, each.verdict, _missing(each)) for each in self.claims]
         claims = Table(("claim", "verdict", "missing"), rows, f"Proofs of {type(self.map).__name__}")
         if not len(self.cells):
             return (claims,)
@@ -169,6 +174,13 @@ def _region(cells: CellSet, caption: str, proved: str) -> Table:
     caption += ": boxes around its pieces" if cells.grid.dimension > 1 else ""
     how = f"proved: {proved}; {len(cells)} of {cells.grid.n_cells} cells"
     return Table(("side", *spans), rows, caption, how)
+
+
+def _missing(claim: Claim) -> str | None:
+    """Say what is not proved, of cycles also where others are."""
+    rest = claim.section.get("missing", [])
+    more = f"; and {len(rest) - 1} more" if len(rest) > 1 else ""
+    return claim.reason or (f"{rest[0]}{more}" if rest else None)
 
 
 def _place(grid: Grid, cell: int) -> str:
@@ -250,18 +262,20 @@ def _expanding(proof: ProofOfMap) -> Claim:
 # ---------------------------------------------------------------- cycles
 
 
-def _follow(proof: ProofOfMap, lo: Floats, hi: Floats, cycle: Cycle) -> list[BranchBoxes] | str:
-    """Enclose the orbit of a box along an itinerary; or say what is missing."""
-    steps: list[BranchBoxes] = []
-    for k, (side, branch) in enumerate(zip(cycle.side.tolist(), cycle.branches.tolist(), strict=True)):
-        found = branch_boxes(proof.map, proof.upper, side, branch, lo[None, :], hi[None, :])
-        if found.state[0] != SURE:
-            return f"the branch of point {k} is not proved"
-        if found.side != cycle.side[(k + 1) % cycle.period]:
+def _stepped(proof: ProofOfMap, lo: Floats, hi: Floats, cycle: Cycle) -> tuple[Intervals, Intervals] | str:
+    """Enclose images (p, d) and slopes (p, d, d) of boxes around the points of an orbit; or say what is missing."""
+    image, slope = np.empty((2, *lo.shape)), np.empty((2, *lo.shape, lo.shape[1]))
+    for side, branch in sorted(set(zip(cycle.side.tolist(), cycle.branches.tolist(), strict=True))):
+        here = np.flatnonzero((cycle.side == side) & (cycle.branches == branch))
+        found = branch_boxes(proof.map, proof.upper, side, branch, lo[here], hi[here])
+        if (found.state == UNKNOWN).any():
+            return "its images are not bounded on a box that Newton's operator contracts"
+        if (found.state != SURE).any():
+            return f"the branch of point {here[np.argmax(found.state != SURE)]} is not proved"
+        if (cycle.side[(here + 1) % cycle.period] != found.side).any():
             return "it ends on another side"
-        steps.append(found)
-        lo, hi = found.lo[0], found.hi[0]
-    return steps
+        image[:, here], slope[:, here] = (found.lo, found.hi), (found.slope_lo, found.slope_hi)
+    return Intervals(*image), Intervals(*slope)
 
 
 def _matrix(lo: Floats, hi: Floats) -> Matrix:
@@ -278,32 +292,44 @@ def _ends(a: Matrix) -> tuple[Floats, Floats]:
     return lo, hi
 
 
-def _slope(steps: Sequence[BranchBoxes]) -> Matrix:
+def _slope(steps: Intervals) -> Matrix:
     """Enclose the derivative of the steps together."""
-    each = [_matrix(step.slope_lo[0], step.slope_hi[0]) for step in steps]
+    each = map(_matrix, steps.lo, steps.hi)
     return reduce(lambda total, step: _times(step, total), each)
 
 
-_ONE = {d: _matrix(np.eye(d), np.eye(d)) for d in (1, 2, 3)}
+def _exactly(x: Floats) -> Intervals:
+    return Intervals(x, x)
 
 
-def _contracts(lo: Floats, hi: Floats, middle: Floats, at: BranchBoxes, slope: Matrix) -> bool:
-    """Whether Krawczyk's operator maps the box into its interior."""
-    d = middle.size
-    with np.errstate(all="ignore"):  # a singular matrix gives nan, which fails below
-        below, above = _ends(slope)
-        inverse = np.asarray(np.linalg.pinv(0.5 * (below + above) - np.eye(d)), dtype=np.float64)
-    c, one = _matrix(inverse, inverse), _ONE[d]
-    off = [
-        [Intervals.of(float(a), float(b)) - float(m)]
-        for a, b, m in zip(at.lo[0], at.hi[0], middle, strict=True)
-    ]
-    wide = [[Intervals.of(float(a), float(b)) - float(m)] for a, b, m in zip(lo, hi, middle, strict=True)]
-    less = [[slope[i][j] - one[i][j] for j in range(d)] for i in range(d)]
-    rest = [[one[i][j] - term for j, term in enumerate(row)] for i, row in enumerate(_times(c, less))]
-    newton, spread = _times(c, off), _times(rest, wide)
-    moved = [float(m) - a[0] + b[0] for m, a, b in zip(middle, newton, spread, strict=True)]
-    return all(low < k.lo[0] and k.hi[0] < high for k, low, high in zip(moved, lo, hi, strict=True))
+def _sum(terms: Intervals) -> Intervals:
+    """Add along the last axis."""
+    return reduce(add, map(Intervals, np.moveaxis(terms.lo, -1, 0), np.moveaxis(terms.hi, -1, 0)))
+
+
+def _inverse(slope: Intervals) -> Floats:
+    """Invert DF in floats; nan, which proves nothing, where it is singular."""
+    p, d = slope.lo.shape[:2]
+    derivative = np.zeros((p, d, p, d))
+    for k in range(p):
+        derivative[k, :, k] += 0.5 * (slope.lo[k] + slope.hi[k])
+        derivative[k, :, (k + 1) % p] -= np.eye(d)
+    try:
+        return np.asarray(np.linalg.inv(derivative.reshape(p * d, p * d)), dtype=np.float64)
+    except np.linalg.LinAlgError:
+        return np.full((p * d, p * d), np.nan)
+
+
+def _krawczyk(middle: Floats, c: Floats, off: Intervals, slope: Intervals, wide: Intervals) -> Intervals:
+    """K(X), from F at the middles, the slopes on X, and X less the middles."""
+    p, d = middle.shape
+    of_points = c.reshape(p * d, p, d)
+    turned = Intervals(slope.lo.swapaxes(1, 2), slope.hi.swapaxes(1, 2))
+    product_ = _sum(_exactly(of_points[:, :, None, :]) * turned) - _exactly(np.roll(of_points, 1, axis=1))
+    rest = _exactly(np.eye(p * d).reshape(p * d, p, d)) - product_
+    newton, spread = (_sum(_sum(terms)) for terms in (_exactly(of_points) * off, rest * wide))
+    moved = _exactly(middle.ravel()) - newton + spread
+    return Intervals(moved.lo.reshape(p, d), moved.hi.reshape(p, d))
 
 
 def _attracts(slope: Matrix) -> bool | None:
@@ -319,32 +345,45 @@ def _attracts(slope: Matrix) -> bool | None:
     return False if det.absolute().lo[0] > 1.0 or room.hi[0] < 0.0 else None
 
 
+@np.errstate(all="ignore")  # what is singular or runs away gives inf and nan, which prove nothing
 def _prove(proof: ProofOfMap, cycle: Cycle) -> CycleOfMap | str:
     """Prove that there is one orbit near one found in floats; or say what is missing."""
-    middle = np.atleast_1d(cycle.x[0]).astype(np.float64)
-    radius = FIRST * np.maximum(np.abs(middle), 1.0)
-    missing = "no box is found that Newton's operator contracts"
+    middle = cycle.x.reshape(cycle.period, -1).astype(np.float64)
+    found = _stepped(proof, middle, middle, cycle)
+    if isinstance(found, str):
+        return found
+    c, least = _inverse(found[1]), FIRST * np.maximum(np.abs(middle), 1.0)
+    off, lo, hi = found[0] - _exactly(np.roll(middle, -1, axis=0)), middle, middle
     for _ in range(TRIES):
-        lo, hi = middle - radius, middle + radius
-        radius = radius * GROWTH
-        at, steps = _follow(proof, middle, middle, cycle), _follow(proof, lo, hi, cycle)
-        if isinstance(at, str) or isinstance(steps, str):
-            return at if isinstance(at, str) else str(steps)
-        slope = _slope(steps)
-        if not _contracts(lo, hi, middle, at[-1], slope):
-            continue
-        points = [(lo, hi), *((step.lo[0], step.hi[0]) for step in steps[:-1])]
-        if any(
-            _meet(points[0], points[k])
-            for k in range(1, cycle.period)
-            if cycle.period % k == 0 and cycle.side[k] == cycle.side[0]
-        ):
-            return "its period may be smaller"
-        if not _within(proof.cells, lo, hi, int(cycle.side[0])):
-            return "it is not in the attracting cells"
-        first, last = (np.stack(ends) for ends in zip(*points, strict=True))
-        return CycleOfMap(first, last, cycle.side, cycle.branches, *_ends(slope), _attracts(slope))
-    return missing
+        held = _krawczyk(middle, c, off, found[1], Intervals(lo, hi) - _exactly(middle))
+        if ((lo < held.lo) & (held.hi < hi)).all():
+            return _proved(proof, held, cycle)
+        more = MORE * (held.hi - held.lo) + least
+        lo, hi = np.minimum(held.lo - more, middle), np.maximum(held.hi + more, middle)
+        if not np.isfinite([lo, hi]).all():
+            break
+        found = _stepped(proof, lo, hi, cycle)
+        if isinstance(found, str):
+            return found
+    return "no box is found that Newton's operator contracts"
+
+
+def _proved(proof: ProofOfMap, at: Intervals, cycle: Cycle) -> CycleOfMap | str:
+    """Say what there is to know of an orbit that lies in boxes; or what is missing."""
+    found = _stepped(proof, at.lo, at.hi, cycle)
+    if isinstance(found, str):
+        return found
+    points = list(zip(at.lo, at.hi, strict=True))
+    if any(
+        _meet(points[0], points[k])
+        for k in range(1, cycle.period)
+        if cycle.period % k == 0 and cycle.side[k] == cycle.side[0]
+    ):
+        return "its period may be smaller"
+    if not _within(proof.cells, *points[0], int(cycle.side[0])):
+        return "it is not in the attracting cells"
+    slope = _slope(found[1])
+    return CycleOfMap(at.lo, at.hi, cycle.side, cycle.branches, *_ends(slope), _attracts(slope))
 
 
 def _meet(one: tuple[Floats, Floats], two: tuple[Floats, Floats]) -> bool:
@@ -352,21 +391,43 @@ def _meet(one: tuple[Floats, Floats], two: tuple[Floats, Floats]) -> bool:
 
 
 def _within(cells: CellSet, lo: Floats, hi: Floats, side: int) -> bool:
-    """Whether a box lies in the cells: one that is smaller than any cell, if all its corners do."""
-    least = np.array([np.diff(edges).min() for edges in cells.grid.edges[side]])
-    numbers = cells.grid.index(np.array(list(product(*zip(lo, hi, strict=True)))), side)
-    return bool((hi - lo < least).all() and (numbers >= 0).all() and cells.mask[numbers].all())
+    """Whether the cells cover a box."""
+    grid = cells.grid
+    corners = grid.index(np.array([lo, hi]), side)
+    if (corners < 0).any():
+        return False
+    first, last = np.transpose(grid.axes(corners, side))
+    mine = cells.mask[grid.of_side(side)].reshape(grid.shape[side])
+    return bool(mine[tuple(slice(a, b + 1) for a, b in zip(first, last, strict=True))].all())
 
 
-def _cycles(proof: ProofOfMap) -> tuple[Claim, tuple[CycleOfMap, ...]]:
+def _between(lower: Any, upper: Any) -> Any:
+    """Parameters half way between two corners."""
+    if isinstance(lower, tuple):
+        return type(lower)(*map(_between, lower, upper))
+    return lower if lower is None or isinstance(lower, bool) else 0.5 * (lower + upper)
+
+
+def _candidates(proof: ProofOfMap) -> tuple[Cycles, list[str]]:
+    """Find cycles in floats for the parameters in the middle, and say what was left out."""
+    cells, middle = proof.cells, _between(proof.map, proof.upper)
+    if cells.grid.dimension > 1:
+        return cycles(replace(proof.graph, map=middle), UP_TO, cells), []
+    found = cycles_of(middle, cells.extents(), cells.grid.domain, UP_TO, most_words=MOST_WORDS)
+    beyond = f"longer cycles: there are more than {MOST_WORDS} itineraries of one length"
+    return found, [] if found.complete else [beyond]
+
+
+def _cycles(proof: ProofOfMap, progress: Progress | None) -> tuple[Claim, tuple[CycleOfMap, ...]]:
     kind = kind_of(proof.map)
     if (len(kind.branches) > 1 and not kind.has_margin) or kind.dimension > 2 or not has_slope(proof.map):
         reason = "cycles need slopes, at most two dimensions, and `margin` where there are branches"
         return Claim("cycles", "undecided", reason, {}, final=True), ()
-    found = cycles(proof.graph, UP_TO, proof.cells) if len(proof.cells) else ()
+    found, missing = _candidates(proof) if len(proof.cells) else ((), [])
     proved: list[CycleOfMap] = []
-    missing = []
-    for cycle in found:
+    for number, cycle in enumerate(found):
+        if progress is not None:
+            progress("cycles", number, len(found))
         answer = _prove(proof, cycle)
         if isinstance(answer, CycleOfMap):
             proved.append(answer)
@@ -393,6 +454,7 @@ CLAIMS_OF_MAP = (*PROVERS, "cycles")
 """What can be claimed of any map."""
 
 
+@shown_in_notebooks
 @arguments_checked_as("certify")
 def certify_map(
     map: Any,  # noqa: A002  # the field's word
@@ -400,6 +462,7 @@ def certify_map(
     claims: Sequence[str] | None = None,
     *,
     upper: Any = None,
+    progress: Progress | None = None,
 ) -> ProofOfMap:
     """Prove claims about the attracting cells of any map; called by `limitsets.certify`.
 
@@ -413,6 +476,8 @@ def certify_map(
         Of `CLAIMS_OF_MAP`; default ("attracts-all",).
     upper : NamedTuple, optional
         The upper corner of the parameters; default `map`.
+    progress : callable, optional
+        Called with the step, how much of it is done, and of how much.
 
     Returns
     -------
@@ -437,6 +502,8 @@ def certify_map(
     guard()
     lower = coerce(map)
     upper = lower if upper is None else coerce(upper)
+    if progress is not None:
+        progress("transitions", 0, 1)
     graph = transitions(lower, grid, "boxes", upper=upper)
     component, _ = _components(graph)
     proof = ProofOfMap(lower, upper, graph, component, (), (), 0.0)
@@ -444,7 +511,7 @@ def certify_map(
     answers = []
     for word in wanted:
         if word == "cycles":
-            answer, found = _cycles(proof)
+            answer, found = _cycles(proof, progress)
         else:
             answer = PROVERS[word](proof)
         answers.append(answer)

@@ -317,16 +317,19 @@ def parameter_box(
     landing = scatter.outward()[1] if scatter.hi > 0 else 0.0
     try:
         sides, radius = reader.narrow_body()
-    except (ZeroDivisionError, ValueError):  # so wide that a length may be nothing, or sides that do not meet
+        full = simulated(scene)
+        angles, p, q = reader.outline() if full is not None else ([], [], [])
+    except (
+        ZeroDivisionError,
+        ValueError,
+    ):  # a length that may be nothing, sides that do not meet, a flat corner
         raise AnswerError(
-            "the part", "such sides", "one that can be, throughout the tolerance", NARROWER
+            "the part", "of no convex shape", "one, throughout the tolerance", NARROWER
         ) from None
     _require_rest(sides, scene.sides.rests.tolist(), kappa, radius)
     scalars = [kappa, reader.number("arm.surface_height"), reader.number("arm.length"), radius]
     ends = [span.outward() for span in scalars]
     columns = [np.array([side[k].outward() for side in sides]) for k in range(3)]
-    full = simulated(scene)
-    angles, p, q = reader.outline() if full is not None else ([], [], [])
     corner = _columns(angles) if angles else np.full((2, len(sides)), np.nan)
     model: Any = Throw
     flight, flip = scene.bare_map.flight, scene.bare_map.flip

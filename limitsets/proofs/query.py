@@ -6,7 +6,7 @@ Cells are refined where needed: first some hundreds a side, then borders spread 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -20,12 +20,14 @@ from limitsets.proofs.goals import Answer, borders, prove, prove_or_refute
 from limitsets.proofs.goals.kind import against, undecided
 from limitsets.proofs.goals.reaches import falls_short
 from limitsets.proofs.parameters import ParameterBox, parameter_box
+from limitsets.proofs.proof import Claim
 from limitsets.proofs.simulated import scattered
 from limitsets.proofs.tolerance import SceneBox
+from limitsets.proofs.weakest_claim import weakest_of
 from limitsets.proofs.worst import worst_orbit
 from limitsets.scene import Scene, load
 
-__all__ = ["Outcome", "Query"]
+__all__ = ["Outcome", "Query", "joined_claims", "unjoined"]
 
 # Cells per side to begin with, then borders over all that attracts, and pieces of a parameter where a cell is open to
 # both decisions; more cells to begin with where nothing attracts.
@@ -258,6 +260,26 @@ class Query:
         if not (found.component >= 0).any():
             return answer
         return against(worst_orbit(found, wrong), answer.reason)
+
+
+def joined_claims(pieces: Sequence[Outcome]) -> tuple[Claim, ...]:
+    """Join what is proved of several pieces: one claim for each goal, of the starts for which all of them prove it."""
+    found = [piece.found for piece in pieces if piece.found is not None]
+    claims = [
+        [
+            Claim("goal", "proved", "", dict(one.section), starts=one.starts, shares=dict(one.shares))
+            for one in piece.answers
+        ]
+        for piece in pieces
+    ]
+    return tuple(weakest_of(of_goal, found) for of_goal in zip(*claims, strict=True))
+
+
+def unjoined(pieces: Sequence[Outcome]) -> str:
+    """Say why pieces do not prove the goals together, in one certificate; empty if they do."""
+    missing = [piece.reason for piece in pieces if piece.verdict != "proved"]
+    missing = missing or [claim.reason for claim in joined_claims(pieces) if claim.verdict != "proved"]
+    return missing[0] if missing else ""
 
 
 def _said(error: AnswerError) -> str:

@@ -105,6 +105,10 @@ def next_command(analysis: Analysis) -> str:
         return (
             f"write {lines} under [effects] of {source}; limitsets check {source} says whether it is in order"
         )
+    if outcome.holds and not outcome.goal.from_anywhere and any(analysis.basins.exits.values()):
+        return (
+            f"limitsets certify {source} (a proof for the starts that stay; a margin is there where all do)"
+        )
     if outcome.holds and not outcome.vacuous:
         return f"limitsets certify {source} (a proof), limitsets margin {source} (how much each quantity may deviate)"
     if outcome.holds is None and not analysis.attractors and (speeds := _speeds(scene)):
@@ -153,7 +157,8 @@ def after_unproved(proof: Proof) -> str:
 
 def without_margin(scene: Scene, goals: Sequence[Goal], *, fails: bool) -> str:
     """Name the command that goes on from a scene without margins: its goal fails, or is not proved of it."""
-    certify = f"limitsets certify {_source(scene)} (what is proved of it, and what is not)"
+    starts = f"limitsets analyse {_source(scene)} (which starts leave the arm: margins need a scene in which none does)"
+    certify = f"limitsets certify {_source(scene)} (what is proved of it, and what is not), {starts}"
     return (design_command(scene, goals) if fails else "") or certify
 
 

@@ -101,11 +101,12 @@ def structure_of(source: str | Path | Mapping[str, Any]) -> tuple[dict[str, Any]
         return {"name": "scene", **source}, None
     if isinstance(source, str) and "\n" in source:
         return {"name": "scene", **_parsed(source, None)}, None
-    if isinstance(source, tuple) and hasattr(source, "_fields"):
+    if hasattr(source, "_fields"):
         remedy = (
             "of a map of one's own: ls.transitions(map, grid) and what follows from it, ls.certify(map, grid)"
         )
-        raise SceneError("the source of a scene", f"a map, {type(source).__name__}", "a scene", remedy)
+        kind = source if isinstance(source, type) else type(source)
+        raise SceneError("the source of a scene", f"a map, {kind.__name__}", "a scene", remedy)
     if not isinstance(source, str | Path):
         allowed = "a built-in name, a path, TOML text or a structure"
         raise SceneError("the source of a scene", shown(source), allowed, "give one of these")

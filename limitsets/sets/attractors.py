@@ -15,7 +15,7 @@ from limitsets.graph import TransitionGraph
 from limitsets.maps import has_slope, orbit
 from limitsets.maps.kernels import scattered
 from limitsets.maps.lyapunov import lyapunov, orbit_with_exponent
-from limitsets.tables import BY_CELLS, Column, Table, Tabled, facts
+from limitsets.tables import Column, Table, Tabled, facts, how_found
 
 __all__ = ["Attractor", "attractors"]
 
@@ -53,6 +53,8 @@ class Attractor(Tabled):
         Share of the orbit's states in the cells: less than 1 shows cells that the images missed.
     stopped : str or None
         Why the orbit ended early: the exit it left by, or "stalled" where a step rounds away (`limitsets.orbit`).
+    how : str
+        "proved" where the transitions are (method "boxes"), "cells" where the images of cells are sampled.
     """
 
     cells: CellSet
@@ -64,6 +66,7 @@ class Attractor(Tabled):
     throws: int
     in_cells: float
     stopped: str | None
+    how: str = "cells"
 
     def tables(self) -> tuple[Table, ...]:
         """Give the tables that show it, the one that is saved as CSV first."""
@@ -85,7 +88,9 @@ class Attractor(Tabled):
         names = [f"x[{axis}]" for axis in range(self.cells.grid.dimension)] if plane else ["x"]
         spans = [Column(name, show=".6g", ends=True) for name in names]
         columns: tuple[Column | str, ...] = ("side", *spans, Column("jogs per visit", ends=True))
-        return Table(columns, rows, "Attractor", BY_CELLS), facts("Its orbit", of, "sampled, not proved")
+        return Table(columns, rows, "Attractor", how_found(self.how)), facts(
+            "Its orbit", of, "sampled, not proved"
+        )
 
 
 def _visits(side: NDArray[np.int64]) -> tuple[tuple[int, ...] | None, dict[int, tuple[int, int]]]:
@@ -140,7 +145,7 @@ def _attractor(graph: TransitionGraph, cells: CellSet, throws: int) -> Attractor
     order, jogs = _visits(sides)
     flips = float((np.diff(sides) != 0).mean()) if sides.size > 1 else 0.0
     return Attractor(
-        cells, extents, order, jogs, flips, exponent, max(sides.size - 1, 0), inside, path.stopped
+        cells, extents, order, jogs, flips, exponent, max(sides.size - 1, 0), inside, path.stopped, graph.how
     )
 
 

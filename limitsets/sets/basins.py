@@ -16,9 +16,12 @@ from limitsets.graph.components import reach
 from limitsets.maps import codes
 from limitsets.sets.attractors import Attractor
 from limitsets.sets.passing import passing
-from limitsets.tables import BY_CELLS, Column, Table, Tabled
+from limitsets.tables import Column, Table, Tabled, how_found
 
 __all__ = ["Basins", "basins"]
+
+# A recurrent set of more cells is hardly one unstable cycle.
+MOST_OF_A_CYCLE = 64
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,6 +43,8 @@ class Basins(Tabled):
         Share of the cells all of whose paths leave by that exit.
     advice : str or None
         What to do about recurrent sets that are not closed, where there are any.
+    how : str
+        "proved" where the transitions are (method "boxes"), "cells" where the images of cells are sampled.
     """
 
     grid: Grid
@@ -48,6 +53,7 @@ class Basins(Tabled):
     undecided_between: float
     exits: dict[str, float]
     advice: str | None = None
+    how: str = "cells"
 
     def tables(self) -> tuple[Table, ...]:
         """Give the tables that show it, the one that is saved as CSV first."""
@@ -56,7 +62,7 @@ class Basins(Tabled):
             *((f"leave: {name}", share) for name, share in self.exits.items()),
             ("undecided", self.undecided_between),
         ]
-        return (Table(("where paths end", Column("share", show=".6f")), rows, "Basins", BY_CELLS),)
+        return (Table(("where paths end", Column("share", show=".6f")), rows, "Basins", how_found(self.how)),)
 
 
 @arguments_checked
@@ -109,6 +115,7 @@ def basins(graph: TransitionGraph, found: tuple[Attractor, ...]) -> Basins:
         by_code[codes.UNDECIDED],
         {name: by_code[code] for name, code in graph.exits.items()},
         _advice(graph, list(itertools.compress(sets, ~(attracting | through)))),
+        graph.how,
     )
 
 
@@ -121,7 +128,11 @@ def _advice(graph: TransitionGraph, lasting: list[NDArray[np.int32]]) -> str | N
         marks[cells] = 1
     weight = graph.grid.measure
     share = float(weight[reach(graph.ranges, graph.components(), marks) > 0].sum() / weight.sum())
+    reached = f"from {100 * share:.3g} % of the starts a recurrent set that is not closed can be reached"
+    coarse = "an attractor in cells that are too coarse for it: they are undecided; ask for finer cells"
+    if max(map(len, lasting)) <= MOST_OF_A_CYCLE:
+        return f"{reached}, an unstable cycle or {coarse}"
     return (
-        f"from {100 * share:.3g} % of the starts a recurrent set that is not closed can be reached, an unstable cycle "
-        "or an attractor in cells that are too coarse for it: they are undecided; ask for finer cells"
+        f"{reached}, a chaotic repeller or {coarse}; near a repeller they decide few more starts, sample the shares: "
+        "limitsets.resilience.basin_stability(graph, found, starts=10000)"
     )

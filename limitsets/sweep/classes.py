@@ -43,6 +43,12 @@ ROUNDING = 1e-9
 _BYTES = 6
 _IRREGULAR = -2
 _COUNTS = ("no", "one", "two", "three", "four")
+# Of a map that is no throw: whose starts leave, whose collapse, and both.
+OVER_THE_ENDS = (
+    ("leave over the upper end", "leaves over the upper end"),
+    ("leave over the lower end", "leaves over the lower end"),
+    "all starts leave, some over either end",
+)
 FIELDS = ("attractors", "undecided", "bands", "flip_order", "period", "leaves", "collapses")
 
 
@@ -136,10 +142,13 @@ class TopologyClass(NamedTuple):
     @property
     def words(self) -> str:
         """What a legend says of it, for a throw."""
-        return self.said("collapse", "collapses")
+        return self.said(("leave", "leaves"), ("collapse", "collapses"))
 
-    def said(self, *collapse: str) -> str:
-        """Say it with these words for what starts do that collapse, and for what every start does."""
+    def said(self, leave: tuple[str, str], collapse: tuple[str, str], both: str = "") -> str:
+        """Say it with these words for what starts do that leave and that collapse, and for what every start does.
+
+        `both`: instead of these where no start stays and some go either way.
+        """
         count = len(self.attractors)
         found = f"{_COUNTS[count] if count < len(_COUNTS) else count} attractor{'s' * (count != 1)}"
         kinds = [each.words for each in self.attractors]
@@ -147,7 +156,9 @@ class TopologyClass(NamedTuple):
             found += f", {kinds[0]}"
         elif count > 1:
             found += f", each {kinds[0]}" if len(set(kinds)) == 1 else f": {'; '.join(kinds)}"
-        ways = [(self.leaves, ("leave", "leaves")), (self.collapses, collapse)]
+        if both and not count and self.leaves == self.collapses == "some":
+            return f"{found}; {both}"
+        ways = [(self.leaves, leave), (self.collapses, collapse)]
         said = [f"{share} starts {several}" for share, (several, _) in ways if share == "some"]
         said += [f"every start {one}" for share, (_, one) in ways if share == "all"]
         return "; ".join((found, " and ".join(said))) if said else found
@@ -295,9 +306,14 @@ def legend(dataset: xr.Dataset) -> list[Entry]:
         here = numbers == number
         if not here.any():
             continue
-        own = "map" in dataset.attrs.get("plan", {})  # which has no joint: code -1 is an exit of its own
-        way = ("leave by the exit -1", "leaves by the exit -1") if own else ("collapse", "collapses")
-        words = "undecided" if number == UNDECIDED else named_class(name).said(*way) + _jogs(dataset, here)
+        kind = None if number == UNDECIDED else named_class(name)
+        own = "map" in dataset.attrs.get("plan", {})  # which has no joint
+        said = (
+            None
+            if kind is None
+            else (kind.said(*OVER_THE_ENDS) if own else kind.words + _jogs(dataset, here))
+        )
+        words = said or UNDECIDED_NAME
         entries.append(Entry(number, name, words, float(here.sum() / there.sum())))
     return sorted(entries, key=lambda each: (each.number == UNDECIDED, -each.share, each.name))
 

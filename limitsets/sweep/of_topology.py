@@ -45,7 +45,7 @@ def _variables(
     each = (("attractor", MOST_ATTRACTORS),)
     sides = (*each, ("side", subject.sides))
     doubts = "; ".join(f"{word}: {DOUBTS[number]}" for word, number in _CODES.items())
-    back = "come back to the joint" if isinstance(subject, SceneSubject) else "leave by the exit -1"
+    back = "come back to the joint" if isinstance(subject, SceneSubject) else "leave over the lower end"
     found = {
         "attractors": Variable("int8", about="how many attractors"),
         "undecided": Variable("int8", codes=_CODES, about=doubts),

@@ -68,9 +68,14 @@ class Atlas(Tabled):
         return tuple(axis["name"] for axis in self.dataset.attrs["plan"]["axes"])
 
     def to_dataframe(self) -> pd.DataFrame:
-        """Give a table with a row for each point, a column for each variable, and one for each entry of an array."""
+        """Give a table with a row for each point, a column for each variable, and one for each entry of an array.
+
+        Attractors beyond the most that a point has are left out.
+        """
         pd = imported("pandas")
         data, columns = self.dataset, {}
+        if "attractors" in data and "attractor" in data.sizes:
+            data = data.isel(attractor=slice(max(int(data["attractors"].max()), 1)))
         for name, variable in data.data_vars.items():
             more = [dim for dim in variable.dims if dim not in self.axes]
             for places in _entries([data.sizes[dim] for dim in more]):
@@ -94,10 +99,12 @@ class Atlas(Tabled):
         """Give what the answers range over."""
         rows = [self._range(str(name)) for name in sorted(self.dataset, key=str)]
         axes = " and ".join(self.axes)
-        return (Table(("variable", "values", "unit"), rows, f"Atlas over {axes}", "sampled, not proved"),)
+        return (
+            Table(("variable", "values", "unit", "what"), rows, f"Atlas over {axes}", "sampled, not proved"),
+        )
 
-    def _range(self, name: str) -> tuple[str, str, str]:
-        """Say what one variable ranges over, apart from where there is nothing; of codes how many there are of each."""
+    def _range(self, name: str) -> tuple[str, str, str, str]:
+        """Say what one variable ranges over, apart from where there is nothing; of codes how many points have each."""
         variable = self.dataset[name]
         values, attributes = np.asarray(variable.values), variable.attrs
         if "flag_meanings" in attributes:
@@ -107,11 +114,11 @@ class Atlas(Tabled):
                 met = {word: count for word, count in counts if count}
                 doubt = met.pop(UNDECIDED_NAME, 0)
                 counts = [("classes", len(met)), ("undecided", doubt)]
-            return name, ", ".join(f"{count} {word}" for word, count in counts if count), ""
+            return name, ", ".join(f"{word}: {count}" for word, count in counts if count), "", ""
         good = values[np.isfinite(values) if values.dtype.kind == "f" else values >= 0]
         ends = [f"{end:.9g}" for end in dict.fromkeys((good.min(), good.max()))] if good.size else []
         said = "none" if not ends or (name == "period" and ends == ["0"]) else " to ".join(ends)
-        return name, said, attributes.get("units", "")
+        return name, said, attributes.get("units", ""), attributes.get("long_name", "")
 
     def to_json(self) -> dict[str, Any]:
         """Give the document of docs/json.md: the scene, the axes, and every variable as nested lists."""
@@ -170,9 +177,13 @@ class Atlas(Tabled):
         from limitsets.regions import certified, evenly  # lazily: an atlas without proofs does not load them
 
         plan = self.dataset.attrs["plan"]
-        if "scene" not in plan or len(self.axes) != 2:
+        if "scene" not in plan:
+            name = plan["map"].rpartition(":")[2]
+            remedy = "limitsets.certify(map, grid, claims, upper=...) proves claims for a box of parameters"
+            raise LimitsetsError("the atlas to certify", f"of the map {name}", "an atlas of a scene", remedy)
+        if len(self.axes) != 2:
             raise LimitsetsError(
-                "the atlas", f"of {len(self.axes)} axes", "an atlas of a scene with two axes", "give x and y"
+                "the atlas", f"of {len(self.axes)} axes", "one with two axes", "give x and y"
             )
         axes = []
         for name in reversed(self.axes):  # x first

@@ -189,7 +189,8 @@ def topologies(
             "the map",
             kind.name,
             "a map of one dimension with image_on",
-            "register image_on: one step on a forced branch; for more dimensions ask transitions and attractors",
+            "register image_on: one step on a forced branch; for more dimensions ask transitions and attractors, "
+            "or give an atlas a task of your own, task=",
         )
     region = region_of(lo, hi, anchor)
     if len(region.lo) != n:

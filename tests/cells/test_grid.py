@@ -83,7 +83,12 @@ def test_refining_keeps_the_old_borders_and_the_measure():
         ([(0.0, float("inf"))], {}, "finite"),
         ("nonsense", {}, "domain"),
         ([(0.0, 1.0)], {"cells": 0}, "integer from 1"),
-        ([(0.0, 1.0)], {"cells": 2.5}, "integer from 1"),
+        ([(0.0, 1.0)], {"cells": 2.5}, "integer from 1; pass cells=1024$"),
+        (
+            [(0.0, 1.0), (0.0, 1.0)],
+            {"cells": -5},
+            "integer from 1, or 2 of them; pass cells=1024, or one per",
+        ),
         ([(0.0, 1.0)], {"cells": (2, 2)}, "integer from 1"),
         ([(0.0, 1.0)], {"grading": "fine"}, "uniform or graded"),
         ([(0.0, 1.0)], {"grading": "graded"}, "anchor"),

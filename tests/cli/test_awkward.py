@@ -145,8 +145,13 @@ def test_a_goal_that_is_not_proved_names_the_certificate(capfd):
     ls.dump(ls.load(LEAD_QUAD), "lead.toml")
     code, out, _ = run(capfd, "margin", "lead.toml", "throw.speed", "arm.surface_height")
     assert code == 1
-    assert "2 margins, all of them 0: the goal is not proved of every start of the scene as it is" in out
+    needed = "a margin needs the goal proved of the scene as it is for every start on the arm, beyond the limit set"
+    assert f"2 margins, all of them 0: {needed}" in out
     assert "next: limitsets certify lead.toml" in out
+    assert "limitsets analyse lead.toml (which starts leave the arm" in out
+    _, out, _ = run(capfd, "analyse", "lead.toml", "-o", "lead")
+    assert "next: limitsets certify lead.toml" in out
+    assert "limitsets margin" not in out  # all of them are 0
 
 
 @pytest.mark.sweep

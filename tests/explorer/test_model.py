@@ -162,6 +162,12 @@ def test_the_logistic_band_is_its_critical_orbit():
     assert found.sets[0][0] == [pytest.approx((3.9 * top * (1 - top), top), abs=1e-6)]
 
 
+def test_a_map_of_one_side_is_not_told_in_the_words_of_throws():
+    said = estimate_words(estimate_of_map(ls.maps.Logistic(3.9), as_domain([(0, 1)])), None, "")
+    assert "; sides" not in said
+    assert "; sides 0-1-2" in estimate_words(estimate(PAPER), PAPER.goal, PAPER.unit)
+
+
 def test_points_of_henon_lie_on_a_cycle_where_one_attracts():
     one = ls.maps.Henon(0.3, 0.3)
     x = ((0.3 - 1) + math.sqrt(0.49 + 4 * 0.3)) / (2 * 0.3)  # Henon's fixed point

@@ -263,6 +263,24 @@ def test_a_goal_that_is_proved_of_nothing_says_so():
     assert "before x = 25: the goal asks nothing of them" in said
 
 
+def test_a_picture_is_sent_when_anything_of_it_has_changed_and_not_otherwise(page):
+    page.beat()
+    canvas = page.lanes.canvas
+    canvas.drawn = "seen"
+    canvas.send()
+    assert canvas.drawn == "seen"
+    changes = [
+        lambda: page.lanes.mark(10.0, 1),
+        lambda: setattr(canvas, "heading", "another"),
+        lambda: canvas.view.update(x=[0.0, 1.0]),
+    ]
+    for change in changes:
+        change()
+        canvas.drawn = "seen"
+        canvas.send()
+        assert canvas.drawn != "seen"
+
+
 def test_a_cycle_within_joined_cells_is_its_points():
     """At r = 3.843 cells of 1/2048 join the six points of the logistic map's cycle to three intervals."""
     from limitsets.explorer.answers import estimate_words

@@ -1,17 +1,20 @@
 """What a beginner passes in the wrong place: every public function says which argument is wrong, and what to pass."""
 
 import inspect
+import math
 
 import numpy as np
 import pytest
 
 import limitsets as ls
 from limitsets import maps
-from limitsets.errors import AnswerError, GridError, LimitsetsError, MapError
+from limitsets.errors import AnswerError, GridError, LimitsetsError, MapError, SceneError
 from limitsets.graph import memory
 from limitsets.proofs.certify import certify_scene
 from limitsets.proofs.of_map import certify_map
+from limitsets.regions import evenly
 from tests.maps_of_tests import Contraction
+from tests.sweep.tasks_of_tests import of_map
 
 SCENE = ls.load("paper-designed")
 GRID = ls.grid(SCENE.domain, cells=64)
@@ -283,6 +286,25 @@ NAMED = {
             MapError,
             "the field r of Logistic is '3.5'.*quotes",
         ),
+        (lambda: ls.transitions(maps.Logistic(math.nan), LINE), MapError, "the field r of Logistic is nan"),
+        (lambda: ls.design(maps.Logistic), SceneError, "source of a scene is 'a map, Logistic'"),
+        (lambda: ls.design(maps.Logistic(3.5)), SceneError, "source of a scene is 'a map, Logistic'"),
+        (lambda: ls.design("paper-designed"), AnswerError, "the critical points wanted is ''.*one per side"),
+        (
+            lambda: ls.atlas(maps.Logistic(3.5), "r=3:3.2:2", task=of_map).certify(),
+            LimitsetsError,
+            "the atlas to certify is 'of the map Logistic'; allowed: an atlas of a scene; limitsets.certify",
+        ),
+        (
+            lambda: ls.atlas(maps.Henon(1.4, 0.3), "a=1:1.2:2", domain=[(0, 1), (0, 1)]),
+            AnswerError,
+            "a task of your own",
+        ),
+        (
+            lambda: evenly("mu", "0.1", "0.9", 4),
+            SceneError,
+            "the quantity is 'mu'.*name one of these, a scene's$",
+        ),
         (
             lambda: ls.grid([(-1, 1), (3, -3)]),
             GridError,
@@ -290,7 +312,7 @@ NAMED = {
         ),
     ],
 )
-def test_a_scene_in_the_wrong_place_is_told_what_goes_there(asked, error, said):
+def test_a_scene_or_a_map_in_the_wrong_place_is_told_what_goes_there(asked, error, said):
     with pytest.raises(error, match=said):
         asked()
 

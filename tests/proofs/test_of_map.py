@@ -11,8 +11,8 @@ import pytest
 import limitsets as ls
 from limitsets import maps
 from limitsets.errors import AnswerError
-from limitsets.proofs.of_map import _prove
-from limitsets.sets import cycles
+from limitsets.proofs.of_map import MOST_WORDS, _prove
+from limitsets.sets import Cycle, cycles
 from tests.maps_of_tests import Tent
 
 CLAIMS = ["invariant", "trapping", "attracts-all", "expanding", "cycles"]
@@ -38,6 +38,33 @@ def _spiral(p, x, side):
     return (0.1 + p.c * u - p.s * v, 0.2 + p.s * u + p.c * v), side, 0
 
 
+class Odd(NamedTuple):
+    a: float
+
+
+def _odd(p, x, side):
+    return p.a * x - x**3, side, 0
+
+
+class Jump(NamedTuple):
+    m: float
+
+
+def _jump_on(p, x, side, branch):
+    return 0.5 * x + p.m - branch, side
+
+
+def _jump_margin(p, x, side):
+    return x
+
+
+def _jump(p, x, side):
+    branch = 1 if x > 0.0 else 0
+    return 0.5 * x + p.m - branch, side, branch
+
+
+ls.register(Odd, image=_odd)
+ls.register(Jump, image=_jump, image_on=_jump_on, margin=_jump_margin, branches=("below", "above"))
 ls.register(Ricker, image=_ricker)
 ls.register(Spiral, image=_spiral, dimension=2)
 
@@ -125,11 +152,102 @@ def test_henon_has_the_orbit_of_period_two_that_attracts():
     assert (roots < cycle.hi[order, 0]).all()
 
 
-def test_an_orbit_that_is_not_there_is_not_proved():
+class Parabola(NamedTuple):
+    c: float
+
+
+def _parabola(p, x, side):
+    return 0.5 * (x - 0.5) ** 2 + x + p.c, side, 0
+
+
+ls.register(Parabola, image=_parabola)
+
+
+@pytest.mark.parametrize(
+    ("low", "high"), [(1e-3, 1e-3), (1e-9, 1e-9), (-1e-3, 1e-3), (0.0, 0.0), (-1e-12, 1e-12)]
+)
+def test_an_orbit_that_is_not_there_for_all_parameters_is_not_proved(low, high):
+    # fixed points at 0.5 +- sqrt(-2 c): none for c > 0, and one that is double at 0
+    grid = ls.grid([(0.0, 1.0)], cells=64)
+    proof = ls.certify(Parabola(low), grid, ["invariant"], upper=Parabola(high))
+    here = Cycle(np.array([0.5]), np.zeros(1, np.int64), np.zeros(1, np.int64), 1.0, 0.0, True)
+    assert isinstance(_prove(proof, here), str)
+
+
+def test_an_orbit_found_badly_is_proved_in_a_box_that_holds_it():
     proof = ls.certify(Ricker(2.3), ls.grid([(0.2, 1.7)], cells=4096), ["invariant"])
     (true,) = cycles(proof.graph, 2, proof.cells)
-    assert not isinstance(_prove(proof, true), str)
-    assert _prove(proof, replace(true, x=true.x + 0.02)) == "no box is found that Newton's operator contracts"
+    found = _prove(proof, replace(true, x=true.x + 1e-3))
+    assert not isinstance(found, str)
+    assert (found.lo[:, 0] <= true.x).all()
+    assert (true.x <= found.hi[:, 0]).all()
+
+
+def test_a_cycle_is_proved_for_a_range_of_parameters_in_which_it_stays_hyperbolic():
+    # a x - x^3 has the fixed points +- sqrt(a - 1), with slope 3 - 2 a
+    grid, low, high = ls.grid([(-2.1, 2.1)], cells=2048), 1.6, 1.7
+    proof = ls.certify(Odd(low), grid, ["cycles"], upper=Odd(high))
+    assert verdicts(proof) == {"cycles": "proved"}
+    assert [cycle.attracts for cycle in proof.cycles] == [True, True]
+    left, right = proof.cycles
+    for a in np.linspace(low, high, 11):
+        assert right.lo[0, 0] <= math.sqrt(a - 1.0) <= right.hi[0, 0]
+        assert left.lo[0, 0] <= -math.sqrt(a - 1.0) <= left.hi[0, 0]
+        assert right.slope_lo[0, 0] <= 3.0 - 2.0 * a <= right.slope_hi[0, 0]
+    doubling = ls.certify(Odd(1.99), grid, ["cycles"], upper=Odd(2.01))  # slope -1 at a = 2
+    assert not any(cycle.attracts for cycle in doubling.cycles)
+
+
+def test_a_cycle_across_a_jump_is_proved_for_a_range_of_parameters():
+    # x < 0: x / 2 + m, else x / 2 + m - 1: the cycle of period 2 solves y = x / 2 + m, x = y / 2 + m - 1
+    proof = ls.certify(Jump(0.5), ls.grid([(-2.1, 2.1)], cells=2048), ["cycles"], upper=Jump(0.55))
+    (cycle,) = proof.cycles
+    assert cycle.attracts
+    for m in (0.5, 0.52, 0.55):
+        points = np.linalg.solve([[-0.5, 1.0], [1.0, -0.5]], [m, m - 1.0])
+        assert ((cycle.lo[:, 0] <= points) & (points <= cycle.hi[:, 0])).all()
+    assert cycle.slope_lo[0, 0] <= 0.25 <= cycle.slope_hi[0, 0]
+
+
+def test_cycles_of_a_chaotic_range_leave_the_other_claims_of_the_call_alone():
+    grid, told = ls.grid([(-2.1, 2.1)], cells=2048), []
+    upper, tell = Odd(2.51), (lambda *step: told.append(step))
+    proof = ls.certify(Odd(2.5), grid, ["invariant", "cycles"], upper=upper, progress=tell)
+    assert verdicts(proof) == {"invariant": "proved", "cycles": "proved"}
+    assert told[0][0] == "transitions"
+    assert [step for step in told if step[0] == "cycles"][-1][1:] == (len(told) - 2, len(told) - 1)
+    for cycle in proof.cycles[:: len(proof.cycles) // 40]:
+        middle = 0.5 * (cycle.lo[:, 0] + cycle.hi[:, 0])
+        for a in (2.5, 2.5037, 2.51):  # Newton's method on all points at once, in floats
+            x, p = middle, cycle.period
+            for _ in range(20):
+                slope = np.diag(a - 3.0 * x**2) - np.roll(np.eye(p), 1, axis=1)
+                x = x - np.linalg.solve(slope, a * x - x**3 - np.roll(x, -1))
+            assert np.abs(a * x - x**3 - np.roll(x, -1)).max() < 1e-12
+            assert ((cycle.lo[:, 0] <= x + 1e-12) & (x - 1e-12 <= cycle.hi[:, 0])).all()
+            slope = np.prod(a - 3.0 * x**2)
+            assert cycle.slope_lo[0, 0] <= slope + 1e-9 * abs(slope)
+            assert slope - 1e-9 * abs(slope) <= cycle.slope_hi[0, 0]
+
+
+def test_a_search_for_very_many_cycles_ends_and_says_so():
+    # a = 2.9: about 3^p / p cycles of period p
+    proof = ls.certify(Odd(2.9), ls.grid([(-2.1, 2.1)], cells=512), ["cycles"])
+    assert 500 < len(proof.cycles) < 2000
+    assert f"more than {MOST_WORDS} itineraries" in str(proof)
+
+
+def test_the_basin_holds_starts_that_pass_through_recurrent_sets_of_coarse_cells():
+    # all of the starts but those that leave: 85.2 %, by orbits of 100 000 starts
+    proof = ls.certify(Odd(2.2), ls.grid([(-2.1, 2.1)], cells=2048), ["trapping"])
+    assert 0.78 < len(proof.enters) / 2048 < 0.852
+    shares = ls.resilience.basin_stability(proof.graph, ls.attractors(proof.graph))
+    assert len(proof.enters) / 2048 == pytest.approx(sum(each.lo for each in shares.attractors), abs=1e-9)
+    lo, hi = proof.graph.grid.boxes(proof.enters.numbers(), 0)
+    x = np.linspace(lo[:, 0], hi[:, 0], 7).ravel()
+    for _ in range(2000):
+        x = 2.2 * x - x**3
+    assert proof.cells.mask[proof.graph.grid.index(x[:, None], 0)].all()
 
 
 def test_a_proof_is_printed_with_the_region_that_it_is_about():

@@ -177,8 +177,13 @@ def test_pieces_of_a_tolerance_claim_the_fewest_starts():
         claim("almost-every", 1.0, thinning=7, near_joint=far),
     )
 
-    def cells(first):
-        return SimpleNamespace(cover=SimpleNamespace(grid=SimpleNamespace(edges=[(np.array([first, 9.0]),)])))
+    def cells(first, *, counts=True):
+        def shares_from(section):  # as much as the starts claimed leave of 0 to 10
+            share = 1.0 - 0.1 * float.fromhex(section["starts"]["from"]["0"])
+            return {"share": share, "leaves": 0.0, "creeps": 0.0, "open": 1.0 - share}, counts
+
+        covered = SimpleNamespace(grid=SimpleNamespace(edges=[(np.array([first, 9.0]),)]))
+        return SimpleNamespace(cover=covered, shares_from=shares_from)
 
     joined = weakest_of([every, almost], [cells(1.5), cells(3.5)])
     assert joined.starts == joined.section["starts"] == "almost-every"
@@ -190,7 +195,11 @@ def test_pieces_of_a_tolerance_claim_the_fewest_starts():
     assert joined.starts == {"from": {"0": 2.5}}
     assert joined.section["starts"] == {"from": {"0": (2.5).hex()}}
     assert joined.section["lost"] == {"0": (1.8).hex()}
-    assert joined.shares["share"] == 0.8
+    assert joined.shares["share"] == 0.75
+    assert joined.verdict == "proved"
+    apart = weakest_of([some, more], [cells(1.5), cells(2.0, counts=False)])
+    assert apart.verdict == "proved-on-cells"  # of the starts of both together, less than of each alone
+    assert "of 25 % of the starts the same is not proved for all" in apart.reason
     joined = weakest_of([every, some], [cells(2.25), cells(1.5)])
     assert joined.starts == {
         "from": {"0": 2.25}

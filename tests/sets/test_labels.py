@@ -299,7 +299,7 @@ def test_an_orbit_stops_where_the_map_is_undefined(params, start):
 
 
 class Unproved(NamedTuple):
-    end: float
+    infinite: float
 
 
 def less(params, x, side):
@@ -308,16 +308,16 @@ def less(params, x, side):
 
 def less_box(lo_params, hi_params, lo, hi, side):
     """Nothing is known of cells beyond 0.5: the box has an end that is none."""
-    end = lo_params.end if hi > 0.5 else 0.4 * hi
+    end = (math.inf if lo_params.infinite > 0.0 else math.nan) if hi > 0.5 else 0.4 * hi
     return 1, (0.4 * lo, end, side, 0), (0.0, 0.0, side, 0), (0.0, 0.0)
 
 
 ls.register(Unproved, image=less, image_box=less_box)
 
 
-@pytest.mark.parametrize("end", [math.nan, math.inf])
-def test_a_proved_image_without_an_end_is_undecided(end):
-    graph = ls.transitions(Unproved(end), ls.grid([(0.0, 1.0)], cells=8), "boxes")
+@pytest.mark.parametrize("infinite", [0.0, 1.0])
+def test_a_proved_image_without_an_end_is_undecided(infinite):
+    graph = ls.transitions(Unproved(infinite), ls.grid([(0.0, 1.0)], cells=8), "boxes")
     shares = ls.basins(graph, ls.attractors(graph, throws=10))
     assert (shares.labels[4:] == UNDECIDED).all()
     assert (shares.labels[:4] == 0).all()
@@ -360,3 +360,26 @@ def test_a_set_that_orbits_pass_through_takes_no_label_away():
     shares = ls.basins(graph, ls.attractors(graph, throws=100))
     assert shares.attractors == (pytest.approx(1.0),)
     assert shares.advice is None
+
+
+def test_a_chaotic_repeller_is_named_and_its_remedy_works():
+    """At 2.7 the odd cubic has an attracting cycle of 6, and a repeller near almost every start."""
+    graph = ls.transitions(ls.maps.Cubic(2.7), ls.grid([(-2.1, 2.1)], cells=4096))
+    found = ls.attractors(graph, throws=100)
+    shares = ls.basins(graph, found)
+    assert shares.undecided_between > 0.8
+    assert "a chaotic repeller" in shares.advice
+    assert "limitsets.resilience.basin_stability(graph, found, starts=10000)" in shares.advice
+    assert ls.resilience.basin_stability(graph, found, starts=1000).undecided < 0.05
+    saddle = ls.transitions(ls.maps.Logistic(3.2), ls.grid([(0.0, 1.0)], cells=1000))
+    assert "repeller" not in ls.basins(saddle, ls.attractors(saddle, throws=100)).advice
+
+
+@pytest.mark.parametrize(
+    ("method", "how"), [("boxes", "proved"), (None, "from sampled images of cells, not proved")]
+)
+def test_a_table_says_whether_its_cells_are_proved(method, how):
+    graph = ls.transitions(ls.maps.Cubic(1.5), ls.grid([(-1.2, 1.2)], cells=101), method)
+    found = ls.attractors(graph, throws=100)
+    assert f"Basins ({how})" in ls.basins(graph, found).table().text()
+    assert f"Attractor ({how})" in found[0].table().text()

@@ -405,6 +405,15 @@ def test_a_table_has_a_row_for_each_point():
     assert [row["kappa"], row["feet[1]"]] == [float(one.kappa), float(one.feet[1])]
 
 
+def test_a_table_has_columns_for_no_more_attractors_than_a_point_has():
+    one = ls.atlas("paper-designed", "throw.speed=150:160:3").to_dataframe()
+    assert [name for name in one.columns if name.startswith("share")] == ["share[0]"]
+    two = ls.atlas(
+        ls.maps.Cubic(1.5), "r=1.3:1.6:3", domain=[(-1.2, 1.2)]
+    ).to_dataframe()  # beside 0 two fixed points attract
+    assert [name for name in two.columns if name.startswith("share")] == ["share[0]", "share[1]"]
+
+
 def test_json_has_everything_and_no_nan():
     import json
 
@@ -477,5 +486,5 @@ def test_without_the_extra_one_line_says_how_to_get_it(library):
 def test_its_table_has_words_and_no_codes():
     found = ls.atlas("paper-designed", "throw.speed=140:170:4")
     values = {row[0]: row[1] for row in found.tables()[0].rows}
-    assert values["class"] == "2 classes"  # every start leaves; one attractor
+    assert values["class"] == "classes: 2"  # every start leaves; one attractor
     assert "not checked" in values["checked"]

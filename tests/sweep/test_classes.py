@@ -164,5 +164,15 @@ def test_starts_of_a_map_do_not_collapse_but_leave_by_its_exit(monkeypatch):
     number = found.number
     data["class"].values[:] = number
     data["class"].attrs.update(flag_meanings=found.name, flag_values=[number])
-    assert legend(data)[0].words.startswith("one attractor, 1 band; some starts leave by the exit -1")
+    assert legend(data)[0].words == "one attractor, 1 band; some starts leave over the lower end"
     assert "joint" not in data["collapses"].attrs["long_name"]
+
+
+def test_the_legend_of_a_map_names_the_ends_of_the_domain():
+    # x -> 1.5 x - x^3: the cubic's starts beyond +-sqrt(2.5) leave, over either end; at 3.2 all but a null set do
+    data = ls.atlas(maps.Cubic(1.5), "r=1.5:3.2:2", domain=[(-2.1, 2.1)]).dataset
+    first, last = sorted(legend(data), key=lambda entry: entry.name)
+    assert first.words.endswith(
+        "some starts leave over the upper end and some starts leave over the lower end"
+    )
+    assert last.words == "no attractors; all starts leave, some over either end"

@@ -102,7 +102,7 @@ MERGING = float(max(np.roots([1.0, -2.0, -4.0, -8.0]).real))  # F^3(c) = 1 - 1/r
 LOGISTIC = {
     "flip": (2.9, 3.1, 3.0, "period 1 -> period 2"),
     "second flip": (3.42, 3.47, 1.0 + math.sqrt(6.0), "period 2 -> period 4"),
-    "tangent": (3.8282, 3.8286, 1.0 + math.sqrt(8.0), "1 band -> period 3"),
+    "tangent": (3.8282, 3.8286, 1.0 + math.sqrt(8.0), "at least 1 band -> period 3"),
     "bands merge": (3.675, 3.68, MERGING, "2 bands -> 1 band"),
     "interior crisis": (3.8566, 3.857, window_end(), "3 bands -> 1 band"),
 }
@@ -390,3 +390,40 @@ def test_progress_is_told():
 def test_what_is_no_path_is_refused(subject, path, options, error):
     with pytest.raises(error):
         ls.continuation(subject, path, **options)
+
+
+def test_bands_beyond_the_resolution_are_told_as_the_least_there_are():
+    # beyond period 128, at 3.5699: the doublings accumulate at 3.5699457
+    found = ls.continuation(maps.Logistic(3.569), {"r": (3.5695, 3.56994)}, steps=3)
+    last = found.attractors[-1][0]
+    assert (last.period, last.decided) == (0, False)
+    assert last.words().startswith("at least ")
+    assert any("-> at least " in event.change for event in found.events)
+    assert not any(event.change.count("at least") == 2 for event in found.events)
+
+
+class Jump(NamedTuple):
+    m: float
+
+
+def _jump_on(p, x, side, branch):
+    return 0.5 * x + p.m - branch, side
+
+
+def _jump(p, x, side):
+    return 0.5 * x + p.m - (x > 0.0), side, 1 if x > 0.0 else 0
+
+
+def _jump_margin(p, x, side):
+    return x
+
+
+ls.register(Jump, image=_jump, image_on=_jump_on, margin=_jump_margin, branches=("below", "above"))
+
+
+def test_a_change_at_zero_is_told_as_zero():
+    # beyond m = 2 / 15 the cycle of period 4 is another: its point next to the jump meets x = 0 there
+    found = ls.continuation(Jump(0.13), {"m": (0.13, 0.134)}, domain=[(-2, 2)], steps=2, most=30)
+    told = [str(event) for event in found.events if event.collision]
+    assert told
+    assert all("at x = 0 on side 0" in text for text in told)

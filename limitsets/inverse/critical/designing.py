@@ -129,8 +129,8 @@ class Design(Tabled):
 def design(
     scene: Scene | str,
     *,
-    critical_points: Sequence[float | str | None],
-    vary: Sequence[str],
+    critical_points: Sequence[float | str | None] = (),
+    vary: Sequence[str] = (),
     bounds: Bounds | None = None,
     starts: int = 8,
     stages: int | None = None,

@@ -8,11 +8,12 @@ quantity differed at every throw.  Time-varying disturbance: the range cannot be
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 
-from limitsets.proofs.query import Outcome, Query
+from limitsets.proofs.query import Outcome, Query, unjoined
+from limitsets.proofs.rational import RationalInterval
 from limitsets.proofs.tolerance import SceneBox
 from limitsets.robust.margins.deviations import DeviationScale, short
 from limitsets.robust.margins.halving import a_little_beyond, halved
@@ -27,7 +28,7 @@ Tell = Callable[[float], None]
 STEPS, FACTOR, TRIALS = 24, 3, 200
 
 # What to do about a bracket that does not close.
-NARROWER = "; it would need finer cells than are tried here: ask for a wider bracket, or another x"
+NARROWER = "it would need finer cells than are tried here: ask for a wider bracket, or another x"
 
 # From this share of the way to where the goal breaks, pieces are tried with the finest cells.
 NEAR = Fraction(3, 4)
@@ -189,6 +190,7 @@ def bracket_fixed(query: Query, scale: DeviationScale, width: Fraction, tell: Te
     if first is not None and first.end is not None:
         found.reason = f"from {scale.text(first.end)} on: {first.found.reason}"
     found = _fixed_proof(query, scale, found, short(goal), tell)
+    _come_back(query, scale, found, width)
     found.reason = "" if found.closed(width) else found.reason
     return found
 
@@ -208,12 +210,52 @@ def _fixed_proof(query: Query, scale: DeviationScale, found: Bracket, goal: Frac
         far, pieces, reason = _grow(query, scale, sign, goal, wall if near else 3 * wall, tell)
         found.pieces += pieces
         if far < goal:
-            goal, found.reason = far, reason + NARROWER
+            stuck = f"{reason}; {NARROWER}" if reason else f"from there on it is in more than {TRIALS} pieces"
+            goal, found.reason = far, stuck
             _fails_beyond(Ray(query, Tolerance.alone(scale), (sign,)), sign, far, found)
             if not far:
                 break
     found.proved = goal
     return found
+
+
+def _come_back(query: Query, scale: DeviationScale, found: Bracket, width: Fraction) -> None:
+    """Come back to the size up to which all pieces together are one claim, as a certificate has to make it.
+
+    Each piece is proved for its own starts; where these differ too much, no claim is left for all of them.
+    """
+    pieces, missing = found.pieces, unjoined(found.pieces) if found.pieces else ""
+    if not missing:
+        return
+
+    def joins(size: Fraction) -> bool:
+        nonlocal missing
+        within = _within(query, scale, pieces, size)
+        why = unjoined(within)
+        if not why:
+            found.proved, found.pieces = size, within
+        missing = why or missing
+        return not why
+
+    top = found.proved
+    if joins(top):
+        return
+    found.proved, found.pieces = Fraction(0), []
+    _, bad = halved(Fraction(0), top, joins, min(width, Fraction(1, 50)), NONE * scale.least)
+    found.reason = f"from {scale.text(bad)} on: {missing}"
+
+
+def _within(query: Query, scale: DeviationScale, pieces: Sequence[Outcome], size: Fraction) -> list[Outcome]:
+    """Cut pieces back to a size: those that reach beyond are proved anew, for more starts."""
+    whole, kept = scale.between(-size, size), []
+    for piece in pieces:
+        own = piece.piece.spans[scale.key] if piece.piece is not None else whole
+        lo, hi = max(own.lo, whole.lo), min(own.hi, whole.hi)
+        if (lo, hi) == (own.lo, own.hi):
+            kept.append(piece)
+        elif lo < hi:
+            kept.append(query.prove(scale.piece(RationalInterval(lo, hi))))
+    return kept
 
 
 def _fails_beyond(ray: Ray, sign: int, far: Fraction, found: Bracket) -> None:

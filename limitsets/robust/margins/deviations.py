@@ -6,6 +6,7 @@ written here are input of `limitsets.certify` and of certificates, so every size
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from decimal import ROUND_CEILING, ROUND_FLOOR, Context, Decimal
 from fractions import Fraction
@@ -19,7 +20,16 @@ from limitsets.scene.facts import Deviation
 from limitsets.scene.quantities import base_unit, find, parsed_deviation, text_at, texts
 from limitsets.scene.units import Quantity, exact_factor, parse
 
-__all__ = ["READINGS", "DeviationScale", "decimal", "deviation_scale", "deviation_scales", "given", "short"]
+__all__ = [
+    "READINGS",
+    "DeviationScale",
+    "decimal",
+    "deviation_scale",
+    "deviation_scales",
+    "given",
+    "nominal_of",
+    "short",
+]
 
 READINGS = ("fixed", "per-throw")
 """Fixed but unknown, or another one at every throw."""
@@ -172,6 +182,19 @@ class DeviationScale:
     def piece(self, span: RationalInterval) -> SceneBox:
         """Return the box of scenes with these values."""
         return SceneBox(self.scene, {self.key: span})
+
+
+def nominal_of(scene: Scene, quantity: str) -> tuple[float | None, str]:
+    """Find the value of a quantity as people say it, and its unit; None for what has none."""
+    if quantity in ("joint", "landing.x"):
+        return None, scene.unit
+    text = text_at(scene.text, quantity)
+    if text is not None:
+        given = parse(text, find(quantity).dimension)
+        return float(given.number), given.unit
+    if quantity == "throw.speed" and scene.gravity is not None:
+        return math.degrees(math.sqrt(scene.gravity / scene.kappa)), "deg/s"
+    return None, scene.unit
 
 
 def _text_at(scene: Scene, name: str) -> str:

@@ -21,6 +21,7 @@ from limitsets.robust.margins.brackets import Bracket, bracket_fixed, bracket_pe
 from limitsets.robust.margins.deviations import DeviationScale, deviation_scale, deviation_scales
 from limitsets.robust.margins.joint import joint_margin
 from limitsets.robust.margins.margin_result import Margin
+from limitsets.robust.margins.margin_texts import failure
 from limitsets.scene import Scene, load
 from limitsets.scene.units import exact_factor
 
@@ -82,7 +83,8 @@ def margin(
     Returns
     -------
     tuple of Margin
-        One per quantity and reading.
+        One per quantity and reading.  Of several, one whose search ends with an error has nothing proved, and the error
+        as its reason.
 
     Raises
     ------
@@ -117,11 +119,25 @@ def margin(
                 progress(f"margin of {label}, {100 * share:.0f} %", number, len(todo))
 
         tell(0.0)
-        if isinstance(one, str):
-            found.append(joint_margin(loaded, goals, width=width, tell=tell))
-        else:
-            found.append(_single(query, one, Fraction(repr(width)), tell))
+        try:
+            if isinstance(one, str):
+                answer = joint_margin(loaded, goals, width=width, tell=tell)
+            else:
+                answer = _single(query, one, Fraction(repr(width)), tell)
+        except Exception as error:
+            if len(todo) == 1:
+                raise
+            answer = _failed(query, one, dict(loaded.text.get("tolerance", {})), failure(error))
+        found.append(answer)
     return tuple(found)
+
+
+def _failed(query: Query, one: DeviationScale | str, tolerance: dict[str, str], reason: str) -> Margin:
+    """Return what is left of a margin whose search ended with an error."""
+    if isinstance(one, DeviationScale):
+        return _of_bracket(query, one, Bracket(reason=reason), Fraction(1), 0.0)
+    about = "joint", "tolerance", query.goals, 0.0, None, "", None, reason, False, 0.0
+    return Margin(*about, query.scene, tolerance, {}, {}, (), None)
 
 
 def _single(query: Query, one: DeviationScale, width: Fraction, tell: Callable[[float], None]) -> Margin:
@@ -132,6 +148,10 @@ def _single(query: Query, one: DeviationScale, width: Fraction, tell: Callable[[
     else:
         search = bracket_fixed if one.reading == "fixed" else bracket_per_throw
         found = search(query, one, width, tell)
+    return _of_bracket(query, one, found, width, time.perf_counter() - begin)
+
+
+def _of_bracket(query: Query, one: DeviationScale, found: Bracket, width: Fraction, seconds: float) -> Margin:
     return Margin(
         one.quantity,
         one.reading,
@@ -142,7 +162,7 @@ def _single(query: Query, one: DeviationScale, width: Fraction, tell: Callable[[
         _nominal(one),
         found.reason,
         found.closed(width),
-        time.perf_counter() - begin,
+        seconds,
         query.scene,
         {},
         *_texts(one, found.proved),
@@ -173,4 +193,5 @@ def _of_none(query: Query, nominal: Outcome) -> Bracket:
     if against.verdict == "refuted":
         reason = f"the goal fails in the scene as it is: {against.reason}"
         return Bracket(Fraction(0), Fraction(0), [], against, reason)
-    return Bracket(reason=f"the goal is not proved of every start of the scene as it is: {nominal.reason}")
+    needed = "a margin needs the goal proved of the scene as it is for every start on the arm, beyond the limit set"
+    return Bracket(reason=f"{needed}: {nominal.reason}")

@@ -80,7 +80,8 @@ def joint_margin(
         cutting = Subdivision(query, vector, rounded(target * stage), sensitivity)
         left = end - time.perf_counter()
         part, why = cutting.run(left if stage == STAGES[-1] else left / 2, tell)
-        reason = why or reason
+        part, missing = cutting.joined(part)
+        reason = missing or why or reason
         if part * cutting.factor <= proved:
             break
         proved, noise = part * cutting.factor, cutting.noise

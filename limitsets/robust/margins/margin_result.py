@@ -12,10 +12,10 @@ from limitsets.files import as_table, picked
 from limitsets.goals import Goal, Predicate, as_written
 from limitsets.proofs.confirm import DeniedError
 from limitsets.proofs.goals import State, rechecked
-from limitsets.proofs.proof import Claim, Proof
-from limitsets.proofs.query import Outcome
+from limitsets.proofs.proof import Proof
+from limitsets.proofs.query import Outcome, joined_claims
 from limitsets.proofs.refutation import KINDS, write_refutation
-from limitsets.proofs.weakest_claim import weakest_of
+from limitsets.robust.margins.deviations import nominal_of
 from limitsets.robust.margins.margin_texts import bound, bound_above
 from limitsets.scene import Scene
 from limitsets.tables import Column, Table, Tabled
@@ -90,9 +90,12 @@ class Margin(Tabled):
     def tables(self) -> tuple[Table, ...]:
         """Give the tables that show it, the one that is saved as CSV first."""
         shown = Column("proved safe up to", show=bound), Column("shown to fail from", show=bound_above)
-        columns = ("quantity", "reading", *shown, "unit", Column("value", show=".6g"), "direction")
+        value = Column("value", show=".6g"), "value_unit"
+        columns = ("quantity", "reading", *shown, "unit", *value, "direction")
         unit = self.unit or "times the tolerance"
-        row = (self.quantity, self.reading, self.proved, self.refuted, unit, self.nominal, self.direction)
+        nominal, of = nominal_of(self.scene, self.quantity)
+        about = nominal, None if nominal is None else of
+        row = (self.quantity, self.reading, self.proved, self.refuted, unit, *about, self.direction)
         how = "brackets: proved below, refuted above"
         return (Table(columns, [row], f"{self.scene.name}: margins", how),)
 
@@ -146,17 +149,9 @@ class Margin(Tabled):
         folder = Path(folder)
         folder.mkdir(parents=True, exist_ok=True)
         stem, written = self.stem, []
-        for number, goal in enumerate(self.goals if self.pieces else ()):
-            answers = [piece.answers[number] for piece in self.pieces]
-            # pieces may be proved for different starts: all together for the fewest
-            claims = [
-                Claim("goal", "proved", "", dict(one.section), starts=one.starts, shares=dict(one.shares))
-                for one in answers
-            ]
-            found = tuple(piece.found for piece in self.pieces if piece.found is not None)
-            proof = Proof(
-                self.scene, self.noise, self.deviations, found, (weakest_of(claims, found),), self.seconds
-            )
+        found = tuple(piece.found for piece in self.pieces if piece.found is not None)
+        for goal, claim in zip(self.goals if found else (), joined_claims(self.pieces), strict=True):
+            proof = Proof(self.scene, self.noise, self.deviations, found, (claim,), self.seconds)
             last = f"-{goal.kind.replace('_', '-')}" if len(self.goals) > 1 else ""
             written.append(proof.save(folder / f"{stem}{last}.proof.zip", recheck=recheck))
         against = self.against

@@ -5,10 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from decimal import ROUND_CEILING, ROUND_FLOOR, Context, Decimal
 
+from limitsets.errors import LimitsetsError
 from limitsets.goals import Goal, OrientedBeyond
 from limitsets.proofs.query import Outcome
 
-__all__ = ["bound", "bound_above", "failing", "reach_of", "void_of"]
+__all__ = ["NOT_FOUND", "bound", "bound_above", "failing", "failure", "reach_of", "void_of"]
+
+NOT_FOUND = "it was not found"
+"""How the reason begins where the search for a margin ends with an error."""
 
 
 def bound(value: float | None, unit: str = "", *, up: bool = False) -> str:
@@ -36,6 +40,20 @@ def failing(value: float | None, unit: str, direction: str | None) -> str:
     ('0.7336 % less', '0.107 in', '-')
     """
     return f"{bound(value, unit, up=True)} {direction or ''}".rstrip()
+
+
+def failure(error: Exception) -> str:
+    """Say which error a search ended with.
+
+    Examples
+    --------
+    >>> failure(ZeroDivisionError())
+    'it was not found: this is a bug in limitsets: ZeroDivisionError'
+    """
+    if isinstance(error, LimitsetsError):
+        return f"{NOT_FOUND}: {error}"
+    words = ": ".join(filter(None, (type(error).__name__, str(error))))
+    return f"{NOT_FOUND}: this is a bug in limitsets: {words}"
 
 
 def bound_above(value: float) -> str:

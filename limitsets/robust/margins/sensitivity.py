@@ -71,6 +71,7 @@ class Sensitivity:
         return list(dict.fromkeys(worst_corner(self.fall[k]) for k in order))
 
 
+@np.errstate(invalid="ignore")  # a side that no part comes to has room without end: inf - inf
 def sensitivity_of(query: Query, tolerance: Tolerance) -> Sensitivity:
     """Measure the sensitivity by differences.
 
@@ -141,7 +142,8 @@ def _slack_of(goal: Goal, highest: Sequence[float]) -> list[float]:
 def _proved_slack(query: Query, piece: SceneBox | None) -> Array:
     """Say what slack is proved; of a place to be reached, nothing of the kind is."""
     extents = query.cells(piece, STEP).cells.extents()
-    highest = [max((hi for _, hi in parts), default=-math.inf) for _, parts in sorted(extents.items())]
+    sides = range(query.scene.sides.a.size)
+    highest = [max((hi for _, hi in extents.get(side, ())), default=-math.inf) for side in sides]
     found: list[float] = []
     for goal in query.goals:
         found += [0.0] if isinstance(goal, Reaches) else _slack_of(goal, highest)

@@ -15,8 +15,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from limitsets.proofs.query import Outcome, Query
+from limitsets.proofs.query import Outcome, Query, unjoined
 from limitsets.robust.margins.brackets import Tell
+from limitsets.robust.margins.halving import halved
 from limitsets.robust.margins.sensitivity import Sensitivity
 from limitsets.robust.margins.vector import Parts, Tolerance
 
@@ -183,6 +184,19 @@ class Subdivision:
                 found = replace(found, found=replace(found.found, cover=replace(cover, box=box)), piece=piece)
             kept.append(found)
         return kept
+
+    def joined(self, share: Fraction) -> tuple[Fraction, str]:
+        """Return up to which share of the box all is one claim, as a certificate has to make it, and what stops it."""
+        missing = unjoined(self.within(share)) if share else ""
+        if missing:
+            share, _ = halved(
+                Fraction(0),
+                share,
+                lambda part: not unjoined(self.within(part)),
+                Fraction(1, 8),
+                Fraction(1, 64),
+            )
+        return share, missing
 
     def done(self, waiting: list[_SubBox]) -> float:
         """Share of the pieces known so far."""

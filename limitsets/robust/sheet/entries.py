@@ -6,20 +6,18 @@ its upper end, and the names of the files that prove both.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from limitsets.files import picked
-from limitsets.scene.quantities import find, text_at
-from limitsets.scene.units import exact_factor, parse
+from limitsets.robust.margins.deviations import nominal_of
+from limitsets.scene.units import exact_factor
 
 if TYPE_CHECKING:
     from limitsets.robust.margins.finding import Margin
-    from limitsets.scene import Scene
 
-__all__ = ["Entry", "in_unit_of", "nominal_of", "percent_of"]
+__all__ = ["Entry", "in_unit_of", "percent_of"]
 
 REFUTED = ".refuted.zip"
 
@@ -152,19 +150,6 @@ class Entry:
             "refutation": self.against,
             "timings": {"margin": self.seconds},
         }
-
-
-def nominal_of(scene: Scene, quantity: str) -> tuple[float | None, str]:
-    """Find the value of a quantity as people say it, and its unit; None for what has none."""
-    if quantity in ("joint", "landing.x"):
-        return None, scene.unit
-    text = text_at(scene.text, quantity)
-    if text is not None:
-        given = parse(text, find(quantity).dimension)
-        return float(given.number), given.unit
-    if quantity == "throw.speed" and scene.gravity is not None:
-        return math.degrees(math.sqrt(scene.gravity / scene.kappa)), "deg/s"
-    return None, scene.unit
 
 
 def percent_of(entry: Entry, size: float | None) -> float | None:

@@ -17,15 +17,15 @@ from limitsets.goals import Goal, OrientedBeyond, Predicate, Reaches
 from limitsets.progress import shown_in_notebooks
 from limitsets.proofs.query import Query
 from limitsets.robust.margins.beyond import MarginsBeyond
-from limitsets.robust.margins.deviations import DeviationScale, deviation_scale, deviation_scales
+from limitsets.robust.margins.deviations import DeviationScale, deviation_scale, deviation_scales, nominal_of
 from limitsets.robust.margins.finding import GoalLike, goals_of, margin
 from limitsets.robust.margins.joint import joint_margin
-from limitsets.robust.margins.margin_texts import reach_of
+from limitsets.robust.margins.margin_texts import failure, reach_of
 from limitsets.robust.margins.vector import Tolerance
 from limitsets.robust.noise.scattering import Scattering
 from limitsets.robust.noise.statistics import CELLS, Levels, NoiseStatistics, noise_levels, noise_statistics
 from limitsets.robust.sheet.checkpoint import Checkpoint, written
-from limitsets.robust.sheet.entries import Entry, nominal_of
+from limitsets.robust.sheet.entries import Entry
 from limitsets.robust.sheet.margin_curve import curve
 from limitsets.robust.sheet.noise_input import noise_of, still
 from limitsets.robust.sheet.summary import PARTS, Robustness
@@ -99,26 +99,34 @@ class _SheetRun:
         found: list[Entry] = []
         for one, entry in zip(self.todo, known, strict=True):
             with self.step(f"margin of {one.quantity}, {one.reading}"):
-                found.append(entry or self.checkpoint.keep(next(answers)))
+                answer = entry or next(answers)
+                if isinstance(answer, str):
+                    self.left_out[f"margin of {one.quantity}, {one.reading}"] = answer
+                else:
+                    found.append(entry or self.checkpoint.keep(answer))
         return found
 
     def _answers(
         self, todo: Sequence[DeviationScale], width: float, verdict: str, first: Entry | None
-    ) -> Iterator[Entry]:
-        """Ask for margins, one after the other, or on the executor; it is not handed goals that are code."""
+    ) -> Iterator[Entry | str]:
+        """Ask for margins, one after the other, or on the executor; it is not handed goals that are code.
+
+        Of one whose search ends with an error, say which.
+        """
         folder, recheck = self.checkpoint.folder, self.checkpoint.recheck
         ask = partial(_single, self.scene, self.goals, width, folder, recheck)
+        tried = partial(_tried, ask)
         if verdict != "proved" and todo:  # no deviation is small enough, whatever the quantity
             first = first or ask(todo[0], self.tell)
             yield from (_same(first, one, self.scene) for one in todo)
         elif (
             self.executor is None or len(todo) < 2 or any(isinstance(goal, Predicate) for goal in self.goals)
         ):
-            yield from (ask(one, self.tell) for one in todo)
+            yield from (tried(one, self.tell) for one in todo)
         else:
-            yield from self.executor.map(ask, todo)
+            yield from self.executor.map(tried, todo)
 
-    def joint(self, width: float) -> Entry:
+    def joint(self, width: float) -> Entry | None:
         """Find the factor on the tolerance."""
         label = "margin of all together"
         with self.step(label):
@@ -127,7 +135,11 @@ class _SheetRun:
                 return entry
             quiet: dict[str, Any] = {"width": width, "tell": lambda share: self.tell(label, share)}
             quiet["seconds"] = FOR_JOINT * self.left()
-            return self.checkpoint.add(joint_margin(self.scene, self.goals, self.tolerance, **quiet))
+            try:
+                return self.checkpoint.add(joint_margin(self.scene, self.goals, self.tolerance, **quiet))
+            except Exception as error:  # noqa: BLE001 - it is told, the rest goes on
+                self.left_out["joint"] = failure(error)
+                return None
 
     def curve(self, side: int) -> MarginsBeyond | None:
         """Find margins against X; None where the part gets farther out on another side."""
@@ -136,8 +148,8 @@ class _SheetRun:
         with self.step("margins against X"):
             try:
                 found, left = curve(self.scene, side, self.tolerance, self.checkpoint.curve, **told)
-            except AnswerError as error:
-                self.left_out["curve"] = str(error)
+            except Exception as error:  # noqa: BLE001 - it is told, the rest goes on
+                self.left_out["curve"] = str(error) if isinstance(error, AnswerError) else failure(error)
                 return None
         if left:
             words = f"there was no time for {left} more places; the same command goes on with them"
@@ -179,6 +191,14 @@ def _single(
     told = None if tell is None else lambda step, _, __: tell(step)
     (found,) = margin(scene, one.quantity, reading=one.reading, goal=goals, width=width, progress=told)
     return written(found, folder, recheck)
+
+
+def _tried(ask: Callable[..., Entry], *about: Any) -> Entry | str:
+    """Ask for a margin; where that ends with an error, say which, so that the others are not lost."""
+    try:
+        return ask(*about)
+    except Exception as error:  # noqa: BLE001 - it is told, the rest goes on
+        return failure(error)
 
 
 def _same(entry: Entry, one: DeviationScale, scene: Scene) -> Entry:
@@ -340,7 +360,8 @@ def _filled(
         nominal = query.prove()
         verdict = nominal.verdict if nominal.verdict == "proved" else query.refute().verdict
     entries = [] if "margins" in missing else sheet.singles(width, verdict)
-    entries += [] if "joint" in missing else [sheet.joint(width)]
+    joint = None if "joint" in missing else sheet.joint(width)
+    entries += [] if joint is None else [joint]
     against = None if "curve" in missing or place is None else sheet.curve(place[1])
     found, levels = None, None
     if "noise" not in missing and noise is not None and place is not None:

@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from fractions import Fraction
 from typing import TYPE_CHECKING, Any
 
 from limitsets.files import as_table, picked
 from limitsets.goals import Goal
 from limitsets.robust.margins.beyond import MarginsBeyond
 from limitsets.robust.margins.finding import Margin
-from limitsets.robust.margins.margin_texts import void_of
+from limitsets.robust.margins.margin_texts import NOT_FOUND, void_of
 from limitsets.robust.noise.statistics import Levels, NoiseStatistics
-from limitsets.robust.sheet.entries import Entry, percent_of
+from limitsets.robust.sheet.entries import Entry
 from limitsets.scene import Scene
+from limitsets.scene.units import exact_factor
 from limitsets.tables import Table, Tabled, joined
 
 if TYPE_CHECKING:
@@ -53,7 +55,7 @@ class Robustness(Tabled):
     audit : Audit or None
         Assumptions of the model that the scene breaks.
     left_out : dict of str to str
-        Which of `PARTS` there is nothing of, and why.
+        Which of `PARTS`, or which margin, there is nothing of, and why.
     width : float
         How close brackets had to be.
     digests : dict of str to str
@@ -91,15 +93,23 @@ class Robustness(Tabled):
         """The factor on the tolerance."""
         return next((entry for entry in self.entries if entry.quantity == "joint"), None)
 
+    @property
+    def failed(self) -> tuple[str, ...]:
+        """Those of `left_out` whose search ended with an error."""
+        return tuple(part for part, why in self.left_out.items() if why.startswith(NOT_FOUND))
+
     def margins(self) -> tuple[Margin, ...]:
         """Give the entries as margins without their proofs, as figures take them."""
         return tuple(self._margin(entry) for entry in self.entries)
 
     def _margin(self, entry: Entry) -> Margin:
         joint = entry.quantity == "joint"
-        share = percent_of(entry, entry.proved)
-        # about the value in the unit of the deviation
-        nominal = None if joint or not share else 100.0 * entry.proved / share
+        nominal = entry.nominal
+        if nominal is not None and entry.unit not in (
+            "%",
+            entry.nominal_unit,
+        ):  # in the unit of the deviation
+            nominal = float(Fraction(repr(nominal)) * exact_factor(entry.nominal_unit, entry.unit))
         return Margin(
             entry.quantity,
             entry.reading,
@@ -107,7 +117,7 @@ class Robustness(Tabled):
             entry.proved,
             entry.refuted,
             entry.unit,
-            nominal if entry.unit != "%" else entry.nominal,
+            nominal,
             entry.reason,
             entry.closed,
             entry.seconds,

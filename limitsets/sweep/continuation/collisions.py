@@ -21,7 +21,7 @@ from scipy.optimize import brentq, minimize_scalar
 
 from limitsets.cells import Domain
 from limitsets.maps import along, images, kind_of
-from limitsets.maps.critical import branches_of_side
+from limitsets.maps.critical import TINY, branches_of_side
 from limitsets.sets.unions import EPS
 from limitsets.sweep.continuation.attracting_cycles import on_itinerary
 from limitsets.sweep.continuation.path import LEAVING, Border, Path, Place
@@ -177,10 +177,9 @@ class Approach(NamedTuple):
             change = {"domain": "end of the domain"}.get(border.kind, border.kind)
         itinerary = tuple(names[branch] for branch in self.word)
         limit = "cycle" if self.start is None else ("c+" if self.from_above else "c-")
-        start = None if self.start is None else begin[0]
-        return Collision(
-            border.x_above, border.side, change, len(self.word), start, begin[1], limit, itinerary
-        )
+        start = None if self.start is None else begin[0] * (abs(begin[0]) >= TINY)
+        at = border.x_above if abs(border.x_above) >= TINY else 0.0
+        return Collision(at, border.side, change, len(self.word), start, begin[1], limit, itinerary)
 
 
 class _Tracked(NamedTuple):

@@ -6,7 +6,7 @@ from itertools import pairwise
 from typing import NamedTuple
 
 from limitsets.sweep.continuation.matching import REACH, Group, distance
-from limitsets.sweep.continuation.result import Event, State
+from limitsets.sweep.continuation.result import LEAST, Event, State
 from limitsets.sweep.continuation.snapshot import Found, Snapshot, arrivals
 from limitsets.sweep.continuation.stepping import Follower, Met
 
@@ -33,9 +33,9 @@ def numbered(follower: Follower) -> list[list[int]]:
 
 def _change(one: Found, other: Found) -> str:
     before, after = State.of(one).words(), State.of(other).words()
-    if before == after and one.bands != other.bands:
-        before, after = f"bands {one.bands}", f"bands {other.bands}"
-    return f"{before} -> {after}" if before != after else ""
+    if before.removeprefix(LEAST) != after.removeprefix(LEAST):
+        return f"{before} -> {after}"
+    return f"bands {one.bands} -> bands {other.bands}" if one.bands != other.bands else ""
 
 
 def _whereto(found: Found, there: Snapshot, numbers: list[int], reach: float) -> str:

@@ -16,7 +16,10 @@ from limitsets.tables import Column, Table, Tabled
 if TYPE_CHECKING:
     pass
 
-__all__ = ["Collision", "Continuation", "Event", "State"]
+__all__ = ["LEAST", "Collision", "Continuation", "Event", "State"]
+
+# Of the bands that a resolution shows.
+LEAST = "at least "
 
 
 @dataclass(frozen=True)
@@ -49,10 +52,10 @@ class State:
         return sum(len(parts) for parts in self.extents.values())
 
     def words(self) -> str:
-        """Say what kind of attractor it is: ``"period 2"``, ``"3 bands"``."""
+        """Say what kind of attractor it is: ``"period 2"``, ``"3 bands"``, ``"at least 2 bands"`` beyond resolution."""
         if self.period:
             return f"period {self.period}"
-        return f"{self.bands} band{'' if self.bands == 1 else 's'}"
+        return f"{'' if self.decided else LEAST}{self.bands} band{'' if self.bands == 1 else 's'}"
 
 
 class Collision(NamedTuple):
