@@ -12,8 +12,8 @@ __all__ = ["certified", "said_of", "with_ending"]
 
 
 def with_ending(file: Path) -> Path:
-    """Give a certificate its ending where its name has none."""
-    return file if file.suffix else file.with_name(f"{file.name}.proof.zip")
+    """Give a certificate its ending where its name has none; what is there, a folder or a device, keeps its name."""
+    return file if file.suffix or file.exists() else file.with_name(f"{file.name}.proof.zip")
 
 
 def certified(

@@ -164,11 +164,12 @@ def hull_of(texts: Sequence[Any], vertices: Array) -> list[Any]:
     Examples
     --------
     >>> hull_of("abcd", np.array([[0.0, 0.0], [0.0, 4.0], [1.0, 1.0], [4.0, 0.0]]))
-    ['d', 'b', 'a']
+    ['a', 'd', 'b']
     """
     from scipy.spatial import ConvexHull, QhullError  # lazily: 0.1 s
 
     try:
-        return [texts[corner] for corner in ConvexHull(vertices).vertices]
+        order = ConvexHull(vertices).vertices
+        return [texts[corner] for corner in np.roll(order, -np.argmin(order))]
     except QhullError:
         return list(texts)
