@@ -26,7 +26,7 @@ def test_the_designed_critical_points_in_every_form(capfd, tmp_path):
     code, out, err = run(capfd, "atlas", "paper-designed", *KAPPA, "--task", TASK)
     assert (code, err) == (0, "")
     assert "2 points, 1 of its 1 chunks by earlier runs: paper-designed-atlas.zarr" in out
-    assert "2 computed" in out
+    assert "computed: 2" in out
 
 
 def test_a_task_in_a_file_of_the_present_folder(capfd, tmp_path, monkeypatch):
