@@ -125,7 +125,14 @@ pound = 453.59237 * gram = lb
 # Lengths are converted in every scene: without the library of units, which takes a tenth of a second to load.
 _METRES = {
     unit: Fraction(size)
-    for unit, size in {"m": "1", "cm": "0.01", "mm": "0.001", "um": "0.000001", "in": "0.0254", "ft": "0.3048"}.items()
+    for unit, size in {
+        "m": "1",
+        "cm": "0.01",
+        "mm": "0.001",
+        "um": "0.000001",
+        "in": "0.0254",
+        "ft": "0.3048",
+    }.items()
 }
 
 
