@@ -19,28 +19,18 @@ from limitsets.robust.margins.sensitivity import sensitivity_of
 from limitsets.robust.margins.vector import Tolerance
 from limitsets.robust.sheet import sheet_run
 from limitsets.robust.sheet.entries import Entry
+from tests.plates import plate
 
 ALL_BUT_MARGINS = ["joint", "curve", "noise", "audit"]
 
 # A trapezium in mm, 3.9 mm below the joint: a deviation of its surface height may lead above the joint.
-OVER_THE_JOINT = """
-name = "over-the-joint"
-[part]
-vertices = [["0 mm", "0 mm"], ["80 mm", "0 mm"], ["62 mm", "45 mm"], ["12 mm", "45 mm"]]
-[part.mass]
-plate_density = "7850 kg/m^3"
-plate_thickness = "2 mm"
-points = [{x = "5.5310 mm", y = "16.9612 mm", mass = "34.5449 g"}]
-[arm]
-surface_height = "-3.8895 mm"
-length = "400 mm"
-[throw]
-speed = "160.2441 deg/s"
-[gravity]
-tilt = "30 deg"
-[goal]
-oriented_beyond = {x = "300 mm", side = 2}
-"""
+OVER_THE_JOINT = plate(
+    ("-8 mm", "-3.8895 mm"),
+    ("180 deg/s", "160.2441 deg/s"),
+    ('x = "58 mm", y = "9 mm", mass = "18 g"', 'x = "5.5310 mm", y = "16.9612 mm", mass = "34.5449 g"'),
+    name="over-the-joint",
+    more='[goal]\noriented_beyond = {x = "300 mm", side = 2}',
+)
 
 
 @pytest.mark.sweep
@@ -69,21 +59,10 @@ def test_a_tolerance_over_the_joint_is_proved_on_cells_as_the_checker_says(tmp_p
 
 
 # A part with a chamfer on which it cannot rest: it rolls on.
-CHAMFERED = """
-name = "chamfered"
-[part]
-vertices = [["0 mm","0 mm"], ["76 mm","0 mm"], ["78.4 mm","4 mm"], ["62 mm","45 mm"], ["12 mm","45 mm"]]
-[part.mass]
-plate_density = "7850 kg/m^3"
-plate_thickness = "2 mm"
-points = [{ x = "58 mm", y = "9 mm", mass = "18 g" }]
-[arm]
-surface_height = "-8 mm"
-length = "400 mm"
-[throw]
-speed = "180 deg/s"
-[gravity]
-tilt = "30 deg"
+CHAMFERED = plate(
+    ('["80 mm", "0 mm"]', '["76 mm", "0 mm"], ["78.4 mm", "4 mm"]'),
+    name="chamfered",
+    more="""
 [goal]
 oriented_beyond = { x = "310 mm", side = 0 }
 [tolerance]
@@ -91,7 +70,8 @@ oriented_beyond = { x = "310 mm", side = 0 }
 [effects]
 landing = true
 roll = true
-"""
+""",
+)
 
 
 def asked(text):

@@ -21,6 +21,7 @@ from limitsets.proofs.goals import reaches
 from limitsets.proofs.query import Query
 from limitsets.robust.margins.deviations import deviation_scale, deviation_scales, given
 from tests.lead_triangle import left_by_some
+from tests.plates import plate
 from tests.thrower import reference
 
 X = 20
@@ -367,24 +368,15 @@ def test_a_scene_without_a_goal_is_asked_for_one():
 
 # A quadrilateral in mm with a lead weight: parts that lie far outside the attractor come to it by throws that a few
 # hundred cells a side do not tell from throws off the arm.
-FROM_AFAR = """
-name = "from-afar"
-[part]
-vertices = [["0 mm", "0 mm"], ["80 mm", "0 mm"], ["88 mm", "42 mm"], ["14 mm", "55 mm"]]
-[part.mass]
-plate_density = "2700 kg/m^3"
-plate_thickness = "2 mm"
-points = [{x = "44.2635 mm", y = "31.2089 mm", mass = "37.1433 g"}]
-[arm]
-surface_height = "-3.3130 mm"
-length = "400 mm"
-[throw]
-speed = "170.9105 deg/s"
-[gravity]
-tilt = "30 deg"
-[goal]
-oriented_beyond = {x = "314.774 mm", side = 2}
-"""
+FROM_AFAR = plate(
+    ('["62 mm", "45 mm"], ["12 mm", "45 mm"]', '["88 mm", "42 mm"], ["14 mm", "55 mm"]'),
+    ("7850 kg/m^3", "2700 kg/m^3"),
+    ('x = "58 mm", y = "9 mm", mass = "18 g"', 'x = "44.2635 mm", y = "31.2089 mm", mass = "37.1433 g"'),
+    ("-8 mm", "-3.3130 mm"),
+    ("180 deg/s", "170.9105 deg/s"),
+    name="from-afar",
+    more='[goal]\noriented_beyond = {x = "314.774 mm", side = 2}',
+)
 
 
 def test_a_goal_that_certify_proves_is_proved_by_the_search_for_margins():

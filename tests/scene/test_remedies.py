@@ -16,22 +16,10 @@ from limitsets.errors import LimitsetsError, SceneError
 from limitsets.inverse import robust_design
 from limitsets.inverse.margin.for_goal import design_for_goal
 from limitsets.scene.checking import examined
+from tests import plates
 from tests.scene.test_chamfer import BOTH, chamfered
 
-PLATE = """
-[part]
-vertices = [["0 mm", "0 mm"], ["80 mm", "0 mm"], ["62 mm", "45 mm"], ["12 mm", "45 mm"]]
-[part.mass]
-plate_density = "7850 kg/m^3"
-plate_thickness = "2 mm"
-points = [{ x = "58 mm", y = "9 mm", mass = "18 g" }]
-[arm]
-surface_height = "-8 mm"
-length = "400 mm"
-[throw]
-speed = "180 deg/s"
-[gravity]
-tilt = "30 deg"
+TOLERANCE = """
 [tolerance]
 "throw.speed" = "0.5 %"
 "part.mass.points[0].mass" = "2 %"
@@ -42,11 +30,7 @@ L_SHAPED = [(0, 0), (0, 60), (20, 60), (20, 20), (80, 20), (80, 0)]  # clockwise
 
 def plate(*changes: tuple[str, str]) -> dict[str, Any]:
     """The scene, its text changed."""
-    text = PLATE
-    for old, new in changes:
-        assert old in text
-        text = text.replace(old, new)
-    return tomllib.loads(text)
+    return tomllib.loads(plates.plate(*changes, more=TOLERANCE))
 
 
 def l_shaped(**tables: Any) -> dict[str, Any]:
