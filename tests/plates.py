@@ -1,4 +1,4 @@
-"""A steel plate with a lead weight, in millimetres, as people write it, and scenes that differ from it in a few lines."""
+"""A steel plate with a lead weight, in millimetres, and scenes that differ from it in a few lines."""
 
 PLATE = """
 [part]

@@ -105,10 +105,8 @@ class Robustness(Tabled):
     def _margin(self, entry: Entry) -> Margin:
         joint = entry.quantity == "joint"
         nominal = entry.nominal
-        if nominal is not None and entry.unit not in (
-            "%",
-            entry.nominal_unit,
-        ):  # in the unit of the deviation
+        # in the unit of the deviation
+        if nominal is not None and entry.unit not in ("%", entry.nominal_unit):
             nominal = float(Fraction(repr(nominal)) * exact_factor(entry.nominal_unit, entry.unit))
         return Margin(
             entry.quantity,
