@@ -7,7 +7,8 @@ from typing import NamedTuple
 
 import pytest
 
-from tests.explorer.served import Visitor, browser, running, served
+from tests.browsers import browser
+from tests.explorer.served import Visitor, running, served
 
 pytestmark = pytest.mark.bench
 

@@ -1,22 +1,15 @@
-"""A server of its own for a test, and Debian's Chromium to look at it."""
+"""A server of its own for a test, and one who looks at its page."""
 
-import os
 import re
 import signal
 import subprocess
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
-from pathlib import Path
 from typing import Any
 
 import pytest
 
-ARGS = [
-    "--no-sandbox", "--disable-gpu", "--disable-background-networking", "--disable-component-update",
-    "--disable-sync", "--no-first-run",
-]  # fmt: skip
-CHROMIUM = Path("/usr/bin/chromium")
 HANDLE = 16.0  # of the browser's own slider [pixels]
 
 
@@ -42,22 +35,6 @@ def running(*arguments: str) -> Iterator[str]:
         finally:
             process.send_signal(signal.SIGINT)
             process.wait(30)
-
-
-@contextmanager
-def browser() -> Iterator[Any]:
-    """Start Chromium."""
-    from playwright.sync_api import sync_playwright
-
-    if not CHROMIUM.exists():
-        pytest.fail(f"{CHROMIUM} is missing: apt-get install chromium (as root), or bash .ci/run as root")
-    os.environ.setdefault("PLAYWRIGHT_SKIP_BROWSER_DOWNLOAD", "1")
-    with sync_playwright() as playwright:
-        started = playwright.chromium.launch(executable_path=str(CHROMIUM), args=ARGS)
-        try:
-            yield started
-        finally:
-            started.close()
 
 
 class Visitor:

@@ -1,4 +1,4 @@
-"""The page in headless Chromium: what a visitor sees and touches, and what two of them do to each other."""
+"""The page in a headless browser: what a visitor sees and touches, and what two of them do to each other."""
 
 import re
 import socket
@@ -10,7 +10,8 @@ import pytest
 from playwright.sync_api import expect
 
 import limitsets as ls
-from tests.explorer.served import Visitor, browser, served
+from tests.browsers import browser
+from tests.explorer.served import Visitor, served
 
 pytestmark = pytest.mark.sweep
 

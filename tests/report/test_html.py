@@ -2,7 +2,6 @@
 
 import base64
 import re
-import shutil
 from html.parser import HTMLParser
 
 import pytest
@@ -10,6 +9,7 @@ import pytest
 import limitsets as ls
 from limitsets.report.html_pages import as_html
 from limitsets.report.writing import FIGURES, write
+from tests.browsers import browser
 
 VOID = {"meta", "img", "br", "hr", "link", "input"}
 
@@ -77,14 +77,9 @@ def test_text_of_a_scene_is_never_markup():
 @pytest.mark.sweep
 @pytest.mark.parametrize("width", [1200, 390])
 def test_no_page_is_wider_than_the_screen(width, folder):
-    sync = pytest.importorskip("playwright.sync_api", reason="playwright drives the browser")
-    if shutil.which("chromium") is None:
-        pytest.skip("there is no Chromium")
-    arguments = ["--no-sandbox", "--disable-gpu", "--disable-background-networking", "--disable-sync"]
     said = []
-    with sync.sync_playwright() as play:
-        browser = play.chromium.launch(executable_path="/usr/bin/chromium", args=arguments)
-        page = browser.new_page(viewport={"width": width, "height": 800})
+    with browser() as started:
+        page = started.new_page(viewport={"width": width, "height": 800})
         page.on("console", lambda message: said.append(message.text))
         page.on(
             "request", lambda request: said.append(request.url) if request.url.startswith("http") else None
@@ -92,5 +87,4 @@ def test_no_page_is_wider_than_the_screen(width, folder):
         page.goto((folder / "report.html").as_uri())
         assert page.evaluate("document.documentElement.scrollWidth") <= width
         assert page.evaluate("[...document.images].every(each => each.naturalWidth > 0)")
-        browser.close()
     assert said == []
