@@ -1,5 +1,7 @@
 """Files that are replaced whole: a crash or Ctrl-C leaves the old ones as they were.  And the one form of our JSON.
 
+Beside them: one process at a time for a place (`locked`), and the digest of the package's own code (`code_digest`).
+
 Answers are written by this file alone, not by msgspec or cattrs: both leave nan as it is and know no numpy, so that the
 same walk would follow theirs, and msgspec writes some floats differently from Python.
 """
@@ -7,17 +9,25 @@ same walk would follow theirs, and msgspec writes some floats differently from P
 from __future__ import annotations
 
 import errno
+import hashlib
 import json
 import math
 import os
+import platform
 import shutil
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import fields, is_dataclass
+from functools import cache
 from pathlib import Path
 from typing import Any
 
-__all__ = ["as_json", "as_plain", "as_table", "picked", "replaced"]
+from limitsets.errors import LimitsetsError
+
+__all__ = ["as_json", "as_plain", "as_table", "code_digest", "locked", "picked", "replaced"]
+
+# Rooms that show answers and make none.
+_FACES = {"plot", "animation", "report", "explorer", "cli"}
 
 
 def as_plain(answer: Any) -> Any:
@@ -112,3 +122,81 @@ def replaced(folder: str | Path) -> Iterator[Path]:
             file.replace(place / file.name)
     finally:
         shutil.rmtree(draft, ignore_errors=True)
+
+
+@contextmanager
+def locked(place: str | Path) -> Iterator[None]:
+    """Keep a file or folder for this process: another one that would write there is refused.
+
+    A file `.NAME.lock` beside it holds process and host.  The lock is the operating system's, so that it ends with the
+    process, however that ends.  Where a file system has no locks, and on Windows, where files that are open cannot be
+    replaced, nothing is kept from writing.
+
+    Raises
+    ------
+    LimitsetsError
+        Another process writes there.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> with tempfile.TemporaryDirectory() as folder, locked(Path(folder) / "s.zarr"):
+    ...     [path.name for path in Path(folder).iterdir()]
+    ['.s.zarr.lock']
+    """
+    path = Path(place).absolute()
+    lock = path.with_name(f".{path.name}.lock")
+    file = _kept_open(lock, path)
+    try:
+        yield
+    finally:
+        if file is not None:
+            lock.unlink(
+                missing_ok=True
+            )  # before it is closed: whoever waits for this file finds that it is gone
+            os.close(file)
+
+
+def _kept_open(lock: Path, place: Path) -> int | None:
+    """Open the file of a lock and lock it; None where there are no locks."""
+    try:
+        import fcntl
+    except ImportError:
+        return None
+    while True:
+        try:
+            lock.parent.mkdir(parents=True, exist_ok=True)
+            file = os.open(lock, os.O_RDWR | os.O_CREAT, 0o666)
+        except OSError:  # whoever writes beside it says so
+            return None
+        try:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            holder = os.read(file, 200).decode(errors="replace") or "another process"
+            os.close(file)
+            raise LimitsetsError(
+                str(place), f"written by {holder}", "a place that one process writes",
+                "wait until that process ends, or name another place",
+            ) from None  # fmt: skip
+        except OSError:
+            os.close(file)
+            return None
+        if lock.exists() and os.path.samestat(os.fstat(file), lock.stat()):
+            os.truncate(file, 0)
+            os.write(file, f"process {os.getpid()} on {platform.node()}".encode())
+            return file
+        os.close(file)  # whoever had it deleted it meanwhile
+
+
+@cache
+def code_digest() -> str:
+    """Return a digest of the package's own code, but for the rooms that only show answers.
+
+    Answers that are kept carry it: those of other code, of the same version even, are not taken for one's own.
+    """
+    package, digest = Path(__file__).parent, hashlib.sha256()
+    for file in sorted(package.rglob("*.py")):
+        path = file.relative_to(package)
+        if path.parts[0] not in _FACES:
+            digest.update(path.as_posix().encode() + b"\0" + file.read_bytes() + b"\0")
+    return digest.hexdigest()

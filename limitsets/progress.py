@@ -11,7 +11,7 @@ from functools import wraps
 from html import escape
 from typing import Any, ParamSpec, TypeAlias, TypeVar
 
-__all__ = ["PATIENCE", "Progress", "bar", "shown_in_notebooks"]
+__all__ = ["GOES_ON", "PATIENCE", "InterruptedRun", "Progress", "bar", "shown_in_notebooks"]
 
 Progress: TypeAlias = Callable[[str, int, int], None]
 """Told the step, how much of it is done, and of how much."""
@@ -21,6 +21,14 @@ R = TypeVar("R")
 
 # What takes longer than this says what it is doing [s].
 PATIENCE = 2.0
+
+# A note on Ctrl-C where answers are kept as they come.
+GOES_ON = "what is done is kept, the same command goes on with the rest"
+
+
+class InterruptedRun(Exception):  # noqa: N818 - no error
+    """Ctrl-C, with what can be said of the run: typer gives KeyboardInterrupt on without its notes."""
+
 
 # Bars on a terminal: of the step on its way, and of those before it.
 BARS = 4

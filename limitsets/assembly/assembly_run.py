@@ -7,7 +7,6 @@ from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import asdict, dataclass
 from functools import lru_cache
-from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,7 +15,7 @@ from limitsets.assembly.counting import Joint, Overlaps, Rate, joint_of, overlap
 from limitsets.assembly.pairing import Pair, Start, pair_of, require_apart, seats_of
 from limitsets.assembly.passing import pass_through
 from limitsets.errors import AnswerError
-from limitsets.files import as_table
+from limitsets.files import as_table, code_digest
 from limitsets.progress import shown_in_notebooks
 from limitsets.robust.noise.sampling import require_seed
 from limitsets.robust.noise.scattering import Scattering
@@ -61,7 +60,7 @@ class Series:
             name: value for name, value in asdict(self).items() if name not in ("scenes", "scatter", "trials")
         }
         scenes = [json.loads(text) for text in self.scenes]
-        return {"limitsets": version("limitsets"), "scenes": scenes, "scatter": self.scatter.words(), **words}
+        return {"limitsets": code_digest(), "scenes": scenes, "scatter": self.scatter.words(), **words}
 
     def film(self, number: int, last: int) -> Recording:
         """Make a trial in contact again, and keep poses from throw `last` on."""

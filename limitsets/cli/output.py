@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import atexit
 import os
 import signal
 import sys
 import threading
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from enum import StrEnum
 from json import loads
 from pathlib import Path
@@ -16,10 +17,9 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
 
 import typer
 
-from limitsets.cli.claims import claim
 from limitsets.errors import LimitsetsError
-from limitsets.files import as_json, replaced
-from limitsets.progress import bar
+from limitsets.files import as_json, locked, replaced
+from limitsets.progress import InterruptedRun, bar
 from limitsets.tables import aligned
 
 if TYPE_CHECKING:
@@ -50,6 +50,11 @@ __all__ = [
 ]
 
 Words: TypeAlias = list[str] | None
+
+# Folders that this process keeps, until it ends.
+_LOCKED: set[Path] = set()
+_LOCKS = ExitStack()
+atexit.register(_LOCKS.close)
 
 
 def option(flags: str, metavar: str, help: str, **limits: Any) -> Any:  # noqa: A002 - typer's word
@@ -164,7 +169,7 @@ def opened(
         from limitsets.report.writing import require_place
 
         require_place(folder)
-        claim(folder)
+        _keep(folder)
         other = _other_scene(folder, chosen)
         if other:
             print(
@@ -172,6 +177,14 @@ def opened(
                 file=sys.stderr,
             )
     return chosen, folder
+
+
+def _keep(folder: Path) -> None:
+    """Keep a folder for this process until it ends."""
+    place = folder.resolve()
+    if place not in _LOCKED:
+        _LOCKS.enter_context(locked(place))
+        _LOCKED.add(place)
 
 
 def _other_scene(folder: Path, scene: SceneOf) -> str:
@@ -281,19 +294,19 @@ class _Interrupts:
 @contextmanager
 def processes(workers: int | None) -> Iterator[Executor | None]:
     """Start processes as tasks come, one a core by default; None where a single one is enough."""
-    from concurrent.futures import ProcessPoolExecutor
-    from multiprocessing import get_context
+    from limitsets.sweep.executors import Processes, present_cores
 
-    count = workers or os.cpu_count() or 1
+    count = workers or present_cores()
     if count == 1:
         yield None
         return
-    quiet = (signal.SIGINT, signal.SIG_IGN)  # a terminal sends Ctrl-C to them, too
-    pool = ProcessPoolExecutor(count, get_context("spawn"), signal.signal, quiet)
+    pool = Processes(count)
     try:
         yield pool
-    finally:
-        pool.shutdown(cancel_futures=True)
+    except BaseException:  # nobody waits for their answers any more
+        pool.abandon()
+        raise
+    pool.end()
 
 
 @contextmanager
@@ -314,6 +327,10 @@ def progress() -> Iterator[Callable[[str, int, int], None]]:
                 shown(step, done, of)
 
             yield tell
+    except KeyboardInterrupt as error:
+        if notes := getattr(error, "__notes__", ()):
+            raise InterruptedRun("; ".join(notes)) from None
+        raise
     finally:
         if ours:
             signal.signal(signal.SIGINT, signal.default_int_handler)

@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from limitsets.errors import LimitsetsError
+from limitsets.progress import InterruptedRun
 
 __all__ = ["main"]
 
@@ -49,6 +50,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         sys.stdout.flush()
     except KeyboardInterrupt:
         return _end("interrupted", INTERRUPTED)
+    except InterruptedRun as error:
+        return _end(f"interrupted; {error}", INTERRUPTED)
     except (BrokenPipeError, SystemExit) as error:
         if not isinstance(error if isinstance(error, OSError) else error.__context__, BrokenPipeError):
             raise

@@ -45,6 +45,7 @@ PACKAGE = Path(__file__).resolve().parents[1]
 # them from importing this file.
 KERNEL_FREE = {
     "arguments.py",
+    "files.py",
     "progress.py",
     "tables.py",
     "checker",

@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import time
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Callable, Collection
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Future, wait
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Protocol, TypeAlias
 
 from limitsets.errors import LimitsetsError
+from limitsets.progress import GOES_ON
 
 if TYPE_CHECKING:
-    from limitsets.sweep.executors import Given
+    from pathlib import Path
+
+    from limitsets.sweep.executors import Given, Processes
 
 __all__ = ["Kept", "Progress", "Work", "drive"]
 
@@ -56,6 +59,8 @@ class Work:
 class Kept(Protocol):
     """Where answers are kept, so that a run that was cut off goes on with the rest."""
 
+    path: Path | None
+
     @property
     def done(self) -> Collection[int]:
         """Numbers of the chunks that are kept."""
@@ -97,8 +102,10 @@ def _in_words(seconds: float) -> str:
     return f"{seconds / 60:.0f} min" if seconds < 6000 else f"{seconds / 3600:.1f} h"
 
 
-def drive(work: Work, store: Kept, pool: Given, progress: Progress | None = None) -> None:
+def drive(work: Work, store: Kept, pool: Given | Processes, progress: Progress | None = None) -> None:
     """Compute the chunks that a store does not hold yet.
+
+    A chunk whose worker died is computed again alone, so that nothing else can have ended its worker.
 
     Raises
     ------
@@ -106,34 +113,41 @@ def drive(work: Work, store: Kept, pool: Given, progress: Progress | None = None
         The task failed, a chunk kills its worker again and again, or the store cannot be written.
     """
     todo = deque(k for k in range(work.chunks) if k not in store.done)
+    again: deque[int] = deque()
+    deaths: Counter[int] = Counter()
     flight: dict[Future[Any], int] = {}
     told = _Told(work, store, progress)
+
+    def lost(number: int) -> None:
+        deaths[number] += 1
+        if deaths[number] == _MOST_DEATHS:
+            raise LimitsetsError(
+                "a worker", f"killed {_MOST_DEATHS} times by one chunk", "a chunk that a worker survives",
+                f"it is the one at {work.place(number)}; look at its memory and at the task there",
+            )  # fmt: skip
+        again.append(number)
+        pool.restart()
+
     try:
-        while todo or flight:
-            lost: list[int] = []
+        while todo or again or flight:
             told.tell()
-            while todo and len(flight) < pool.window and not lost:
-                k = todo.popleft()
+            alone = again or any(k in deaths for k in flight.values())
+            while (todo or again) and len(flight) < (1 if alone else pool.window):
+                number = (again or todo).popleft()
                 try:
-                    flight[pool.submit(work.function, *work.given, k)] = k
+                    flight[pool.submit(work.function, *work.given, number)] = number
                 except BrokenExecutor:
-                    lost.append(k)
-            done, _ = wait(flight, timeout=_SECONDS, return_when=FIRST_COMPLETED)
-            for future in done:
-                k = flight.pop(future)
-                if not _kept(work, store, future, k, told):
-                    lost.append(k)
-            if lost:
-                for future, k in flight.items():
-                    if not _kept(work, store, future, k, told):
-                        lost.append(k)
-                flight.clear()
-                pool.restart()
-                _one_by_one(work, store, pool, sorted(lost), told)
-    except BaseException:
+                    lost(number)
+            for future in wait(flight, timeout=_SECONDS, return_when=FIRST_COMPLETED).done:
+                number = flight.pop(future)
+                if not _kept(work, store, future, number, told):
+                    lost(number)
+    except BaseException as error:
         for future in flight:
             future.cancel()
         pool.abandon()
+        if isinstance(error, KeyboardInterrupt) and store.path is not None:
+            error.add_note(GOES_ON)
         raise
     pool.end()
 
@@ -154,23 +168,3 @@ def _kept(work: Work, store: Kept, future: Future[Any], number: int, told: _Told
     store.write(found)
     told.points += work.size(number)
     return True
-
-
-def _one_by_one(work: Work, store: Kept, pool: Given, lost: list[int], told: _Told) -> None:
-    """Compute alone each chunk that may have killed its worker, so that the one that does is known."""
-    for number in lost:
-        told.tell()
-        for _ in range(_MOST_DEATHS):
-            try:
-                future = pool.submit(work.function, *work.given, number)
-            except BrokenExecutor:
-                pool.restart()
-                continue
-            if _kept(work, store, future, number, told):
-                break
-            pool.restart()
-        else:
-            raise LimitsetsError(
-                "a worker", f"killed {_MOST_DEATHS} times by one chunk", "a chunk that a worker survives",
-                f"it is the one at {work.place(number)}; look at its memory and at the task there",
-            )  # fmt: skip

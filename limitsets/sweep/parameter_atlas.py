@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
+from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -14,7 +15,7 @@ import numpy as np
 from limitsets.arguments import arguments_checked
 from limitsets.cells import as_domain
 from limitsets.errors import LimitsetsError
-from limitsets.files import as_plain
+from limitsets.files import as_plain, locked
 from limitsets.maps import coerce, kind_of
 from limitsets.maps.contract import require_dimension
 from limitsets.progress import shown_in_notebooks
@@ -25,7 +26,7 @@ from limitsets.sweep.classes import UNDECIDED_NAME
 from limitsets.sweep.driving import Progress, Work, drive
 from limitsets.sweep.executors import chosen_pool
 from limitsets.sweep.plan import Plan, chunk_shape, code_of
-from limitsets.sweep.store import CHECKSUM, Store, imported
+from limitsets.sweep.store import CHECKSUM, SEAL, Store, imported
 from limitsets.sweep.subjects import MapSubject, SceneSubject, Subject
 from limitsets.sweep.tasks import named, resolved
 from limitsets.sweep.work import answer
@@ -309,19 +310,22 @@ def atlas(
     )  # fmt: skip
     path = None if store is None else Path(store)
     imported("xarray")
-    held = Store(plan, path)
-    kept, of = len(held.done), math.prod(plan.chunks)
-    if kept < of:
-        if executor is None and cluster is None and of - kept > 1:
-            _require_importable(plan)
-        with chosen_pool(of - kept, executor, cluster, workers) as pool:
-            drive(_work(plan), held, pool, progress)
+    with nullcontext() if path is None else locked(path):
+        held = Store(plan, path)
+        kept, of = len(held.done), math.prod(plan.chunks)
+        if kept < of:
+            if executor is None and cluster is None and of > 1:
+                _require_importable(plan)
+            with chosen_pool(of, executor, cluster, workers) as pool:
+                drive(_work(plan), held, pool, progress)
     return Atlas(opened(held.group.store), path, of - kept, kept)
 
 
 def opened(store: Any) -> xr.Dataset:
     """Open what a store holds, without the marks of its chunks."""
     found = imported("xarray").open_zarr(store, chunks=None, consolidated=False, decode_timedelta=False)
+    for variable in found.variables.values():
+        variable.attrs.pop(SEAL, None)
     return found.drop_vars(CHECKSUM)  # type: ignore[no-any-return]  # a Dataset
 
 

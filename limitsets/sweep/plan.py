@@ -15,11 +15,12 @@ import numpy as np
 import numpy.typing as npt
 
 from limitsets.errors import LimitsetsError
+from limitsets.files import code_digest
 from limitsets.sweep.axes import Axis
 from limitsets.sweep.subjects import Subject, source_of
 from limitsets.sweep.tasks import registered, resolved
 
-__all__ = ["Plan", "chunk_shape", "code_of", "differences", "require_same_code"]
+__all__ = ["Plan", "chunk_shape", "code_of", "differences", "digest_of", "require_same_code"]
 
 Region: TypeAlias = tuple[slice, ...]
 
@@ -30,14 +31,17 @@ _RELIED_ON = ("limitsets", "numpy", "numba")
 
 
 def code_of(subject: Subject, task: str) -> dict[str, dict[str, str]]:
-    """Return the versions of packages, and digests of the files outside this one, on which numbers depend."""
+    """Return versions of packages, and digests of the code, ours and outside, on which numbers depend."""
     versions = {}
     for package in _RELIED_ON:
         try:
             versions[package] = version(package)
         except PackageNotFoundError:  # sources that are not installed
             versions[package] = ""
-    return {"versions": versions, "sources": subject.sources | source_of(task.partition(":")[0])}
+    return {
+        "versions": versions,
+        "sources": {"limitsets": code_digest()} | subject.sources | source_of(task.partition(":")[0]),
+    }
 
 
 @dataclass(frozen=True, eq=False)
@@ -152,7 +156,7 @@ class Plan:
     @cached_property
     def digest(self) -> str:
         """The hash of the plan."""
-        return hashlib.sha256(json.dumps(self.record, sort_keys=True).encode()).hexdigest()
+        return digest_of(self.record)
 
     def require(self) -> None:
         """Refuse a plan that cannot be carried out, before anything is computed."""
@@ -176,6 +180,11 @@ class Plan:
             raise LimitsetsError(
                 "the options of the task", dict(self.options), "numbers, text, lists and tables", "pass such"
             ) from None
+
+
+def digest_of(record: Any) -> str:
+    """Return the hash of the record of a plan."""
+    return hashlib.sha256(json.dumps(record, sort_keys=True).encode()).hexdigest()
 
 
 def chunk_shape(shape: tuple[int, ...], task: str) -> tuple[int, ...]:

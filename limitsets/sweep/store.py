@@ -2,11 +2,14 @@
 
 A chunk counts as done when the checksum of its data stands in the array `chunk_checksum`.  The checksum is written
 after the data, in a file of its own that is replaced whole, and it is compared with the data when a store is continued:
-a chunk that was cut off, by whatever (a killed driver, a full disk, power), is computed once more.
+a chunk that was cut off, by whatever (a killed driver, a full disk, power), is computed once more.  What stands beside
+the data is compared when a store is opened: coordinates and attributes with the plan, and what an array says of itself
+(shape, dimensions, unit, codes) with a checksum among its attributes.  A store that differs there is refused.
 """
 
 from __future__ import annotations
 
+import json
 import math
 import zlib
 from collections.abc import Iterator, Mapping
@@ -19,7 +22,7 @@ import numpy.typing as npt
 
 from limitsets.errors import LimitsetsError
 from limitsets.files import replaced
-from limitsets.sweep.plan import Plan, differences
+from limitsets.sweep.plan import Plan, differences, digest_of
 from limitsets.sweep.subjects import SceneSubject
 
 if TYPE_CHECKING:
@@ -28,9 +31,10 @@ if TYPE_CHECKING:
     from limitsets.sweep.tasks import Variable
     from limitsets.sweep.work import Answer
 
-__all__ = ["CHECKSUM", "Store", "imported"]
+__all__ = ["CHECKSUM", "SEAL", "Store", "imported"]
 
 CHECKSUM = "chunk_checksum"
+SEAL = "metadata_checksum"
 _REMEDY = "name another store, or remove this one"
 _MOST_SHOWN = 3
 
@@ -80,9 +84,9 @@ class Store:
                 self._begin()
             self.group = self._opened(library)
         self.arrays: dict[str, Any] = dict(self.group.arrays())
-        for axis in plan.axes:
-            del self.arrays[axis.name]
+        axes = {axis.name: self.arrays.pop(axis.name) for axis in plan.axes if axis.name in self.arrays}
         self.marks = self.arrays.pop(CHECKSUM)
+        self._require_whole(axes)
         self.done = {number for number in range(math.prod(plan.chunks)) if self._is_done(number)}
 
     def _begin(self) -> None:
@@ -90,38 +94,66 @@ class Store:
         plan = self.plan
         self.group.attrs.update(_attributes(plan))
         for axis in plan.axes:
-            self._add(axis.name, axis.values, (axis.name,), {"units": axis.unit} if axis.unit else {})
+            values = axis.values
+            array = self._made(
+                axis.name, values.shape, values.shape, values.dtype, 0.0, (axis.name,), _unit(axis.unit)
+            )
+            array[...] = values
         dims = tuple(f"chunk of {axis.name}" for axis in plan.axes)
-        about: dict[str, Any] = {"long_name": "CRC-32 of the chunk's data; 0 where the chunk is not done"}
-        self.group.create_array(
-            CHECKSUM, shape=plan.chunks, chunks=tuple(1 for _ in dims), dtype="uint32", fill_value=0,
-            dimension_names=dims, attributes=about,
+        about = {"long_name": "CRC-32 of the chunk's data; 0 where the chunk is not done"}
+        self._made(CHECKSUM, plan.chunks, (1,) * len(dims), np.dtype("uint32"), 0, dims, about)
+
+    def _made(
+        self,
+        name: str,
+        shape: tuple[int, ...],
+        chunks: tuple[int, ...],
+        dtype: np.dtype[Any],
+        fill: float,
+        dims: tuple[str, ...],
+        attributes: dict[str, Any],
+    ) -> Any:
+        """Make an array, sealed."""
+        sealed = attributes | {SEAL: _seal(name, shape, chunks, dtype, fill, dims, attributes)}
+        return self.group.create_array(
+            name, shape=shape, chunks=chunks, dtype=dtype, fill_value=fill, dimension_names=dims,
+            attributes=sealed,
         )  # fmt: skip
 
-    def _add(
-        self, name: str, values: npt.NDArray[Any], dims: tuple[str, ...], attributes: dict[str, Any]
-    ) -> None:
-        array = self.group.create_array(
-            name, shape=values.shape, chunks=values.shape, dtype=values.dtype, dimension_names=dims,
-            attributes=attributes,
-        )  # fmt: skip
-        array[...] = values
+    def _require_whole(self, axes: Mapping[str, Any]) -> None:
+        """Refuse a store in which something beside the data is not as it was written."""
+        wrong = [
+            f"the axis {axis.name}"
+            for axis in self.plan.axes
+            if axis.name not in axes or not _holds(axes[axis.name], axis.values, _unit(axis.unit))
+        ]
+        wrong += [f"what {name} says of itself" for name, array in self._sealed() if not _is_sealed(array)]
+        if dict(self.group.attrs) != _attributes(self.plan):
+            wrong.append("its attributes")
+        if wrong:
+            raise _damaged(self.path, ", ".join(wrong))
+
+    def _sealed(self) -> Iterator[tuple[str, Any]]:
+        yield from self.arrays.items()
+        yield CHECKSUM, self.marks
 
     def _opened(self, library: Any) -> zarr.Group:
         """Open a store of this very plan."""
         try:
             group = library.open_group(str(self.path), mode="r+", zarr_format=3, use_consolidated=False)
-            theirs = dict(group.attrs)["plan"]
+            theirs, digest = (dict(group.attrs)[name] for name in ("plan", "plan_hash"))
             dict(group.arrays())[CHECKSUM]
         except (OSError, ValueError, KeyError, TypeError) as error:
             raise LimitsetsError(
                 "the store", str(self.path), "a new folder, or a store that limitsets atlas began",
                 f"it is none, or damaged ({type(error).__name__}): {_REMEDY}",
             ) from None  # fmt: skip
+        if digest_of(theirs) != digest:
+            raise _damaged(self.path, "its plan")
         wrong = list(differences(self.plan.record, theirs))
         wrong = [each for each in wrong if not each[0].endswith(".sha256")] or wrong
         if wrong:
-            words = [f"{name} is {_short(there)} there, {_short(here)} here" for name, here, there in wrong]
+            words = [_difference(*each) for each in wrong]
             shown = "; ".join(words[:_MOST_SHOWN])
             more = f" and {len(wrong) - _MOST_SHOWN} more" if len(wrong) > _MOST_SHOWN else ""
             raise LimitsetsError(
@@ -165,15 +197,11 @@ class Store:
         """Return the array of a variable, made when its first chunk comes."""
         shape = (*self.plan.shape, *(n for _, n in variable.dims))
         if name not in self.arrays:
-            self.arrays[name] = self.group.create_array(
-                name,
-                shape=shape,
-                chunks=(*self.plan.chunk, *(max(n, 1) for _, n in variable.dims)),
-                dtype=variable.dtype,
-                fill_value=variable.empty,
-                dimension_names=(*(axis.name for axis in self.plan.axes), *(dim for dim, _ in variable.dims)),
-                attributes=_described(variable, self.plan.subject.unit),
-            )
+            chunks = (*self.plan.chunk, *(max(n, 1) for _, n in variable.dims))
+            dims = (*(axis.name for axis in self.plan.axes), *(dim for dim, _ in variable.dims))
+            about = _described(variable, self.plan.subject.unit)
+            dtype = np.dtype(variable.dtype)
+            self.arrays[name] = self._made(name, shape, chunks, dtype, variable.empty, dims, about)
         if self.arrays[name].shape != shape:
             raise LimitsetsError(
                 f"the variable {name}", shape, f"{self.arrays[name].shape}, as at other points",
@@ -184,7 +212,8 @@ class Store:
 
     def _name_codes(self, name: str, codes: Mapping[str, int]) -> None:
         """Add the names of codes that were not met before; in order, so that the last chunk written is not seen."""
-        attributes = self.arrays[name].attrs
+        array = self.arrays[name]
+        attributes = array.attrs
         words = attributes.get("flag_meanings", "").split()
         known = dict(zip(words, attributes.get("flag_values", []), strict=True))
         if codes.items() <= known.items():
@@ -194,7 +223,8 @@ class Store:
             raise LimitsetsError(
                 f"the codes of {name}", both, "another code for each name", "give them other codes"
             )
-        attributes.update(_flags(both))
+        told = {key: value for key, value in attributes.items() if key != SEAL} | _flags(both)
+        attributes.update(told | {SEAL: _seal_of(array, told)})
 
     @contextmanager
     def _written(self) -> Iterator[None]:
@@ -206,6 +236,13 @@ class Store:
                 "the store", str(self.path), "a place that can be written",
                 f"it could not be: {error.strerror or error}; what is done is kept, the same call does the rest",
             ) from error  # fmt: skip
+
+
+def _damaged(path: Path | None, what: str) -> LimitsetsError:
+    """Say what of a store is not as it was written."""
+    return LimitsetsError(
+        f"the store {path}", "damaged", "a store as it was written", f"{what} changed since; {_REMEDY}"
+    )
 
 
 def checksum(found: Mapping[str, npt.NDArray[Any]]) -> int:
@@ -220,8 +257,59 @@ def checksum(found: Mapping[str, npt.NDArray[Any]]) -> int:
     return total or 1
 
 
+def _seal(
+    name: str,
+    shape: tuple[int, ...],
+    chunks: tuple[int, ...],
+    dtype: np.dtype[Any],
+    fill: float,
+    dims: tuple[str, ...],
+    attributes: Mapping[str, Any],
+) -> int:
+    """Return a checksum of what an array says of itself."""
+    said = [name, shape, chunks, dtype.str.lstrip("<>|="), f"{float(fill)}", dims, dict(attributes)]
+    return zlib.crc32(json.dumps(said, sort_keys=True).encode())
+
+
+def _seal_of(array: Any, attributes: Mapping[str, Any]) -> int:
+    """Return the checksum of what an array in a store says of itself, with these attributes."""
+    dims = tuple(array.metadata.dimension_names or ())
+    name = array.path.rpartition("/")[2]
+    return _seal(name, array.shape, array.chunks, array.dtype, array.fill_value, dims, attributes)
+
+
+def _is_sealed(array: Any) -> bool:
+    """Whether an array says of itself what was written."""
+    attributes = dict(array.attrs)
+    try:
+        return bool(attributes.pop(SEAL, None) == _seal_of(array, attributes))
+    except (TypeError, ValueError):  # what no array of ours says
+        return False
+
+
+def _holds(array: Any, values: npt.NDArray[Any], attributes: dict[str, Any]) -> bool:
+    """Whether an array holds these coordinates, with these attributes."""
+    try:
+        found = np.asarray(array[...])
+    except (OSError, ValueError, RuntimeError):  # what codecs make of bytes that were damaged
+        return False
+    said = {key: value for key, value in dict(array.attrs).items() if key != SEAL}
+    return _is_sealed(array) and said == attributes and found.tobytes() == values.tobytes()
+
+
+def _unit(unit: str) -> dict[str, Any]:
+    return {"units": unit} if unit else {}
+
+
 def _is(values: npt.NDArray[Any], fill: Any) -> bool:
     return bool((np.isnan(values) if values.dtype.kind == "f" else values == fill).all())
+
+
+def _difference(name: str, here: Any, there: Any) -> str:
+    """Say what differs between two plans."""
+    if name.startswith("sources."):
+        return f"the code of {name.removeprefix('sources.')} is not the code that began it"
+    return f"{name} is {_short(there)} there, {_short(here)} here"
 
 
 def _short(value: Any) -> str:

@@ -5,11 +5,12 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Iterator
 from concurrent.futures import Executor
+from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
 
 from limitsets.errors import AnswerError
-from limitsets.files import as_json, as_plain, replaced
+from limitsets.files import as_json, as_plain, locked, replaced
 from limitsets.sweep.driving import Progress, Work, drive
 from limitsets.sweep.executors import chosen_pool
 
@@ -118,7 +119,8 @@ def complete(
         points,
     )
     here = executor is None and cluster is None and workers is None
-    with chosen_pool(1 if here else kept.chunks, executor, cluster, workers) as pool:
+    alone = nullcontext() if kept.path is None else locked(kept.path)
+    with alone, chosen_pool(1 if here else kept.chunks, executor, cluster, workers) as pool:
         drive(work, kept, pool, progress)
 
 

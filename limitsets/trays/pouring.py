@@ -9,7 +9,6 @@ from __future__ import annotations
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -17,6 +16,7 @@ import numpy as np
 from limitsets.engine import Crowd
 from limitsets.engine.depression import EMPTY, FAR, Motion, Pose, state_of
 from limitsets.errors import AnswerError
+from limitsets.files import code_digest
 from limitsets.sweep.trial_file import Row
 from limitsets.trays.passing import Passes, random_of
 
@@ -59,7 +59,7 @@ class Pouring:
     def question(self) -> dict[str, Any]:
         """Give what is asked, for the file of the batches."""
         return {
-            "limitsets": version("limitsets"),
+            "limitsets": code_digest(),
             "scene": self.asked.plate.part.as_dict(),
             "side": self.asked.side,
             "step": self.asked.plate.step,

@@ -2,6 +2,7 @@
 
 import csv
 import json
+import platform
 import re
 import subprocess
 import sys
@@ -102,13 +103,13 @@ def test_a_report_of_another_scene_is_not_replaced_without_a_word(capfd):
 @pytest.mark.skipif(sys.platform == "win32", reason="no locks of this kind there")
 def test_two_runs_at_once_do_not_write_into_one_folder(capfd, tmp_path):
     """The first holds the folder as long as it runs, however it ends."""
-    code = "import sys, time, pathlib; from limitsets.cli.claims import claim; claim(pathlib.Path('shared'));"
-    code += "print('held', flush=True); time.sleep(60)"
+    code = "import time; from limitsets.files import locked\nwith locked('shared'):"
+    code += " print('held', flush=True); time.sleep(60)"
     with subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True) as other:
         assert other.stdout.readline() == "held\n"
         status, _, err = run(capfd, "analyse", "paper-designed", "--cells", "64", "-o", "shared")
         assert status == 2
-        assert "another run is writing there" in err
+        assert f"shared is 'written by process {other.pid} on {platform.node()}'" in err
         assert not Path("shared").exists()
         assert run(capfd, "analyse", "paper-designed", "--cells", "64", "-o", "mine")[0] == 0
         other.kill()

@@ -1,6 +1,7 @@
 """Runs that are killed, and disks that are full: what is computed afterwards is what an undisturbed run gives."""
 
 import errno
+import json
 import os
 import random
 import signal
@@ -17,7 +18,10 @@ from zarr.storage import _local
 
 from limitsets.errors import LimitsetsError
 from limitsets.sweep import atlas
+from limitsets.sweep.driving import Work, drive
+from limitsets.sweep.executors import Processes
 from tests.sweep.stores import bytes_of, run
+from tests.sweep.tasks_of_tests import TASK, X, Y, long_answer
 
 ROOT = Path(__file__).resolve().parents[2]
 FEW, MANY = range(1), range(1, 20)
@@ -86,6 +90,39 @@ def test_a_killed_driver_is_continued_and_leaves_no_workers(seed, tmp_path, whol
         assert len(gone) == len(workers)
     run(store)
     assert bytes_of(store) == whole
+
+
+class Memory:
+    """Keeps the numbers of chunks, in memory; its disk is full after so many."""
+
+    path = None
+
+    def __init__(self, room):
+        self.done, self.room = set(), room
+
+    def write(self, found):
+        if len(self.done) == self.room:
+            raise OSError(errno.ENOSPC, "No space left on device")
+        self.done.add(found[0])
+
+
+@pytest.mark.parametrize("room", [2, 9])
+def test_a_worker_that_ends_amid_a_long_answer_keeps_nobody_waiting(room, tmp_path):
+    """Because it was killed, or because the disk is full and all are ended while they answer."""
+    kept, ended = Memory(room), []
+    work = Work(9, long_answer, (str(tmp_path),), lambda k: 1, str, "the task", "name", "points")
+
+    def run_it():
+        with suppress(OSError):
+            drive(work, kept, Processes(2))
+        ended.append(True)
+
+    runner = threading.Thread(target=run_it, daemon=True)
+    runner.start()
+    runner.join(120)
+    assert ended
+    assert len(kept.done) == room
+    assert len(list(tmp_path.iterdir())) >= 1  # some worker died indeed
 
 
 def wait_for_work(driver, store):
@@ -178,6 +215,98 @@ if hasattr(os, "geteuid") and os.geteuid() == 0:
             assert bytes_of(place / "s.zarr") == whole
         finally:
             subprocess.run(["umount", str(place)], check=True)
+
+
+def test_a_second_process_is_refused_as_long_as_the_first_writes(tmp_path, whole):
+    store = tmp_path / "s.zarr"
+    command = [sys.executable, "-m", "tests.sweep.tasks_of_tests", str(store)]
+    driver = subprocess.Popen(command, cwd=ROOT, start_new_session=True)
+    wait_for_work(driver, store)
+    with pytest.raises(
+        LimitsetsError, match=rf"written by process {driver.pid} on .*wait until that process ends"
+    ):
+        run(store)
+    driver.kill()
+    driver.wait()
+    run(store)
+    assert bytes_of(store) == whole
+    assert [path.name for path in tmp_path.iterdir()] == ["s.zarr"]
+
+
+def flipped(file, rng):
+    """Flip one bit of a file."""
+    data = bytearray(file.read_bytes())
+    data[rng.randrange(len(data))] ^= 1 << rng.randrange(8)
+    file.write_bytes(bytes(data))
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize(
+    "name",
+    ["arm.surface_height/c/0", "throw.speed/c/0", "throw.speed/zarr.json", "kappa/zarr.json", "zarr.json"],
+)
+def test_a_bit_that_flipped_beside_the_data_is_one_line(name, seed, tmp_path, whole):
+    """Coordinates, units, codes and attributes; what a flip leaves as it was (a space, a case of E) may pass."""
+    store = tmp_path / "s.zarr"
+    run(store)
+    flipped(store / name, random.Random(seed))
+    words = refused(store)
+    if words is not None:
+        assert "damaged" in words
+        assert "\n" not in words
+        return
+    for key, text in whole.items():
+        if key.endswith("zarr.json"):
+            assert json.loads((store / key).read_text()) == json.loads(text)
+
+
+def refused(store):
+    """Say why a store that was done is not opened; None where it is, and nothing of it is computed again."""
+    try:
+        found = run(store)
+    except LimitsetsError as error:
+        return str(error)
+    assert found.new == 0
+    return None
+
+
+@pytest.mark.parametrize(
+    ("name", "old", "new"),
+    [
+        ("kappa", '"in"', '"mm"'),
+        ("throw.speed", '"deg/s"', '"rad/s"'),
+        ("status", "impossible", "impassible"),
+        ("status", '"flag_values": [', '"flag_values": [ 7,'),
+        ("chunk_checksum", "CRC", "CRD"),
+    ],
+)
+def test_units_codes_and_attributes_are_compared(name, old, new, tmp_path):
+    store = tmp_path / "s.zarr"
+    atlas("paper-designed", X, Y, task=f"{TASK.partition(':')[0]}:in_blocks", store=store)
+    file = store / name / "zarr.json"
+    text = file.read_text()
+    assert old in text
+    file.write_text(text.replace(old, new))
+    with pytest.raises(LimitsetsError, match=rf"damaged.*{name}.*name another store"):
+        atlas("paper-designed", X, Y, task=f"{TASK.partition(':')[0]}:in_blocks", store=store)
+
+
+def test_other_code_of_the_same_version_does_not_continue_a_store(tmp_path, monkeypatch):
+    store = tmp_path / "s.zarr"
+    run(store)
+    monkeypatch.setattr("limitsets.sweep.plan.code_digest", lambda: "0" * 64)
+    with pytest.raises(LimitsetsError, match="the code of limitsets is not the code that began it"):
+        run(store)
+
+
+def test_a_worker_of_other_code_is_refused(tmp_path, monkeypatch):
+    from limitsets.sweep.parameter_atlas import plan_of
+    from limitsets.sweep.work import answer
+
+    plan = plan_of("paper-designed", X, Y, task=TASK)
+    monkeypatch.setattr("limitsets.sweep.plan.code_digest", lambda: "0" * 64)
+    with pytest.raises(LimitsetsError, match=r"sources\.limitsets of a worker"):
+        answer(plan, 0)
 
 
 def test_chunks_that_were_damaged_are_computed_again(tmp_path, whole):

@@ -9,12 +9,11 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Mapping
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
 from limitsets.errors import AnswerError
-from limitsets.files import as_json, replaced
+from limitsets.files import as_json, code_digest, replaced
 from limitsets.goals import Goal, Predicate
 from limitsets.robust.margins.finding import Margin
 from limitsets.robust.margins.margin_result import goal_table, settled
@@ -30,12 +29,8 @@ THROWN = ("part", "arm", "throw", "gravity", "model", "effects", "world")
 
 
 def digest_of(*words: Any) -> str:
-    """Make a word of all that a margin depends on, the version of the package among it."""
-    try:
-        package = version("limitsets")
-    except PackageNotFoundError:  # sources that are not installed
-        package = ""
-    text = json.dumps([*words, package], sort_keys=True)
+    """Make a word of all that a margin depends on, the code of the package among it."""
+    text = json.dumps([*words, code_digest()], sort_keys=True)
     return hashlib.sha256(text.encode()).hexdigest()
 
 

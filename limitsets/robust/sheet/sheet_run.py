@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 from limitsets.arguments import arguments_checked
 from limitsets.errors import AnswerError
 from limitsets.goals import Goal, OrientedBeyond, Predicate, Reaches
-from limitsets.progress import shown_in_notebooks
+from limitsets.progress import GOES_ON, shown_in_notebooks
 from limitsets.proofs.query import Query
 from limitsets.robust.margins.beyond import MarginsBeyond
 from limitsets.robust.margins.deviations import DeviationScale, deviation_scale, deviation_scales, nominal_of
@@ -328,7 +328,12 @@ def robustness(
     )
     told = progress or (lambda step, done, of: None)
     sheet = _SheetRun(quiet, goals, todo, vector, checkpoint, told, seconds, executor)
-    return _filled(sheet, given, noise, law, width, cells, frozenset(leave_out), begin)
+    try:
+        return _filled(sheet, given, noise, law, width, cells, frozenset(leave_out), begin)
+    except KeyboardInterrupt as error:
+        if folder is not None:
+            error.add_note(GOES_ON)
+        raise
 
 
 def _filled(
