@@ -46,6 +46,7 @@ PACKAGE = Path(__file__).resolve().parents[1]
 KERNEL_FREE = {
     "arguments.py",
     "progress.py",
+    "proposals.py",
     "tables.py",
     "checker",
     "scene",
