@@ -262,7 +262,7 @@ def test_a_design_for_critical_points_keeps_deg_per_s():
 
 
 def test_arm_and_throw_are_tried_before_another_part():
-    """The threshold of paper-designed is 20.1837 at a surface of -0.3 in (physics of the throw): above 20, and the arm is enough."""
+    """The threshold of paper-designed is 20.1837 at a surface of -0.3 in, above the 20 of the goal."""
     tree = ls.load("paper-designed").as_dict()
     tree["arm"]["surface_height"] = "-0.3 in"
     found = design_for_goal(ls.load(tree), evaluations=96)

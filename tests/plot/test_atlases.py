@@ -198,7 +198,7 @@ def test_where_no_line_is_the_legend_says_whether_the_goal_holds():
 
 
 def test_where_no_part_gets_to_x_it_is_said():
-    """A goal of parts beyond X holds there of none: paper-designed gets to 23.3831516 on side 2 (the paper's design)."""
+    """A goal of parts beyond X holds there of none: paper-designed gets to 23.3831516 on side 2."""
     for x, words in ((23.3, False), (23.5, True)):
         tree = ls.load("paper-designed").as_dict()
         tree["goal"] = {"oriented_beyond": {"x": f"{x} in", "side": 2}}
