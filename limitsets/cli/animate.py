@@ -8,7 +8,7 @@ from typing import Annotated, Any
 import typer
 
 from limitsets.cli.arguments import place
-from limitsets.cli.output import Json, Scene, answer, option, progress
+from limitsets.cli.output import Json, Scene, answer, option, progress, stem_of
 from limitsets.errors import LimitsetsError
 
 __all__ = ["animate"]
@@ -68,7 +68,7 @@ def animate(
         from limitsets.scene import load
 
         chosen = load(scene)
-        file = Path(f"{chosen.name}.html") if out is None else out
+        file = Path(f"{stem_of(chosen)}.html") if out is None else out
         require_file(file)  # before anything is searched or proved
         begin = None if start is None else _start(chosen, start)
         if begin is not None and (tray or margin is not None or assemble is not None):

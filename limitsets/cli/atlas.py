@@ -21,6 +21,7 @@ from limitsets.cli.output import (
     progress,
     saved,
     show,
+    stem_of,
 )
 
 if TYPE_CHECKING:
@@ -71,7 +72,7 @@ def atlas(
         if task is not None:  # a file of the present folder is found, as `python -m` would find it
             sys.path.insert(0, str(Path.cwd()))
         chosen, _ = opened(scene, None)
-        store = out or Path(f"{chosen.name}-atlas.zarr")
+        store = out or Path(f"{stem_of(chosen)}-atlas.zarr")
         wanted = [name.strip() for words in variables or [] for name in words.split(",")]
         found = run(
             chosen,
@@ -89,7 +90,7 @@ def atlas(
         )
         picture = store.with_name(f"{store.name.removesuffix('.zarr')}.{form}")
         drawn = _draw(found, picture)
-        proof = Path(f"{chosen.name}-regions.proof.zip") if certify else None
+        proof = Path(f"{stem_of(chosen)}-regions.proof.zip") if certify else None
         shares = _certified(found, proof, workers, tell) if proof is not None else {}
     place = picture if drawn else None
     answer(found if json else None, json, lambda: _text(found, csv, place), csv=(csv, found.table))

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from limitsets.cli.output import saved
+from limitsets.proposals import proposed
 
 __all__ = ["certified", "said_of", "with_ending"]
 
@@ -43,4 +44,4 @@ def said_of(written: dict[str, Any], missing: str) -> str:
     if written["denied"]:
         return f"the checker denies the certificate: it is kept as {file}"
     done = "not rechecked" if seconds is None else f"rechecked in {seconds:.2g} s"
-    return f"certificate: {file}, {done} (check it: limitsets recheck {file})"
+    return f"certificate: {file}, {done} (check it: {proposed('recheck', file)})"

@@ -11,7 +11,8 @@ import typer
 
 from limitsets.cli.arguments import HELP_NO_RECHECK, deviations
 from limitsets.cli.certificates import with_ending
-from limitsets.cli.output import Csv, Json, Scene, Words, answer, option, progress, saved, table
+from limitsets.cli.output import Csv, Json, Scene, Words, answer, option, progress, saved, stem_of, table
+from limitsets.proposals import proposed
 
 if TYPE_CHECKING:
     from limitsets.proofs import Claim, Proof
@@ -58,7 +59,7 @@ def certify(
         from limitsets.scene import load
 
         chosen = load(scene)
-        file = Path(f"{chosen.name}.proof.zip") if out is None else with_ending(out)
+        file = Path(f"{stem_of(chosen)}.proof.zip") if out is None else with_ending(out)
         from limitsets.proofs import certify as run
         from limitsets.proofs.confirm import DeniedError
 
@@ -110,7 +111,7 @@ def _text(proof: Proof, file: Path | None, kept: str, seconds: float | None) -> 
     else:
         left = "" if proof.proved else ", of what is proved only"
         done = "not rechecked" if seconds is None else f"rechecked in {seconds:.2g} s"
-        typer.echo(f"certificate: {file}{left}, {done} (check it: limitsets recheck {file})")
+        typer.echo(f"certificate: {file}{left}, {done} (check it: {proposed('recheck', file)})")
 
     if not proof.proved:
         typer.echo(f"next: {after_unproved(proof)}")

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from pathlib import Path
-from shlex import quote
 from typing import TYPE_CHECKING
 
 import typer
 
 from limitsets.cli.arguments import bounds_of
 from limitsets.cli.output import answer, opened, progress, save_scene, show, show_scene
+from limitsets.proposals import proposed
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -61,7 +61,9 @@ def _text(found: GoalDesign, files: list[Path], asked: int) -> None:
     show(found.table())
     typer.echo(found.message[:1].upper() + found.message[1:] + ".")
     typer.echo(found.itself)
-    if found.evaluations < asked:
+    if found.room > 0.0 and not any(name.startswith("part.") for name in found.varied):
+        typer.echo("arm and throw are enough: the part stays as it is")
+    elif found.evaluations < asked:
         whole = asked - found.evaluations < POPULATION
         why = f"only whole generations of {POPULATION} are" if whole else "all designs came to rate alike"
         typer.echo(f"{found.evaluations} of {asked} designs were looked at: {why}")
@@ -82,6 +84,6 @@ def _text(found: GoalDesign, files: list[Path], asked: int) -> None:
     if met and found.verdict != "proved":
         file = next((str(path) for path in files if path.suffix == ".toml"), None)
         save = "" if file else "add -o design.toml to this command, then "
-        command = f"limitsets certify {quote(file or 'design.toml')}"
+        command = proposed("certify", file or "design.toml")
         typer.echo(f"next: {save}{command} (what keeps the design from a proof)")
     show_scene(found.scene, files, met=met)

@@ -130,6 +130,7 @@ def _written(found: RobustDesign, out: Path, form: str, *, recheck: bool) -> tup
 
 def _text(found: RobustDesign, files: list[Path]) -> None:
     """Print what changed, both margins, the throws, the lead weight, and the scene."""
+    from limitsets.inverse.margin.design_result import both
     from limitsets.report.tables import in_time
 
     unit, rate = found.scene.unit, found.scene.world.throw_rate
@@ -154,7 +155,14 @@ def _text(found: RobustDesign, files: list[Path]) -> None:
     asked = getattr(found.before.goal, "x", None)
     if asked is not None and asked != found.x:
         typer.echo(f"the goal's X has moved from {asked:g} to {found.x:g} {unit} (design --goal keeps it)")
-    if "center" in found.scene.text["part"]["mass"]:  # else the file has the masses
+    (fell, _), (least, _) = both(found.before_margins), both(found.margins)
+    if fell is not None and least is not None and least < fell:
+        typer.echo(
+            f"careful: what is proved fell, from {fell:.4g} to {least:.4g} times the tolerance: the design is better"
+            " by floats alone"
+        )
+    moved = any(name.startswith("part.") for name in found.varied)
+    if moved and "center" in found.scene.text["part"]["mass"]:  # else the file has the masses, or they stay
         lead = found.lead
         typer.echo(
             f"lead weight: {100 * lead.share:.1f} % of the mass at x = {lead.x:.4g}, y = {lead.y:.4g} {unit}"

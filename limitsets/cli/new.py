@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from limitsets.cli.output import Json, answer, option
+from limitsets.proposals import proposed
 
 __all__ = ["new"]
 
@@ -26,6 +27,6 @@ def new(
 
     def text() -> None:
         typer.echo(f"scene: {written}")
-        typer.echo(f"next: edit it, then limitsets check {written} and limitsets analyse {written}")
+        typer.echo(f"next: edit it, then {proposed('check', written)} and {proposed('analyse', written)}")
 
     answer({"scene": str(written)}, json, text)

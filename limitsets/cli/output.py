@@ -46,6 +46,7 @@ __all__ = [
     "saved",
     "show",
     "show_scene",
+    "stem_of",
     "table",
 ]
 
@@ -164,18 +165,13 @@ def opened(
     from limitsets.scene import load
 
     chosen = (read or load)(scene)
-    folder = out or Path(f"{chosen.name}-{word}")
+    folder = out or Path(f"{stem_of(chosen)}-{word}")
     if out or word:
         from limitsets.report.writing import require_place
 
         require_place(folder)
         _keep(folder)
-        other = _other_scene(folder, chosen)
-        if other:
-            print(
-                f"limitsets: {folder} holds the report of another scene, {other}: it is replaced",
-                file=sys.stderr,
-            )
+        _require_own(folder, chosen)
     return chosen, folder
 
 
@@ -187,15 +183,33 @@ def _keep(folder: Path) -> None:
         _LOCKED.add(place)
 
 
-def _other_scene(folder: Path, scene: SceneOf) -> str:
-    """Name the scene of a report that is in a folder already, where it is another one."""
+def stem_of(scene: SceneOf) -> str:
+    """Give what outputs of a scene are named after: its file, or its name where it is built in.
+
+    Examples
+    --------
+    >>> import limitsets as ls
+    >>> stem_of(ls.load("paper-designed"))
+    'paper-designed'
+    """
+    return Path(scene.file).stem if scene.file and scene.file.endswith(".toml") else scene.name
+
+
+def _require_own(folder: Path, scene: SceneOf) -> None:
+    """Refuse a folder with the report of another scene; say where it is that of other values of this one."""
     for file in sorted(folder.glob("*.json")):
+        found = {}
         with suppress(OSError, ValueError, TypeError, KeyError):
-            found = loads(file.read_text(encoding="utf-8"))["scene"]
-            if found != scene.as_dict():
-                name = str(found["name"])
-                return name if name != scene.name else f"{name} with other values"
-    return ""
+            found = dict(loads(file.read_text(encoding="utf-8"))["scene"])
+        if found and found.get("name") != scene.name:
+            raise LimitsetsError(
+                "the folder of the report", str(folder), f"one of {scene.name}, or a new one",
+                f"it holds that of {found.get('name')}; name another with --out, or delete it",
+            )  # fmt: skip
+        if found and found != scene.as_dict():
+            said = f"limitsets: {folder} holds the report of {scene.name} with other values: it is replaced"
+            print(said, file=sys.stderr)
+            return
 
 
 @contextmanager
@@ -270,7 +284,7 @@ def show_scene(scene: SceneOf, files: list[Path], *, met: bool = True) -> None:
     if file is not None:
         typer.echo(f"scene: {file}" + ("" if met else " (the nearest miss, no answer)"))
         return
-    typer.echo(f"scene (add -o {quote(scene.name)}.toml to save it):\n\n{dump(scene)}".rstrip("\n"))
+    typer.echo(f"scene (add -o {quote(f'{scene.name}.toml')} to save it):\n\n{dump(scene)}".rstrip("\n"))
 
 
 class _Interrupts:

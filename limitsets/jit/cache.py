@@ -47,6 +47,7 @@ KERNEL_FREE = {
     "arguments.py",
     "files.py",
     "progress.py",
+    "proposals.py",
     "tables.py",
     "checker",
     "scene",

@@ -26,6 +26,10 @@ def title_of(found: Atlas) -> str:
     return str(found.dataset.attrs.get("title", "")).removeprefix("atlas of ")
 
 
+# Hatch of points at which no part gets to the X of the goal.
+UNREACHED = "...."
+
+
 def frame(found: Atlas, tall: float = 0.0) -> tuple[Figure, Axes]:
     """Make a figure with its axes labelled, flat where one quantity varies, but at least so tall [inches]."""
     names = found.axes
@@ -122,6 +126,30 @@ def goal_line(axes: Axes, found: Atlas) -> list[Any]:
     ticked = [withTickedStroke(angle=-90, **ticks)]
     return [
         style.key("the goal fails on the side of the ticks", color=style.GOAL, lw=1.6, path_effects=ticked)
+    ]
+
+
+def unreached(axes: Axes, found: Atlas) -> list[Any]:
+    """Hatch where no part gets to the goal's X: a goal that asks of parts beyond X holds there of none.
+
+    Returns the entry of a legend.
+    """
+    data = found.dataset
+    if "threshold" not in data or "reach" not in data:
+        return []
+    from limitsets.scene import load
+
+    goal = load(data.attrs["scene"]).goal
+    reach = np.where(np.isnan(data["reach"].values), -np.inf, data["reach"].values)
+    farthest = reach.reshape(*data["threshold"].shape, -1, reach.shape[-1]).max(axis=(-2, -1))
+    none = np.isfinite(farthest) & (farthest <= goal.x)
+    if not none.any():
+        return []
+    hatched(axes, *pixels(found), np.atleast_2d(none), UNREACHED)
+    return [
+        Patch(
+            label=f"no part gets to x = {goal.x:g}", hatch=UNREACHED, fill=False, edgecolor=style.INK, lw=0.5
+        )
     ]
 
 

@@ -21,7 +21,7 @@ from scipy.ndimage import distance_transform_edt, label
 from limitsets.arguments import arguments_checked
 from limitsets.errors import AnswerError
 from limitsets.plot import style
-from limitsets.plot.atlas_frame import frame, goal_line, hatched, mark, pixels, title_of
+from limitsets.plot.atlas_frame import frame, goal_line, hatched, mark, pixels, title_of, unreached
 from limitsets.sweep.classes import (
     UNDECIDED,
     AttractorKind,
@@ -140,7 +140,7 @@ def atlas(found: Atlas) -> Figure:
         axes.set_yticks([])
     rows = np.atleast_2d(numbers)
     _paint(axes, found, rows, looks)
-    goal = goal_line(axes, found)
+    goal = goal_line(axes, found) + unreached(axes, found)
     for k, each in enumerate(lines):
         _label(axes, found, rows == each.number, str(k + 1))
     handles = [

@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from pathlib import Path
-from shlex import quote
 from typing import TYPE_CHECKING
 
 from limitsets import plot
 from limitsets.files import as_json
+from limitsets.proposals import proposed
 from limitsets.report.pages import words
 from limitsets.report.tables import percent
 from limitsets.report.writing import laid
@@ -117,7 +117,7 @@ def audit_line(found: Audit, file: str) -> str:
         if broken
         else "no assumption is seen to break on the limit set"
     )
-    return f"audit: {said}; limitsets audit {quote(file)}"
+    return f"audit: {said}; {proposed('audit', file)}"
 
 
 def audit_page(found: Audit, figures: Mapping[str, str] | None = None) -> str:

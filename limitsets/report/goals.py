@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
-import shlex
 from typing import TYPE_CHECKING
 
+from limitsets.errors import AnswerError
 from limitsets.goals import Goal, OrientedBeyond, Reaches, StaysOnArm, unknown_goal
+from limitsets.proofs.simulated import simulated
+from limitsets.proposals import proposed
 from limitsets.report.tables import percent
 
 if TYPE_CHECKING:
@@ -102,29 +104,38 @@ def next_command(analysis: Analysis) -> str:
     assert outcome is not None
     if analysis.choice.tipping:  # which no other command switches on
         lines = " and ".join(f"{effect} = true" for effect in analysis.choice.tipping)
-        return (
-            f"write {lines} under [effects] of {source}; limitsets check {source} says whether it is in order"
-        )
+        return f"write {lines} under [effects] of {source}; {proposed('check', source)} says whether it is in order"
+    audited = f"{proposed('audit', source)} (which assumptions it breaks)"
+    if not can_be_proved(scene):
+        return audited
     if outcome.holds and not outcome.goal.from_anywhere and any(analysis.basins.exits.values()):
-        return (
-            f"limitsets certify {source} (a proof for the starts that stay; a margin is there where all do)"
-        )
+        return f"{proposed('certify', source)} (a proof for the starts that stay; a margin is there where all do)"
     if outcome.holds and not outcome.vacuous:
-        return f"limitsets certify {source} (a proof), limitsets margin {source} (how much each quantity may deviate)"
+        proof, margins = proposed("certify", source), proposed("margin", source)
+        return f"{proof} (a proof), {margins} (how much each quantity may deviate)"
     if outcome.holds is None and not analysis.attractors and (speeds := _speeds(scene)):
-        return f"limitsets atlas {source} {speeds} (at which speeds of the throw parts stay)"
+        return f"{proposed('atlas', source, *speeds)} (at which speeds of the throw parts stay)"
     if outcome.holds is None:
-        return f"limitsets certify {source} (whether it can be proved)"
-    return design_command(scene, [outcome.goal]) or f"limitsets audit {source} (which assumptions it breaks)"
+        return f"{proposed('certify', source)} (whether it can be proved)"
+    return design_command(scene, [outcome.goal]) or audited
 
 
-def _speeds(scene: Scene) -> str:
+def can_be_proved(scene: Scene) -> bool:
+    """Whether there are proofs about a scene: not with effects that nothing encloses."""
+    try:
+        simulated(scene)
+    except AnswerError:
+        return False
+    return True
+
+
+def _speeds(scene: Scene) -> tuple[str, ...]:
     """Write an axis of an atlas from half to twice the speed that a scene gives; empty where it gives none."""
     given = scene.text["throw"].get("speed")
     if given is None:
-        return ""
+        return ()
     value = float(given.split()[0])
-    return f"--x throw.speed={0.5 * value:g}:{2.0 * value:g}:100"
+    return "--x", f"throw.speed={0.5 * value:g}:{2.0 * value:g}:100"
 
 
 def after_undecided(analysis: Analysis) -> str:
@@ -140,7 +151,7 @@ def after_undecided(analysis: Analysis) -> str:
     creeping = analysis.scene.surface_height > 0.0  # to the joint, for ever
     if analysis.basins.undecided_between == 0.0 or cells > MOST_CELLS or creeping:
         return ""
-    return f"limitsets analyse {_source(analysis.scene)} --cells {cells} (finer cells)"
+    return f"{proposed('analyse', _source(analysis.scene), '--cells', cells)} (finer cells)"
 
 
 def after_unproved(proof: Proof) -> str:
@@ -148,17 +159,19 @@ def after_unproved(proof: Proof) -> str:
     scene, goal = proof.scene, proof.scene.goal
     refuted = any(claim.claim == "goal" and claim.verdict == "refuted" for claim in proof.claims)
     if proof.noise or proof.tolerance:
-        return f"limitsets margin {_source(scene)} (how much each quantity may deviate)"
+        return f"{proposed('margin', _source(scene))} (how much each quantity may deviate)"
     if refuted and goal is not None and (design := design_command(scene, [goal])):
         return design
     source = _source(scene)
-    return f"limitsets analyse {source} (what sampled throws say), limitsets audit {source} (what the model leaves out)"
+    sampled, audited = proposed("analyse", source), proposed("audit", source)
+    return f"{sampled} (what sampled throws say), {audited} (what the model leaves out)"
 
 
 def without_margin(scene: Scene, goals: Sequence[Goal], *, fails: bool) -> str:
     """Name the command that goes on from a scene without margins: its goal fails, or is not proved of it."""
-    starts = f"limitsets analyse {_source(scene)} (which starts leave the arm: margins need a scene in which none does)"
-    certify = f"limitsets certify {_source(scene)} (what is proved of it, and what is not), {starts}"
+    analysed = proposed("analyse", _source(scene))
+    starts = f"{analysed} (which starts leave the arm: margins need a scene in which none does)"
+    certify = f"{proposed('certify', _source(scene))} (what is proved of it, and what is not), {starts}"
     return (design_command(scene, goals) if fails else "") or certify
 
 
@@ -167,11 +180,11 @@ def design_command(scene: Scene, goals: Sequence[Goal]) -> str:
     if scene.effects.on() or not any(isinstance(goal, OrientedBeyond | Reaches) for goal in goals):
         return ""
     words = "a scene that meets it: centre of mass, throw and surface moved"
-    return f"limitsets design {_source(scene)} --goal ({words})"
+    return f"{proposed('design', _source(scene), '--goal')} ({words})"
 
 
 def _source(scene: Scene) -> str:
-    return shlex.quote(scene.file or f"{scene.name}.toml")
+    return scene.file or f"{scene.name}.toml"
 
 
 def void_of(outcome: GoalOutcome, unit: str) -> str:

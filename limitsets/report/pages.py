@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 from limitsets.analysis import in_limit_sets
 from limitsets.goals import order_of
+from limitsets.proposals import proposed
 from limitsets.report.goals import goal_sentence, next_command, verdict_of, void_of
 from limitsets.report.tables import bands, count, intervals, percent, table
 
@@ -51,6 +52,7 @@ def environment() -> Environment:
     found.globals |= {
         "next_command": next_command,
         "order_of": order_of,
+        "proposed": proposed,
         "question_of": goal_sentence,
         "table": table,
         "verdict_of": verdict_of,

@@ -99,6 +99,7 @@ def robustness_page(found: Robustness, figures: Mapping[str, str]) -> str:
             numbers=noise and _numbers(noise, len(found.scene.sides), found.scene.world.throw_rate),
             changes=noise and _changes(noise),
             files=list(dict.fromkeys(proofs)),
+            proved_some=any(entry.holds for entry in found.entries),
         )
         + "\n"
     )

@@ -89,14 +89,37 @@ def test_a_map_in_the_place_of_a_scene_is_named(ask):
 
 
 @pytest.mark.sweep
-def test_a_report_of_another_scene_is_not_replaced_without_a_word(capfd):
+def test_a_report_of_another_scene_is_not_replaced(capfd):
     words = ("--cells", "64", "-o", "reports")
     _, _, err = run(capfd, "analyse", "paper-designed", *words)
     assert "replaced" not in err
     _, _, err = run(capfd, "analyse", "paper-designed", *words)
     assert "replaced" not in err
-    _, _, err = run(capfd, "analyse", "paper-initial", *words)
-    assert "reports holds the report of another scene, paper-designed: it is replaced" in err
+    status, _, err = run(capfd, "analyse", "paper-initial", *words)
+    assert status == 2
+    assert "it holds that of paper-designed; name another with --out, or delete it" in err
+    Path("mine.toml").write_text(ls.dump(ls.load(own(arm={"surface_height": "-0.19 in", "length": "28 in"}))))
+    _, _, err = run(capfd, "analyse", "mine.toml", *words)
+    assert "reports holds the report of paper-designed with other values: it is replaced" in err
+
+
+def test_outputs_bear_the_name_of_the_file(capfd):
+    """Two files may hold scenes of one name."""
+    Path("mine.toml").write_text(ls.dump(ls.load("paper-designed")))
+    assert run(capfd, "certify", "mine.toml", "--no-recheck")[0] == 0
+    assert [file.name for file in Path().glob("*.proof.zip")] == ["mine.proof.zip"]
+
+
+def test_a_scene_that_certify_refuses_is_not_proposed_to_it(capfd):
+    """The effect slip has no enclosure."""
+    given = own(world={"friction": 0.9}, effects={"slip": True})
+    Path("my part.toml").write_text(ls.dump(ls.load(given)))
+    assert run(capfd, "certify", "my part.toml")[0] == 2
+    status, out, _ = run(capfd, "analyse", "my part.toml", "--cells", "128", "-o", "out")
+    assert status == 0
+    assert "limitsets certify" not in out
+    assert "limitsets audit 'my part.toml'" in out
+    assert "limitsets certify" not in Path("out/report.md").read_text()
 
 
 @pytest.mark.sweep

@@ -259,3 +259,14 @@ def test_a_design_for_critical_points_keeps_deg_per_s():
     assert found.reached
     first = [points[0].x for points in ls.critical_points(found.scene.map, found.scene.domain).values()]
     assert first == pytest.approx([10, 10, 20], abs=1e-8)
+
+
+def test_arm_and_throw_are_tried_before_another_part():
+    """The threshold of paper-designed is 20.1837 at a surface of -0.3 in, above the 20 of the goal."""
+    tree = ls.load("paper-designed").as_dict()
+    tree["arm"]["surface_height"] = "-0.3 in"
+    found = design_for_goal(ls.load(tree), evaluations=96)
+    assert found.room_before == pytest.approx(20.0 - 20.1837, abs=1e-3)
+    assert found.verdict == "proved"
+    assert set(found.varied) == {"throw.kappa", "arm.surface_height"}
+    assert found.scene.text["part"] == found.before.text["part"]

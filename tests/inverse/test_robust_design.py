@@ -285,3 +285,17 @@ def test_the_usual_bounds_are_in_the_scenes_unit():
     cm = ls.load(tree)
     for name, (lo, hi) in bounds_of(inches).items():
         assert bounds_of(cm)[name] == pytest.approx((2.54 * lo, 2.54 * hi), rel=1e-12)
+
+
+def test_what_belongs_to_x_moves_with_it():
+    """The cavity stayed where it was, so that nothing was fed by the design."""
+    given = ls.load("paper-designed").as_dict()
+    given["cavity"] = {"position": "20 in", "width": "9 in", "depth": "5 in", "angle": "30 deg"}
+    given["feedback"] = {"sensor": {"beyond": "20 in"}, "throws": [{"name": "slow", "speed": "150 deg/s"}]}
+    given["throw"] = {"speed": "158.02 deg/s"}
+    given["gravity"] = {"acceleration": "193.045 in/s^2"}
+    found = robust_design(ls.load(given), vary=["throw.speed"], evaluations=4, orders=False, prove=0.0)
+    text = found.scene.as_dict()
+    place = text["goal"]["oriented_beyond"]["x"]
+    assert float(place.split()[0]) == found.x != 20.0
+    assert text["cavity"]["position"] == text["feedback"]["sensor"]["beyond"] == place

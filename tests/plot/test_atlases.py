@@ -197,6 +197,16 @@ def test_where_no_line_is_the_legend_says_whether_the_goal_holds():
         assert f"the goal {word} wherever there is a limit set" in texts
 
 
+def test_where_no_part_gets_to_x_it_is_said():
+    """A goal of parts beyond X holds there of none: paper-designed gets to 23.3831516 on side 2."""
+    for x, words in ((23.3, False), (23.5, True)):
+        tree = ls.load("paper-designed").as_dict()
+        tree["goal"] = {"oriented_beyond": {"x": f"{x} in", "side": 2}}
+        found = ls.atlas(ls.load(tree), "throw.kappa=25.3778518:25.3778519:2")
+        texts = [text.get_text() for text in ls.plot.atlas(found).legends[0].get_texts()]
+        assert (f"no part gets to x = {x}" in texts) == words
+
+
 @pytest.mark.parametrize(
     ("one", "other"),
     [

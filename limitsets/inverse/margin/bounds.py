@@ -10,7 +10,7 @@ from limitsets.errors import AnswerError
 from limitsets.scene import Scene
 from limitsets.scene.quantities import find
 
-__all__ = ["Ends", "bounds_of"]
+__all__ = ["Ends", "bounds_of", "of_the_arm"]
 
 Ends = tuple[float | None, float | None]
 """Lowest and highest [scene's units]; None for the usual one."""
@@ -65,9 +65,13 @@ def bounds_of(
     return found
 
 
+def of_the_arm(scene: Scene) -> list[str]:
+    """Name what is changed without another part: the throw, as the scene gives it, and the surface's height."""
+    return ["throw.speed" if "speed" in scene.text["throw"] else "throw.kappa", "arm.surface_height"]
+
+
 def _usual(scene: Scene) -> list[str]:
     mass: Mapping[str, Any] = scene.text["part"]["mass"]
-    throw = "throw.speed" if "speed" in scene.text["throw"] else "throw.kappa"
     if "center" in mass:
         own = [f"part.mass.{word}" for word in ("center.along", "center.above", "radius_of_gyration")]
     else:
@@ -76,7 +80,7 @@ def _usual(scene: Scene) -> list[str]:
             for k in range(len(mass.get("points", ())))
             for word in ("x", "y", "mass")
         ]
-    return [*own, throw, "arm.surface_height"]
+    return [*own, *of_the_arm(scene)]
 
 
 def _own(scene: Scene, name: str) -> tuple[float, float]:

@@ -21,7 +21,7 @@ import numpy as np
 from limitsets.errors import AnswerError, SceneError
 from limitsets.files import as_table, picked
 from limitsets.goals import OrientedBeyond, Reaches
-from limitsets.inverse.margin.bounds import Ends, bounds_of
+from limitsets.inverse.margin.bounds import Ends, bounds_of, of_the_arm
 from limitsets.inverse.margin.model_validity import validity_slack
 from limitsets.inverse.margin.search import ASSUMPTION, LEAVES, LOST, NO_PART, Tell, said
 from limitsets.maps import advance
@@ -39,6 +39,9 @@ SHORT = "do not reach X on the wanted side"
 
 # Starts that are sampled where parts leave, and throws of each.
 STARTS, THROWS = 2000, 2000
+
+# Share of the designs, one in so many, for arm and throw alone.
+ALONE = 2
 
 # Designs of a population, and decimals of what is found.
 POPULATION, DECIMALS = 24, 4
@@ -196,6 +199,23 @@ class _GoalSearch:
         except SceneError:
             return None
 
+    def run(self, bounds: Mapping[str, tuple[float, float]], evaluations: int, seed: int) -> None:
+        """Look at so many designs between bounds, the best one so far among the first."""
+        from scipy.optimize import differential_evolution
+
+        self.bounds = dict(bounds)
+        population = np.random.default_rng(seed).random((min(POPULATION, max(evaluations, 5)), len(bounds)))
+        population[0] = [_share(self.best[2].value(name), *pair) for name, pair in bounds.items()]
+        differential_evolution(
+            self.cost,
+            [(0.0, 1.0)] * len(bounds),
+            init=population,
+            maxiter=max(evaluations // len(population) - 1, 0),
+            polish=False,
+            tol=0.0,
+            seed=seed,
+        )
+
     def cost(self, shares: Sequence[float]) -> float:
         """Rate unknowns, the less the better."""
         self.tell("designs", min(self.evaluations, self.of), self.of)
@@ -225,7 +245,7 @@ def design_for_goal(
     scene : Scene, str or Path
         Where to begin, in the minimal model, with a goal `oriented_beyond` or `reaches`.
     vary : sequence of str, optional
-        Quantities to vary; default the throw, the mass and the surface's height, as the scene gives them.
+        Quantities to vary; default the throw and the surface's height, and where these do not meet the goal the mass.
     bounds : mapping of str to (float or None, float or None), optional
         Bounds of some of them [scene's units]; what is left out has usual ones, which hold the scene's own value.
     evaluations : int
@@ -251,8 +271,6 @@ def design_for_goal(
     >>> found.verdict, found.scene.goal == found.before.goal
     ('proved', True)
     """
-    from scipy.optimize import differential_evolution
-
     begin, start = time.perf_counter(), load(scene)
     if not isinstance(start.goal, OrientedBeyond | Reaches):
         kind = None if start.goal is None else start.goal.kind
@@ -265,23 +283,15 @@ def design_for_goal(
         raise AnswerError("the scene", "with effects on", "the minimal model", "switch its effects off")
     if evaluations < 1:
         raise AnswerError("the evaluations", evaluations, "1 or more", "allow for some designs")
-    ends = bounds_of(start, vary, bounds)
-    search = _GoalSearch(start, ends, progress or (lambda what, done, of: None), evaluations)
+    search = _GoalSearch(start, {}, progress or (lambda what, done, of: None), evaluations)
     rating, room_before, why = search.rated(start)
     search.best = rating, room_before, start
-    random = np.random.default_rng(seed)
-    population = random.random((min(POPULATION, max(evaluations, 5)), len(ends)))
-    population[0] = [_share(start.value(name), *pair) for name, pair in ends.items()]
-    differential_evolution(
-        search.cost,
-        [(0.0, 1.0)] * len(ends),
-        init=population,
-        maxiter=max(evaluations // len(population) - 1, 0),
-        polish=False,
-        tol=0.0,
-        seed=seed,
-    )
-    _, room, made = search.best
+    # arm and throw are set in minutes, another part is made: it varies only where they do not meet the goal
+    if vary is None and bounds is None:
+        search.run(bounds_of(start, of_the_arm(start)), evaluations // ALONE, seed)
+    if vary is not None or bounds is not None or search.rated(search.best[2])[2]:
+        search.run(bounds_of(start, vary, bounds), evaluations - search.evaluations, seed)
+    ends, (_, room, made) = search.bounds, search.best
     name = start.name if start.name.endswith("-design") else f"{start.name}-design"
     found = load(made.as_dict() | {"name": name})
     asked = (

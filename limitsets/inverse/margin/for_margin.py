@@ -149,7 +149,14 @@ def _rounded(scene: Scene, search: DesignSearch) -> Scene:
 def _with_purpose(scene: Scene, x: float, side: int, tolerance: Mapping[str, str], name: str) -> Scene:
     tree = copy.deepcopy(scene.as_dict())
     tree["name"] = name
-    tree["goal"] = {"oriented_beyond": {"x": f"{x:.{DECIMALS_OF_X}f} {scene.unit}", "side": side}}
+    place = f"{x:.{DECIMALS_OF_X}f} {scene.unit}"
+    tree["goal"] = {"oriented_beyond": {"x": place, "side": side}}
+    # the cavity and the sensor belong to the place where parts are wanted
+    if "cavity" in tree:
+        tree["cavity"]["position"] = place
+    sensor = tree.get("feedback", {}).get("sensor", {})
+    if "beyond" in sensor:
+        sensor["beyond"] = place
     tree["tolerance"] = {name: text for name, text in tolerance.items() if name != "landing.x"}
     return load(tree)
 
