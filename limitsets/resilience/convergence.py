@@ -1,8 +1,8 @@
 """Convergence times: steps until an orbit is in the attracting cells, or has left.
 
-Sampled on random starts, whose orbits may leave the domain and come back; and, where the images of cells are enclosed, bounded for every start of the inner basin by the
-rank of its cell, the longest path to the attracting cells or out of the domain, with the longest stays in the recurrent
-components on the way, each of which an orbit passes once.
+Sampled on random starts, whose orbits may leave the domain and come back; and, where the images of cells are enclosed,
+bounded for every start of the inner basin by the rank of its cell, the longest path to the attracting cells or out of
+the domain, with the longest stays in the recurrent components on the way, each of which an orbit passes once.
 
 Source: Datseris, Rossi, Wagemakers, "Framework for global stability analysis of dynamical systems", Chaos 33, 073151,
 2023; ranks: docs/certificates.md.

@@ -319,11 +319,10 @@ def _sampled(parted: Colours, box: int, starts: int, steps: int, seed: int) -> t
     label = np.concatenate(
         [labelled_lattice(parted, side, axes, each, steps, rng) for side, axes in enumerate(begins)]
     )
-    lattices = [label]
-    for phase in product(range(2), repeat=grid.dimension):
-        lattices.append(label[(slice(None), *(slice(first, None, 2) for first in phase))])
+    phases = product(range(2), repeat=grid.dimension)
+    every_second = (label[(slice(None), *(slice(first, None, 2) for first in phase))] for phase in phases)
     counts = []
-    for some in lattices:
+    for some in (label, *every_second):
         flat = some.reshape(boxes, -1)
         counts.append(np.stack([(flat == code).sum(axis=1) for code in (*parted.codes, codes.UNDECIDED)]))
     return [count.astype(np.float64) for count in counts], each
@@ -338,7 +337,7 @@ def _of_starts(parted: Colours, box: int, counts: Floats) -> _Boxes:
 
 
 def _deviation(counts: Floats, weight: Floats) -> float:
-    """Standard deviation of the mean over boxes, of one start in each."""
+    """Give the standard deviation of the mean over boxes, of one start in each."""
     decided = counts[:-1]
     with np.errstate(divide="ignore", invalid="ignore"):
         p = decided / decided.sum(axis=0)

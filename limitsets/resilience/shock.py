@@ -125,7 +125,8 @@ def minimal_fatal_shock(
     Raises
     ------
     AnswerError
-        For attractors of another graph, a state outside the domain or undecided, or a number of starts or steps below 1.
+        For attractors of another graph, a state outside the domain or undecided, or a number of starts or steps below
+        1.
 
     Notes
     -----

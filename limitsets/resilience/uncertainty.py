@@ -4,11 +4,11 @@ f(e) is the share of the starts that come to another basin than one of the two s
 the uncertainty exponent a = d - D in d dimensions, D being the box-counting dimension of the boundary.  A straight
 boundary gives a = 1.  Where a = 0.3 an error of the start that is ten times smaller halves the uncertain starts.
 
-One start is drawn in each cell, so that starts of one row differ in one coordinate only, and compared over whole cells;
-or as many random starts as are asked for, with neighbours as near as a ten thousandth of a cell.  Far apart, f no longer
-grows: three independent starts differ with the probability 1 - sum p_j^3, p_j being the shares of the basins.  The fit
-takes the distances at which f is at most a third of this.  Its error holds how far the slopes of their nearer and farther
-half differ, since the range is a choice.
+One start is drawn in each cell, so that starts of one row differ in one coordinate only, and compared over whole
+cells; or as many random starts as are asked for, with neighbours as near as a ten thousandth of a cell.  Far apart, f
+no longer grows: three independent starts differ with the probability 1 - sum p_j^3, p_j being the shares of the basins.
+The fit takes the distances at which f is at most a third of this.  Its error holds half the difference between the
+slopes of their nearer and farther half, since the range is a choice.
 
 Source: Grebogi, McDonald, Ott, Yorke, "Final state sensitivity: an obstruction to predictability", Physics Letters A
 99, 1983; "Fractal basin boundaries", Physica D 17, 1985.
@@ -76,7 +76,8 @@ class UncertaintyExponent(Tabled):
         Whether orbits that cross the border of the domain were given up there, in the exit: with `starts` they may
         come back.
     how : str
-        "sampled": orbits of one start in each cell, followed until the basin of their cell is decided; of random starts.
+        "sampled": orbits of one start in each cell, followed until the basin of their cell is decided; or of random
+        starts.
     """
 
     exponent: float
@@ -151,7 +152,8 @@ def uncertainty_exponent(
     Raises
     ------
     AnswerError
-        For attractors of another graph, fewer than 40 cells along an axis, or a number of starts or steps below 1.
+        For attractors of another graph, fewer than 40 cells along an axis, fewer starts than 20 for each distance, or
+        a number of steps below 1.
 
     Notes
     -----
@@ -212,9 +214,12 @@ def _sampled(
     """
     grid = parted.grid
     count = round(IN_A_DECADE * np.log10(farthest / NEAREST)) + 1
+    if starts < count * FEWEST_UNCERTAIN:
+        fewest = f"an integer from {count * FEWEST_UNCERTAIN}, for {count} distances"
+        raise AnswerError("the number of starts", starts, fewest, "pass starts=100000")
     apart, shares, uncertain, labels = np.geomspace(farthest, NEAREST, count), [], [], []
     for distance in apart:
-        cell, (x, side) = random_cells(grid, max(starts // count, 1), rng)
+        cell, (x, side) = random_cells(grid, starts // count, rng)
         axis, row = rng.integers(grid.dimension, size=side.size), np.arange(side.size)
         width = np.empty_like(x)
         for s in np.unique(side).tolist():

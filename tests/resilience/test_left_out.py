@@ -138,10 +138,10 @@ def test_orbits_of_starts_come_back():
     assert times.attractors[0].longest == 2
     assert times.exits["outside"].longest == 1
     assert times.exits["outside"].starts == pytest.approx(8000 / 3, abs=200)
-    # the only boundary is at 2, in a third of the seventh of ten boxes; cells see one at 1, too
+    # the only boundary is at 2, in a third of the seventh of ten boxes; cells see the one at 1 in the fourth
     whole, cut = (ROOM.basin_entropy(graph, attractors, box=30, starts=each) for each in (6000, None))
     assert whole.value == pytest.approx((math.log(3.0) - 2.0 / 3.0 * LN2) / 10.0, abs=1e-3)
-    assert cut.value == pytest.approx(2.0 * whole.value, abs=0.01)
+    assert cut.value == pytest.approx(whole.value, abs=0.005)
     assert (whole.cut, cut.cut) == (False, True)
     met = ROOM.wada(graph, attractors, starts=3000)
     assert met.of <= 3
@@ -151,8 +151,11 @@ def test_orbits_of_starts_come_back():
 def test_a_map_that_keeps_to_its_domain_is_not_cut_off(method):
     assert not ROOM.basin_stability(*setting(CUBIC, [(-1.2, 1.2)], 400, method)).cut
     assert ROOM.basin_stability(*setting(CUBIC, [(-2.0, 2.0)], 400, method)).cut
+
+
+def test_the_arm_ends_where_its_domain_does():
     scene = ls.load("paper-designed")
-    assert not ROOM.basin_stability(*setting(scene.map, scene.domain, 512, method)).cut
+    assert not ROOM.basin_stability(*setting(scene.map, scene.domain, 512)).cut
 
 
 def test_starts_of_ikeda_come_back_to_the_fixed_point():
