@@ -7,7 +7,7 @@ boundary gives a = 1.  Where a = 0.3 an error of the start that is ten times sma
 One start is drawn in each cell, so that starts of one row differ in one coordinate only, and compared over whole
 cells; or as many random starts as are asked for, with neighbours as near as a ten thousandth of a cell.  Far apart, f
 no longer grows: three independent starts differ with the probability 1 - sum p_j^3, p_j being the shares of the basins.
-The fit takes the distances at which f is at most a third of this.  Its error holds half the difference between the
+The fit takes the distances at which f is at most half of this.  Its error holds the difference between the
 slopes of their nearer and farther half, since the range is a choice.
 
 Source: Grebogi, McDonald, Ott, Yorke, "Final state sensitivity: an obstruction to predictability", Physics Letters A
@@ -42,7 +42,7 @@ FARTHEST, DISTANCES, PARTS = 100, 13, 4
 NEAREST, IN_A_DECADE, FEWEST_UNCERTAIN = 1e-4, 4, 20
 
 # The fit takes shares up to this part of that of independent starts, at so many distances at least.
-UNSATURATED, FEWEST_FITTED = 1.0 / 3.0, 4
+UNSATURATED, FEWEST_FITTED = 0.5, 4
 
 # Fewer cells along an axis than this do not give one decade.
 FEWEST = 40
@@ -286,7 +286,7 @@ def _fit(
     nearer, farther = (
         _line(x[part], y[part], variance[part])[0] for part in (slice(half + 1), slice(half, None))
     )
-    return slope, float(np.hypot(stdtrit(x.size - 2, 0.975) * random, 0.5 * (farther - nearer)))
+    return slope, float(np.hypot(stdtrit(x.size - 2, 0.975) * random, farther - nearer))
 
 
 def _line(
