@@ -23,20 +23,18 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from itertools import product
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from limitsets.arguments import arguments_checked
-from limitsets.cells import Grid
 from limitsets.errors import AnswerError
 from limitsets.files import as_table, picked
 from limitsets.graph import TransitionGraph
-from limitsets.maps import codes
-from limitsets.resilience.colours import ROUNDING, Colours, best, colours, told
-from limitsets.resilience.orbits import STEPS, labelled_lattice, leaves_by_the_border
+from limitsets.resilience.boxes import Boxes, counted_starts, of_cells, of_starts
+from limitsets.resilience.colours import ROUNDING, best, colours, told
+from limitsets.resilience.orbits import STEPS, leaves_by_the_border
 from limitsets.sets import Attractor
 from limitsets.tables import Column, Table, Tabled, how_found
 
@@ -46,9 +44,6 @@ Floats = NDArray[np.float64]
 
 # Cells along each side of a box.
 BOX = 20
-
-# Fewest starts along each axis of a box: every second of them gives two.
-ALONG = 4
 
 
 @dataclass(frozen=True)
@@ -106,18 +101,6 @@ class BasinEntropy(Tabled):
         return as_table(
             **picked(self, "value", "lo", "hi", "how", "boxes", "box", "undecided", "starts", "cut")
         )
-
-
-@dataclass(frozen=True, eq=False)
-class _Boxes:
-    """Per box: its measure, basins met for certain, entropies (nan where all is undecided), their bracket."""
-
-    weight: Floats
-    met: NDArray[np.int64]
-    value: Floats
-    lo: Floats
-    hi: Floats
-    undecided: float
 
 
 @arguments_checked
@@ -218,7 +201,7 @@ def boundary_basin_entropy(
     return _measured(_of_boundary, graph, found, box, starts, steps, seed)
 
 
-def _of_all(each: _Boxes) -> tuple[Floats, float, float, float]:
+def _of_all(each: Boxes) -> tuple[Floats, float, float, float]:
     """Weights of the boxes that count, the mean over them, its bracket."""
     weight = np.where(np.isfinite(each.value), each.weight, 0.0)
     total = each.weight.sum()
@@ -226,7 +209,7 @@ def _of_all(each: _Boxes) -> tuple[Floats, float, float, float]:
     return weight, _mean(each.value, weight), lo, hi
 
 
-def _of_boundary(each: _Boxes) -> tuple[Floats, float, float, float]:
+def _of_boundary(each: Boxes) -> tuple[Floats, float, float, float]:
     """Weights of the boxes that meet two basins, the mean over them, its bracket."""
     sure = each.met > 1
     maybe = ~sure & (each.hi > 0.0)
@@ -242,7 +225,7 @@ def _of_boundary(each: _Boxes) -> tuple[Floats, float, float, float]:
 
 
 def _measured(
-    measure: Callable[[_Boxes], tuple[Floats, float, float, float]],
+    measure: Callable[[Boxes], tuple[Floats, float, float, float]],
     graph: TransitionGraph,
     found: tuple[Attractor, ...],
     box: int,
@@ -255,14 +238,14 @@ def _measured(
         raise AnswerError("the cells along a box", box, f"an integer from 2 to {most}", "pass box=20")
     parted, followed = colours(graph, found), None
     if starts is None:
-        each = _of_cells(parted, box)
+        each = of_cells(parted, box)
         weight, value, lo, hi = measure(each)
     else:
-        mass, size = _sampled(parted, box, starts, steps, seed)
+        mass, size = counted_starts(parted, box, starts, steps, seed)
         followed = mass[0].shape[1] * size**graph.grid.dimension
-        each = _of_starts(parted, box, mass[0])
+        each = of_starts(parted, box, mass[0])
         weight, value, lo, hi = measure(each)
-        coarse = [measure(_of_starts(parted, box, some)) for some in mass[1:]]
+        coarse = [measure(of_starts(parted, box, some)) for some in mass[1:]]
         gap = value - float(np.mean([np.nan_to_num(each_value) for _, each_value, *_ in coarse]))
         spread = 2.0 * _deviation(mass[0], weight) / np.sqrt(size)
         # boxes that half the starts do not see to count: as many again, and two deviations more, may count unseen
@@ -283,59 +266,6 @@ def _mean(values: Floats, weights: Floats) -> float:
     return float((values * weights)[some].sum() / weights.sum()) if some.any() else np.nan
 
 
-def _of_cells(parted: Colours, box: int) -> _Boxes:
-    grid = parted.grid
-    parts = [
-        _gathered(grid, np.where(parted.labels == code, grid.measure, 0.0), box) for code in parted.codes
-    ]
-    mass = np.stack([*parts, np.zeros_like(parts[0])])  # last, elsewhere
-    open_to, left = np.zeros(mass.shape, dtype=bool), np.zeros(grid.n_cells)
-    for number, some in enumerate(parted.possible):
-        left[:] = 0.0
-        left[parted.undecided] = some
-        open_to[number] = _gathered(grid, left, box) > 0.0
-    left[:] = 0.0
-    left[parted.undecided] = grid.measure[parted.undecided]
-    weight, rest = _gathered(grid, grid.measure, box), _gathered(grid, left, box)
-    return _bracketed(weight, mass, open_to, rest, parted.basins.undecided_between)
-
-
-def _sampled(parted: Colours, box: int, starts: int, steps: int, seed: int) -> tuple[list[Floats], int]:
-    """Count the starts of each basin in each box, undecided last; of all, then of every second along each axis."""
-    grid, rng = parted.grid, np.random.default_rng(seed)
-    begins = [
-        [np.append(_begins(int(n), box), int(n)) for n in grid.shape[side]] for side in range(grid.sides)
-    ]
-    boxes = sum(int(np.prod([begin.size - 1 for begin in axes])) for axes in begins)
-    each = int((starts / boxes) ** (1.0 / grid.dimension) + 1e-9)
-    if each < ALONG:
-        fewest = boxes * ALONG**grid.dimension
-        raise AnswerError(
-            "the number of starts",
-            starts,
-            f"an integer from {fewest}, {ALONG} along each axis of {boxes} boxes",
-            f"pass starts={fewest}, or larger boxes",
-        )
-    label = np.concatenate(
-        [labelled_lattice(parted, side, axes, each, steps, rng) for side, axes in enumerate(begins)]
-    )
-    phases = product(range(2), repeat=grid.dimension)
-    every_second = (label[(slice(None), *(slice(first, None, 2) for first in phase))] for phase in phases)
-    counts = []
-    for some in (label, *every_second):
-        flat = some.reshape(boxes, -1)
-        counts.append(np.stack([(flat == code).sum(axis=1) for code in (*parted.codes, codes.UNDECIDED)]))
-    return [count.astype(np.float64) for count in counts], each
-
-
-def _of_starts(parted: Colours, box: int, counts: Floats) -> _Boxes:
-    weight = _gathered(parted.grid, parted.grid.measure, box)
-    mass, rest = np.vstack([counts[:-1], np.zeros_like(counts[-1:])]), counts[-1]
-    open_to = np.ones(mass.shape, dtype=bool)
-    undecided = float((rest / counts.sum(axis=0) * weight).sum() / weight.sum())
-    return _bracketed(weight, mass, open_to, rest, undecided)
-
-
 def _deviation(counts: Floats, weight: Floats) -> float:
     """Give the standard deviation of the mean over boxes, of one start in each."""
     decided = counts[:-1]
@@ -345,62 +275,3 @@ def _deviation(counts: Floats, weight: Floats) -> float:
         variance = (p * word**2).sum(axis=0) - (p * word).sum(axis=0) ** 2
     total = weight.sum()
     return float(np.sqrt(np.nansum(weight**2 * variance)) / total) if total else 0.0
-
-
-def _bracketed(
-    weight: Floats, mass: Floats, open_to: NDArray[np.bool_], rest: Floats, undecided: float
-) -> _Boxes:
-    value = _entropy(mass)
-    value[mass.sum(axis=0) == 0.0] = np.nan
-    lo, hi = value.copy(), value.copy()
-    some = rest > 0.0
-    lo[some], hi[some] = (
-        _least(mass[:, some], open_to[:, some], rest[some]),
-        _largest(mass[:, some], open_to[:, some], rest[some]),
-    )
-    return _Boxes(weight, (mass > 0.0).sum(axis=0), value, lo, hi, undecided)
-
-
-def _begins(cells: int, box: int) -> NDArray[np.int64]:
-    """Cells along an axis in which boxes begin."""
-    count = max(1, round(cells / box))
-    return np.arange(count) * cells // count
-
-
-def _gathered(grid: Grid, values: Floats, box: int) -> Floats:
-    """Sum values of cells over boxes, side after side."""
-    parts = []
-    for side in range(grid.sides):
-        shape = tuple(int(n) for n in grid.shape[side])
-        block = values[grid.of_side(side)].reshape(shape)
-        for axis, n in enumerate(shape):
-            block = np.add.reduceat(block, _begins(n, box), axis=axis)
-        parts.append(block.ravel())
-    return np.concatenate(parts)
-
-
-def _entropy(mass: Floats) -> Floats:
-    """Entropy of each column."""
-    with np.errstate(divide="ignore", invalid="ignore"):
-        p = mass / mass.sum(axis=0)
-        found: Floats = np.where(p > 0.0, -p * np.log(p), 0.0).sum(axis=0)
-    return found
-
-
-def _least(mass: Floats, open_to: NDArray[np.bool_], rest: Floats) -> Floats:
-    """Give all that is left to the largest basin that may have it."""
-    full = mass.copy()
-    largest = np.where(open_to, mass, -1.0).argmax(axis=0)
-    full[largest, np.arange(rest.size)] += rest
-    return _entropy(full)
-
-
-def _largest(mass: Floats, open_to: NDArray[np.bool_], rest: Floats) -> Floats:
-    """Fill the smallest basins that may have some up to one level, as water would."""
-    bars = np.sort(np.where(open_to, mass, np.inf), axis=0)
-    number = np.arange(1, len(bars) + 1)[:, None]
-    with np.errstate(invalid="ignore"):
-        levels = (rest + np.cumsum(bars, axis=0)) / number
-    wet = (bars < levels) & np.isfinite(levels)
-    level = np.where(wet, levels, np.inf).min(axis=0)
-    return _entropy(np.where(open_to, np.maximum(mass, level), mass))

@@ -10,7 +10,7 @@ import pytest
 import limitsets as ls
 from limitsets.cells import Domain
 from limitsets.errors import AnswerError
-from limitsets.resilience import entropy
+from limitsets.resilience import boxes
 from tests.maps_of_tests import Tent, ThreeState
 from tests.resilience.maps_with_basins import Gaps, Stripes, Turnstile, Wall
 
@@ -89,11 +89,11 @@ def test_the_bracket_is_that_of_all_allotments():
         mass, rest = rng.random(3) * (rng.random(3) < 0.7), rng.random() + 0.05
         may = rng.random(3) < 0.7
         may[rng.integers(3)] = True
-        tried = entropy._entropy(mass[:, None] + rest * parts[:, (parts[~may] == 0.0).all(axis=0)])
+        tried = boxes.entropy_of(mass[:, None] + rest * parts[:, (parts[~may] == 0.0).all(axis=0)])
         column = mass[:, None], may[:, None], np.array([rest])
-        assert entropy._least(*column)[0] == pytest.approx(tried.min(), abs=1e-12)
-        assert entropy._largest(*column)[0] == pytest.approx(tried.max(), abs=2e-3)
-        assert entropy._largest(*column)[0] >= tried.max() - 1e-12
+        assert boxes.least_entropy(*column)[0] == pytest.approx(tried.min(), abs=1e-12)
+        assert boxes.largest_entropy(*column)[0] == pytest.approx(tried.max(), abs=2e-3)
+        assert boxes.largest_entropy(*column)[0] >= tried.max() - 1e-12
 
 
 def test_one_basin_has_no_entropy_and_no_boundary():
