@@ -225,13 +225,13 @@ def _sampled(
         for s in np.unique(side).tolist():
             lo, hi = grid.boxes(cell[side == s], s)
             width[side == s] = hi - lo
-        known, differs, own = np.ones(side.size, dtype=bool), np.zeros(side.size, dtype=bool), None
-        for away in (0.0, distance, -distance):
+        own, _ = follow(parted.graph, parted.blocks, x, side, steps, returning=True)
+        known, differs = own != codes.UNDECIDED, np.zeros(side.size, dtype=bool)
+        for away in (distance, -distance):
             other = x.copy()
             other[row, axis] += away * width[row, axis]
             within = (other >= grid.domain.lo[side]).all(axis=1) & (other <= grid.domain.hi[side]).all(axis=1)
             label, _ = follow(parted.graph, parted.blocks, other, side, steps, returning=True)
-            own = label if own is None else own
             known &= ~within | (label != codes.UNDECIDED)
             differs |= within & (label != own)
         labels.append(own)

@@ -153,8 +153,8 @@ def wada(
     if starts is None:
         cell, label = np.arange(graph.n_cells), labelled_starts(parted, steps, rng)
     else:
-        cell, (x, side) = random_cells(graph.grid, starts, rng)
-        label, _ = follow(graph, parted.blocks, x, side, steps, returning=True)
+        cell, drawn = random_cells(graph.grid, starts, rng)
+        label, _ = follow(graph, parted.blocks, *drawn, steps, returning=True)
     number, undecided = _numbers(parted, label), float((label == codes.UNDECIDED).mean())
     seen = np.zeros((parted.codes.size, graph.n_cells), dtype=bool)
     seen[number[number >= 0], cell[number >= 0]] = True
