@@ -18,10 +18,13 @@ from limitsets.graph.components import reach
 from limitsets.maps import codes
 from limitsets.sets import Attractor, Basins, basins
 
-__all__ = ["ROUNDING", "Colours", "colours"]
+__all__ = ["MOST_UNDECIDED", "ROUNDING", "Colours", "best", "colours", "told"]
 
 # Bits of one sweep over the graph.
 BITS = 64
+
+# Where a larger share is undecided there is a bracket, and no best value within it.
+MOST_UNDECIDED = 0.1
 
 # Proved shares and entropies are rounded by this much, against the rounding of sums.
 ROUNDING = 1e-12
@@ -111,3 +114,18 @@ def colours(graph: TransitionGraph, found: tuple[Attractor, ...]) -> Colours:
             possible[begin + bit] = seen >> np.uint64(bit) & np.uint64(1)
     labels = np.array([*range(len(found)), *graph.exits.values()], dtype=np.int64)
     return Colours(graph, shares, blocks, labels, undecided, possible)
+
+
+def best(value: float, undecided: float) -> float:
+    """Give a best value, nan where more than a tenth is undecided."""
+    return value if undecided <= MOST_UNDECIDED else np.nan
+
+
+def told(caption: str, undecided: float, cut: bool = False) -> str:
+    """Write what is beside a number into the caption of its table: what is left out, and where orbits were cut off."""
+    words = [caption]
+    if undecided > MOST_UNDECIDED:
+        words.append(f"{undecided:.1%} undecided, no best value".replace("%", " %"))
+    if cut:
+        words.append("orbits end at the border of the domain, starts=... follows them beyond")
+    return "; ".join(words)

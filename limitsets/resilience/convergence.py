@@ -1,8 +1,8 @@
 """Convergence times: steps until an orbit is in the attracting cells, or has left.
 
-Sampled on random starts; and, where the images of cells are enclosed, bounded for every start of the inner basin by the
-rank of its cell, the longest path to the attracting cells or out of the domain, with the longest stays in the recurrent
-components on the way, each of which an orbit passes once.
+Sampled on random starts, whose orbits may leave the domain and come back; and, where the images of cells are enclosed,
+bounded for every start of the inner basin by the rank of its cell, the longest path to the attracting cells or out of
+the domain, with the longest stays in the recurrent components on the way, each of which an orbit passes once.
 
 Source: Datseris, Rossi, Wagemakers, "Framework for global stability analysis of dynamical systems", Chaos 33, 073151,
 2023; ranks: docs/certificates.md.
@@ -17,12 +17,11 @@ from typing import Any
 import numpy as np
 
 from limitsets.arguments import arguments_checked
-from limitsets.errors import AnswerError
 from limitsets.files import as_table, picked
 from limitsets.graph import TransitionGraph
 from limitsets.graph.components import ranks
 from limitsets.maps import codes
-from limitsets.resilience.colours import Colours, colours
+from limitsets.resilience.colours import MOST_UNDECIDED, Colours, colours, told
 from limitsets.resilience.orbits import STEPS, follow, random_starts
 from limitsets.sets import Attractor
 from limitsets.sets.passing import longest_stays
@@ -42,7 +41,8 @@ class Times:
     starts : int
         Random starts that came there.
     mean, median, longest : float
-        Of their steps, from undecided cells too; nan if there are none.
+        Of their steps, from undecided cells too; nan if there are none, and where more than a tenth of all starts is
+        still on its way: the slowest are missing.
     at_most : int or None
         Proved: no start of the inner basin takes more.  None without proof or where the inner basin is empty.
     mean_at_most : float or None
@@ -66,7 +66,7 @@ class ConvergenceTimes(Tabled):
     attractors : tuple of Times
         One for each attractor: 0 from within its cells.
     exits : dict of str to Times
-        One for each exit: 1 from where one step leads out.
+        One for each exit: steps until an orbit that ends there first leaves, 1 from where one step leads out.
     undecided : float
         Share of the random starts still on their way after the last step.
     starts, steps : int
@@ -95,7 +95,14 @@ class ConvergenceTimes(Tabled):
             Column("longest", "steps", ".4g"),
         )
         proved = ("at most, proved", Column("mean at most, proved", "steps", ".4g"))
-        return (Table(("to", "starts", *means, *proved), rows, "Convergence times", how_found(self.how)),)
+        return (
+            Table(
+                ("to", "starts", *means, *proved),
+                rows,
+                told("Convergence times", self.undecided),
+                how_found(self.how),
+            ),
+        )
 
     def to_json(self) -> dict[str, Any]:
         """Give the times as JSON takes them."""
@@ -120,7 +127,7 @@ def convergence_times(
     found : tuple of Attractor
         From `limitsets.attractors` of the same graph.
     starts : int
-        Random starts, evenly by length (area, volume) over all sides.
+        Random starts, evenly by length (area, volume) over all sides.  Their orbits may leave the domain and come back.
     steps : int
         Each is followed for so many steps at most.
     seed : int
@@ -145,24 +152,21 @@ def convergence_times(
     >>> times.median <= times.at_most
     True
     """
-    for thing, number in (("the number of starts", starts), ("the number of steps", steps)):
-        if number < 1:
-            raise AnswerError(thing, number, "an integer from 1", "pass 1000")
     parted = colours(graph, found)
     bounds = _bounds(parted)
     x, side = random_starts(graph.grid, starts, np.random.default_rng(seed))
-    end, made = follow(graph, parted.blocks, x, side, steps)
+    end, made = follow(graph, parted.blocks, x, side, steps, returning=True)
+    undecided = float((end == codes.UNDECIDED).mean())
     times = []
     for code, bound in zip(parted.codes, bounds, strict=True):
         taken = made[end == code]
         mean, median, longest = (
             (float(taken.mean()), float(np.median(taken)), float(taken.max()))
-            if taken.size
+            if taken.size and undecided <= MOST_UNDECIDED
             else (np.nan,) * 3
         )
         times.append(Times(taken.size, mean, median, longest, *bound))
     exits = dict(zip(graph.exits, times[len(found) :], strict=True))
-    undecided = float((end == codes.UNDECIDED).mean())
     return ConvergenceTimes(tuple(times[: len(found)]), exits, undecided, starts, steps)
 
 

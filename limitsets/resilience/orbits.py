@@ -1,4 +1,8 @@
-"""Random starts in cells, and where their orbits come to."""
+"""Random starts in cells, and where their orbits come to.
+
+Cells end at the border of the domain: what leaves is lost to them.  Orbits of starts that a caller asks for may come
+back: one has left for good where it ends beyond the border and was there for the last half of its steps.
+"""
 
 from __future__ import annotations
 
@@ -8,12 +12,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from limitsets.cells import Grid
+from limitsets.errors import AnswerError
 from limitsets.graph import TransitionGraph
 from limitsets.graph.target import Target
 from limitsets.maps import codes, images
 from limitsets.resilience.colours import Colours
 
-__all__ = ["STEPS", "follow", "labelled_starts", "random_starts", "starts_in"]
+__all__ = [
+    "STEPS",
+    "follow",
+    "labelled_lattice",
+    "labelled_starts",
+    "leaves_by_the_border",
+    "random_cells",
+    "random_starts",
+    "starts_in",
+]
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -35,8 +49,18 @@ def starts_in(grid: Grid, cells: Integers, rng: np.random.Generator) -> tuple[Fl
 
 def random_starts(grid: Grid, count: int, rng: np.random.Generator) -> tuple[Floats, Integers]:
     """Draw starts evenly by length (area, volume) over all sides."""
+    return random_cells(grid, count, rng)[1]
+
+
+def random_cells(
+    grid: Grid, count: int, rng: np.random.Generator
+) -> tuple[Integers, tuple[Floats, Integers]]:
+    """Draw starts evenly over all sides, with their cells; AnswerError for a number below 1."""
+    if count < 1:
+        raise AnswerError("the number of starts", count, "an integer from 1", "pass 1000")
     measure = grid.measure
-    return starts_in(grid, rng.choice(grid.n_cells, count, p=measure / measure.sum()), rng)
+    cells = rng.choice(grid.n_cells, count, p=measure / measure.sum())
+    return cells, starts_in(grid, cells, rng)
 
 
 def _next(params: Any, x: Floats, side: Integers) -> tuple[Floats, Integers, Integers]:
@@ -49,8 +73,31 @@ def _next(params: Any, x: Floats, side: Integers) -> tuple[Floats, Integers, Int
     return after, to, code
 
 
+def leaves_by_the_border(graph: TransitionGraph) -> bool:
+    """Whether the image of some cell's centre lies beyond a border at which the grid ends, and not the map.
+
+    The border of graded cells is the map's own: the throw ends there.
+    """
+    grid = graph.grid
+    if grid.domain.anchor is not None:
+        return False
+    for s in range(grid.sides):
+        x = grid.boxes(np.arange(grid.n_cells)[grid.of_side(s)], s)
+        after, to, code = _next(graph.map, 0.5 * (x[0] + x[1]), np.full(len(x[0]), s))
+        for into in np.unique(to[code >= 0]).tolist():
+            if (grid.index(after[(code >= 0) & (to == into)], into) < 0).any():
+                return True
+    return False
+
+
 def follow(
-    graph: TransitionGraph, stops: NDArray[np.int32], x: Floats, side: Integers, steps: int
+    graph: TransitionGraph,
+    stops: NDArray[np.int32],
+    x: Floats,
+    side: Integers,
+    steps: int,
+    *,
+    returning: bool = False,
 ) -> tuple[Integers, Integers]:
     """Follow starts, as the cells do without random noise, until they come to a cell with a label or leave the domain.
 
@@ -64,19 +111,29 @@ def follow(
         Starts in the domain.
     steps : int
         At most so many.
+    returning : bool
+        Follow orbits beyond the border, from where they may come back.
 
     Returns
     -------
     ndarray of int, shape (n,)
         Label, or code of the exit; undecided for those still on their way.
     ndarray of int, shape (n,)
-        Steps made.
+        Steps to the label; of those that have left, to where they first did.
+
+    Raises
+    ------
+    AnswerError
+        The number of steps is below 1.
     """
+    if steps < 1:
+        raise AnswerError("the number of steps", steps, "an integer from 1", "pass 1000")
     grid, ways = graph.grid, list(graph.exits.values())
     target = Target.of(grid, graph.exits)
     below, above = ways[target.sink_below], ways[target.sink_above]
     end, made = np.full(side.size, codes.UNDECIDED, dtype=np.int64), np.zeros(side.size, dtype=np.int64)
     going, code = np.arange(side.size), np.zeros(side.size, dtype=np.int64)
+    gone, inside = np.zeros_like(made), np.zeros_like(made)  # first step beyond the border, last one within
     for step in range(steps + 1):
         if step:
             x, side, code = _next(graph.map, x, side)
@@ -87,11 +144,20 @@ def follow(
             cell = grid.index(x[here], s)
             low = (x[here] < grid.domain.lo[s]).any(axis=1)
             label[here] = np.where(cell >= 0, stops[cell], np.where(low, below, above))
+            if returning:
+                out, finite = cell < 0, np.isfinite(x[here]).all(axis=1)
+                first = here[out & (gone[going[here]] == 0)]
+                gone[going[first]] = step
+                inside[going[here[~out]]] = step
+                on_their_way = here[out & finite & ((step < steps) | (2 * inside[going[here]] > steps))]
+                label[on_their_way] = codes.UNDECIDED
         end[going] = label
         on = np.flatnonzero(label == codes.UNDECIDED)
         going, x, side = going[on], x[on], side[on]
         if not going.size:
             break
+    left = (end < 0) & (end != codes.UNDECIDED) & (gone > 0)
+    made[left] = gone[left]
     return end, made
 
 
@@ -107,3 +173,42 @@ def labelled_starts(parted: Colours, steps: int, rng: np.random.Generator) -> In
         x = np.stack([at[k] for at, k in zip(places, grid.axes(cells, s), strict=True)], axis=1)
         label[cells] = follow(parted.graph, parted.labels, x, np.full(cells.size, s), steps)[0]
     return label
+
+
+def labelled_lattice(
+    parted: Colours, side: int, boxes: list[Integers], each: int, steps: int, rng: np.random.Generator
+) -> Integers:
+    """Label of so many starts along each axis of boxes of cells, with orbits that may come back.
+
+    Parameters
+    ----------
+    parted : Colours
+        Basins of the cells.
+    side : int
+        Of the starts.
+    boxes : list of ndarray
+        Of each axis the cells in which boxes begin, and the number of its cells last.
+    each : int
+        Starts along each axis of a box, one in each of as many equal parts, at one place in all of them.
+    steps : int
+        At most so many are followed.
+    rng : Generator
+        Draws that place of each axis.
+
+    Returns
+    -------
+    ndarray of int, shape (number of boxes, each, ...)
+        Label, or code of the exit, or undecided.
+    """
+    places = []
+    for edges, begin in zip(parted.grid.edges[side], boxes, strict=True):
+        at = edges[begin]
+        part = (np.arange(each) + rng.random()) / each
+        places.append((at[:-1, None] + part * np.diff(at)[:, None]).ravel())
+    x = np.stack(np.meshgrid(*places, indexing="ij"), axis=-1).reshape(-1, len(places))
+    label, _ = follow(parted.graph, parted.blocks, x, np.full(len(x), side), steps, returning=True)
+    block = label.reshape([n for begin in boxes for n in (begin.size - 1, each)])
+    axes = range(len(places))
+    return block.transpose(*(2 * k for k in axes), *(2 * k + 1 for k in axes)).reshape(
+        -1, *[each] * len(places)
+    )

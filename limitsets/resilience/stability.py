@@ -13,12 +13,11 @@ import numpy as np
 
 from limitsets.arguments import arguments_checked
 from limitsets.cells import CellSet
-from limitsets.errors import AnswerError
 from limitsets.files import as_table, picked
 from limitsets.graph import TransitionGraph
 from limitsets.maps import codes
-from limitsets.resilience.colours import ROUNDING, Colours, colours
-from limitsets.resilience.orbits import STEPS, follow, random_starts
+from limitsets.resilience.colours import ROUNDING, Colours, best, colours, told
+from limitsets.resilience.orbits import STEPS, follow, leaves_by_the_border, random_starts
 from limitsets.sets import Attractor
 from limitsets.tables import Column, Table, Tabled, how_found
 
@@ -35,7 +34,7 @@ class Share:
     Attributes
     ----------
     share : float
-        The best number: that of the decided starts.
+        The best number: that of the decided starts; nan where more than a tenth of all is undecided.
     lo, hi : float
         Its bracket.
     """
@@ -62,6 +61,9 @@ class BasinStability(Tabled):
         Share of undecided cells; of random starts that came nowhere.
     starts : int or None
         Random starts, if any.
+    cut : bool
+        Whether orbits that cross the border of the domain were given up there, in the exit: with `starts` they may
+        come back.
     inner, outer : tuple of CellSet
         Cells all of whose starts lie in the basin, and cells outside which none does: attractors, then exits.
     """
@@ -71,19 +73,23 @@ class BasinStability(Tabled):
     exits: dict[str, Share]
     undecided: float
     starts: int | None
+    cut: bool
     inner: tuple[CellSet, ...]
     outer: tuple[CellSet, ...]
 
     def tables(self) -> tuple[Table, ...]:
         """Give the tables that show it, the one that is saved as CSV first."""
         named = [*((f"attractor {k}", each) for k, each in enumerate(self.attractors)), *self.exits.items()]
-        rows = [(name, each.share, (each.lo, each.hi)) for name, each in named]
+        rows = [
+            *((name, each.share, (each.lo, each.hi)) for name, each in named),
+            ("undecided", self.undecided, None),
+        ]
         columns = ("basin", Column("share", show=".6f"), Column("bracket", show=".6f", ends=True))
-        return (Table(columns, rows, "Basin stability", how_found(self.how)),)
+        return (Table(columns, rows, told("Basin stability", self.undecided, self.cut), how_found(self.how)),)
 
     def to_json(self) -> dict[str, Any]:
         """Give the shares as JSON takes them."""
-        return as_table(**picked(self, "how", "attractors", "exits", "undecided", "starts"))
+        return as_table(**picked(self, "how", "attractors", "exits", "undecided", "starts", "cut"))
 
 
 @arguments_checked
@@ -104,7 +110,7 @@ def basin_stability(
     found : tuple of Attractor
         From `limitsets.attractors` of the same graph.
     starts : int, optional
-        Sample so many random starts instead of counting cells.
+        Sample so many random starts instead of counting cells.  Their orbits may leave the domain and come back.
     steps : int
         Each is followed for so many steps at most.
     seed : int
@@ -139,7 +145,8 @@ def basin_stability(
     else:
         shares, undecided, how = *_sampled(parted, starts, steps, seed), "sampled"
     exits = dict(zip(graph.exits, shares[len(found) :], strict=True))
-    return BasinStability(how, tuple(shares[: len(found)]), exits, undecided, starts, inner, outer)
+    cut = starts is None and leaves_by_the_border(graph)
+    return BasinStability(how, tuple(shares[: len(found)]), exits, undecided, starts, cut, inner, outer)
 
 
 def _counted(
@@ -149,21 +156,18 @@ def _counted(
     shares = []
     for some, most in zip(inner, outer, strict=True):
         lo, hi = some.measure() / total, most.measure() / total
-        best = min(lo / (1.0 - undecided), hi) if undecided < 1.0 else np.nan
+        share = best(min(lo / max(1.0 - undecided, 0.5), hi), undecided)
         down = lo - ROUNDING if 0 < len(some) < some.mask.size else float(len(some) > 0)
         up = hi + ROUNDING if 0 < len(most) < most.mask.size else float(len(most) > 0)
-        shares.append(Share(float(best), max(down, 0.0), min(up, 1.0)))
+        shares.append(Share(share, max(down, 0.0), min(up, 1.0)))
     return shares, undecided
 
 
 def _sampled(parted: Colours, starts: int, steps: int, seed: int) -> tuple[list[Share], float]:
     from scipy.special import betaincinv
 
-    for thing, number in (("the number of starts", starts), ("the number of steps", steps)):
-        if number < 1:
-            raise AnswerError(thing, number, "an integer from 1", "pass 1000")
     x, side = random_starts(parted.grid, starts, np.random.default_rng(seed))
-    end, _ = follow(parted.graph, parted.blocks, x, side, steps)
+    end, _ = follow(parted.graph, parted.blocks, x, side, steps, returning=True)
     undecided = int((end == codes.UNDECIDED).sum())
     shares = []
     for code in parted.codes:
@@ -171,6 +175,6 @@ def _sampled(parted: Colours, starts: int, steps: int, seed: int) -> tuple[list[
         most, tail = k + undecided, 0.5 * (1.0 - CONFIDENCE)
         lo = betaincinv(k, starts - k + 1, tail) if k else 0.0
         hi = betaincinv(most + 1, starts - most, 1.0 - tail) if most < starts else 1.0
-        best = k / (starts - undecided) if undecided < starts else np.nan
-        shares.append(Share(float(best), float(lo), float(hi)))
+        share = best(k / max(starts - undecided, 1), undecided / starts)
+        shares.append(Share(share, float(lo), float(hi)))
     return shares, undecided / starts

@@ -24,8 +24,15 @@ from limitsets.errors import AnswerError
 from limitsets.files import as_table, picked
 from limitsets.graph import TransitionGraph
 from limitsets.maps import codes
-from limitsets.resilience.colours import Colours, colours
-from limitsets.resilience.orbits import STEPS, follow, labelled_starts, starts_in
+from limitsets.resilience.colours import MOST_UNDECIDED, Colours, colours, told
+from limitsets.resilience.orbits import (
+    STEPS,
+    follow,
+    labelled_starts,
+    leaves_by_the_border,
+    random_cells,
+    starts_in,
+)
 from limitsets.sets import Attractor
 from limitsets.tables import Column, Table, Tabled
 
@@ -52,15 +59,18 @@ class Wada(Tabled):
     ----------
     shares : tuple of float
         Share of the boundary boxes that meet all basins, at four refinements of the starts in them: rising to 1 for a
-        Wada boundary.  nan without boundary boxes, and where fewer than three basins were met.
+        Wada boundary.  nan without boundary boxes, where fewer than three basins were met, and where more than a tenth
+        of the starts is undecided.
     basins : tuple of int or str
-        Those met by one start in each cell: numbers of attractors, names of exits.
+        Those met by the first starts: numbers of attractors, names of exits.
     refinements : tuple of int
-        Starts per cell and axis.
+        Starts per cell and axis; the first are one in each cell, or the random ones that were asked for.
     boxes, of : int
         Boxes of three cells along each axis that were looked at, of so many on a boundary.
     undecided : float
-        Share of the starts, one per cell, that came nowhere.
+        Share of the first starts that came nowhere.
+    cut : bool
+        Whether orbits that cross the border of the domain were given up there, in the exit.
     how : str
         "sampled, at this resolution": never proved.
     """
@@ -71,17 +81,21 @@ class Wada(Tabled):
     boxes: int
     of: int
     undecided: float
+    cut: bool = False
     how: str = "sampled, at this resolution"
 
     def tables(self) -> tuple[Table, ...]:
         """Give the tables that show it, the one that is saved as CSV first."""
         rows = list(zip(self.refinements, self.shares, strict=False))
         columns = ("starts per cell and axis", Column("share of boxes that meet all basins", show=".6f"))
-        return (Table(columns, rows, f"Wada: {self.boxes} of {self.of} boxes", f"{self.how}, not proved"),)
+        caption = told(f"Wada: {self.boxes} of {self.of} boxes", self.undecided, self.cut)
+        return (Table(columns, rows, caption, f"{self.how}, not proved"),)
 
     def to_json(self) -> dict[str, Any]:
         """Give the shares as JSON takes them."""
-        return as_table(**picked(self, "shares", "basins", "refinements", "boxes", "of", "undecided", "how"))
+        return as_table(
+            **picked(self, "shares", "basins", "refinements", "boxes", "of", "undecided", "cut", "how")
+        )
 
 
 @arguments_checked
@@ -90,6 +104,7 @@ def wada(
     found: tuple[Attractor, ...],
     *,
     boxes: int = BOXES,
+    starts: int | None = None,
     steps: int = STEPS,
     seed: int = 0,
 ) -> Wada:
@@ -103,6 +118,9 @@ def wada(
         From `limitsets.attractors` of the same graph.
     boxes : int
         Boundary boxes to look at; drawn at random where there are more.
+    starts : int, optional
+        Follow so many random starts first, instead of one in each cell that is not decided: one for each cell or more.
+        Their orbits, and those of the finer starts, may leave the domain and come back.
     steps : int
         An orbit is followed for so many steps at most.
     seed : int
@@ -132,15 +150,21 @@ def wada(
     if boxes < 1:
         raise AnswerError("the number of boxes", boxes, "an integer from 1", "pass boxes=400")
     parted, rng = colours(graph, found), np.random.default_rng(seed)
-    label = labelled_starts(parted, steps, rng)
-    number = _numbers(parted, label)
-    met = np.flatnonzero(np.bincount(number[number >= 0], minlength=parted.codes.size))
+    if starts is None:
+        cell, label = np.arange(graph.n_cells), labelled_starts(parted, steps, rng)
+    else:
+        cell, drawn = random_cells(graph.grid, starts, rng)
+        label, _ = follow(graph, parted.blocks, *drawn, steps, returning=True)
+    number, undecided = _numbers(parted, label), float((label == codes.UNDECIDED).mean())
+    seen = np.zeros((parted.codes.size, graph.n_cells), dtype=bool)
+    seen[number[number >= 0], cell[number >= 0]] = True
+    met = np.flatnonzero(seen.any(axis=1))
     chosen = []
     for side in range(graph.grid.sides):
-        block = number[graph.grid.of_side(side)].reshape(tuple(graph.grid.shape[side]))
-        several = np.zeros(block.shape, dtype=np.int64)
+        shape = tuple(int(n) for n in graph.grid.shape[side])
+        several = np.zeros(shape, dtype=np.int64)
         for colour in met:
-            several += _around(block == colour)
+            several += _around(seen[colour, graph.grid.of_side(side)].reshape(shape))
         chosen.append(graph.grid.offset[side] + np.flatnonzero(several > 1))
     middle = np.concatenate(chosen)
     of = middle.size
@@ -150,14 +174,15 @@ def wada(
     shares = []
     for parts in REFINEMENTS:
         if parts == 1:
-            _see(graph.grid, middle, number, here)
+            _see(graph.grid, middle, seen, here)
         else:
             left = np.flatnonzero(~here[:, met].all(axis=1))
-            _look(parted, middle[left], left, parts, steps, rng, here)
-        shares.append(float(here[:, met].all(axis=1).mean()) if of and met.size > 2 else np.nan)
+            _look(parted, middle[left], left, parts, steps, rng, here, returning=starts is not None)
+        known = of and met.size > 2 and undecided <= MOST_UNDECIDED
+        shares.append(float(here[:, met].all(axis=1).mean()) if known else np.nan)
     names = tuple(parted.names[k] for k in met)
-    undecided = float((label == codes.UNDECIDED).mean())
-    return Wada(tuple(shares), names, REFINEMENTS, middle.size, of, undecided)
+    cut = starts is None and leaves_by_the_border(graph)
+    return Wada(tuple(shares), names, REFINEMENTS, middle.size, of, undecided, cut)
 
 
 def _numbers(parted: Colours, label: NDArray[np.int64]) -> NDArray[np.int64]:
@@ -194,11 +219,10 @@ def _neighbours(
             yield mine[inside], grid.offset[s] + cell
 
 
-def _see(grid: Grid, middle: NDArray[np.int64], number: NDArray[np.int64], here: NDArray[np.bool_]) -> None:
-    """Mark the basins of the starts that are known, one in each cell."""
+def _see(grid: Grid, middle: NDArray[np.int64], seen: NDArray[np.bool_], here: NDArray[np.bool_]) -> None:
+    """Mark the basins that the first starts met."""
     for box, cell in _neighbours(grid, middle):
-        some = number[cell] >= 0
-        here[box[some], number[cell][some]] = True
+        here[box] |= seen[:, cell].T
 
 
 def _look(
@@ -209,13 +233,19 @@ def _look(
     steps: int,
     rng: np.random.Generator,
     here: NDArray[np.bool_],
+    returning: bool,
 ) -> None:
-    """Mark the basins of more random starts in the undecided cells of boxes; the others are of one basin."""
+    """Mark the basins of more random starts in the undecided cells of boxes; the others are of one basin.
+
+    Of orbits that may come back the cells decide nothing: all are looked at.
+    """
+    stops = parted.blocks if returning else parted.labels
     for box, cell in _neighbours(parted.grid, middle):
-        open_ones = np.flatnonzero(parted.labels[cell] == codes.UNDECIDED)
+        open_ones = np.flatnonzero(stops[cell] == codes.UNDECIDED)
         each = parts**parted.grid.dimension
         for some in np.array_split(open_ones, 1 + open_ones.size * each // BATCH):
             starts = starts_in(parted.grid, np.repeat(cell[some], each), rng)
-            number = _numbers(parted, follow(parted.graph, parted.labels, *starts, steps)[0])
+            label, _ = follow(parted.graph, stops, *starts, steps, returning=returning)
+            number = _numbers(parted, label)
             which = np.repeat(row[box[some]], each)
             here[which[number >= 0], number[number >= 0]] = True

@@ -140,3 +140,76 @@ ls.register(
     margin=turnstile_margin,
     branches=("stays", "changes"),
 )
+
+
+class Excursion(NamedTuple):
+    """x' = 1/2 below 1, 5 up to 2, 7 up to 3; beyond, 5 goes to 1/2 and 7 stays.
+
+    Known answers: on [0, 3] a third of the starts stays, a third leaves and comes back, a third leaves for good.
+    """
+
+    leave: float
+
+
+def excursion(params, x, side):
+    if x < 1.0:
+        return 0.5, side, 0
+    if x < 2.0:
+        return params.leave, side, 0
+    if x < 3.0:
+        return params.leave + 2.0, side, 0
+    return (0.5 if x < params.leave + 1.0 else x), side, 0
+
+
+ls.register(Excursion, image=excursion)
+
+
+class Grebogi(NamedTuple):
+    """Grebogi, McDonald, Ott, Yorke, Physics Letters A 99, 1983, with the angle from 0 to 2 pi by `floor`.
+
+    Two attracting fixed points, (0, -J) and (pi, J); a fractal boundary.
+    """
+
+    j0: float
+
+
+def grebogi(params, z, side):
+    turned = z[0] + 1.32 * math.sin(2.0 * z[0]) - 0.9 * math.sin(4.0 * z[0]) - z[1] * math.sin(z[0])
+    around = 2.0 * math.pi
+    return (turned - around * math.floor(turned / around), -params.j0 * math.cos(z[0])), side, 0
+
+
+ls.register(Grebogi, image=grebogi, dimension=2)
+
+
+class Ikeda(NamedTuple):
+    """Ikeda's map: at u = 0.9 an attracting fixed point near (2.97, 4.15) beside a chaotic attractor."""
+
+    u: float
+
+
+def ikeda(params, z, side):
+    angle = 0.4 - 6.0 / (1.0 + z[0] * z[0] + z[1] * z[1])
+    turned = z[0] * math.cos(angle) - z[1] * math.sin(angle), z[0] * math.sin(angle) + z[1] * math.cos(angle)
+    return (1.0 + params.u * turned[0], params.u * turned[1]), side, 0
+
+
+ls.register(Ikeda, image=ikeda, dimension=2)
+
+
+class Waves(NamedTuple):
+    """Left of x_0 = 7/2 two basins that meet on a sine, right of it on x_1 = 3; the fixed points are (4, 2), (4, 4)."""
+
+    pitch: float
+    steep: float
+    shift: float
+
+
+def waves(params, z, side):
+    above = math.sin(params.pitch * z[0] + params.shift) + params.steep * (z[1] - 2.0) > 0.0
+    if z[0] > 3.5:
+        above = z[1] > 3.0
+    return (4.0, 4.0 if above else 2.0), side, 0
+
+
+ls.register(Waves, image=waves, dimension=2)
