@@ -36,7 +36,7 @@ class Question:
     """
 
     contact: str = "hinge"
-    carried: bool = False
+    carried: bool = True
     step: float = 4e-3
 
 
