@@ -106,7 +106,7 @@ def pass_through(
 
 def _thrown(end: ArmEnd, params: Any, start: Start, shift: float) -> tuple[Start, str | None, int]:
     """Throw one part: where it lies, its fate if it has met one, and the side it comes to lie on."""
-    if end.at_edge(np.array([start[0]]), np.array([start[1]]))[0]:
+    if end.at_edge(*start):
         return start, "edge", start[1]
     found = images(params, [start[0]], start[1])
     x, side, code = float(found.x[0]) + shift, int(found.side[0]), int(found.code[0])

@@ -9,7 +9,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -158,7 +158,7 @@ class ArmEnd:
         fed = np.where(side == self.side, np.where(clears, 0, 2), 1)
         return np.where(beyond >= 0.0, fed, -1)
 
-    def at_edge(self, x: NDArray[np.float64], side: NDArray[np.int64]) -> NDArray[np.bool_]:
+    def at_edge(self, x: Any, side: Any) -> Any:
         """Say of which parts at rest before the end the next throw acts beyond it: their fate is "edge"."""
         return (x > self.edges[side]) & (x < self.x)
 

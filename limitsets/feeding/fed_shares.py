@@ -132,7 +132,8 @@ class Curve:
     Attributes
     ----------
     factors, right : ndarray, shape (n,)
-        Factor on all deviations, and the share fed rightly.
+        Factor on all deviations, and the share fed rightly of the parts that are not thrown at the edge, where no fate
+        is simulated.
     wanted : float
         The share asked about.
     level : (float, float) or None
@@ -187,7 +188,8 @@ def success_curve(
 
     def right(factor: float) -> float:
         tell("noise levels", len(shares), len(possible) + HALVINGS)
-        shares.append(problem.solve(scatter.scaled(factor)).shares["right"])
+        found = problem.solve(scatter.scaled(factor)).shares
+        shares.append(found["right"] / max(1.0 - found["edge"], found["right"]))
         return shares[-1]
 
     shares: list[float] = []
