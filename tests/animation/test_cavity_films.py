@@ -29,7 +29,7 @@ def deepest(film, scene):
     for frame in range(film.frames):
         angle = float(film.arm[frame])
         back = np.array([[math.cos(angle), -math.sin(angle)], [math.sin(angle), math.cos(angle)]])
-        for part in range(len(film.outlines)):
+        for part in np.flatnonzero(np.isfinite(film.poses[frame, :, 0])):  # those in play
             corners = (film.polygon(frame, part) @ back).tolist()  # as seen from the arm
             worst = max(worst, *(depth_of_overlap(corners, block.tolist()) for block in blocks))
     return worst
@@ -56,9 +56,10 @@ def test_parts_in_the_cavity_are_not_swept_through_it(carried):
     crowd.place(1, 19.0, 2)
     crowd.throw()
     film = film_of_recording(crowd.recording(), ASKED, [scene, scene], carried=carried)
-    assert (film.arm.min() < -0.05) is carried  # a standing cavity is in the way of the arm's swing
+    assert bool(film.arm.min() < -0.05) is carried  # a standing cavity is in the way of the arm's swing
     assert ("with the cavity" in film.about) is carried
-    assert deepest(film, scene) < 0.05  # the engine's contacts overlap a little, and more as parts strike
+    # in one step a corner comes as deep as it is fast, 25 in x 4e-3; swept through the ramp it would be inches
+    assert deepest(film, scene) < 0.15
     shown = [
         shape.points
         for shape in Picture.of(film).moving(int(film.arm.argmin()))

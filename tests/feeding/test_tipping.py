@@ -1,4 +1,4 @@
-"""A part that comes down beyond the end of the arm: its momentum about the end goes on; thrown at the end it is lost."""
+"""A part that comes down beyond the end of the arm goes on turning about the end; thrown at the end it is lost."""
 
 import math
 
@@ -136,7 +136,7 @@ def test_limits_of_the_time():
 
 @pytest.mark.parametrize(("beyond", "off"), [(0.01, 0.02), (0.3, 0.02), (1.0, 0.1)])
 def test_the_engines_own_contact_takes_as_long(beyond, off):
-    """Nothing of ours: a polygon of pymunk turns about its left corner and meets the corner of a block, rough and plastic.
+    """Nothing of ours: a polygon of pymunk turns about its left corner and meets the corner of a block.
 
     1 in beyond the end the part turns so fast that it leaves the end for a moment: a hinge would have to pull there.
     """
@@ -150,7 +150,9 @@ def test_the_engines_own_contact_takes_as_long(beyond, off):
     part = pymunk.Poly(body, [(-a, -d), (6.75 - a, -d), (4.8641 - a, 3.0665 - d)])
     arm.friction = part.friction = 50.0
     lean, corner = 1e-3, np.array([beyond - a, 0.0])
-    centre = corner + [a * math.cos(lean) - d * math.sin(lean), a * math.sin(lean) + d * math.cos(lean)]
+    centre = corner + np.array(
+        [a * math.cos(lean) - d * math.sin(lean), a * math.sin(lean) + d * math.cos(lean)]
+    )
     body.position, body.angle, body.angular_velocity = tuple(centre), lean, -fall
     body.velocity = (fall * (centre - corner)[1], -fall * (centre - corner)[0])
     space.add(arm, body, part)
