@@ -128,7 +128,7 @@ def _tipping(axes: Axes, found: Feeding) -> None:
     axes.set_ylim(bottom=0.0)
     begins = "from rest" if scene.cavity is not None and scene.cavity.tips == "rest" else "as it comes down"
     axes.set_title(f"time to tip, {begins} (shaded: clear)", loc="left", fontsize=style.TEXT)
-    axes.set_xlabel(f"rests beyond the end by [{scene.unit}]", fontsize=style.SMALL)
+    axes.set_xlabel(f"comes down beyond the end by [{scene.unit}]", fontsize=style.SMALL)
     axes.set_ylabel("time [s]", fontsize=style.SMALL)
     style.open_frame(axes)
 
