@@ -82,7 +82,7 @@ def time_to_tip(
     >>> time_to_tip([0.0, 0.1], 0.7, 1.25, 193.0, 0.56).round(3)
     array([  inf, 0.282])
     >>> time_to_tip([0.0, 0.1], 0.7, 1.25, 193.0, 0.56, rate=8.0).round(3)
-    array([0.067, 0.063])
+    array([0.067, 0.065])
     """
     e, first = np.broadcast_arrays(np.asarray(beyond, dtype=np.float64), np.asarray(rate, dtype=np.float64))
     node, weight = _rule()

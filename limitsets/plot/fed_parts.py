@@ -158,7 +158,8 @@ def _throws(axes: Axes, found: Feeding) -> None:
     axes.set_title(f"fates (dots: {trials.fate.size} trials)", loc="left", fontsize=style.TEXT)
     axes.set_xlabel("throws", fontsize=style.SMALL)
     axes.set_ylabel("share of random starts", fontsize=style.SMALL)
-    axes.legend(fontsize=style.SMALL, frameon=False)
+    axes.set_ylim(0.0, 1.4 * axes.get_ylim()[1])  # room for the legend over the steps
+    axes.legend(fontsize=style.SMALL, frameon=False, loc="upper left")
     style.open_frame(axes)
 
 

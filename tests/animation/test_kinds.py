@@ -163,7 +163,9 @@ def test_a_pair_in_contact_swings_with_the_arm_and_keeps_the_engine_s_poses():
     low = int(np.argmin(film.arm))
     thrown = [part for time, part, word in kept.marks if word == "thrown" and time == kept.times[0]]
     angle = -film.arm[low]
-    on_arm = [part for part in thrown if kept.poses[0, part, 0] < end]  # others lie in the cavity, thrown with it
+    on_arm = [
+        part for part in thrown if kept.poses[0, part, 0] < end
+    ]  # others lie in the cavity, thrown with it
     assert on_arm
     for part in on_arm:
         corners = film.polygon(low, part)
