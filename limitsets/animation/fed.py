@@ -1,6 +1,6 @@
 """A film of feeding: throws until the part tips over the end of the arm, falls onto the ramp and slides down.
 
-The part tips about the end of the arm as limitsets/feeding/falling.py says: M theta'' = g (d sin theta + e cos theta).
+The part tips about the end of the arm as limitsets/feeding/tipping.py says: M theta'' = g (d sin theta + e cos theta).
 It then slides without friction until it meets the far wall or the floor; that, and a fall of a part that lies wholly
 beyond the end, is drawn.
 """
@@ -14,12 +14,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from limitsets.animation.cavity_drawn import cavity_pieces
 from limitsets.animation.cutting import Asked, Leg, Pace, cut
 from limitsets.animation.film import Film
 from limitsets.animation.lanes import known_of, require_start
 from limitsets.animation.legs import RESTS, STAYS, drawn_of, legs_of, rest_leg
-from limitsets.engine.ground import ground_of
 from limitsets.errors import AnswerError
+from limitsets.feeding.tipping import rate_about_end
+from limitsets.maps import codes
 from limitsets.plot.poses import angle_on_side, outline
 from limitsets.plot.throwing import Throw, motion, throws_of
 
@@ -37,6 +39,7 @@ TRIED, ANGLES = 40, 400
 # Throws shown at most, and of a start that is chosen.
 MOST_THROWS, USUAL = 60, 8
 WORDS = ("fed rightly", "fed on a wrong side", "not clear of the wall")
+AT_EDGE = "the next throw acts beyond the end of the arm, which is not simulated: assumed not fed"
 BEYOND = "the struck corner is beyond the end of the arm: the map throws as if the arm went on"
 # A place of rest nearer to the end than this share of the arm looks as if it were beyond.
 NEAR = 0.005
@@ -50,8 +53,9 @@ def film_of_feeding(found: Feeding, asked: Asked) -> Film:
 def film_of_end(end: ArmEnd, asked: Asked) -> Film:
     """Show a part until it is fed."""
     start, throws = asked.start, asked.throws
-    if start is not None and not start[0] < end.x:
-        allowed = f"below {end.x:g} {end.scene.unit}, where the arm ends"
+    sides = end.edges.size
+    if start is not None and not start[0] < (end.edges[start[1]] if 0 <= start[1] < sides else end.x):
+        allowed = f"below {end.x:g} {end.scene.unit}, where the arm ends, and where throws act beyond the end"
         raise AnswerError("x of the start", start[0], allowed, "start on the arm")
     goes_on = f"where the arm ends: side {end.side} is wanted"
     found, lanes = known_of(end.scene, asked.progress, lines=((end.x, goes_on),))
@@ -67,18 +71,13 @@ def film_of_end(end: ArmEnd, asked: Asked) -> Film:
     for number, throw in enumerate(made, start=1):
         stays = STAYS if number == len(made) and fate < 0 else RESTS
         note = BEYOND if motion(scene, throw).struck[0] > end.x else ""
-        legs += legs_of(scene, throw, pace, f"Throw {number}", stays=stays, note=note)
+        edge = (AT_EDGE, -1) if end.at_edge(throw.after, throw.side_after) else None
+        legs += legs_of(scene, throw, pace, f"Throw {number}", stays=stays, note=note, after=edge)
     if fate >= 0:
         legs += _falls(end, scene, last, fate, pace)
-    cavity = end.scene.cavity
-    assert cavity is not None  # an ArmEnd has one
-    ground = ground_of(scene, wall=0.5 * float(scene.sides.length.max()))
-    pieces = [piece.corners for piece in ground.pieces if piece.name != "arm"]
-    foot = (end.x + cavity.width + 1.0, scene.surface_height - cavity.depth - 0.6)
+    pieces = cavity_pieces(scene, 0.5 * float(scene.sides.length.max()))
     about = "; ".join(words for words in (drawn_of(scene), "the slide down the ramp is drawn") if words)
-    return cut(
-        scene, legs, pace, title=scene.name, about=about, lanes=lanes, ground=pieces, end=end.x, view=(foot,)
-    )
+    return cut(scene, legs, pace, title=scene.name, about=about, lanes=lanes, ground=pieces, end=end.x)
 
 
 def _fate(end: ArmEnd, throw: Throw) -> int:
@@ -91,7 +90,9 @@ def _until_fed(end: ArmEnd, scene: Scene, x: float, side: int, throws: int) -> l
     from limitsets.maps import orbit
     from limitsets.thrower import trace
 
-    beyond = np.flatnonzero(orbit(scene.map, x, side, throws).x[1:] >= end.x)
+    path = orbit(scene.map, x, side, throws)
+    over = (path.x >= end.x) | end.at_edge(path.x, path.side)
+    beyond = np.flatnonzero(over[1:])
     count = int(beyond[0]) + 1 if beyond.size else throws
     return throws_of(scene, trace(scene.map, x, side, count))
 
@@ -120,7 +121,7 @@ def _falls(end: ArmEnd, scene: Scene, throw: Throw, fate: int, pace: Pace) -> li
     about_end = outline(scene, side) + np.array([beyond, d])  # the corners from the end of the arm
     hinge = np.array([end.x, scene.surface_height])
     start = angle_on_side(scene, side)
-    words = f"{WORDS[fate]}, from x = {throw.after:.2f} {scene.unit} on side {side}"
+    words, where = WORDS[fate], f"from x = {throw.after:.2f} {scene.unit} on side {side}"
 
     def pose(tipped: Array, along: Array, down: Array) -> Array:
         cos, sin = np.cos(tipped), np.sin(tipped)
@@ -136,6 +137,7 @@ def _falls(end: ArmEnd, scene: Scene, throw: Throw, fate: int, pace: Pace) -> li
             np.zeros_like,
             lambda share: np.tile(place, (share.size, 1)),
             caption,
+            where,
             trail=True,
             begins=begins,
         )
@@ -155,11 +157,12 @@ def _falls(end: ArmEnd, scene: Scene, throw: Throw, fate: int, pace: Pace) -> li
         ]
     most = _first_contact(cavity, about_end)
     inertia = scene.radius_of_gyration**2 + beyond**2 + d**2
-    time, angle_at = _tipping(beyond, d, inertia, gravity, most)
+    rate = rate_about_end(scene, throw.x, side, beyond) if throw.code == codes.JOG else 0.0
+    time, angle_at = _tipping((rate, beyond, d), inertia, gravity, most)
     tips = leg(
         time * pace.unit,
         lambda share: pose(angle_at(share * time), 0.0 * share, 0.0 * share),
-        f"It tips over the end of the arm: {words}",
+        f"It tips over the end: {words}",
         begins=True,
     )
     slide = _slide(cavity, about_end) if most >= cavity.angle else 0.0
@@ -199,10 +202,12 @@ def _first_contact(cavity: Cavity, about_end: Array) -> float:
 
 
 def _tipping(
-    beyond: float, height: float, inertia: float, gravity: float, most: float
+    begins: tuple[float, float, float], inertia: float, gravity: float, most: float
 ) -> tuple[float, Callable[[Array], Array]]:
-    """Time to tip by an angle, and the angle over time."""
+    """Time to tip by an angle from a rate, e and d, and the angle over time."""
     from scipy.integrate import solve_ivp
+
+    rate, beyond, height = begins
 
     def rates(_: float, state: Array) -> list[float]:
         sine, cosine = math.sin(state[0]), math.cos(state[0])
@@ -217,7 +222,7 @@ def _tipping(
         inertia / (gravity * height)
     )
     found = solve_ivp(
-        rates, (0.0, patience), [0.0, 0.0], "DOP853", dense_output=True, events=down, rtol=1e-10, atol=1e-14
+        rates, (0.0, patience), [0.0, rate], "DOP853", dense_output=True, events=down, rtol=1e-10, atol=1e-14
     )
     end, solution = float(found.t[-1]), found.sol
     return end, lambda at: np.minimum(solution(at)[0], most)

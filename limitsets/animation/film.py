@@ -106,7 +106,7 @@ class Film:
     surface : tuple of (float, float) or None
         Height of the arm's surface over the joint, and where the arm ends [length]; None where the arm is ground.
     ground : tuple of ndarray, shape (m, 2)
-        What does not move [length].
+        What turns with the arm, as it is with the arm level: the cavity; what stands, where the arm is ground [length].
     captions, notes : tuple of str
         Texts: the first line, and the second.
     caption, note : ndarray of int, shape (frames,)
@@ -168,3 +168,7 @@ class Film:
         height, end = self.surface
         corners = np.array([[0.0, height], [end, height], [end, height - thick], [0.0, height - thick]])
         return turned(corners, float(self.arm[frame]))
+
+    def ground_polygons(self, frame: int) -> list[Array]:
+        """Corners of the ground's pieces in a frame [length]."""
+        return [turned(each, float(self.arm[frame])) for each in self.ground]

@@ -19,12 +19,12 @@ from limitsets.plot.throwing import Throw, motion, stroke_of
 if TYPE_CHECKING:
     from limitsets.scene import Scene
 
-__all__ = ["carried", "drawn_of", "legs_of", "lowered", "raised", "rest_leg"]
+__all__ = ["drawn_of", "legs_of", "lowered", "raised", "rest_leg", "riding", "swing_of"]
 
 Array = NDArray[np.float64]
 
 SWING = math.radians(12.0)
-"""By how much the arm swings up where the scene has no stroke."""
+"""By how much the arm swings up where the scene has no stroke; with a cavity at its end half as much is drawn."""
 
 RESTS, LOWERS, STAYS = 0.5, 0.5, 1.5
 """Seconds for which the part is shown at rest, the arm goes down, and the last picture stays."""
@@ -49,11 +49,16 @@ def _lying(scene: Scene, x: float, side: int) -> Array:
     return np.array([x, scene.surface_height + float(scene.sides.d[side]), angle_on_side(scene, side)])
 
 
-def carried(poses: Array, angle: Array | float) -> Array:
+def riding(poses: Array, angle: Array | float) -> Array:
     """Poses of parts that lie on the arm, once that is turned about the joint; shapes (3,) or (n, 3), () or (n,)."""
     cos, sin = np.cos(angle), np.sin(angle)
     x, y = cos * poses[..., 0] - sin * poses[..., 1], sin * poses[..., 0] + cos * poses[..., 1]
     return np.stack([x, y, poses[..., 2] + angle], axis=-1)
+
+
+def swing_of(scene: Scene) -> float:
+    """By how much the arm swings up [rad]."""
+    return SWING if scene.cavity is None else 0.5 * SWING
 
 
 def lowered(swing: float, share: Array) -> Array:
@@ -116,7 +121,7 @@ def legs_of(
     after : tuple of (str, int), optional
         Note and stage once it rests.
     """
-    moves, swing = motion(scene, throw), stroke_of(scene) or SWING
+    moves, swing = motion(scene, throw), stroke_of(scene) or swing_of(scene)
     unit = pace.unit / pace.rate(scene, throw.kappa)
     lying, unit_of = _lying(scene, throw.x, throw.side), scene.unit
     at_rest = f"{throw.word}, x = {throw.after:.2f} {unit_of} on side {throw.side_after}"
@@ -139,7 +144,7 @@ def legs_of(
     return [
         Leg(
             LOWERS,
-            lambda share: carried(lying, lowered(swing, share)),
+            lambda share: riding(lying, lowered(swing, share)),
             lambda share: lowered(swing, share),
             lambda share: _on_lane(throw.x, throw.side, share),
             f"{name}: the arm goes down",
@@ -149,7 +154,7 @@ def legs_of(
         ),
         Leg(
             2.0 * swing * unit,
-            lambda share: carried(lying, raised(swing, share)),
+            lambda share: riding(lying, raised(swing, share)),
             lambda share: raised(swing, share),
             lambda share: _on_lane(throw.x, throw.side, share),
             f"{name}: the arm swings up and stops",

@@ -13,7 +13,7 @@ import numpy as np
 
 from limitsets.animation.film import Film
 from limitsets.animation.lanes_drawn import KNOWN, LANE
-from limitsets.animation.picture import ARM, EDGES, LEANS, PARTS, THICK, TOP, Picture
+from limitsets.animation.picture import ARM, EDGES, GROUND, LEANS, PARTS, THICK, TOP, Picture
 from limitsets.animation.raster import Progress
 from limitsets.animation.shapes import Shape
 from limitsets.files import as_plain
@@ -80,6 +80,7 @@ def _data(picture: Picture) -> dict[str, Any]:
         "poses": rounded(film.poses),
         "outlines": [rounded(each) for each in film.outlines],
         "labels": [[[each.word, *rounded([each.x, each.y])] for each in labels] for labels in film.labels],
+        "ground": [rounded(each) for each in film.ground] if film.arm.any() else [],
         "surface": None if film.surface is None else list(film.surface),
         "thick": 0.0 if film.surface is None else THICK * film.surface[1] / 28.0,
         "captions": list(film.captions),
@@ -102,6 +103,7 @@ def _data(picture: Picture) -> dict[str, Any]:
             "parts": PARTS,
             "edges": EDGES,
             "arm": ARM,
+            "ground": GROUND,
             "ink": style.INK,
             "impact": style.FLIP,
             "roll": style.ROLL,

@@ -19,8 +19,9 @@ from limitsets.animation.film import Film
 from limitsets.animation.lanes_drawn import KNOWN, LEFT, LanePicture, pointer
 from limitsets.animation.shapes import Shape, shape_of, text_of
 from limitsets.plot import style
+from limitsets.plot.poses import turned
 
-__all__ = ["ARM", "EDGES", "LEANS", "PARTS", "THICK", "TOP", "Picture"]
+__all__ = ["ARM", "EDGES", "GROUND", "LEANS", "PARTS", "THICK", "TOP", "Picture"]
 
 Array = NDArray[np.float64]
 
@@ -98,13 +99,7 @@ class Picture:
     def still(self) -> list[Shape]:
         """Everything that stays where it is."""
         film = self.film
-        found = [
-            shape_of("polygon", self._in_sight(each), fill=GROUND, what="ground") for each in film.ground
-        ]
-        found += [
-            shape_of("line", [*self._in_sight(each), self._in_sight(each)[0]], stroke="#9a9a9a", width=1.0)
-            for each in film.ground
-        ]
+        found = [] if film.arm.any() else self._ground(0)
         if self.rows is not None:
             found += self.rows.still()
         words = f"{film.title}: {film.about}" if film.about else film.title
@@ -112,6 +107,11 @@ class Picture:
             y = self.size[1] - 22.0 + 14.0 * number
             found.append(text_of(line, 12.0, y, size=11.0, fill="#5a5a5a", what="about"))
         return found
+
+    def _ground(self, k: int) -> list[Shape]:
+        pieces = [self._in_sight(each) for each in self.film.ground_polygons(k)]
+        found = [shape_of("polygon", each, fill=GROUND, what="ground") for each in pieces]
+        return found + [shape_of("line", [*each, each[0]], stroke="#9a9a9a", width=1.0) for each in pieces]
 
     def _in_sight(self, polygon: Array) -> Array:
         """Clip a polygon to the upper part: ground is as thick as parts are long."""
@@ -124,6 +124,7 @@ class Picture:
         """Everything else, in a frame."""
         film = self.film
         found = self._known(k)
+        found += self._ground(k) if film.arm.any() else []
         found += self._arm(k)
         first, last = (int(each) for each in film.trail[k])
         if last > first:
@@ -227,6 +228,8 @@ def _bounds(film: Film) -> tuple[Array, Array]:
             lo, hi = np.minimum(lo, (x.min(), y.min())), np.maximum(hi, (x.max(), y.max()))
     places = list(film.view)
     if film.surface is not None:
+        angles = (float(film.arm.min()), float(film.arm.max()))
+        places += [tuple(each) for piece in film.ground for k in angles for each in turned(piece, k).tolist()]
         end = film.surface[1]
         places += [
             (0.0, 0.0),

@@ -15,9 +15,10 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from limitsets.animation.cavity_drawn import cavity_pieces
 from limitsets.animation.cutting import Asked, Pace, labels_of, require_length
 from limitsets.animation.film import Film, Mark
-from limitsets.animation.legs import LOWERS, STAYS, SWING, carried, lowered, raised
+from limitsets.animation.legs import LOWERS, STAYS, lowered, raised, riding, swing_of
 from limitsets.engine.ground import ground_of
 from limitsets.errors import AnswerError
 
@@ -52,17 +53,21 @@ def film_of_recording(
     asked: Asked,
     scenes: Sequence[Scene] = (),
     title: str = "parts in the rigid-body engine",
+    *,
+    carried: bool = True,
 ) -> Film:
-    """Show a recording from its beginning, up to so many throws."""
+    """Show a recording from its beginning, up to so many throws; of a cavity that stands without the arm's swing."""
     if asked.start is not None:
         raise AnswerError("the start", asked.start, "none: a recording has its own", "leave it out")
     if not recording.times.size:
         raise AnswerError("the recording", "empty", "one with frames", "record a throw")
     pace = asked.pace(scenes[0]) if scenes else Pace(asked.fps, asked.slow)
-    swing = 0.0
-    if scenes:
-        swing = 2.0 * SWING * pace.unit / pace.rate(scenes[0], scenes[0].kappa)
-    shown, thrown = _frames(recording, asked.throws, pace, swing)
+    swing, about = 0.0, "the arm's swing is not shown"
+    if scenes and carried:
+        about = "the swing of the arm, with the cavity, is drawn"
+        swing = swing_of(scenes[0])
+    takes = 2.0 * swing * pace.unit / pace.rate(scenes[0], scenes[0].kappa) if scenes else 0.0
+    shown, thrown = _frames(recording, asked.throws, pace, (swing, takes))
     at = np.array([each.time for each in shown])
     kept = np.maximum(np.searchsorted(recording.times, at + 1e-9, side="right") - 1, 0)
     texts = [_words(recording, thrown, each) for each in shown]
@@ -71,14 +76,14 @@ def film_of_recording(
     if scenes:
         pieces = ground_of(scenes[0])
         surface = (pieces.height, pieces.end)
-        ground = tuple(each.corners for each in pieces.pieces if each.name != "arm")
+        ground = cavity_pieces(scenes[0], 0.5 * float(scenes[0].sides.length.max()))
     poses = _swung(recording, kept, shown, thrown)
     return Film(
         title,
         scenes[0].unit if scenes else "",
         pace.clock if scenes else "",
         pace.fps,
-        f"{pace.words}; " + ("the swing of the arm is drawn" if scenes else "the arm's swing is not shown"),
+        f"{pace.words}; {about}",
         np.arange(count) / (pace.unit * pace.fps),
         poses,
         tuple(recording.outlines),
@@ -96,7 +101,7 @@ def film_of_recording(
         None,
         np.full((count, 2), np.nan),
         np.full(count, -1, dtype=np.int64),
-        _view(tuple(recording.ground), poses),
+        () if scenes else _view(ground, poses),
     )
 
 
@@ -106,7 +111,8 @@ def film_of_assembly(found: Assembly, asked: Asked) -> Film:
     number = 0 if example is None else example
     scenes, last = found.pair.scenes, LAST if asked.throws is None else asked.throws
     title = f"{scenes[0].name} and {scenes[1].name}, trial {number}: {found.rows[number]['outcome']}"
-    return film_of_recording(found.film(number, last), asked._replace(throws=None), scenes, title)
+    recording, carried = found.film(number, last), found.series.carried
+    return film_of_recording(recording, asked._replace(throws=None), scenes, title, carried=carried)
 
 
 def film_of_tray(found: TrayFill, asked: Asked) -> Film:
@@ -138,9 +144,9 @@ def film_of_tray(found: TrayFill, asked: Asked) -> Film:
 
 
 def _frames(
-    recording: Recording, throws: int | None, pace: Pace, swing: float
+    recording: Recording, throws: int | None, pace: Pace, swing: tuple[float, float]
 ) -> tuple[list[_Frame], list[float]]:
-    """Choose the moments that are shown, before each throw the arm's swing, and say when parts are thrown."""
+    """Choose the moments that are shown, each throw's swing (angle, seconds) first, and say when parts are thrown."""
     first, end = float(recording.times[0]), float(recording.times[-1])
     thrown = sorted({time for time, _, word in recording.marks if word == "thrown"})
     if throws is not None and len(thrown) > throws:
@@ -150,10 +156,10 @@ def _frames(
     require_length(round((end - first) * pace.unit * pace.fps))
     frames, begin = [_Frame(first, 0.0, "")], first
     for end_of_leg in ends:
-        if swing and begin in thrown:
-            down, up = (max(1, round(seconds * pace.fps)) for seconds in (LOWERS, swing))
+        if swing[0] and begin in thrown:
+            down, up = (max(1, round(seconds * pace.fps)) for seconds in (LOWERS, swing[1]))
             for way, count, said in ((lowered, down, "goes down"), (raised, up, "swings up and stops")):
-                angles = way(SWING, np.arange(1, count + 1) / count).tolist()
+                angles = way(swing[0], np.arange(1, count + 1) / count).tolist()
                 frames += [_Frame(begin, angle, f": the arm {said}") for angle in angles]
         count = max(1, round((end_of_leg - begin) * pace.unit * pace.fps))
         frames += [_Frame(begin + (end_of_leg - begin) * k / count, 0.0, "") for k in range(1, count + 1)]
@@ -169,7 +175,7 @@ def _swung(recording: Recording, kept: NDArray[np.int64], shown: list[_Frame], t
     for frame, each in enumerate(shown):
         if each.arm:
             riders = [part for time, part, word in recording.marks if word == "thrown" and time == each.time]
-            poses[frame, riders] = carried(poses[frame, riders], each.arm)
+            poses[frame, riders] = riding(poses[frame, riders], each.arm)
     return poses
 
 

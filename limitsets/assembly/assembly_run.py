@@ -26,16 +26,14 @@ from limitsets.tables import Column, Table, Tabled
 if TYPE_CHECKING:
     from limitsets.engine.recording import Recording
 
-__all__ = ["OUTCOMES", "PAPER", "SURVIVED", "Assembly", "assemble"]
+__all__ = ["OUTCOMES", "Assembly", "assemble"]
 
 Progress = Callable[[str, int, int], None]
 
-OUTCOMES = ("assembled", "ejected", "order", "wrong", "wall", "left", "never", "unfinished")
+OUTCOMES = ("assembled", "ejected", "order", "wrong", "wall", "edge", "left", "never", "unfinished")
 """Both in their places; one came out of the cavity again; both on their sides, but the second below the first; one in a
-wrong orientation; one stuck at the wall; one left the arm otherwise; one is still on the arm; one still moves."""
-
-PAPER, SURVIVED, OF = 11, 17, 20
-"""Of 20 trials of the paper so many assembled; of 20 assembled pairs so many were whole after the next throw."""
+wrong orientation; one stuck at the wall; one thrown so near the end that the throw acts beyond it, which is assumed to
+be no feed; one left the arm otherwise; one is still on the arm; one still moves."""
 
 TRIALS, CHUNK = 2000, 10
 SERIES = 20
@@ -106,6 +104,7 @@ ENDED = {
     "order": "the second part lies below the first",
     "wrong": "stuck in a wrong orientation",
     "wall": "stuck at the wall",
+    "edge": "assumed not fed: a throw acts beyond the end",
     "left": "a part left the arm otherwise",
     "never": "a part stays on the arm",
     "unfinished": "still in motion",
@@ -229,7 +228,6 @@ class Assembly(Tabled):
             first_series={"of": self.first_series.of, "assembled": self.first_series.count},
             joint=self.joint,
             survived=self.survived or None,
-            paper={"assembled": rate_of(PAPER, OF), "survived": rate_of(SURVIVED, OF)},
         )
 
 
@@ -241,7 +239,7 @@ def assemble(
     scatter: Scattering | None = None,
     *,
     contact: str | None = None,
-    carried: bool = False,
+    carried: bool = True,
     apart: bool | None = None,
     starts: Sequence[Start] | None = None,
     trials: int = TRIALS,
@@ -264,7 +262,7 @@ def assemble(
         How a struck corner meets the arm where the scenes have ``contact = true``: ``"hinge"`` (default) or
         ``"unilateral"``.  Without contact in the scenes the parts pass through each other, and the map alone throws.
     carried : bool
-        With contact: whether the cavity is part of the arm, and thrown with what lies in it.
+        With contact: whether the cavity is part of the arm, and thrown with what lies in it, as the paper's was.
     apart : bool, optional
         Whether random starts are those of parts that do not overlap; default with contact, where they have to be.
     starts : pair of (float, int), optional
@@ -302,7 +300,7 @@ def assemble(
     if trials < 1:
         raise AnswerError("the trials", trials, "1 or more", "throw some parts")
     require_seed(seed)
-    if not pair.contact and (contact is not None or carried):
+    if not pair.contact and (contact is not None or not carried):
         remedy = "switch it on in both scenes: [effects] contact = true"
         raise AnswerError("effects.contact", False, "true, for trials in the engine", remedy)
     if contact not in (None, "hinge", "unilateral"):
@@ -313,7 +311,9 @@ def assemble(
     given = None if starts is None else require_apart(pair, starts)
     one, two = (json.dumps(each.as_dict()) for each in pair.scenes)
     side_by_side = bool(how if apart is None else apart)
-    series = Series((one, two), pair.scatter, how, carried, side_by_side, given, seed, trials)
+    series = Series(
+        (one, two), pair.scatter, how, carried and pair.contact, side_by_side, given, seed, trials
+    )
     kept = TrialFile(None if file is None else Path(file), series.question(), trials, CHUNK)
     where: dict[str, Any] = {"executor": executor, "cluster": cluster, "workers": workers}
     complete(kept, made, (series, CHUNK), "assembly", "trials", **where, progress=progress)

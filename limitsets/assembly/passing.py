@@ -52,7 +52,7 @@ class Passed:
         """A word of `limitsets.assembly.assembly_run.OUTCOMES`."""
         if self.fates == ("right", "right"):
             return "assembled" if self.throws[0] < self.throws[1] else "order"
-        for word in ("wrong", "wall", "left"):
+        for word in ("wrong", "wall", "edge", "left"):
             if word in self.fates:
                 return word
         return "never"
@@ -106,6 +106,8 @@ def pass_through(
 
 def _thrown(end: ArmEnd, params: Any, start: Start, shift: float) -> tuple[Start, str | None, int]:
     """Throw one part: where it lies, its fate if it has met one, and the side it comes to lie on."""
+    if end.at_edge(*start):
+        return start, "edge", start[1]
     found = images(params, [start[0]], start[1])
     x, side, code = float(found.x[0]) + shift, int(found.side[0]), int(found.code[0])
     scene = end.scene

@@ -36,7 +36,7 @@ class Question:
     """
 
     contact: str = "hinge"
-    carried: bool = False
+    carried: bool = True
     step: float = 4e-3
 
 
@@ -83,7 +83,15 @@ class _Watched:
         self.entered: list[int | None] = [None, None]
         self.wall = [False, False]
         self.ended = [False, False]
-        self.ejected = self.left = self.touched = False
+        self.ejected = self.left = self.touched = self.edge = False
+
+    def acts_beyond(self, rests: list[Rest]) -> bool:
+        """Whether the next throw acts beyond the end of the arm on a part: what it does is not simulated."""
+        self.edge = any(
+            rest.where == "arm" and end.at_edge(rest.x, rest.side)
+            for end, rest in zip(self.pair.ends, rests, strict=True)
+        )
+        return self.edge
 
     def seen(self, throw: int, rests: list[Rest]) -> None:
         """Take note of where the parts are after a throw."""
@@ -114,8 +122,8 @@ class _Watched:
             return "assembled"
         if self.ejected:
             return "ejected"
-        if self.left:
-            return "left"
+        if self.left or self.edge:
+            return "left" if self.left else "edge"
         if any(rest.where == "unfinished" for rest in rests):
             return "unfinished"
         inside = [k for k, rest in enumerate(rests) if rest.where == "cavity"]
@@ -180,6 +188,8 @@ def push(
     watched = _Watched(pair, crowd)
     rests = crowd.rests()
     for throw in range(1, MOST_THROWS + 1):
+        if watched.acts_beyond(rests):
+            break
         crowd.film.on = last is not None and throw >= last
         rests = crowd.throw(*draws.throw())
         watched.seen(throw, rests)

@@ -45,6 +45,9 @@ def animate(
         str | None,
         option("--assemble", "SCENE2", "Throw the part together with another; both scenes in contact."),
     ] = None,
+    standing: Annotated[
+        bool, typer.Option("--standing", help="With --assemble: the cavity stands, it is not thrown.")
+    ] = False,
     tray: Annotated[bool, typer.Option("--tray", help="Show a depression of the scene's [tray].")] = False,
     parts: Annotated[
         int | None, option("--parts", "N", "With --tray: N parts a pass that push each other.", min=1, max=50)
@@ -62,6 +65,10 @@ def animate(
         raise LimitsetsError("the reading", reading, "with --margin", "name the quantity", key="--reading")
     if parts is not None and not tray:
         raise LimitsetsError("the parts", parts, "with --tray", "ask for a tray", key="--parts")
+    if standing and assemble is None:
+        raise LimitsetsError(
+            "the cavity", "standing", "with --assemble", "name the other part", key="--standing"
+        )
     with progress() as tell:
         from limitsets.animation import animate as write
         from limitsets.animation import require_file
@@ -80,6 +87,7 @@ def animate(
             "tray": tray,
             "margin": margin,
             "assemble": assemble,
+            "standing": standing,
         }
         shown = _shown(chosen, tell, reading=reading, parts=parts, **asked)
         write(shown, file, start=begin, throws=throws, fps=fps, slow=slow, progress=tell)
@@ -105,6 +113,7 @@ def _shown(
     tray: bool,
     margin: str | None,
     assemble: str | None,
+    standing: bool,
     reading: str | None,
     parts: int | None,
 ) -> Any:
@@ -124,7 +133,7 @@ def _shown(
     if assemble is not None:
         from limitsets.assembly import assemble as pairs
 
-        return pairs(scene, assemble, trials=PAIRS, progress=tell)
+        return pairs(scene, assemble, carried=not standing, trials=PAIRS, progress=tell)
     if margin is not None:
         from limitsets.robust import margin as bracket
 

@@ -20,6 +20,9 @@ HELP_SCATTER = (
     "Random noise at every throw, like throw.speed='0.5 %'; repeatable. Default: the scenes', if any."
 )
 HELP_CONTACT = "With contact in the scenes: hinge (a struck corner is held, the default) or unilateral."
+HELP_STANDING = (
+    "With contact: the cavity stands in the room. Default: it is part of the arm, and thrown with it."
+)
 HELP_FILE = "Keep finished trials there; the same command goes on with what is left."
 
 
@@ -31,10 +34,7 @@ def assemble(
         str, option("--law", "LAW", "Of --scatter: gaussian (standard deviations) or bounded.")
     ] = "gaussian",
     contact: Annotated[str | None, option("--contact", "HOW", HELP_CONTACT)] = None,
-    carried: Annotated[
-        bool,
-        typer.Option("--carried", help="With contact: the cavity is part of the arm, and thrown with it."),
-    ] = False,
+    standing: Annotated[bool, typer.Option("--standing", help=HELP_STANDING)] = False,
     trials: Annotated[int, option("--trials", "N", "Pairs thrown from random starts.", min=1)] = 2000,
     seed: Annotated[int, option("--seed", "N", "Of the trials.", min=0)] = 0,
     workers: Annotated[int | None, option("--workers", "N", "Processes that throw.", min=1)] = None,
@@ -60,7 +60,7 @@ def assemble(
             scene2,
             scattering_from(chosen, random, law) if random else None,
             contact=contact,
-            carried=carried,
+            carried=not standing,
             trials=trials,
             seed=seed,
             file=file,
@@ -112,8 +112,8 @@ def _text(found: Assembly, files: list[Path]) -> None:
         low, high = rate.interval
         what = "the cavity standing" if name == "standing" else "the cavity thrown too"
         whole = f"{rate.count} of {rate.of} ({low:.3f} to {high:.3f})"
-        typer.echo(f"whole after the next throw, {what}: {whole}; the paper: 17 of 20")
+        typer.echo(f"whole after the next throw, {what}: {whole}")
     first = found.first_series
-    typer.echo(f"{first.count} assembled in the first {first.of} trials; the paper: 11 of 20")
+    typer.echo(f"{first.count} assembled in the first {first.of} trials")
     if files:
         typer.echo(f"written: {', '.join(map(str, files))}")

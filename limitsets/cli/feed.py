@@ -129,6 +129,11 @@ def _text(found: Feeding, files: list[Path], written: dict[str, Any] | None) -> 
         for line in (*found.safe.lines(end.side), *found.fed.lines(unit)):
             typer.echo(line)
     show(found.table())
+    if edge := found.shares.shares["edge"]:
+        typer.echo(
+            f"assumed: {100 * edge:.2f} % of the parts are thrown from so near the end of the arm that the throw acts"
+            " beyond it; what that throw does is not simulated, and the proofs throw as if the arm went on"
+        )
     if found.brackets is not None:
         for line in _proved(found.brackets):
             typer.echo(line)

@@ -46,8 +46,8 @@ class Crowd:
     watch : bool
         Whether `overlapped` tells which outlines have met where parts do not push each other; slow for very many.
     carried : bool
-        Whether the cavity is part of the arm, and all that lies in it is thrown; else only those parts are that touch
-        the arm's surface with a corner or have their centre of mass before its end.
+        Whether the cavity is part of the arm, as the paper's was, and all that lies in it is thrown; else only those
+        parts are that touch the arm's surface with a corner or have their centre of mass before its end.
     friction : float, optional
         On the arm; from the first scene's world where not given.
     sliding : float
@@ -93,7 +93,7 @@ class Crowd:
         contact: str = "hinge",
         between: bool = True,
         watch: bool = True,
-        carried: bool = False,
+        carried: bool = True,
         friction: float | None = None,
         sliding: float = 0.2,
         restitution: float | None = None,
@@ -295,9 +295,14 @@ class Crowd:
                 member.body.activate()  # it may stand on its corner for long, but not for good
             member.due = self.count + wait
             return
-        if member.lie_down(self.space) != member.side:
+        side, x, _ = member.coming_down()
+        if side != member.side:
             self._mark("roll", member.number)
         member.mode, member.shape.filter = LOOSE, self.contacts.on_all
+        if x > self.ground.end and self.cavity is not None and self.cavity.tips == "moving":
+            member.let_go(self.space)  # the end of the arm stops the face, not the part
+            return
+        member.lie_down(self.space)
         # the engine's memory breaks where a body is put to sleep that is in contact with one awake
         if member.body.position.x <= self.ground.end and not self.contacts.any_of(member.number):
             member.body.sleep()

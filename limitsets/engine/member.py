@@ -164,12 +164,16 @@ class Member:
         gap = min(angle - self.low, self.high - angle) - abs(rate) * step
         return whole_steps(gap, abs(rate), gain, step)
 
-    def lie_down(self, space: Any) -> int:
-        """Lie on the face that comes down, at rest, and let go of the corner; which side."""
+    def coming_down(self) -> tuple[int, float, float]:
+        """Which face of a held part comes down, where its centre of mass is along the arm then, and its angle."""
         ends = (self.low, self.faces[0]), (self.high, self.faces[1])
         angle, side = min(ends, key=lambda end: abs(self.body.angle - end[0]))
         radius, phase = self.polar[self.vertex]
-        x = self.place[0] - radius * math.cos(angle + phase)
+        return side, self.place[0] - radius * math.cos(angle + phase), angle
+
+    def lie_down(self, space: Any) -> int:
+        """Lie on the face that comes down, at rest, and let go of the corner; which side."""
+        side, x, angle = self.coming_down()
         self.let_go(space)
         self.stand((x, self.scene.surface_height + float(self.scene.sides.d[side]), angle))
         return side

@@ -1,13 +1,13 @@
 """Feeding: the arm ends in a cavity, and a part that comes to rest beyond the end falls in.
 
-`falling` says what becomes of such a part; `proving` which sides can be fed, and that every start is; `fed_shares` the
-probabilities under noise, and the noise at which success falls to a share; `bracketing` proves brackets of them, and
-`trials` throws parts as experimenters do, and `crowd` many at once, in the engine.  `feeding_run` joins them
-(`limitsets.feed`).
+`falling` says what becomes of such a part, `tipping` how long it takes; `proving` which sides can be fed, and that
+every start is; `fed_shares` the probabilities under noise, and the noise at which success falls to a share;
+`bracketing` proves brackets of them, and `trials` throws parts as experimenters do, and `crowd` many at once, in the
+engine.  `feeding_run` joins them (`limitsets.feed`).
 """
 
 from limitsets.feeding.falling import FATES as FATES
 from limitsets.feeding.falling import clear_beyond as clear_beyond
-from limitsets.feeding.falling import time_to_tip as time_to_tip
 from limitsets.feeding.feeding_run import Feeding as Feeding
 from limitsets.feeding.feeding_run import feed as feed
+from limitsets.feeding.tipping import time_to_tip as time_to_tip

@@ -27,7 +27,9 @@ def fate_brackets(
     throws: int = THROWS,
     progress: Callable[[str, int, int], None] | None = None,
 ) -> AbsorptionBrackets:
-    """Prove brackets of the fates right, wrong, wall and exits ("left") within n throws.
+    """Prove brackets of the fates right, wrong, wall, edge and exits ("left") within n throws.
+
+    A part that comes to rest where the next throw acts beyond the end has ended here, a throw before it is thrown.
 
     Raises
     ------
@@ -65,4 +67,6 @@ def _places(end: ArmEnd) -> dict[str, Places]:
     if at < last:
         wall.append((end.side, at, math.inf))
     wrong = [(side, end.x, math.inf) for side in range(len(end.scene.sides)) if side != end.side]
-    return {name: places for name, places in (("right", right), ("wrong", wrong), ("wall", wall)) if places}
+    edge = [(side, lo, end.x) for side, lo in enumerate(end.edges.tolist()) if lo < end.x]
+    named = (("right", right), ("wrong", wrong), ("wall", wall), ("edge", edge))
+    return {name: places for name, places in named if places}

@@ -49,7 +49,7 @@ class CrowdTrials:
         Whether the parts push each other.
     contact : str
         How the arm holds a struck corner: "hinge" or "unilateral" (`limitsets.engine.Crowd`).
-    fates : ndarray of int64, shape (batches, 5)
+    fates : ndarray of int64, shape (batches, 6)
         How many of those on the arm before the first throw met each fate of `FATES`; those of the last were on the arm
         still when throwing ended.
     throws : ndarray of int64, shape (batches,)
@@ -267,8 +267,17 @@ class _Batch:
             deviation = _drawn(self.random, scatter.speed, 1)[0]
             shifts = _drawn(self.random, scatter.landing, parts)
             self.throws += 1
+            self._lose_at_edge()
             self._take_out(crowd.throw(float(deviation), shifts.tolist()))
         return thrown
+
+    def _lose_at_edge(self) -> None:
+        """Take out the parts on which this throw acts beyond the end of the arm: what it does is not simulated."""
+        for rest in self.crowd.rests():
+            at_edge = rest.where == "arm" and bool(self.end.at_edge(rest.x, rest.side))
+            if at_edge and rest.number not in self.fate:
+                self.fate[rest.number] = FATES.index("edge")
+                self.crowd.take(rest.number)
 
     def _take_out(self, rests: list[Rest]) -> None:
         """Count and take out what lies in the cavity, the lowest first, as more slides down; and what has left."""

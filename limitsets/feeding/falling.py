@@ -1,13 +1,6 @@
-"""What falls in: a part at rest beyond the end of the arm tips over it, lies down flush on the ramp and slides down.
+"""What falls in: a part that comes to rest beyond the end of the arm tips over it, and slides down the ramp.
 
-The end is a hinge: no slip, from rest.  With the centre of mass e beyond the end and d above the side, theta the angle
-by which it has tipped and M = rho^2 + e^2 + d^2,
-
-    (M/2) theta'^2 = g (d (1 - cos theta) + e sin theta),
-
-so that the time to the ramp's angle is an integral over theta.  The substitution theta = (e/d)(cosh s - 1) is the
-motion of the pendulum that is linear in theta; what is left to integrate is smooth, however small e.
-What is assumed stands in docs/feeding.md.
+How long it takes to tip: `tipping`.  What is assumed stands in docs/feeding.md.
 """
 
 from __future__ import annotations
@@ -15,14 +8,14 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cache
 from itertools import pairwise
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from limitsets.errors import AnswerError
+from limitsets.feeding.tipping import tipping_times
 from limitsets.geometry.polygon import above_side, side_ends
 from limitsets.goals import OrientedBeyond, Reaches
 from limitsets.robust.noise.chain_solution import starts_from
@@ -31,62 +24,15 @@ from limitsets.scene.scene import require_rests
 if TYPE_CHECKING:
     from limitsets.scene import Cavity, Scene
 
-__all__ = ["FATES", "ArmEnd", "arm_end_of", "clear_beyond", "farthest_clear", "time_to_tip"]
+__all__ = ["FATES", "ArmEnd", "arm_end_of", "clear_beyond", "farthest_clear"]
 
-FATES = ("right", "wrong", "wall", "left", "never")
+FATES = ("right", "wrong", "wall", "edge", "left", "never")
 """What becomes of a part: fed on the wanted side; on another one; on the wanted side but it meets the far wall (or is
-still tipping at the next throw); it leaves the arm otherwise; it is still on the arm when throwing ends."""
+still tipping at the next throw); it is thrown from so near before the end that the throw acts beyond the end, which is
+not simulated: it is assumed not to be fed; it leaves the arm otherwise; it is still on the arm when throwing ends."""
 
-# Abscissae of the integral, and places between which the time to tip is searched for the dwell.
-NODES, PLACES = 96, 200
-
-
-@cache
-def _rule() -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Nodes and weights of Gauss and Legendre: numpy solves an eigenvalue problem for them at each call."""
-    return np.polynomial.legendre.leggauss(NODES)
-
-
-def time_to_tip(
-    beyond: ArrayLike, height: float, radius_of_gyration: float, gravity: float, angle: float
-) -> NDArray[np.float64]:
-    """Give the time in which a part tips over the end of the arm, from rest until its side lies on the ramp.
-
-    Parameters
-    ----------
-    beyond : array_like
-        How far beyond the end the centre of mass rests, from 0 [length].
-    height : float
-        Of the centre of mass above the side [length].
-    radius_of_gyration : float
-        About the centre of mass [length].
-    gravity : float
-        In the plane of the motion [length/s^2].
-    angle : float
-        Of the ramp, below 90 degrees [rad].
-
-    Returns
-    -------
-    ndarray of float64
-        Seconds; infinite at the end itself.
-
-    Examples
-    --------
-    >>> time_to_tip([0.0, 0.1], 0.7, 1.25, 193.0, 0.56).round(3)
-    array([  inf, 0.282])
-    """
-    e = np.asarray(beyond, dtype=np.float64)
-    node, weight = _rule()
-    with np.errstate(divide="ignore", invalid="ignore"):
-        last = 2.0 * np.arcsinh(np.sqrt(0.5 * height * angle / e))
-        s = 0.5 * last[..., None] * (1.0 + node)
-        scale = (e / height)[..., None]
-        theta = 2.0 * scale * np.sinh(0.5 * s) ** 2
-        fallen = 2.0 * height * np.sin(0.5 * theta) ** 2 + e[..., None] * np.sin(theta)
-        total = (weight * scale * np.sinh(s) / np.sqrt(fallen)).sum(axis=-1) * 0.5 * last
-        inertia = radius_of_gyration**2 + height**2 + e**2
-        time = np.sqrt(inertia / (2.0 * gravity)) * total
-    return np.where(e > 0.0, time, np.inf)
+# Places between which the time to tip is searched for the dwell.
+PLACES = 200
 
 
 def farthest_clear(scene: Scene, cavity: Cavity, side: int) -> float:
@@ -141,20 +87,18 @@ def clear_beyond(scene: Scene, side: int) -> tuple[tuple[float, float], ...]:
         return ()
     if rate is None:
         return ((0.0, most),)
-    gravity = scene.gravity
-    if gravity is None:
+    if scene.gravity is None:
         remedy = "add [gravity] to the scene, or leave world.throw_rate out"
         raise AnswerError("gravity", None, "known where parts have limited time to tip", remedy)
-    height = float(scene.sides.d[side])
+    times = tipping_times(scene, side)
 
     def late(e: float) -> float:
-        time = time_to_tip(e, height, scene.radius_of_gyration, gravity, cavity.angle)
-        return float(time) - 1.0 / rate
+        return float(times(np.array([e]))[0]) - 1.0 / rate
 
-    # the time grows by ln 2 / sqrt(g d / M) whenever e halves: from so near to the end that it exceeds any dwell
+    # from rest the time grows by ln 2 / sqrt(g d / M) whenever e halves: from so near that it exceeds any dwell
     near, far = np.geomspace(most * 1e-200, most * 1e-3, PLACES), np.linspace(most * 1e-3, most, PLACES)
     places = [*near[:-1].tolist(), *far.tolist()]
-    is_late = [late(e) > 0.0 for e in places]
+    is_late = (times(np.array(places)) > 1.0 / rate).tolist()
     ends = [] if is_late[0] else [0.0]
     for (lo, hi), (before, after) in zip(pairwise(places), pairwise(is_late), strict=True):
         if before != after:
@@ -191,6 +135,9 @@ class ArmEnd:
         The side wanted.
     clear : tuple of (float, float)
         How far beyond the end a part on that side clears the wall [length].
+    edges : ndarray, shape (n_sides,)
+        From here to the end a throw acts beyond the end: its impulse, (rho^2 + d (h + d)) / x right of the foot of the
+        centre of mass, finds no arm below [length].
     starts : ndarray, shape (n_sides,)
         Random starts lie from here to the end, equally likely per length on all sides [length].
     """
@@ -199,6 +146,7 @@ class ArmEnd:
     x: float
     side: int
     clear: tuple[tuple[float, float], ...]
+    edges: NDArray[np.float64]
     starts: NDArray[np.float64]
 
     def fate(self, x: NDArray[np.float64], side: NDArray[np.int64]) -> NDArray[np.int64]:
@@ -209,6 +157,10 @@ class ArmEnd:
             clears |= (beyond >= lo) & (beyond <= hi)
         fed = np.where(side == self.side, np.where(clears, 0, 2), 1)
         return np.where(beyond >= 0.0, fed, -1)
+
+    def at_edge(self, x: Any, side: Any) -> Any:
+        """Say of which parts at rest before the end the next throw acts beyond it: their fate is "edge"."""
+        return (x > self.edges[side]) & (x < self.x)
 
 
 def arm_end_of(scene: Scene, side: int | None = None, starts: Mapping[int, float] | None = None) -> ArmEnd:
@@ -237,4 +189,13 @@ def arm_end_of(scene: Scene, side: int | None = None, starts: Mapping[int, float
             allowed = f"by side, from a of that side to below {x:g} {scene.unit}"
             raise AnswerError("the starts", f"{number}: {least}", allowed, "name places on the arm")
         begin[number] = least
-    return ArmEnd(scene, x, side, clear_beyond(scene, side), begin)
+    return ArmEnd(scene, x, side, clear_beyond(scene, side), _edges(scene, x), begin)
+
+
+def _edges(scene: Scene, x: float) -> NDArray[np.float64]:
+    """Give by side the least place from which a throw acts beyond the end: y + c / y > x, the side over the end."""
+    sides = scene.sides
+    c = scene.radius_of_gyration**2 + sides.d * (scene.surface_height + sides.d)
+    root = np.sqrt(np.maximum(x * x - 4.0 * c, 0.0))
+    acts = np.where(4.0 * c < x * x, 0.5 * (x + root), 0.0)
+    return np.clip(acts, np.maximum(x - sides.right, sides.a), x)

@@ -33,7 +33,7 @@ class FedShares:
 
     Attributes
     ----------
-    by_throw : ndarray, shape (n, 4)
+    by_throw : ndarray, shape (n, 5)
         Share that meets each fate of `FATES` but the last, at each throw from the first.
     never : float
         Share that is on the arm still after the last throw counted.
@@ -95,8 +95,9 @@ class FeedingProblem:
     def cover(self) -> Grid:
         """Cells with borders at the end of the arm and where parts begin and cease to clear the wall."""
         found = cells_for_noise(self.end.scene.domain, self.chain.cells)
-        for beyond in {0.0, *(edge for pair in self.end.clear for edge in pair)}:
-            found = with_border(found, self.end.x + beyond)
+        cuts = {self.end.x + beyond for beyond in (0.0, *(each for pair in self.end.clear for each in pair))}
+        for cut in cuts.union(self.end.edges.tolist()):
+            found = with_border(found, cut)
         return found
 
     def solve(self, scatter: Scattering) -> FedShares:
@@ -104,13 +105,15 @@ class FeedingProblem:
         cover = self.cover()
         chain = self.chain.chain(cover, scatter)
         x = np.concatenate([cover.centres(side) for side in range(cover.sides)])
-        fate = self.end.fate(x, cover.side_of(np.arange(cover.n_cells)))
+        side = cover.side_of(np.arange(cover.n_cells))
+        fate, edge = self.end.fate(x, side), self.end.at_edge(x, side)
         masses = random_starts(cover, self.chain.starts, self.end.x)
         rows: list[list[float]] = []
         while masses.sum() > UNDER_WAY and len(rows) < MOST_THROWS:
+            tipped, masses[edge] = float(masses[edge].sum()), 0.0
             left = float((masses @ chain.sinks).sum())
             masses = chain.adjoint(masses)
-            rows.append([*(float(masses[fate == number].sum()) for number in range(3)), left])
+            rows.append([*(float(masses[fate == number].sum()) for number in range(3)), tipped, left])
             masses[fate >= 0] = 0.0
         return FedShares(np.array(rows), float(masses.sum()), chain.cut)
 
@@ -129,7 +132,8 @@ class Curve:
     Attributes
     ----------
     factors, right : ndarray, shape (n,)
-        Factor on all deviations, and the share fed rightly.
+        Factor on all deviations, and the share fed rightly of the parts that are not thrown at the edge, where no fate
+        is simulated.
     wanted : float
         The share asked about.
     level : (float, float) or None
@@ -184,7 +188,8 @@ def success_curve(
 
     def right(factor: float) -> float:
         tell("noise levels", len(shares), len(possible) + HALVINGS)
-        shares.append(problem.solve(scatter.scaled(factor)).shares["right"])
+        found = problem.solve(scatter.scaled(factor)).shares
+        shares.append(found["right"] / max(1.0 - found["edge"], found["right"]))
         return shares[-1]
 
     shares: list[float] = []

@@ -16,13 +16,10 @@ from limitsets.robust.noise.proportions import binomial_interval
 from limitsets.robust.noise.sampling import ManyParts, scattering_map, uniform_starts
 from limitsets.robust.noise.scattering import Scattering
 
-__all__ = ["PAPER", "SERIES", "Trials", "run_trials"]
+__all__ = ["SERIES", "Trials", "run_trials"]
 
 SERIES = 20
-"""Trials of the paper, each from a random start."""
-
-PAPER = 19
-"""So many of them succeeded."""
+"""Trials of a series, each from a random start."""
 
 MOST_THROWS = 20_000
 
@@ -36,11 +33,9 @@ class Trials:
     fate : ndarray of int64, shape (n,)
         Number in `FATES` of what became of each.
     throws : ndarray of int64, shape (n,)
-        Throws made until then.
+        Throws made until then, that which acts beyond the end of the arm included.
     beyond : ndarray of bool, shape (n,)
         Whether the struck corner lay beyond the end of the arm at any throw: the model has an arm below it there.
-    tips : ndarray of bool, shape (n,)
-        Whether the impulse of any throw acted beyond the end of the arm, so that the throw itself tips the part over.
     seed : int
         Of starts and noise.
     """
@@ -48,7 +43,6 @@ class Trials:
     fate: NDArray[np.int64]
     throws: NDArray[np.int64]
     beyond: NDArray[np.bool_]
-    tips: NDArray[np.bool_]
     seed: int
 
     @property
@@ -76,9 +70,7 @@ class Trials:
                 "mean": float(series.mean()) if series.size else math.nan,
                 "right": np.bincount(series, minlength=SERIES + 1),
             },
-            paper={"right": PAPER, "of": SERIES, "interval": binomial_interval(PAPER, SERIES)},
             corner_beyond_end=float(self.beyond.mean()),
-            throw_tips_over_end=float(self.tips.mean()),
         )
 
 
@@ -114,25 +106,23 @@ def run_trials(
     many = ManyParts(scattering_map(scene, scatter, seed), *uniform_starts(random, end.starts, end.x, count))
     fate = np.full(count, len(FATES) - 1, dtype=np.int64)
     throws = np.full(count, MOST_THROWS, dtype=np.int64)
-    beyond, tips = np.zeros(count, dtype=bool), np.zeros(count, dtype=bool)
+    beyond = np.zeros(count, dtype=bool)
     waiting = np.arange(count)
-    a, d, right = scene.sides.a, scene.sides.d, scene.sides.right
+    a, right = scene.sides.a, scene.sides.right
     for number in range(1, MOST_THROWS + 1):
         if progress is not None:
             progress("trials", count - waiting.size, count)
-        # the impulse of the throw acts so far right of the foot of the centre of mass (docs/model.md)
-        height = d[many.side]
-        shift = (scene.radius_of_gyration**2 + height * (scene.surface_height + height)) / many.x
-        tips[waiting] |= many.x + shift > end.x
+        edge = end.at_edge(many.x, many.side)
         code = many.throw()
         # a jog lands on the left corner of its side, a flip on the right corner of the next one
         corner = many.x + np.where(code == 0, -a[many.side], right[many.side])
-        beyond[waiting] |= ((code == 0) | (code == 1)) & (corner > end.x)
-        met = np.where(code < 0, 3, end.fate(many.x, many.side))
+        beyond[waiting] |= ((code == 0) | (code == 1)) & (corner > end.x) & ~edge
+        met = np.where(code < 0, FATES.index("left"), end.fate(many.x, many.side))
+        met[edge] = FATES.index("edge")
         done = met >= 0
         fate[waiting[done]], throws[waiting[done]] = met[done], number
         many.keep(~done)
         waiting = waiting[~done]
         if not waiting.size:
             break
-    return Trials(fate, throws, beyond, tips, seed)
+    return Trials(fate, throws, beyond, seed)

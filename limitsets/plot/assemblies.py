@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.patches import Patch, Polygon
 
 from limitsets.arguments import arguments_checked
-from limitsets.assembly.assembly_run import OF, OUTCOMES, PAPER
+from limitsets.assembly.assembly_run import OUTCOMES
 from limitsets.assembly.counting import rate_of
 from limitsets.plot import style
 
@@ -28,6 +28,7 @@ WORDS = {
     "order": "second part below",
     "wrong": "wrong orientation",
     "wall": "stuck at the wall",
+    "edge": "thrown at the end (assumed)",
     "left": "left the arm",
     "never": "still on the arm",
     "unfinished": "still in motion",
@@ -48,7 +49,7 @@ def assembly(found: Assembly) -> Figure:
     Returns
     -------
     matplotlib.figure.Figure
-        Shares of the outcomes with their intervals beside the paper's 11 of 20; with contact one case of each outcome:
+        Shares of the outcomes with their intervals; with contact one case of each outcome:
         both parts at rest, and faintly on their way in the last throw; without, the throws until each part is fed.
     """
     cases = [name for name in OUTCOMES if found.contact != "none" and found.example(name) is not None]
@@ -67,7 +68,8 @@ def assembly(found: Assembly) -> Figure:
         looks = zip((one, two), PARTS, ("-", style.FLIP_LINE), strict=True)
         handles = [Patch(label=name, fc=face, ec=edge, ls=line, lw=1.4) for name, (face, edge), line in looks]
         style.legend(figure, handles, 2)
-    meet = {"none": "pass through each other"}.get(found.contact, f"in contact, {found.contact}")
+    held = f"in contact, {found.contact}, cavity {'carried' if found.series.carried else 'standing'}"
+    meet = "pass through each other" if found.contact == "none" else held
     style.title(figure, f"{one} and {two}, {meet}: {len(found.rows)} trials")
     return figure
 
@@ -81,11 +83,6 @@ def _outcomes(axes: Axes, found: Assembly) -> None:
         axes.plot([low, high], [row, row], color=style.INK, lw=1.3)
         style.note(axes, f"{rate.count}", (high, row), (4, -3))
     axes.set_yticks(range(len(shown)), [WORDS[name] for name in reversed(shown)], fontsize=style.SMALL)
-    low, high = rate_of(PAPER, OF).interval
-    at = len(shown) - 1
-    axes.plot([low, high], [at + 0.42] * 2, color=style.GOAL, lw=2.4, solid_capstyle="butt")
-    axes.plot([PAPER / OF], [at + 0.42], color=style.GOAL, marker="D", ms=5, ls="")
-    style.note(axes, f"the paper's {PAPER} of {OF}", (high, at + 0.42), (4, -3), color=style.GOAL)
     axes.set_xlim(0.0, 1.15)
     axes.set_xlabel("share of the trials, 95 % interval", fontsize=style.SMALL)
     axes.set_title("what becomes of a pair", loc="left", fontsize=style.TEXT)

@@ -9,11 +9,10 @@ import numpy as np
 from matplotlib.patches import Polygon
 
 from limitsets.arguments import arguments_checked
-from limitsets.feeding.falling import FATES, time_to_tip
-from limitsets.feeding.trials import PAPER, SERIES
+from limitsets.feeding.falling import FATES
+from limitsets.feeding.tipping import tipping_times
 from limitsets.geometry.polygon import above_side, side_ends
 from limitsets.plot import style
-from limitsets.robust.noise.proportions import binomial_interval
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -28,6 +27,7 @@ LOOKS: dict[str, dict[str, Any]] = {
     "right": {"color": style.GOAL, "ls": "-"},
     "wrong": {"color": style.FLIP, "ls": style.FLIP_LINE},
     "wall": {"color": style.ROLL, "ls": style.ROLL_LINE},
+    "edge": {"color": style.INK, "ls": (0, (5, 1.5, 1, 1.5))},
     "left": {"color": style.JOG, "ls": (0, (1, 1.5))},
 }
 # Shares below this are not drawn.
@@ -36,6 +36,7 @@ WORDS = {
     "right": "side wanted, clear",
     "wrong": "another side",
     "wall": "meets the wall",
+    "edge": "thrown at the end (assumed not fed)",
     "left": "leaves the arm",
 }
 
@@ -113,13 +114,10 @@ def _cavity(axes: Axes, found: Feeding) -> None:
 
 def _tipping(axes: Axes, found: Feeding) -> None:
     scene = found.end.scene
-    cavity, side = scene.cavity, found.end.side
-    assert cavity is not None
-    assert scene.gravity is not None
+    side = found.end.side
     most = min(float(scene.sides.a[side]), scene.arm_length - found.end.x)
     e = np.geomspace(1e-6 * most, most, 300)
-    time = time_to_tip(e, float(scene.sides.d[side]), scene.radius_of_gyration, scene.gravity, cavity.angle)
-    axes.plot(e, time, color=style.INK, lw=1.3)
+    axes.plot(e, tipping_times(scene, side)(e), color=style.INK, lw=1.3)
     rate = scene.world.throw_rate
     if rate is not None:
         axes.axhline(1.0 / rate, color=style.FLIP, lw=1.1, ls=style.FLIP_LINE)
@@ -128,8 +126,9 @@ def _tipping(axes: Axes, found: Feeding) -> None:
         axes.axvspan(max(lo, float(e[0])), hi, color="#9BD1B8", alpha=0.4, lw=0)
     axes.set_xscale("log")
     axes.set_ylim(bottom=0.0)
-    axes.set_title("time to tip (shaded: clear)", loc="left", fontsize=style.TEXT)
-    axes.set_xlabel(f"rests beyond the end by [{scene.unit}]", fontsize=style.SMALL)
+    begins = "from rest" if scene.cavity is not None and scene.cavity.tips == "rest" else "as it comes down"
+    axes.set_title(f"time to tip, {begins} (shaded: clear)", loc="left", fontsize=style.TEXT)
+    axes.set_xlabel(f"comes down beyond the end by [{scene.unit}]", fontsize=style.SMALL)
     axes.set_ylabel("time [s]", fontsize=style.SMALL)
     style.open_frame(axes)
 
@@ -138,7 +137,7 @@ def _throws(axes: Axes, found: Feeding) -> None:
     rows, trials = found.shares.by_throw, found.trials
     last = (found.shares.quantile(0.999) or rows.shape[0]) + 2
     number = np.arange(1, min(last, rows.shape[0]) + 1)
-    for column, name in enumerate(FATES[:4]):
+    for column, name in enumerate(FATES[:-1]):
         total = np.cumsum(rows[:, column])[: number.size]
         if total[-1] > LEAST:
             label = f"{WORDS[name]}: {100 * found.shares.shares[name]:.3g} %"
@@ -159,15 +158,14 @@ def _throws(axes: Axes, found: Feeding) -> None:
     axes.set_title(f"fates (dots: {trials.fate.size} trials)", loc="left", fontsize=style.TEXT)
     axes.set_xlabel("throws", fontsize=style.SMALL)
     axes.set_ylabel("share of random starts", fontsize=style.SMALL)
-    axes.legend(fontsize=style.SMALL, frameon=False)
+    axes.set_ylim(0.0, 1.4 * axes.get_ylim()[1])  # room for the legend over the steps
+    axes.legend(fontsize=style.SMALL, frameon=False, loc="upper left")
     style.open_frame(axes)
 
 
 def _levels(axes: Axes, found: Feeding) -> None:
     curve = found.curve
     assert curve is not None
-    low, high = binomial_interval(PAPER, SERIES)
-    axes.axhspan(low, high, color="#E8E1A0", alpha=0.5, lw=0, label="the paper's 19 of 20, 95 % interval")
     axes.plot(curve.factors, curve.right, color=style.INK, marker="o", ms=3.5, lw=1.3)
     axes.axhline(curve.wanted, color=style.GOAL, lw=1.0, ls=(0, (4, 2)), label=f"{100 * curve.wanted:g} %")
     if curve.level is not None and curve.level[1] > 0.0:

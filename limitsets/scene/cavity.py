@@ -33,12 +33,16 @@ class Cavity:
         Of the floor below the arm's surface, where the ramp ends and the wall begins [length].
     angle : float
         Of the ramp below the arm's surface [rad].
+    tips : str
+        How a part that comes down beyond the end begins to tip over it: ``"moving"``, with the angular momentum about
+        the end with which it came down, or ``"rest"``.
     """
 
     position: float
     width: float
     depth: float
     angle: float
+    tips: str = "moving"
 
 
 def resolve_cavity(
@@ -93,4 +97,4 @@ def resolve_cavity(
             allowed,
             "the ramp is longer than the cavity: make it less deep, or wider",
         )
-    return Cavity(position, width, depth, angle)
+    return Cavity(position, width, depth, angle, table.tips)

@@ -28,6 +28,7 @@ __all__ = [
     "Name",
     "Pair",
     "SideNumber",
+    "Tips",
     "Yes",
     "number",
     "quantity",
@@ -113,6 +114,7 @@ SideNumber: TypeAlias = Annotated[
 ]
 Flight: TypeAlias = Annotated[str, word("exact", "small-angle", "small-angle-2")]
 Flip: TypeAlias = Annotated[str, word("signed", "energy")]
+Tips: TypeAlias = Annotated[str, word("moving", "rest")]
 Deviation: TypeAlias = Annotated[
     str,
     _fitting(

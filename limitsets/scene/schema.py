@@ -28,6 +28,7 @@ from limitsets.scene.leaves import (
     Name,
     Pair,
     SideNumber,
+    Tips,
     Yes,
     number,
     quantity,
@@ -191,6 +192,10 @@ class CavityTable(Table):
     width: Annotated[Length, says("from the end of the arm to the far wall", "8 in")]
     depth: Annotated[Length, says("of the floor below the arm's surface", "2 in")]
     angle: Annotated[Angle, says("of the ramp from the end of the arm to the floor", "30 deg")]
+    tips: Annotated[
+        Tips,
+        says('how a part begins to tip over the end: "moving", as it came down, or "rest"', "moving"),
+    ] = "moving"
 
 
 class TrayTable(Table):

@@ -149,11 +149,12 @@ def draw(numbers: dict[str, Any]) -> Figure:
         "right": "0.25",
         "wrong": "0.55",
         "wall": "0.75",
+        "edge": "0.68",
         "left": "0.88",
         "never": "white",
         "spilled": "white",
     }
-    hatches = {"spilled": "///", "never": "..."}
+    hatches = {"edge": "\\\\", "spilled": "///", "never": "..."}
     for fate, shade in shades.items():
         high = []
         for parts, each in rows.items():
@@ -164,7 +165,7 @@ def draw(numbers: dict[str, Any]) -> Figure:
         )
         below = [low + more for low, more in zip(below, high, strict=True)]
     fates.set(xlabel="parts given, that push each other", ylabel="share", ylim=(0.0, 1.0))
-    fates.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=6, fontsize=8, columnspacing=1.0)
+    fates.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=7, fontsize=8, columnspacing=1.0)
     return figure
 
 

@@ -15,3 +15,12 @@ def pair(*, contact=False, **tables):
         tree["effects"] = {**tree.get("effects", {}), **({"contact": True} if contact else {})}
         found.append(ls.load({**tree, **tables}))
     return found
+
+
+def both_own(*, contact):
+    """Give both under a user's own names."""
+    scenes = pair(contact=contact)
+    return [
+        ls.load({**scene.as_dict(), "name": name})
+        for scene, name in zip(scenes, ("lower", "upper"), strict=True)
+    ]

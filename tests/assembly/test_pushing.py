@@ -73,7 +73,7 @@ def test_what_points_at_a_part_that_slides_down_stops_it_at_its_side():
 
 
 def test_parts_let_go_in_their_seats_stay_there_and_survive(joined):
-    crowd = crowd_of(joined, Question())
+    crowd = crowd_of(joined, Question(carried=False))
     for number, pose in enumerate(seated(joined)):
         crowd.drop(number, pose)
     watched = _Watched(joined, crowd)

@@ -179,7 +179,7 @@ def test_the_first_series_is_of_twenty_or_of_all_there_are(whole):
 
 KEYS = {
     "scenes", "unit", "contact", "carried", "misfit", "overlaps", "trials", "seed", "scatter", "counts", "assembled",
-    "first_series", "joint", "survived", "paper",
+    "first_series", "joint", "survived",
 }  # fmt: skip
 
 
@@ -196,7 +196,6 @@ def test_json_and_the_command(capfd, tmp_path):
     assert set(found["joint"]) == {
         "table", "rates", "both", "product", "error", "error_interval", "serial"
     }  # fmt: skip
-    assert found["paper"]["assembled"]["count"] == 11
     assert json.loads((tmp_path / "assembly.json").read_text()) == found
     assert (tmp_path / "assembly.png").stat().st_size > 10_000
     code, out, _ = run(capfd, "assemble", *NAMES, *options)

@@ -430,3 +430,15 @@ def test_a_cavity_that_cannot_be_read(good, tmp_path, cavity):
     f = ending(good, EVERY)
     f.header["boxes"][0]["scene"]["cavity"] = CAVITY | cavity
     assert verdict(f, tmp_path).verdict == "bad file"
+
+
+def test_how_a_part_tips_is_read_and_nothing_else(good, tmp_path):
+    """What the cavity is like beyond the end is not claimed, but its keys are known."""
+    for key, sure in (("tips", True), ("tilts", False)):
+        f = ending(good, {"side": 2, "safety": "every"})
+        for box in f.header["boxes"]:
+            box["scene"]["cavity"][key] = "rest"
+        if sure:
+            assert verdict(f, tmp_path).claims[0][1] in ("proved", "proved-on-cells")
+        else:
+            assert "unknown key" in str(verdict(f, tmp_path))

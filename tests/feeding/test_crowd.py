@@ -101,7 +101,7 @@ def test_the_lowest_part_is_taken_out_first_and_the_next_slides_down():
     assert [rest.side for rest in rests] == [2, -1]  # the second lies on the first
     batch = _Batch(crowd, arm_end_of(fed), np.random.default_rng(0))
     batch._take_out(rests)
-    assert batch.fates() == [2, 0, 0, 0, 0]
+    assert batch.fates() == [2, 0, 0, 0, 0, 0]
 
 
 @pytest.mark.parametrize(("off", "fate"), [(-0.01, "left"), (0.01, "never")])
@@ -117,7 +117,7 @@ def test_a_part_that_rests_at_a_or_nearer_to_the_joint_has_left(off, fate):
 
 def test_rates_count_right_feeds_per_throw():
     found = run_crowd(arm_end_of(scene()), NOISE, 1, batches=2)
-    made = replace(found, fates=np.array([[3, 0, 0, 0, 0], [1, 0, 0, 0, 2]]), throws=np.array([10, 30]))
+    made = replace(found, fates=np.array([[3, 0, 0, 0, 0, 0], [1, 0, 0, 0, 0, 2]]), throws=np.array([10, 30]))
     rate, error = made.right_per_throw
     assert rate == pytest.approx(0.1)
     # residuals 3 - 1 and 1 - 3: standard deviation sqrt(8), over sqrt(2) batches of 20 throws in the mean

@@ -59,7 +59,7 @@ def test_without_a_rate_of_throws_a_part_has_time_to_tip():
 
 
 def test_the_next_throw_comes_too_early_close_to_the_end():
-    scene = with_cavity(rate="2 Hz")
+    scene = with_cavity(rate="2 Hz", tips="rest")
     ((least, most),) = clear_beyond(scene, 2)
     assert float(time_to_tip(least, D, RHO, G, ANGLE)) == pytest.approx(0.5, rel=1e-9)
     # the linear pendulum is a little too fast: cosh(0.5 sqrt(g d / M)) - 1 = d angle / e

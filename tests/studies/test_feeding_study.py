@@ -39,7 +39,11 @@ def test_as_expected(ran):
 
 def test_nothing_fails_within_the_margin(ran):
     for case in ("robust", "designed"):
-        assert ran[1][f"{case}, starts named"]["trials"]["right"] == 4000
+        trials = ran[1][f"{case}, starts named"]["trials"]
+        assert trials["right"] + trials["edge"] == 4000
+        assert (
+            trials["edge"] > 0
+        )  # assumed not to be fed: nothing is proved of a throw that acts beyond the end
 
 
 def test_the_readme_has_the_paper_s_counts(ran):
