@@ -124,7 +124,7 @@ def table(rows: dict[str, dict[str, Any]]) -> str:
 
 
 def main(
-    seed: int = 0, out: Path = HERE, trials: int = 100_000, cells: int = 1024, *, level: bool = True
+    seed: int = 0, out: Path = HERE, trials: int = 100_000, *, level: bool = True
 ) -> dict[str, Any]:
     """Run the study, write the figure into `out`, return the numbers."""
     out.mkdir(parents=True, exist_ok=True)
@@ -137,7 +137,6 @@ def main(
             noise=case.noise,
             trials=trials,
             seed=seed,
-            cells=cells,
             level=level,
         )
         rows[name] = row(found)

@@ -18,7 +18,7 @@ def written(name, **changes):
 
 def test_words_files_and_exit(capfd):
     file = written("paper-designed", rate="2 Hz")
-    quick = ("--trials", "200", "--cells", "64")
+    quick = ("--trials", "200")
     code, out, _ = run(capfd, "feed", file, *quick, "-o", "fed")
     assert code == 0
     assert "the arm ends at x = 20 in, side 2 is wanted" in out
@@ -33,7 +33,7 @@ def test_json_alone_and_noise(capfd):
     file = written("paper-designed")
     code, out, _ = run(
         capfd, "feed", file, "--json", "--no-proof", "--scatter", "landing.x=0.1 in", "--law", "bounded",
-        "--trials", "50", "--cells", "32", "--seed", "4",
+        "--trials", "50", "--seed", "4",
     )  # fmt: skip
     assert code == 0
     table = json.loads(out)
@@ -46,7 +46,7 @@ def test_json_alone_and_noise(capfd):
 @pytest.mark.sweep
 def test_the_certificate_is_written_and_rechecked(capfd):
     file = written("paper-designed", position="20.5 in")
-    quick = ("--trials", "50", "--cells", "32", "--certificate", "fed.proof.zip")
+    quick = ("--trials", "50", "--certificate", "fed.proof.zip")
     code, out, _ = run(capfd, "feed", file, *quick)
     assert code == 0
     assert "certificate: fed.proof.zip, rechecked in" in out
@@ -69,7 +69,7 @@ def test_what_the_checker_denies_is_undecided(capfd, monkeypatch):
         return section | {"progress": section["progress"] | {"throws": 5}}
 
     monkeypatch.setattr(writing, "section_of", too_few)
-    quick = ("--trials", "50", "--cells", "32", "--certificate", "fed.proof.zip")
+    quick = ("--trials", "50", "--certificate", "fed.proof.zip")
     code, out, _ = run(capfd, "feed", file, *quick)
     assert code == 1
     assert "progress: UNDECIDED, the checker denies it: side 0, cell" in out
@@ -79,7 +79,7 @@ def test_what_the_checker_denies_is_undecided(capfd, monkeypatch):
 
 
 def test_not_proved_is_exit_1(capfd):
-    code, out, _ = run(capfd, "feed", written("paper-initial"), "--trials", "50", "--cells", "32")
+    code, out, _ = run(capfd, "feed", written("paper-initial"), "--trials", "50")
     assert code == 1
     assert "safety: REFUTED" in out
 
@@ -96,7 +96,7 @@ def test_many_parts_at_once(capfd):
     pytest.importorskip("pymunk")
     tables = {"world": {"friction": 0.9, "throw_rate": "2 Hz"}, "effects": {"contact": True}}
     ls.dump(with_cavity("paper-designed", tables=tables), "many.toml")
-    quick = ("--no-proof", "--trials", "20", "--cells", "32", "--parts", "2", "--batches", "2")
+    quick = ("--no-proof", "--trials", "20", "--parts", "2", "--batches", "2")
     code, out, _ = run(capfd, "feed", "many.toml", *quick, "--json")
     assert code == 0
     crowds = json.loads(out)["crowds"]

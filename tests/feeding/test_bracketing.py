@@ -16,7 +16,7 @@ NOISE = Scattering(landing=Uniform(0.2))
 @pytest.fixture(scope="module")
 def found():
     scene = with_cavity("paper-initial", rate="4 Hz")
-    return ls.feed(scene, NOISE, prove=False, level=False, trials=4000, cells=512, brackets=500)
+    return ls.feed(scene, NOISE, prove=False, level=False, trials=4000, brackets=500)
 
 
 @pytest.mark.sweep
@@ -47,7 +47,7 @@ def test_the_json_has_them(found):
 
 def test_without_noise_there_are_none():
     with pytest.raises(AnswerError, match="the noise of the brackets"):
-        ls.feed(with_cavity("paper-initial"), prove=False, trials=10, cells=32, brackets=50)
+        ls.feed(with_cavity("paper-initial"), prove=False, trials=10, brackets=50)
 
 
 @pytest.mark.sweep  # brackets of 200 throws
@@ -56,7 +56,7 @@ def test_the_command_shows_them(capfd, tmp_path, monkeypatch):
     ls.dump(with_cavity("paper-initial"), "fed.toml")
     code, out, _ = run(
         capfd, "feed", "fed.toml", "--no-proof", "--scatter", "landing.x=0.2 in", "--law", "bounded",
-        "--trials", "50", "--cells", "32", "--brackets", "200",
+        "--trials", "50", "--brackets", "200",
     )  # fmt: skip
     assert code == 0
     assert "PROVED: on the wanted side, clear of the wall within 200 throws: 0.3" in out
