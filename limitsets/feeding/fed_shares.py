@@ -132,7 +132,7 @@ class Curve:
         lo, hi = self.level
         if hi == 0.0:
             return f"success is below {share} without noise: {100 * float(self.right[0]):.2f} %"
-        return f"success falls to {share} at {(lo + hi) / 2:.3g} times the noise ({lo:.4g} to {hi:.4g} times)"
+        return f"success falls to {share} at {lo:.4g} to {hi:.4g} times the noise"
 
 
 def success_curve(

@@ -30,7 +30,7 @@ NEVER = FATES.index("never")
 
 # Parts thrown to find how many throws a part takes.
 PILOT = 200
-# Share of a_i within which a part that creeps to the joint is given up: rounding of x would end the way.
+# Share of a_i within which a part that creeps to the joint is followed no farther.
 AT_JOINT = 1e-9
 
 

@@ -115,7 +115,9 @@ def table(rows: dict[str, dict[str, Any]]) -> str:
         )
         least, most = found["right, 95 % interval"]
         level = found["level for 95 %"]
-        times = "not reached" if level is None else f"{sum(level) / 2:.2f} times" if level[1] > 0.0 else "0"
+        times = "not reached" if level is None else "0"
+        if level is not None and level[1] > 0.0:
+            times = f"{level[0]:.2f} to {level[1]:.2f} times"
         lines.append(
             f"| {name} | {shares} | {least:.5f} to {most:.5f} | {found['series of 20 with 19 or 20 right']:.3f}"
             f" | {found['mean throws']:.1f} | {found['95 % throws']} | {times} |"
