@@ -21,9 +21,9 @@ Progress = Callable[[str, int, int], None]
 # Factors on the noise of the curve; the speed's deviation stays above this share of the speed, backwards.
 FACTORS = (0.0, 0.25, 0.5, 0.75, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0, 12.0, 16.0, 24.0, 32.0)
 BACKWARDS = -0.5
-HALVINGS = 8
-# Parts thrown at each level of the noise, and between two levels, and throws: fewer parts where they take more.
-FEW, MANY = (20_000, 5e6), (100_000, 1e7)
+HALVINGS = 5
+# Parts thrown between two levels of the noise, and throws, at most; the share of both at the levels themselves.
+PARTS, THROWS, AT_LEVELS = 100_000, 1e7, 0.2
 # Shares of the starts for which `FedShares.to_json` says after how many throws they have ended.
 ENDED = (*(round(0.05 * k, 2) for k in range(1, 20)), 0.99, 0.999)
 
@@ -141,6 +141,7 @@ def success_curve(
     *,
     wanted: float = 0.95,
     factors: Sequence[float] = FACTORS,
+    parts: int = PARTS,
     seed: int = 0,
     progress: Progress | None = None,
 ) -> Curve:
@@ -156,6 +157,8 @@ def success_curve(
         The share.
     factors : sequence of float
         Ascending from 0; those at which the arm might turn half backwards are left out.
+    parts : int
+        Thrown between two levels; a fifth of them at each level.
     seed : int
         Of starts and noise, the same at every level.
     progress : callable, optional
@@ -165,25 +168,26 @@ def success_curve(
     possible = [factor for factor in factors if factor * reach > BACKWARDS]
     tell = progress or (lambda stage, done, of: None)
 
-    def right(factor: float, parts: int, throws: float) -> float:
-        tell("noise levels", len(known), len(possible) + HALVINGS)
+    def right(factor: float, of: float = 1.0) -> float:
+        tell("noise levels", len(known), len(possible) + 2 * HALVINGS)
         noise = scatter.scaled(factor)
-        made = run_trials(end, noise, trials_within(end, noise, parts, throws, seed=seed), seed=seed)
+        count = trials_within(end, noise, max(int(of * parts), 1), of * THROWS, seed=seed)
+        made = run_trials(end, noise, count, seed=seed)
         known[factor] = made.intervals["right"]
         return made.counts["right"] / made.fate.size
 
     known: dict[float, tuple[float, float]] = {}
-    shares = [right(factor, *FEW) for factor in possible]
-    below = next((k for k, share in enumerate(shares) if share <= wanted), None)
+    shares = [right(factor, AT_LEVELS) for factor in possible]
     level = None
-    if below is not None:
-        lo, hi = possible[max(below - 1, 0)], possible[below]
-        for _ in range(HALVINGS if hi > lo else 0):
-            middle = 0.5 * (lo + hi)
-            lo, hi = (lo, middle) if right(middle, *MANY) <= wanted else (middle, hi)
-        # of all levels tried, those nearest to this one that are not in doubt
-        level = (
-            max((factor for factor in known if factor <= hi and known[factor][0] > wanted), default=0.0),
-            min((factor for factor in known if factor >= hi and known[factor][1] < wanted), default=possible[-1]),
-        )
+    if min(shares) <= wanted:
+        ends = []
+        for side in (0, 1):  # where the lower end of the interval falls to the share, and where the upper one does
+            below = next((k for k, factor in enumerate(possible) if known[factor][side] <= wanted), -1)
+            lo, hi = possible[max(below - 1, 0) if below >= 0 else -1], possible[below]
+            for _ in range(HALVINGS if hi > lo else 0):
+                middle = 0.5 * (lo + hi)
+                right(middle)
+                lo, hi = (lo, middle) if known[middle][side] <= wanted else (middle, hi)
+            ends.append((lo, hi)[side])
+        level = (ends[0], ends[1])
     return Curve(np.array(possible), np.array(shares), wanted, level)

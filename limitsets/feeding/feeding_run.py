@@ -15,7 +15,7 @@ from limitsets.feeding.bracketing import fate_brackets
 from limitsets.feeding.crowd import BATCHES, CrowdTrials, run_crowd
 from limitsets.feeding.falling import ArmEnd, arm_end_of, clear_beyond, time_to_tip
 from limitsets.feeding.fed_shares import ENDED, Curve, FedShares, success_curve
-from limitsets.feeding.proving import SECONDS, FeedingProof, proved_feeding
+from limitsets.feeding.proving import FeedingProof, proved_feeding
 from limitsets.feeding.trials import Trials, run_trials, trials_within
 from limitsets.feeding.verdicts import Fed, Safe
 from limitsets.feeding.writing import holds, write_proof
@@ -34,6 +34,8 @@ Progress = Callable[[str, int, int], None]
 
 # Parts thrown unless it is said how many: fewer where that takes more throws than these.
 TRIALS, THROWS = 100_000, 5e7
+# In which finer cells are tried for the proofs.
+SECONDS = 60.0
 
 # Fates for people.
 FED = {
@@ -313,8 +315,10 @@ def feed(
     # normal deviations have no bound, so that nothing holds for every sequence: the proofs are of the still scene then
     proved = end if read.effects.spread != "gaussian" else replace(end, scene=still(read))
     proof = proved_feeding(proved, noise, seconds=seconds, progress=progress) if prove else None
-    curve = success_curve(end, scatter, seed=seed, progress=progress) if level and scatter.given() else None
     count = trials_within(end, scatter, TRIALS, THROWS, seed=seed) if trials is None else trials
+    curve = None
+    if level and scatter.given():
+        curve = success_curve(end, scatter, parts=min(count, TRIALS), seed=seed, progress=progress)
     return Feeding(
         end,
         {number: clear_beyond(read, number) for number in range(len(read.sides))},

@@ -10,6 +10,7 @@ impossible; then almost every start is fed where the starts that stay before X a
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import replace
@@ -37,8 +38,8 @@ Progress = Callable[[str, int, int], None]
 # Cells per side, tried in turn until both questions are answered.
 LADDER = (2048, 8192, 32768)
 
-# Seconds in which finer cells are tried, and how much longer these take than the ones before.
-SECONDS, FINER = 60.0, 4.0
+# How much longer finer cells take than the ones before.
+FINER = 4.0
 
 
 class FeedingProof(NamedTuple):
@@ -63,7 +64,7 @@ def proved_feeding(
     end: ArmEnd,
     noise: Mapping[str, str] | None = None,
     *,
-    seconds: float = SECONDS,
+    seconds: float = math.inf,
     progress: Progress | None = None,
 ) -> FeedingProof:
     """Prove which sides can be fed and that every start is, or show what refutes it.

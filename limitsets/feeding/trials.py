@@ -118,6 +118,8 @@ def creeping_below(end: ArmEnd, scatter: Scattering) -> NDArray[np.float64]:
 
 def trials_within(end: ArmEnd, scatter: Scattering, most: int, throws: float, *, seed: int = 0) -> int:
     """Say how many parts can be thrown with about so many throws, found with 200 parts; `most` at most."""
+    if most <= PILOT:
+        return most
     pilot = run_trials(end, scatter, PILOT, seed=seed)
     return int(min(most, max(PILOT, throws / float(pilot.throws.mean()))))
 

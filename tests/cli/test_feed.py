@@ -2,6 +2,10 @@
 
 import json
 import re
+import signal
+import subprocess
+import sys
+import time
 from pathlib import Path
 
 import pytest
@@ -76,6 +80,21 @@ def test_what_the_checker_denies_is_undecided(capfd, monkeypatch):
     assert "the checker denies the certificate: it is kept as fed.denied.zip" in out
     assert Path("fed.denied.zip").exists()
     assert not Path("fed.proof.zip").exists()
+
+
+@pytest.mark.sweep
+def test_a_run_that_is_ended_leaves_no_draft():
+    """A signal that ends a process leaves its files as they are: the command has to take away what it began."""
+    command = [sys.executable, "-m", "limitsets", "feed", written("paper-designed", position="20.5 in")]
+    command += ["--trials", "50", "--certificate", "out/fed.proof.zip"]
+    folder = Path("out")
+    with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as process:
+        while process.poll() is None and not list(folder.glob(".draft-*")):
+            time.sleep(0.002)
+        assert list(folder.glob(".draft-*"))
+        process.terminate()
+    assert process.returncode == 128 + signal.SIGTERM
+    assert not list(folder.iterdir())
 
 
 def test_not_proved_is_exit_1(capfd):
