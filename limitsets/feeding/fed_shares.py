@@ -178,16 +178,20 @@ def success_curve(
 
     known: dict[float, tuple[float, float]] = {}
     shares = [right(factor, AT_LEVELS) for factor in possible]
-    level = None
-    if min(shares) <= wanted:
-        ends = []
-        for side in (0, 1):  # where the lower end of the interval falls to the share, and where the upper one does
-            below = next((k for k, factor in enumerate(possible) if known[factor][side] <= wanted), -1)
-            lo, hi = possible[max(below - 1, 0) if below >= 0 else -1], possible[below]
-            for _ in range(HALVINGS if hi > lo else 0):
-                middle = 0.5 * (lo + hi)
-                right(middle)
-                lo, hi = (lo, middle) if known[middle][side] <= wanted else (middle, hi)
-            ends.append((lo, hi)[side])
-        level = (ends[0], ends[1])
+    first = next((k for k, share in enumerate(shares) if share <= wanted), None)
+    if first is None:
+        return Curve(np.array(possible), np.array(shares), wanted, None)
+    sure = [factor for factor in possible[:first] if known[factor][0] > wanted]
+    gone = [factor for factor in possible[first:] if known[factor][1] <= wanted]
+    # where the lower end of the interval falls to the share, and where the upper end does
+    between = [
+        [sure[-1] if sure else 0.0, possible[first]],
+        [possible[max(first - 1, 0)], gone[0] if gone else possible[-1]],
+    ]
+    for end_of, ends in enumerate(between):
+        for _ in range(HALVINGS if ends[1] > ends[0] else 0):
+            middle = 0.5 * (ends[0] + ends[1])
+            right(middle)
+            ends[int(known[middle][end_of] <= wanted)] = middle
+    level = (between[0][0], between[1][1])
     return Curve(np.array(possible), np.array(shares), wanted, level)

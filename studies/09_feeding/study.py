@@ -125,9 +125,7 @@ def table(rows: dict[str, dict[str, Any]]) -> str:
     return "\n".join(lines)
 
 
-def main(
-    seed: int = 0, out: Path = HERE, trials: int = 100_000, *, level: bool = True
-) -> dict[str, Any]:
+def main(seed: int = 0, out: Path = HERE, trials: int = 100_000, *, level: bool = True) -> dict[str, Any]:
     """Run the study, write the figure into `out`, return the numbers."""
     out.mkdir(parents=True, exist_ok=True)
     rows = {}

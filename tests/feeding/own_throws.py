@@ -43,7 +43,13 @@ def shares(end, count, seed, speed=lambda random, n: np.zeros(n), landing=None, 
             clear |= (beyond >= lo) & (beyond <= hi)
         left = ~((x > scene.sides.a[side]) & (x <= scene.arm_length))
         fed, wanted = ~left & (beyond >= 0.0), side == end.side
-        met += [(fed & wanted & clear).sum(), (fed & ~wanted).sum(), (fed & wanted & ~clear).sum(), left.sum(), 0]
+        met += [
+            (fed & wanted & clear).sum(),
+            (fed & ~wanted).sum(),
+            (fed & wanted & ~clear).sum(),
+            left.sum(),
+            0,
+        ]
         x, side = x[~left & ~fed], side[~left & ~fed]
         if not x.size:
             break

@@ -96,7 +96,10 @@ def test_when_time_is_up_what_is_proved_is_the_answer():
     """The same throw on the first cells only: the side is proved there, and progress names the cells it ended on."""
     told = []
     found = proved_feeding(
-        arm_end_of(with_cavity()), {"throw.speed": "10 %"}, seconds=0.0, progress=lambda *step: told.append(step)
+        arm_end_of(with_cavity()),
+        {"throw.speed": "10 %"},
+        seconds=0.0,
+        progress=lambda *step: told.append(step),
     )
     assert found.safe.verdict == "proved"
     assert found.fed.verdict == "undecided"
