@@ -23,7 +23,11 @@ HELP_SCATTER = (
     "Random noise at every throw, like throw.speed='0.5 %'; repeatable. "
     "Default: the scene's [world] scatter where [effects] has spread, else none."
 )
-HELP_NO_LEVEL = "Do not look for the noise at which 95 % are fed: most of the time that noise takes."
+HELP_TRIALS = "Parts thrown from random starts. Default: 100 000, fewer where that takes over 5e7 throws."
+HELP_SECONDS = "For the proofs: finer cells are tried only if they are likely to be done by then."
+HELP_NO_LEVEL = (
+    "Do not look for the noise at which 95 % are fed: most of the time that scattered trials take."
+)
 HELP_NOISE = "What may differ at every throw in the proofs, like throw.speed='0.3 %'; repeatable."
 
 
@@ -35,11 +39,8 @@ def feed(
         str, option("--law", "LAW", "Of --scatter: gaussian (standard deviations) or bounded.")
     ] = "gaussian",
     noise: Annotated[Words, option("--noise", "Q=DEV", HELP_NOISE)] = None,
-    trials: Annotated[int, option("--trials", "N", "Parts thrown from random starts.", min=1)] = 10_000,
+    trials: Annotated[int | None, option("--trials", "N", HELP_TRIALS, min=1)] = None,
     seed: Annotated[int, option("--seed", "N", "Of the trials.", min=0)] = 0,
-    cells: Annotated[
-        int, option("--cells", "N", "Cells per side, for the probabilities.", min=8, max=100_000)
-    ] = 1024,
     brackets: Annotated[
         int | None,
         option(
@@ -54,6 +55,7 @@ def feed(
     ] = None,
     batches: Annotated[int, option("--batches", "N", "How often --parts are thrown.", min=1)] = 20,
     no_proof: Annotated[bool, typer.Option("--no-proof", help="Probabilities and trials only.")] = False,
+    seconds: Annotated[float, option("--seconds", "S", HELP_SECONDS, min=0.0)] = 60.0,
     no_level: Annotated[bool, typer.Option("--no-level", help=HELP_NO_LEVEL)] = False,
     out: Annotated[Path | None, option("--out -o", "DIR", "Write feeding.json and figures there.")] = None,
     certificate: Annotated[
@@ -80,10 +82,10 @@ def feed(
             side=side,
             noise=deviations("--noise", noise),
             prove=not no_proof,
+            seconds=seconds,
             level=not no_level,
             trials=trials,
             seed=seed,
-            cells=cells,
             brackets=brackets,
             parts=parts,
             batches=batches,

@@ -1,9 +1,9 @@
 """Feeding: the arm ends in a cavity, and a part that comes to rest beyond the end falls in.
 
 `falling` says what becomes of such a part, `tipping` how long it takes; `proving` which sides can be fed, and that
-every start is; `fed_shares` the probabilities under noise, and the noise at which success falls to a share;
-`bracketing` proves brackets of them, and `trials` throws parts as experimenters do, and `crowd` many at once, in the
-engine.  `feeding_run` joins them (`limitsets.feed`).
+every start is; `trials` throws parts as experimenters do, `fed_shares` counts their fates, and finds the noise at which
+success falls to a share; `bracketing` proves brackets of the probabilities; `crowd` throws many at once, in the engine.
+`feeding_run` joins them (`limitsets.feed`).
 """
 
 from limitsets.feeding.falling import FATES as FATES

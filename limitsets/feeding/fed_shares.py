@@ -1,54 +1,81 @@
-"""Feeding under noise by the transfer operator: the shares of all fates, throw by throw; the noise that is too much."""
+"""Shares of all fates among parts that were thrown, throw by throw; the noise that is too much."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
-from limitsets.cells import Grid
 from limitsets.feeding.falling import FATES, ArmEnd
-from limitsets.robust.noise.arrivals import cells_for_noise, random_starts, with_border
-from limitsets.robust.noise.chain_solution import ChainProblem
+from limitsets.feeding.trials import Trials, run_trials, trials_within
+from limitsets.robust.noise.proportions import binomial_interval
 from limitsets.robust.noise.scattering import Scattering
 
-__all__ = ["Curve", "FedShares", "FeedingProblem", "success_curve"]
+__all__ = ["Curve", "FedShares", "success_curve"]
 
 Progress = Callable[[str, int, int], None]
 
-# Share of the starts that is still under way when counting ends, and throws after which it does in any case.
-UNDER_WAY, MOST_THROWS = 1e-9, 20_000
 # Factors on the noise of the curve; the speed's deviation stays above this share of the speed, backwards.
 FACTORS = (0.0, 0.25, 0.5, 0.75, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0, 12.0, 16.0, 24.0, 32.0)
 BACKWARDS = -0.5
-HALVINGS = 8
+HALVINGS = 5
+# Parts thrown between two levels of the noise, and throws, at most; the share of both at the levels themselves.
+PARTS, THROWS, AT_LEVELS = 100_000, 1e7, 0.2
+# Shares of the starts for which `FedShares.to_json` says after how many throws they have ended.
+ENDED = (*(round(0.05 * k, 2) for k in range(1, 20)), 0.99, 0.999)
 
 
 @dataclass(frozen=True, eq=False)
 class FedShares:
-    """Shares of random starts; an approximation between cells, not proved.
+    """Shares of random starts, as counted in trials; not proved.
 
     Attributes
     ----------
-    by_throw : ndarray, shape (n, 5)
-        Share that meets each fate of `FATES` but the last, at each throw from the first.
-    never : float
-        Share that is on the arm still after the last throw counted.
-    cut : float
-        Probability of noise beyond where laws without bounds were cut off, per throw.
+    trials : Trials
+        The parts that were thrown.
+
+    Examples
+    --------
+    >>> fate, none = np.array([0, 0, 1, 4]), np.zeros(4, dtype=bool)
+    >>> found = FedShares(Trials(fate, np.array([1, 3, 2, 20_000]), none, none, 0))
+    >>> found.shares["right"], found.mean_throws, found.quantile(0.75), found.ended.tolist()
+    (0.5, 2.0, 3, [0.0, 0.25, 0.5, 0.75])
     """
 
-    by_throw: NDArray[np.float64]
-    never: float
-    cut: float
+    trials: Trials
 
     @property
     def shares(self) -> dict[str, float]:
         """Share of each fate."""
-        return dict(zip(FATES, [*self.by_throw.sum(axis=0).tolist(), self.never], strict=True))
+        return {name: count / self.trials.fate.size for name, count in self.trials.counts.items()}
+
+    @property
+    def errors(self) -> dict[str, float]:
+        """By fate how far its probability may be from the share: the farther end of its 95 % interval."""
+        return {
+            name: max(share - low, high - share)
+            for (name, share), (low, high) in zip(
+                self.shares.items(), self.trials.intervals.values(), strict=True
+            )
+        }
+
+    @cached_property
+    def by_throw(self) -> NDArray[np.float64]:
+        """Share that meets each fate of `FATES` but the last, at each throw from the first, shape (n, 5)."""
+        fates = len(FATES) - 1
+        ended = self.trials.fate < fates
+        last = int(self.trials.throws[ended].max(initial=0))
+        place = (self.trials.throws[ended] - 1) * fates + self.trials.fate[ended]
+        return np.bincount(place, minlength=last * fates).reshape(-1, fates) / ended.size
+
+    @property
+    def never(self) -> float:
+        """Share that is on the arm still after the last throw made."""
+        return self.shares["never"]
 
     @property
     def ended(self) -> NDArray[np.float64]:
@@ -58,76 +85,25 @@ class FedShares:
     @property
     def mean_throws(self) -> float:
         """Mean number of throws of those that end; nan where none do."""
-        total = self.by_throw.sum(axis=1)
-        ended = float(total.sum())
-        return float(total @ np.arange(1, total.size + 1)) / ended if ended > 0.0 else math.nan
+        throws = self.trials.throws[self.trials.fate < len(FATES) - 1]
+        return float(throws.mean()) if throws.size else math.nan
 
     def quantile(self, share: float) -> int | None:
         """Throws after which `share` of all starts have ended; None where so many never do."""
-        reached = np.flatnonzero(self.ended >= share)
-        return int(reached[0]) if reached.size else None
+        needed = math.ceil(share * self.trials.fate.size - 1e-9)
+        throws = np.sort(self.trials.throws[self.trials.fate < len(FATES) - 1])
+        return int(throws[needed - 1]) if 0 < needed <= throws.size else None
 
     def per_minute(self, throw_rate: float | None) -> float | None:
         """Parts fed rightly per minute where the next part starts as soon as one has ended; None if one never may."""
-        if throw_rate is None or self.never > 1e-6:
+        if throw_rate is None or self.never > 0.0:
             return None
         return 60.0 * throw_rate * self.shares["right"] / self.mean_throws
 
 
 @dataclass(frozen=True, eq=False)
-class FeedingProblem:
-    """The end of an arm, cells, and the places where they were cut for earlier solutions."""
-
-    end: ArmEnd
-    chain: ChainProblem
-
-    @classmethod
-    def of(cls, end: ArmEnd, cells: int, strata: int) -> FeedingProblem:
-        """Ask on so many cells a side, each law cut into so many strata."""
-        return cls(end, ChainProblem(end.scene, (end.x, end.side), end.starts, cells, strata))
-
-    def coarser(self) -> tuple[FeedingProblem, FeedingProblem]:
-        """Ask on half as many cells, and with half as many strata."""
-        half = {name: max(getattr(self.chain, name) // 2, 1) for name in ("cells", "strata")}
-        one, two = (replace(self.chain, **{name: count}) for name, count in half.items())
-        return replace(self, chain=one), replace(self, chain=two)
-
-    def cover(self) -> Grid:
-        """Cells with borders at the end of the arm and where parts begin and cease to clear the wall."""
-        found = cells_for_noise(self.end.scene.domain, self.chain.cells)
-        cuts = {self.end.x + beyond for beyond in (0.0, *(each for pair in self.end.clear for each in pair))}
-        for cut in cuts.union(self.end.edges.tolist()):
-            found = with_border(found, cut)
-        return found
-
-    def solve(self, scatter: Scattering) -> FedShares:
-        """Move random starts on until nearly all have ended."""
-        cover = self.cover()
-        chain = self.chain.chain(cover, scatter)
-        x = np.concatenate([cover.centres(side) for side in range(cover.sides)])
-        side = cover.side_of(np.arange(cover.n_cells))
-        fate, edge = self.end.fate(x, side), self.end.at_edge(x, side)
-        masses = random_starts(cover, self.chain.starts, self.end.x)
-        rows: list[list[float]] = []
-        while masses.sum() > UNDER_WAY and len(rows) < MOST_THROWS:
-            tipped, masses[edge] = float(masses[edge].sum()), 0.0
-            left = float((masses @ chain.sinks).sum())
-            masses = chain.adjoint(masses)
-            rows.append([*(float(masses[fate == number].sum()) for number in range(3)), tipped, left])
-            masses[fate >= 0] = 0.0
-        return FedShares(np.array(rows), float(masses.sum()), chain.cut)
-
-    def errors(self, scatter: Scattering, found: FedShares) -> dict[str, float]:
-        """How much the shares change from half as many cells, and from half as many strata, added up."""
-        others = [each.solve(scatter).shares for each in self.coarser()]
-        return {
-            name: sum(abs(share - other[name]) for other in others) for name, share in found.shares.items()
-        }
-
-
-@dataclass(frozen=True, eq=False)
 class Curve:
-    """Share of right feeds against the level of the noise; an approximation between cells, not proved.
+    """Share of right feeds against the level of the noise, as counted in trials; not proved.
 
     Attributes
     ----------
@@ -137,8 +113,9 @@ class Curve:
     wanted : float
         The share asked about.
     level : (float, float) or None
-        The smallest factor at which the share falls to what is wanted, between these two; None where it does not,
-        ``(0, 0)`` where it is below without noise.
+        The smallest factor at which the share falls to what is wanted, between these two: there the 95 % intervals of
+        the trials lie above it, and below; None where it does not fall so far, ``(0, 0)`` where it is below without
+        noise.
     """
 
     factors: NDArray[np.float64]
@@ -154,54 +131,70 @@ class Curve:
             return (
                 f"success stays above {share} up to {at:g} times the noise, {100 * least:.2f} % at the least"
             )
-        if self.level[1] == 0.0:
+        lo, hi = self.level
+        if hi == 0.0:
             return f"success is below {share} without noise: {100 * float(self.right[0]):.2f} %"
-        return f"success falls to {share} at {sum(self.level) / 2:.3g} times the noise"
+        return f"success falls to {share} at {lo:.4g} to {hi:.4g} times the noise"
 
 
 def success_curve(
-    problem: FeedingProblem,
+    end: ArmEnd,
     scatter: Scattering,
     *,
     wanted: float = 0.95,
     factors: Sequence[float] = FACTORS,
+    parts: int = PARTS,
+    seed: int = 0,
     progress: Progress | None = None,
 ) -> Curve:
     """Find the least noise, a multiple of the one given, at which only a share of the starts is fed rightly.
 
     Parameters
     ----------
-    problem : FeedingProblem
-        What is asked, on which cells.
+    end : ArmEnd
+        The end of the arm.
     scatter : Scattering
         The noise at a factor of 1.
     wanted : float
         The share.
     factors : sequence of float
         Ascending from 0; those at which the arm might turn half backwards are left out.
+    parts : int
+        Thrown between two levels; a fifth of them at each level.
+    seed : int
+        Of starts and noise, the same at every level.
     progress : callable, optional
         Told (stage, done, all).
     """
-    reach = 0.0 if scatter.speed is None else scatter.speed.strata(problem.chain.strata).lo
+    reach = 0.0 if scatter.speed is None else scatter.speed.strata(2).lo
     possible = [factor for factor in factors if factor * reach > BACKWARDS]
     tell = progress or (lambda stage, done, of: None)
 
-    def right(factor: float) -> float:
-        tell("noise levels", len(shares), len(possible) + HALVINGS)
-        found = problem.solve(scatter.scaled(factor)).shares
-        shares.append(found["right"] / max(1.0 - found["edge"], found["right"]))
-        return shares[-1]
+    def right(factor: float, of: float = 1.0) -> float:
+        tell("noise levels", len(known), len(possible) + 2 * HALVINGS)
+        noise = scatter.scaled(factor)
+        count = trials_within(end, noise, max(int(of * parts), 1), of * THROWS, seed=seed)
+        made = run_trials(end, noise, count, seed=seed).counts
+        fed, decided = made["right"], count - made["edge"]  # of parts thrown at the edge no fate is simulated
+        known[factor] = binomial_interval(fed, decided)
+        return fed / max(decided, 1)
 
-    shares: list[float] = []
-    known = [right(factor) for factor in possible]
-    below = next((k for k, share in enumerate(known) if share <= wanted), None)
-    level = None
-    if below == 0:
-        level = (0.0, 0.0)
-    elif below is not None:
-        lo, hi = possible[below - 1], possible[below]
-        for _ in range(HALVINGS):
-            middle = 0.5 * (lo + hi)
-            lo, hi = (lo, middle) if right(middle) <= wanted else (middle, hi)
-        level = (lo, hi)
-    return Curve(np.array(possible), np.array(known), wanted, level)
+    known: dict[float, tuple[float, float]] = {}
+    shares = [right(factor, AT_LEVELS) for factor in possible]
+    first = next((k for k, share in enumerate(shares) if share <= wanted), None)
+    if first is None:
+        return Curve(np.array(possible), np.array(shares), wanted, None)
+    sure = [factor for factor in possible[:first] if known[factor][0] > wanted]
+    gone = [factor for factor in possible[first:] if known[factor][1] <= wanted]
+    # where the lower end of the interval falls to the share, and where the upper end does
+    between = [
+        [sure[-1] if sure else 0.0, possible[first]],
+        [possible[max(first - 1, 0)], gone[0] if gone else possible[-1]],
+    ]
+    for end_of, ends in enumerate(between):
+        for _ in range(HALVINGS if ends[1] > ends[0] else 0):
+            middle = 0.5 * (ends[0] + ends[1])
+            right(middle)
+            ends[int(known[middle][end_of] <= wanted)] = middle
+    level = (between[0][0], between[1][1])
+    return Curve(np.array(possible), np.array(shares), wanted, level)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from concurrent.futures import Executor
 from dataclasses import dataclass, fields, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -15,16 +16,15 @@ from limitsets.errors import AnswerError
 from limitsets.feeding.bracketing import fate_brackets
 from limitsets.feeding.crowd import BATCHES, CrowdTrials, run_crowd
 from limitsets.feeding.falling import ArmEnd, arm_end_of, clear_beyond
-from limitsets.feeding.fed_shares import Curve, FedShares, FeedingProblem, success_curve
+from limitsets.feeding.fed_shares import ENDED, Curve, FedShares, success_curve
 from limitsets.feeding.proving import FeedingProof, proved_feeding
 from limitsets.feeding.tipping import tipping_times
-from limitsets.feeding.trials import Trials, run_trials
+from limitsets.feeding.trials import Trials, run_trials, trials_within
 from limitsets.feeding.verdicts import Fed, Safe
 from limitsets.feeding.writing import holds, write_proof
 from limitsets.files import as_table, picked
 from limitsets.progress import shown_in_notebooks
 from limitsets.robust.brackets.result import AbsorptionBrackets
-from limitsets.robust.noise.proportions import binomial_interval
 from limitsets.robust.noise.sampling import require_seed
 from limitsets.robust.noise.scattering import Scattering, scattering_of
 from limitsets.robust.sheet.noise_input import still
@@ -35,7 +35,10 @@ __all__ = ["Feeding", "feed"]
 
 Progress = Callable[[str, int, int], None]
 
-CELLS, STRATA, TRIALS = 1024, 24, 10_000
+# Parts thrown unless it is said how many: fewer where that takes more throws than these.
+TRIALS, THROWS = 100_000, 5e7
+# In which finer cells are tried for the proofs.
+SECONDS = 60.0
 
 # Fates for people.
 FED = {
@@ -65,10 +68,6 @@ class Feeding(Tabled):
         What differs at every throw in these proofs, and by how much.
     scatter : Scattering
         The noise of the probabilities and of the trials; none in a scene without it.
-    shares : FedShares
-        Probabilities of all fates from random starts, throw by throw; sampled.
-    errors : dict of str to float
-        How much the probabilities change from half as many cells, and half as many strata of the noise.
     curve : Curve or None
         The share of right feeds against the level of the noise; None without noise.
     trials : Trials
@@ -85,12 +84,20 @@ class Feeding(Tabled):
     proof: FeedingProof | None
     noise: dict[str, str]
     scatter: Scattering
-    shares: FedShares
-    errors: dict[str, float]
     curve: Curve | None
     trials: Trials
     brackets: AbsorptionBrackets | None = None
     crowds: tuple[CrowdTrials, ...] = ()
+
+    @cached_property
+    def shares(self) -> FedShares:
+        """Shares of all fates among the trials, throw by throw: estimates of their probabilities; sampled."""
+        return FedShares(self.trials)
+
+    @property
+    def errors(self) -> dict[str, float]:
+        """By fate how far its probability may be from the share, 95 %."""
+        return self.shares.errors
 
     @property
     def safe(self) -> Safe | None:
@@ -157,17 +164,9 @@ class Feeding(Tabled):
 
     def tables(self) -> tuple[Table, ...]:
         """Give the tables that show it, the one that is saved as CSV first."""
-        count = self.trials.fate.size
+        count, errors, counts = self.trials.fate.size, self.errors, self.trials.counts
         rows = [
-            (
-                FED[name],
-                name,
-                share,
-                self.errors[name],
-                self.trials.counts[name],
-                count,
-                binomial_interval(self.trials.counts[name], count),
-            )
+            (FED[name], name, share, errors[name], counts[name], count, self.trials.intervals[name])
             for name, share in self.shares.shares.items()
         ]
         columns = (
@@ -180,7 +179,7 @@ class Feeding(Tabled):
             Column("95 % interval", show=".4f", ends=True),
         )
         name = self.end.scene.name
-        found = [Table(columns, rows, f"{name}: what is fed", "computed and sampled, not proved")]
+        found = [Table(columns, rows, f"{name}: what is fed", "sampled, not proved")]
         if self.safe is not None and self.fed is not None:
             lines = [
                 ("only the wanted side is fed", self.safe.verdict),
@@ -194,7 +193,7 @@ class Feeding(Tabled):
 
     def to_json(self) -> dict[str, Any]:
         """Give it as JSON takes it: docs/json.md."""
-        scene, shares = self.end.scene, self.shares
+        scene, shares, errors = self.end.scene, self.shares, self.errors
         rate = scene.world.throw_rate
         return as_table(
             scene=scene.name,
@@ -210,11 +209,14 @@ class Feeding(Tabled):
             noise=self.noise or None,
             scatter=self.scatter.words() or None,
             probabilities={
-                name: {"value": share, "error": self.errors[name]} for name, share in shares.shares.items()
+                name: {"value": share, "error": errors[name]} for name, share in shares.shares.items()
             },
-            throws={"mean": shares.mean_throws, "quantile_95": shares.quantile(0.95), "ended": shares.ended},
+            throws={
+                "mean": shares.mean_throws,
+                "quantile_95": shares.quantile(0.95),
+                "ended": {"share": ENDED, "throws": [shares.quantile(share) for share in ENDED]},
+            },
             right_per_minute=shares.per_minute(rate),
-            noise_cut_off=shares.cut,
             success=None
             if self.curve is None
             else as_table(**picked(self.curve, *(each.name for each in fields(Curve)))),
@@ -234,11 +236,10 @@ def feed(
     starts: Mapping[int, float] | None = None,
     noise: Mapping[str, str] | None = None,
     prove: bool = True,
+    seconds: float = SECONDS,
     level: bool = True,
-    trials: int = TRIALS,
+    trials: int | None = None,
     seed: int = 0,
-    cells: int = CELLS,
-    strata: int = STRATA,
     brackets: int | None = None,
     parts: int | None = None,
     batches: int = BATCHES,
@@ -262,14 +263,14 @@ def feed(
         ``{"throw.speed": "0.3 %"}``: what may differ at every throw in the proofs, whatever the sequence.
     prove : bool
         Whether to prove safety and progress.
+    seconds : float
+        Finer cells than the first are tried in these proofs only if they are likely to be done in so many seconds.
     level : bool
         Whether to look for the level of the noise at which 95 % are fed rightly.
-    trials : int
-        Parts thrown from random starts.
+    trials : int, optional
+        Parts thrown from random starts; by default 100 000, or fewer where that takes more than 5e7 throws.
     seed : int
         Of the trials.
-    cells, strata : int
-        Cells per side, and pieces into which each law of the noise is cut, for the probabilities.
     brackets : int, optional
         Cells per side for proved brackets of the fates, of noise with uniform or normal laws: seconds to minutes.
     parts : int, optional
@@ -296,7 +297,7 @@ def feed(
     >>> import limitsets as ls
     >>> cavity = {"position": "20 in", "width": "9.3 in", "depth": "5.8633 in", "angle": "32.23 deg"}
     >>> scene = ls.load({**ls.load("paper-designed").as_dict(), "cavity": cavity})
-    >>> found = ls.feed(scene, trials=1000, cells=256)
+    >>> found = ls.feed(scene, trials=1000)
     >>> found.safe.verdict, found.fed.throws
     ('proved', 786)
     >>> found.trials.counts["right"] + found.trials.counts["edge"]
@@ -304,7 +305,7 @@ def feed(
     """
     read = load(scene)
     end = arm_end_of(read, side, starts)
-    if trials < 1:
+    if trials is not None and trials < 1:
         raise AnswerError("the trials", trials, "1 or more", "throw some parts")
     require_seed(seed)
     if scatter is None:
@@ -315,23 +316,19 @@ def feed(
     crowds = tuple(run_crowd(end, scatter, parts or 0, between=between, **how) for between in both)
     # normal deviations have no bound, so that nothing holds for every sequence: the proofs are of the still scene then
     proved = end if read.effects.spread != "gaussian" else replace(end, scene=still(read))
-    proof = proved_feeding(proved, noise, progress=progress) if prove else None
-    problem = FeedingProblem.of(end, cells, strata)
-    if progress is not None:
-        progress("probabilities", 0, 3)
-    shares = problem.solve(scatter)
-    errors = problem.errors(scatter, shares)
-    curve = success_curve(problem, scatter, progress=progress) if level and scatter.given() else None
+    proof = proved_feeding(proved, noise, seconds=seconds, progress=progress) if prove else None
+    count = trials_within(end, scatter, TRIALS, THROWS, seed=seed) if trials is None else trials
+    curve = None
+    if level and scatter.given():
+        curve = success_curve(end, scatter, parts=min(count, TRIALS), seed=seed, progress=progress)
     return Feeding(
         end,
         {number: clear_beyond(read, number) for number in range(len(read.sides))},
         proof,
         dict(noise or {}),
         scatter,
-        shares,
-        errors,
         curve,
-        run_trials(end, scatter, trials, seed=seed, progress=progress),
+        run_trials(end, scatter, count, seed=seed, progress=progress),
         None if brackets is None else fate_brackets(end, scatter, brackets, progress=progress),
         crowds,
     )

@@ -10,6 +10,8 @@ impossible; then almost every start is fed where the starts that stay before X a
 
 from __future__ import annotations
 
+import math
+import time
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import NamedTuple
@@ -36,6 +38,9 @@ Progress = Callable[[str, int, int], None]
 # Cells per side, tried in turn until both questions are answered.
 LADDER = (2048, 8192, 32768)
 
+# How much longer finer cells take than the ones before.
+FINER = 4.0
+
 
 class FeedingProof(NamedTuple):
     """What is proved of feeding, and the cells on which.
@@ -56,7 +61,11 @@ class FeedingProof(NamedTuple):
 
 
 def proved_feeding(
-    end: ArmEnd, noise: Mapping[str, str] | None = None, *, progress: Progress | None = None
+    end: ArmEnd,
+    noise: Mapping[str, str] | None = None,
+    *,
+    seconds: float = math.inf,
+    progress: Progress | None = None,
 ) -> FeedingProof:
     """Prove which sides can be fed and that every start is, or show what refutes it.
 
@@ -66,8 +75,10 @@ def proved_feeding(
         The end of the arm, the side wanted.
     noise : mapping of str to str, optional
         ``{"throw.speed": "0.3 %"}``: what may differ at every throw, as for `limitsets.certify`.
+    seconds : float
+        Finer cells than the first are tried only if they are likely to be done in so many seconds from the start.
     progress : callable, optional
-        Told (stage, done, all).
+        Told (stage, done, all); the stage names the shares that are proved so far.
 
     Returns
     -------
@@ -90,8 +101,10 @@ def proved_feeding(
     wrong = OrientedBeyond(end.x, end.side, from_anywhere=True).wrong()
     shown: tuple[State, ...] = ()
     never = Refutation()
+    begin, proved = time.perf_counter(), ""
     for step, cells in enumerate(LADDER):
-        tell(f"proof on {cells} cells a side", step, len(LADDER) + 2)
+        began = time.perf_counter()
+        tell(f"proof on {cells} cells a side{proved}", step, len(LADDER) + 2)
         found = attraction(cover(box, cells, dict.fromkeys(range(len(scene.sides)), cuts)))
         paths = Paths.of(found, end)
         safe, fed = paths.safe(), paths.fed()
@@ -110,5 +123,11 @@ def proved_feeding(
             fed = replace(fed, verdict="refuted", never_fed=never.states, cycle=cycle, reason=reason)
         refuted = fed.verdict == "refuted" and fed.almost_every == "proved"
         if safe.verdict in ("proved", "refuted") and (fed.verdict == "proved" or refuted):
+            break
+        proved = f"; so far {100 * safe.share:.4g} % safe, {100 * max(fed.share, fed.almost_share):.4g} % fed"
+        now = time.perf_counter()
+        if cells < LADDER[-1] and now - begin + FINER * (now - began) > seconds:
+            open_ = f"finer cells than {cells} a side were not tried: they would take more than {seconds:g} s"
+            fed = replace(fed, reason="; ".join(filter(None, (fed.reason, open_))))
             break
     return FeedingProof(safe, fed, found)

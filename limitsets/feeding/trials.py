@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -14,14 +15,20 @@ from limitsets.feeding.falling import FATES, ArmEnd
 from limitsets.files import as_table
 from limitsets.robust.noise.proportions import binomial_interval
 from limitsets.robust.noise.sampling import ManyParts, scattering_map, uniform_starts
-from limitsets.robust.noise.scattering import Scattering
+from limitsets.robust.noise.scattering import Scattering, still_map
 
-__all__ = ["SERIES", "Trials", "run_trials"]
+__all__ = ["SERIES", "Trials", "creeping_below", "run_trials", "trials_within"]
 
 SERIES = 20
 """Trials of a series, each from a random start."""
 
 MOST_THROWS = 20_000
+NEVER = FATES.index("never")
+
+# Parts thrown to find how many throws a part takes.
+PILOT = 200
+# Share of a_i within which a part that creeps to the joint is followed no farther.
+AT_JOINT = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,6 +57,11 @@ class Trials:
         """How many met each fate."""
         return dict(zip(FATES, np.bincount(self.fate, minlength=len(FATES)).tolist(), strict=True))
 
+    @cached_property
+    def intervals(self) -> dict[str, tuple[float, float]]:
+        """Intervals of the probabilities of each fate, 95 %."""
+        return {name: binomial_interval(found, self.fate.size) for name, found in self.counts.items()}
+
     def series(self) -> NDArray[np.int64]:
         """Right feeds in each series of 20 trials, in the order of the trials; what is left over is left out."""
         whole = self.fate[: self.fate.size // SERIES * SERIES].reshape(-1, SERIES)
@@ -62,7 +74,7 @@ class Trials:
             trials=count,
             seed=self.seed,
             counts=self.counts,
-            intervals={name: binomial_interval(found, count) for name, found in self.counts.items()},
+            intervals=self.intervals,
             mean_throws=float(self.throws.mean()),
             series={
                 "of": SERIES,
@@ -72,6 +84,36 @@ class Trials:
             },
             corner_beyond_end=float(self.beyond.mean()),
         )
+
+
+def creeping_below(end: ArmEnd, scatter: Scattering) -> NDArray[np.float64]:
+    """By side the x below which a part creeps to the joint and never comes there; a_i where none does.
+
+    With the arm's surface above the joint a start just beyond a_i keeps the share 1 - 2 h/kappa of its distance at
+    every throw of the minimal model, whatever the speed (docs/model.md, "Conventions": near a_i).  Noise of the landing
+    place takes it off the arm.
+
+    Examples
+    --------
+    >>> import limitsets as ls
+    >>> from limitsets.feeding.falling import arm_end_of
+    >>> from limitsets.robust import Scattering
+    >>> end = arm_end_of(ls.load("paper-triangle"))  # the surface lies below the joint
+    >>> bool((creeping_below(end, Scattering()) == end.scene.sides.a).all())
+    True
+    """
+    scene, a = end.scene, end.scene.sides.a
+    minimal = not hasattr(still_map(scene), "bare")
+    creeps = minimal and scatter.landing is None and 0.0 < 2.0 * scene.surface_height < scene.kappa
+    return a * (1.0 + AT_JOINT) if creeps else a
+
+
+def trials_within(end: ArmEnd, scatter: Scattering, most: int, throws: float, *, seed: int = 0) -> int:
+    """Say how many parts can be thrown with about so many throws, found with 200 parts; `most` at most."""
+    if most <= PILOT:
+        return most
+    pilot = run_trials(end, scatter, PILOT, seed=seed)
+    return int(min(most, max(PILOT, throws / float(pilot.throws.mean()))))
 
 
 def run_trials(
@@ -104,11 +146,12 @@ def run_trials(
     scene = end.scene
     random = np.random.Generator(np.random.Philox(seed))
     many = ManyParts(scattering_map(scene, scatter, seed), *uniform_starts(random, end.starts, end.x, count))
-    fate = np.full(count, len(FATES) - 1, dtype=np.int64)
+    fate = np.full(count, NEVER, dtype=np.int64)
     throws = np.full(count, MOST_THROWS, dtype=np.int64)
     beyond = np.zeros(count, dtype=bool)
     waiting = np.arange(count)
     a, right = scene.sides.a, scene.sides.right
+    creeping = creeping_below(end, scatter)
     for number in range(1, MOST_THROWS + 1):
         if progress is not None:
             progress("trials", count - waiting.size, count)
@@ -118,6 +161,7 @@ def run_trials(
         corner = many.x + np.where(code == 0, -a[many.side], right[many.side])
         beyond[waiting] |= ((code == 0) | (code == 1)) & (corner > end.x) & ~edge
         met = np.where(code < 0, FATES.index("left"), end.fate(many.x, many.side))
+        met = np.where((met < 0) & (many.x < creeping[many.side]), NEVER, met)
         met[edge] = FATES.index("edge")
         done = met >= 0
         fate[waiting[done]], throws[waiting[done]] = met[done], number

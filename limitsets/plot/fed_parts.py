@@ -134,32 +134,20 @@ def _tipping(axes: Axes, found: Feeding) -> None:
 
 
 def _throws(axes: Axes, found: Feeding) -> None:
-    rows, trials = found.shares.by_throw, found.trials
+    rows = found.shares.by_throw
     last = (found.shares.quantile(0.999) or rows.shape[0]) + 2
     number = np.arange(1, min(last, rows.shape[0]) + 1)
     for column, name in enumerate(FATES[:-1]):
         total = np.cumsum(rows[:, column])[: number.size]
-        if total[-1] > LEAST:
+        if total.size and total[-1] > 0.0:
             label = f"{WORDS[name]}: {100 * found.shares.shares[name]:.3g} %"
             axes.step(number, total, where="post", lw=1.3, label=label, **LOOKS[name])
-        met = np.sort(trials.throws[trials.fate == column])
-        if met.size:
-            shown = (
-                np.searchsorted(met, number[:: max(number.size // 12, 1)], side="right") / trials.fate.size
-            )
-            axes.plot(
-                number[:: max(number.size // 12, 1)],
-                shown,
-                ls="",
-                marker="o",
-                ms=3.5,
-                color=LOOKS[name]["color"],
-            )
-    axes.set_title(f"fates (dots: {trials.fate.size} trials)", loc="left", fontsize=style.TEXT)
+    axes.set_title(f"fates of {found.trials.fate.size} parts", loc="left", fontsize=style.TEXT)
     axes.set_xlabel("throws", fontsize=style.SMALL)
     axes.set_ylabel("share of random starts", fontsize=style.SMALL)
     axes.set_ylim(0.0, 1.4 * axes.get_ylim()[1])  # room for the legend over the steps
-    axes.legend(fontsize=style.SMALL, frameon=False, loc="upper left")
+    if axes.lines:
+        axes.legend(fontsize=style.SMALL, frameon=False, loc="upper left")
     style.open_frame(axes)
 
 

@@ -318,7 +318,7 @@ def _numbers(noise: NoiseStatistics, sides: int, rate: float | None) -> Table:
         for name, (told, kind) in (rests | NUMBERS).items()
         if name in noise.numbers
     ]
-    return ["number", "computed", "error, about"], rows
+    return ["number", "computed", "change on halving"], rows
 
 
 def _changes(noise: NoiseStatistics) -> Table:

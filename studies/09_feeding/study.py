@@ -116,7 +116,9 @@ def table(rows: dict[str, dict[str, Any]]) -> str:
         )
         least, most = found["right, 95 % interval"]
         level = found["level for 95 %"]
-        times = "not reached" if level is None else f"{sum(level) / 2:.2f} times" if level[1] > 0.0 else "0"
+        times = "not reached" if level is None else "0"
+        if level is not None and level[1] > 0.0:
+            times = f"{level[0]:.2f} to {level[1]:.2f} times"
         lines.append(
             f"| {name} | {shares} | {least:.5f} to {most:.5f} | {found['series of 20 with 19 or 20 right']:.3f}"
             f" | {found['mean throws']:.1f} | {found['95 % throws']} | {times} |"
@@ -124,9 +126,7 @@ def table(rows: dict[str, dict[str, Any]]) -> str:
     return "\n".join(lines)
 
 
-def main(
-    seed: int = 0, out: Path = HERE, trials: int = 100_000, cells: int = 1024, *, level: bool = True
-) -> dict[str, Any]:
+def main(seed: int = 0, out: Path = HERE, trials: int = 100_000, *, level: bool = True) -> dict[str, Any]:
     """Run the study, write the figure into `out`, return the numbers."""
     out.mkdir(parents=True, exist_ok=True)
     rows = {}
@@ -138,7 +138,6 @@ def main(
             noise=case.noise,
             trials=trials,
             seed=seed,
-            cells=cells,
             level=level,
         )
         rows[name] = row(found)

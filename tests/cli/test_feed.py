@@ -2,6 +2,10 @@
 
 import json
 import re
+import signal
+import subprocess
+import sys
+import time
 from pathlib import Path
 
 import pytest
@@ -18,7 +22,7 @@ def written(name, **changes):
 
 def test_words_files_and_exit(capfd):
     file = written("paper-designed", rate="2 Hz")
-    quick = ("--trials", "200", "--cells", "64")
+    quick = ("--trials", "200")
     code, out, _ = run(capfd, "feed", file, *quick, "-o", "fed")
     assert code == 0
     assert "the arm ends at x = 20 in, side 2 is wanted" in out
@@ -33,7 +37,7 @@ def test_json_alone_and_noise(capfd):
     file = written("paper-designed")
     code, out, _ = run(
         capfd, "feed", file, "--json", "--no-proof", "--scatter", "landing.x=0.1 in", "--law", "bounded",
-        "--trials", "50", "--cells", "32", "--seed", "4",
+        "--trials", "50", "--seed", "4",
     )  # fmt: skip
     assert code == 0
     table = json.loads(out)
@@ -46,7 +50,7 @@ def test_json_alone_and_noise(capfd):
 @pytest.mark.sweep
 def test_the_certificate_is_written_and_rechecked(capfd):
     file = written("paper-designed", position="20.5 in")
-    quick = ("--trials", "50", "--cells", "32", "--certificate", "fed.proof.zip")
+    quick = ("--trials", "50", "--certificate", "fed.proof.zip")
     code, out, _ = run(capfd, "feed", file, *quick)
     assert code == 0
     assert "certificate: fed.proof.zip, rechecked in" in out
@@ -69,7 +73,7 @@ def test_what_the_checker_denies_is_undecided(capfd, monkeypatch):
         return section | {"progress": section["progress"] | {"throws": 5}}
 
     monkeypatch.setattr(writing, "section_of", too_few)
-    quick = ("--trials", "50", "--cells", "32", "--certificate", "fed.proof.zip")
+    quick = ("--trials", "50", "--certificate", "fed.proof.zip")
     code, out, _ = run(capfd, "feed", file, *quick)
     assert code == 1
     assert "progress: UNDECIDED, the checker denies it: side 0, cell" in out
@@ -78,8 +82,23 @@ def test_what_the_checker_denies_is_undecided(capfd, monkeypatch):
     assert not Path("fed.proof.zip").exists()
 
 
+@pytest.mark.sweep
+def test_a_run_that_is_ended_leaves_no_draft():
+    """A signal that ends a process leaves its files as they are: the command has to take away what it began."""
+    command = [sys.executable, "-m", "limitsets", "feed", written("paper-designed", position="20.5 in")]
+    command += ["--trials", "50", "--certificate", "out/fed.proof.zip"]
+    folder = Path("out")
+    with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as process:
+        while process.poll() is None and not list(folder.glob(".draft-*")):
+            time.sleep(0.002)
+        assert list(folder.glob(".draft-*"))
+        process.terminate()
+    assert process.returncode == 128 + signal.SIGTERM
+    assert not list(folder.iterdir())
+
+
 def test_not_proved_is_exit_1(capfd):
-    code, out, _ = run(capfd, "feed", written("paper-initial"), "--trials", "50", "--cells", "32")
+    code, out, _ = run(capfd, "feed", written("paper-initial"), "--trials", "50")
     assert code == 1
     assert "safety: REFUTED" in out
 
@@ -96,7 +115,7 @@ def test_many_parts_at_once(capfd):
     pytest.importorskip("pymunk")
     tables = {"world": {"friction": 0.9, "throw_rate": "2 Hz"}, "effects": {"contact": True}}
     ls.dump(with_cavity("paper-designed", tables=tables), "many.toml")
-    quick = ("--no-proof", "--trials", "20", "--cells", "32", "--parts", "2", "--batches", "2")
+    quick = ("--no-proof", "--trials", "20", "--parts", "2", "--batches", "2")
     code, out, _ = run(capfd, "feed", "many.toml", *quick, "--json")
     assert code == 0
     crowds = json.loads(out)["crowds"]

@@ -10,7 +10,7 @@ from tests.cli.command import run
 from tests.feeding.scenes import with_cavity
 
 SCATTER = {"speed": "0.3 %", "landing": "0.02 in"}
-QUICK = ("--no-proof", "--trials", "20", "--cells", "32")
+QUICK = ("--no-proof", "--trials", "20")
 
 
 def noisy(**tables):

@@ -127,7 +127,7 @@ def test_rates_count_right_feeds_per_throw():
 
 
 def test_feed_has_both_kinds_and_its_json():
-    found = ls.feed(scene(), NOISE, prove=False, level=False, trials=50, cells=32, parts=2, batches=2, seed=5)
+    found = ls.feed(scene(), NOISE, prove=False, level=False, trials=50, parts=2, batches=2, seed=5)
     assert [crowd.between for crowd in found.crowds] == [True, False]
     table = json.loads(as_json(found))
     first = table["crowds"][0]

@@ -92,6 +92,22 @@ def test_a_throw_that_scatters_by_10_percent_feeds_side_2_only():
     assert set(safe.possible) == {2}
 
 
+def test_when_time_is_up_what_is_proved_is_the_answer():
+    """The same throw on the first cells only: the side is proved there, and progress names the cells it ended on."""
+    told = []
+    found = proved_feeding(
+        arm_end_of(with_cavity()),
+        {"throw.speed": "10 %"},
+        seconds=0.0,
+        progress=lambda *step: told.append(step),
+    )
+    assert found.safe.verdict == "proved"
+    assert found.fed.verdict == "undecided"
+    assert "finer cells than 2048 a side were not tried" in found.fed.reason
+    assert found.found.cover.grid.n_cells < 8192
+    assert not any("8192" in stage for stage, _, _ in told)
+
+
 def test_scattered_landings_are_fed_from_some_x_on():
     """Nearer to the joint than this some throw of 0.005 in too short loses more than it gains."""
     scene = with_cavity()

@@ -5,16 +5,19 @@ import json
 import numpy as np
 import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
-from scipy.stats import beta, binomtest
+from scipy.stats import beta
 
 import limitsets as ls
 from limitsets.cli.feed import _text
+from limitsets.errors import LimitsetsError
+from limitsets.feeding import Feeding
 from limitsets.feeding.falling import FATES, arm_end_of
-from limitsets.feeding.fed_shares import FedShares, FeedingProblem, success_curve
-from limitsets.feeding.trials import run_trials
+from limitsets.feeding.fed_shares import FedShares, success_curve
+from limitsets.feeding.trials import Trials, run_trials
 from limitsets.files import as_json
 from limitsets.robust import Gaussian, Scattering, Uniform
 from limitsets.robust.noise.proportions import binomial_interval
+from tests.feeding.own_throws import shares
 from tests.feeding.scenes import with_cavity
 
 NOISE = Scattering(speed=Gaussian(0.005), landing=Gaussian(0.02))
@@ -29,36 +32,113 @@ def test_the_interval_of_19_of_20():
     assert binomial_interval(20, 20)[0] == pytest.approx(0.025 ** (1 / 20), rel=1e-9)
 
 
-def assert_alike(found, trials):
-    """Counts within what binomials and the operator's error allow."""
-    count = trials.fate.size
-    for name, share in found["shares"].items():
-        low, high = binomtest(trials.counts[name], count).proportion_ci(0.9999, method="exact")
-        error = found["errors"][name]
-        assert low - error <= share <= high + error, name
-
-
 @pytest.fixture(scope="module")
 def initial():
     """Four ends: about 0.3 right, 0.6 wrong, 0.1 thrown at the end, and from rest, at 2 Hz, some meet the wall."""
     end = arm_end_of(with_cavity("paper-initial", rate="2 Hz", tips="rest"))
-    problem = FeedingProblem.of(end, 512, 16)
-    found = problem.solve(NOISE)
-    return end, found, problem.errors(NOISE, found), run_trials(end, NOISE, 20_000, seed=3)
+    return end, run_trials(end, NOISE, 20_000, seed=3)
+
+
+def assert_within(found, truth, count):
+    """Shares are within their stated errors of those of so many other parts, whose own errors count too."""
+    for name, share in truth.items():
+        low, high = binomial_interval(round(share * count), count)
+        allowed = np.hypot(found.errors[name], max(share - low, high - share))
+        assert abs(found.shares[name] - share) <= 1.3 * allowed, (name, found.shares[name], share)
 
 
 def test_two_ways_agree(initial):
-    _, found, errors, trials = initial
-    assert sum(found.shares.values()) == pytest.approx(1.0, abs=1e-6)
+    """The package's throws, and the equations of docs/model.md in numpy, under noise."""
+    end, trials = initial
+    found = FedShares(trials)
+    assert sum(found.shares.values()) == pytest.approx(1.0)
+    assert found.by_throw.sum() == pytest.approx(1.0)
     assert 0.2 < found.shares["right"] < 0.4
     assert found.shares["wall"] > 1e-3
-    assert_alike({"shares": found.shares, "errors": errors}, trials)
-    mean = trials.throws.mean()
-    assert abs(found.mean_throws - mean) < 5.0 * trials.throws.std() / np.sqrt(trials.throws.size)
+    own = shares(end, 20_000, 8, lambda r, n: r.normal(0, 0.005, n), lambda r, n: r.normal(0, 0.02, n))
+    assert_within(found, own, 20_000)
+
+
+# 1.2 million parts without noise: issue 27
+TRUE_WALL = {"2 Hz": (0.004378, 6e-5), "3 Hz": (0.019347, 1.3e-4)}
+
+
+@pytest.mark.parametrize("rate", TRUE_WALL)
+def test_the_stated_error_of_the_wall_holds_without_noise(rate):
+    """Transfer between cells said 0.004732 +- 0.000013 and 0.020389: cells spread the parts next to the end."""
+    found = ls.feed(with_cavity(rate=rate), prove=False)
+    value, error = TRUE_WALL[rate]
+    assert abs(found.shares.shares["wall"] - value) <= found.errors["wall"] + error
+    assert found.errors["wall"] < 0.15 * value
+
+
+def random_feeder(random):
+    """Give a feeder of 3 to 6 corners, and its noise: of the speed, of the landing, both or none."""
+    while True:
+        count = int(random.integers(3, 7))
+        at = np.sort(random.uniform(0.0, 2.0 * np.pi, count))
+        corners = np.c_[np.cos(at) * random.uniform(1.0, 1.8), np.sin(at)] * random.uniform(1.8, 3.2)
+        length = random.uniform(24.0, 36.0)
+        x = random.uniform(0.55, 0.85) * length
+        tree = {
+            "name": "random",
+            "part": {
+                "vertices": [[f"{u} in", f"{v} in"] for u, v in corners.tolist()],
+                "mass": {"plate_density": "1 kg/m^2"},
+            },
+            "arm": {"length": f"{length} in", "surface_height": f"{-random.uniform(0.1, 0.8)} in"},
+            "throw": {"kappa": f"{random.uniform(8.0, 40.0)} in"},
+            "cavity": {"position": f"{x} in", "width": "12 in", "depth": "4.6 in", "angle": "32.23 deg"},
+            "goal": {"oriented_beyond": {"x": f"{x} in", "side": int(random.integers(count))}},
+        }
+        law = (Gaussian, Uniform)[int(random.integers(2))]
+        noise = Scattering(
+            speed=law(random.uniform(0.002, 0.02)) if random.random() < 0.5 else None,
+            landing=law(random.uniform(0.01, 0.15)) if random.random() < 0.5 else None,
+        )
+        try:
+            end = arm_end_of(ls.load(tree))
+        except LimitsetsError:
+            continue
+        if FedShares(run_trials(end, noise, 200)).never == 0.0:
+            return end, noise
+
+
+def drawn(law):
+    """Draw from a law, by its definition."""
+    if law is None:
+        return None
+    if isinstance(law, Gaussian):
+        return lambda random, n: random.normal(0.0, law.sigma, n)
+    return lambda random, n: random.uniform(-law.bound, law.bound, n)
+
+
+@pytest.mark.sweep
+@pytest.mark.parametrize("seed", range(8))
+def test_random_feeders_are_within_the_stated_error(seed):
+    end, noise = random_feeder(np.random.default_rng([27, seed]))
+    found = FedShares(run_trials(end, noise, 100_000, seed=seed))
+    speed = drawn(noise.speed) or (lambda _, n: np.zeros(n))
+    assert_within(found, shares(end, 100_000, seed, speed, drawn(noise.landing)), 100_000)
+
+
+@pytest.mark.parametrize("height", ["0.25 in", "0.5 in"])
+def test_parts_that_creep_to_the_joint_never_leave_the_arm(height):
+    """Above the joint a start near a keeps 1 - 2 h/kappa of its distance from a; cells counted it as one that left."""
+    end = arm_end_of(
+        with_cavity(tables={"arm": {**ls.load("paper-designed").as_dict()["arm"], "surface_height": height}})
+    )
+    for noise in (Scattering(), Scattering(speed=Gaussian(0.005))):
+        counts = run_trials(end, noise, 300).counts
+        assert counts["never"] > 0
+        assert counts["left"] == 0
+    # scattered landings do take them off the arm
+    assert run_trials(end, Scattering(landing=Gaussian(0.02)), 300).counts["left"] > 0
 
 
 def test_of_parts_that_all_stay_no_mean_is_told():
-    stay = FedShares(np.zeros((5, 5)), 1.0, 0.0)
+    none = np.zeros(5, dtype=bool)
+    stay = FedShares(Trials(np.full(5, 5), np.full(5, 20_000), none, none, 0))
     assert np.isnan(stay.mean_throws)
     assert stay.per_minute(60.0) is None
 
@@ -66,8 +146,8 @@ def test_of_parts_that_all_stay_no_mean_is_told():
 @pytest.mark.sweep  # all throws that may be made are made
 def test_where_no_part_comes_beyond_the_end_nothing_is_fed(capsys):
     """The limit set of paper-designed ends at 23.38 in; the arm here at 26 in."""
-    found = ls.feed(with_cavity(position="26 in"), prove=False, level=False, trials=20, cells=32)
-    assert found.shares.shares["never"] == pytest.approx(1.0, abs=1e-9)
+    found = ls.feed(with_cavity(position="26 in"), prove=False, level=False, trials=20)
+    assert found.shares.shares["never"] == 1.0
     assert np.isnan(found.shares.mean_throws)
     assert found.shares.quantile(0.95) is None
     _text(found, [], None)
@@ -75,16 +155,24 @@ def test_where_no_part_comes_beyond_the_end_nothing_is_fed(capsys):
 
 
 def test_parts_per_minute_are_right_feeds_over_the_time_of_all(initial):
-    _, found, _, trials = initial
-    assert found.per_minute(2.0) == pytest.approx(
-        120.0 * (trials.fate == 0).sum() / trials.throws.sum(), rel=0.05
-    )
+    trials = initial[1]
+    found = FedShares(trials)
+    assert found.per_minute(2.0) == pytest.approx(120.0 * (trials.fate == 0).sum() / trials.throws.sum())
     assert found.per_minute(None) is None
+
+
+def test_throws_until_the_end_are_told_in_a_few_numbers(initial):
+    """By share of the starts the least number of throws after which so many have ended: not a number per throw."""
+    end, trials = initial
+    told = json.loads(as_json(Feeding(end, {}, None, {}, NOISE, None, trials)))["throws"]["ended"]
+    assert len(told["share"]) == len(told["throws"]) <= 25
+    for share, throws in zip(told["share"], told["throws"], strict=True):
+        assert (trials.throws <= throws).mean() >= share > (trials.throws < throws).mean()
 
 
 def test_trials_do_not_depend_on_how_many_there_are(initial):
     """Numbers are counted: a series is the series of that seed, and a throw of the same part the same."""
-    end, _, _, trials = initial
+    end, trials = initial
     again = run_trials(end, NOISE, 20_000, seed=3)
     assert (again.fate == trials.fate).all()
     assert (again.throws == trials.throws).all()
@@ -95,12 +183,8 @@ def test_trials_do_not_depend_on_how_many_there_are(initial):
 
 
 def test_without_noise_all_are_fed_on_side_2():
-    end = arm_end_of(with_cavity())
-    found = FeedingProblem.of(end, 256, 8).solve(Scattering())
-    assert found.shares["right"] + found.shares["edge"] == pytest.approx(1.0, abs=1e-6)
-    trials = run_trials(end, Scattering(), 2000)
+    trials = run_trials(arm_end_of(with_cavity()), Scattering(), 2000)
     assert trials.counts["right"] + trials.counts["edge"] == 2000
-    assert found.shares["edge"] == pytest.approx(0.043, abs=0.01)
     assert trials.throws.max() <= 786
     # r_2 = 20: a flip from side 2 would start beyond the end; flips to side 2 strike far before it
     assert not trials.beyond.any()
@@ -110,7 +194,7 @@ def test_without_noise_all_are_fed_on_side_2():
 def test_close_to_the_end_at_a_high_rate_parts_meet_the_wall():
     """The share within the distance that does not clear, by the density of first rests beyond the end."""
     slow, fast = (arm_end_of(with_cavity(rate=rate, tips="rest")) for rate in ("2 Hz", "4 Hz"))
-    first, second = (FeedingProblem.of(end, 512, 8).solve(NOISE).shares["wall"] for end in (slow, fast))
+    first, second = (FedShares(run_trials(end, NOISE, 100_000)).shares["wall"] for end in (slow, fast))
     assert 0.0 < first < second
     ((least, _),), ((more, _),) = slow.clear, fast.clear
     # the density of first rests hardly changes so near to the end
@@ -119,37 +203,36 @@ def test_close_to_the_end_at_a_high_rate_parts_meet_the_wall():
 
 def test_the_level_at_which_success_falls():
     """A wall that half the parts meet at so high a rate: below 95 % without any noise; and none where all is right."""
-    problem = FeedingProblem.of(arm_end_of(with_cavity(rate="8 Hz", tips="rest")), 128, 8)
-    assert success_curve(problem, NOISE, factors=(0.0, 1.0)).level == (0.0, 0.0)
-    problem = FeedingProblem.of(arm_end_of(with_cavity()), 128, 8)
-    curve = success_curve(problem, Scattering(speed=Uniform(0.01)), factors=(0.0, 1.0))
+    end = arm_end_of(with_cavity(rate="8 Hz", tips="rest"))
+    assert success_curve(end, NOISE, factors=(0.0, 1.0)).level == (0.0, 0.0)
+    curve = success_curve(arm_end_of(with_cavity()), Scattering(speed=Uniform(0.01)), factors=(0.0, 1.0))
     assert curve.level is None
     assert "stays above 95 %" in curve.line()
 
 
+@pytest.mark.sweep
 def test_a_level_is_bracketed():
-    problem = FeedingProblem.of(arm_end_of(with_cavity()), 128, 8)
-    noise = Scattering(landing=Uniform(0.5))
-    curve = success_curve(problem, noise, factors=(0.0, 1.0, 2.0, 4.0, 8.0))
+    """Other parts, thrown at both ends, are fed rightly more often than wanted, and less often."""
+    end, noise = arm_end_of(with_cavity()), Scattering(landing=Uniform(0.5))
+    curve = success_curve(end, noise, factors=(0.0, 1.0, 2.0, 4.0, 8.0))
     lo, hi = curve.level
-    shares = [problem.solve(noise.scaled(factor)).shares for factor in (lo, hi)]
-    right = [each["right"] / (1.0 - each["edge"]) for each in shares]
-    assert right[0] > 0.95 >= right[1]
-    assert hi - lo <= 4.0 / 2**8
+    for factor, sign in ((lo, 1.0), (hi, -1.0)):
+        found = FedShares(run_trials(end, noise.scaled(factor), 100_000, seed=9))
+        right = found.shares["right"] / (1.0 - found.shares["edge"])
+        assert sign * (right - 0.95) > -2.0 * found.errors["right"]
+    assert hi - lo <= 0.1 * hi
 
 
 KEYS = {
     "scene", "unit", "position", "side", "starts_from", "throw_rate", "clear", "tipping", "safety",
     "progress", "noise", "scatter", "brackets", "crowds",
-    "probabilities", "throws", "right_per_minute", "noise_cut_off", "success", "trials",
+    "probabilities", "throws", "right_per_minute", "success", "trials",
 }  # fmt: skip
 
 
 @pytest.mark.sweep
 def test_json_and_figure():
-    found = ls.feed(
-        with_cavity(rate="2 Hz", tips="rest"), NOISE, trials=400, cells=128, strata=8, level=False
-    )
+    found = ls.feed(with_cavity(rate="2 Hz", tips="rest"), NOISE, trials=400, level=False)
     table = json.loads(as_json(found))
     assert set(table) == KEYS
     assert set(table["probabilities"]) == set(table["trials"]["counts"]) == set(FATES)

@@ -13,7 +13,6 @@ from limitsets.engine import Crowd
 from limitsets.errors import SceneError
 from limitsets.feeding import clear_beyond, time_to_tip
 from limitsets.feeding.falling import arm_end_of
-from limitsets.feeding.fed_shares import FeedingProblem
 from limitsets.feeding.tipping import rate_about_end, tipping_times
 from limitsets.feeding.trials import run_trials
 from limitsets.robust import Scattering
@@ -203,10 +202,5 @@ def test_a_throw_that_acts_beyond_the_end_is_a_fate_of_its_own():
         assert x + (scene.radius_of_gyration**2 + d * (scene.surface_height + d)) / x == pytest.approx(20.0)
         places = np.array([x - 1e-6, x + 1e-6, 20.0 - 1e-6, 20.0])
         assert end.at_edge(places, np.full(4, side)).tolist() == [False, True, True, False]
-    trials, shares = (
-        run_trials(end, Scattering(), 20_000),
-        FeedingProblem.of(end, 512, 8).solve(Scattering()).shares,
-    )
-    assert 0.02 < shares["edge"] < 0.06
-    assert trials.counts["edge"] / 20_000 == pytest.approx(shares["edge"], abs=0.006)
-    assert sum(shares.values()) == pytest.approx(1.0, abs=1e-6)
+    trials = run_trials(end, Scattering(), 20_000)
+    assert 0.02 < trials.counts["edge"] / 20_000 < 0.06

@@ -98,7 +98,7 @@ class NoiseStatistics(ChainSolution, Tabled):
     def tables(self) -> tuple[Table, ...]:
         """Give the tables that show it, the one that is saved as CSV first."""
         rows = [(name, value, self.errors.get(name)) for name, value in self.numbers.items()]
-        columns = ("of the noise", Column("value", show=".6g"), Column("error", show=".1e"))
+        columns = ("of the noise", Column("value", show=".6g"), Column("change on halving", show=".1e"))
         return (Table(columns, rows, f"{self.scene}: under noise", how_found(self.how)),)
 
     def to_json(self) -> dict[str, Any]:
