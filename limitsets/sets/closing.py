@@ -64,7 +64,7 @@ def _stepped(params: Any, x: Array, side: Ints) -> tuple[Array, Ints, Ints]:
 
 
 def _ahead(x: Any) -> Any:
-    """What stands at the next point of each orbit."""
+    """Turn to what stands at the next point of each orbit."""
     return np.roll(x, -1, axis=1)
 
 
@@ -135,7 +135,9 @@ def _slopes(slopes: Slopes, x: Array, side: Ints, code: Ints) -> Array:
 
 
 @np.errstate(all="ignore")  # images that are not there
-def _noise(params: Any, x: Array, side: Ints, after: Array, slope: Array, scale: float) -> tuple[Array, Array]:
+def _noise(
+    params: Any, x: Array, side: Ints, after: Array, slope: Array, scale: float
+) -> tuple[Array, Array]:
     """How far images just beside each point are from the tangent: rounding, and jumps, along each coordinate."""
     noise, jumps = np.zeros_like(x), np.zeros_like(x)
     for way in _offsets(x.shape[-1]):
@@ -172,7 +174,12 @@ def _closed(
     noise, jumps = _noise(params, x, side, after, slope, scale)
     size = scale + np.abs(after) + np.einsum("mpij,mpj->mpi", np.abs(slope), np.abs(x))
     rounding = ROUNDING * EPS * size + 2.0 * noise
-    done, points, branches, missed = np.zeros(len(x), dtype=bool), x.copy(), np.zeros_like(side), np.zeros_like(x)
+    done, points, branches, missed = (
+        np.zeros(len(x), dtype=bool),
+        x.copy(),
+        np.zeros_like(side),
+        np.zeros_like(x),
+    )
     for way in (None, np.zeros(x.shape[-1]), *(_offsets(x.shape[-1]) if seams else ())):
         tried = x
         if way is not None:  # what `image` itself calls the points
@@ -198,7 +205,7 @@ def _closed(
 
 
 def _multiplier(slopes: Array) -> float:
-    """Derivative of all steps together, in the plane the largest modulus of its eigenvalues."""
+    """Find the derivative of all steps together, in the plane the largest modulus of its eigenvalues."""
     if slopes.shape[1] == 1:
         return float(np.prod(slopes))
     total = np.eye(slopes.shape[1])

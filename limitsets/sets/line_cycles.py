@@ -70,7 +70,9 @@ def _orbits(alphabet: Alphabet, letters: Ints, x: Array) -> list[Closed]:
     points = np.empty((*letters.shape, 1))
     points[:, 0, 0] = x
     for j in range(1, letters.shape[1]):
-        points[:, j, 0] = along(alphabet.params, points[:, j - 1, 0], sides[:, j - 1], branches[:, j - 1, None])[0]
+        points[:, j, 0] = along(
+            alphabet.params, points[:, j - 1, 0], sides[:, j - 1], branches[:, j - 1, None]
+        )[0]
 
     def slopes(at: Array, side: Ints, branch: Ints) -> Array:
         return along(alphabet.params, at[:, 0], side, branch[:, None])[2]

@@ -139,4 +139,6 @@ def cycles_from(params: Any, starts: ArrayLike, side: ArrayLike, up_to: int) -> 
         _, one_of_each = np.unique(keys, axis=0, return_index=True)
         orbits = _orbits(params, roots[one_of_each], on[one_of_each], period)
         found += closed(params, *orbits, scale, slopes, seams=len(kind.branches) == 1)
-    return Cycles(distinct(found), complete=False, how="by Newton's method from many starts: completeness not claimed")
+    return Cycles(
+        distinct(found), complete=False, how="by Newton's method from many starts: completeness not claimed"
+    )
