@@ -3,9 +3,9 @@
 For points x_0 .. x_p-1 with slopes S_j the corrections d_j solve S_j d_j - d_j+1 = x_j+1 - f(x_j), p equations at once,
 so that no point inherits the errors of those before it.  A computed step differs from the exact one by rounding,
 
-    a_j = 64 eps (scale + |f(x_j)| + |S_j| |x_j|) + 2 noise_j ,
+    a_j = 64 eps (scale + |f(x_j)| + |S_j| |x_j|) + 4 noise ,
 
-where noise_j is how far images of points very near x_j are from the tangent there, for formulas that cancel.  The orbit
+where noise is how far images of points very near the orbit are from the tangents there, for formulas that cancel.  The orbit
 counts where |f(x_j) - x_j+1| <= a_j for each j, with f the kernel `image` on whatever branch it takes.  The points are
 then known to |J^-1| a, with J the matrix of the equations: orbits nearer than that are one.
 
@@ -32,7 +32,7 @@ __all__ = ["Closed", "Slopes", "closed", "corrected", "distinct"]
 ROUNDING, FARTHEST, VAGUE = 64.0, 1e-6, 1e-4
 
 # The distance, relative to the extent of x, at which a step is compared with its tangent: curvature is nothing there.
-BESIDE = 2.0**-36
+BESIDE = 1.7e-10
 
 # Numbers of one matrix, and of all that are inverted together.
 AT_ONCE = 1 << 22
@@ -173,7 +173,7 @@ def _closed(
     after, slope = measured(x)
     noise, jumps = _noise(params, x, side, after, slope, scale)
     size = scale + np.abs(after) + np.einsum("mpij,mpj->mpi", np.abs(slope), np.abs(x))
-    rounding = ROUNDING * EPS * size + 2.0 * noise
+    rounding = ROUNDING * EPS * size + 4.0 * noise.max(axis=(1, 2))[:, None, None]
     done, points, branches, missed = (
         np.zeros(len(x), dtype=bool),
         x.copy(),

@@ -109,8 +109,12 @@ def require_closed(params, found):
             miss.append(np.abs(one.x[0] - to).max())
         assert max(miss) == cycle.residual <= cycle.rounding
         assert len(np.unique(np.column_stack([points, cycle.side]), axis=0)) == cycle.period
-    rounded = [(c.period, *sorted(np.round(np.ravel(c.x), 7).tolist())) for c in found]
-    assert len(set(rounded)) == len(rounded)
+    points = [np.round(c.x.reshape(c.period, -1), 7) + 0.0 for c in found]
+    rounded = {
+        tuple(sorted((*x, s) for x, s in zip(p.tolist(), c.side.tolist(), strict=True)))
+        for p, c in zip(points, found, strict=True)
+    }
+    assert len(rounded) == len(found)
 
 
 def lifted(p, n, up_to):
