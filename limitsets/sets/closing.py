@@ -5,9 +5,9 @@ so that no point inherits the errors of those before it.  A computed step differ
 
     a_j = 64 eps (scale + |f(x_j)| + |S_j| |x_j|) + 4 noise ,
 
-where noise is how far images of points very near the orbit are from the tangents there, for formulas that cancel.  The orbit
-counts where |f(x_j) - x_j+1| <= a_j for each j, with f the kernel `image` on whatever branch it takes.  The points are
-then known to |J^-1| a, with J the matrix of the equations: orbits nearer than that are one.
+where noise is how far images of points very near the orbit are from the tangents there, for formulas that cancel.  The
+orbit counts where |f(x_j) - x_j+1| <= a_j for each j, with f the kernel `image` on whatever branch it takes.  The points
+are then known to |J^-1| a, with J the matrix of the equations: orbits nearer than that are one.
 
 A map on a circle or torus has a seam, where a formula jumps by one turn.  A point on it has two names, 0 and 1, and
 rounding chooses.  Two such orbits are one if their points differ by the jump and their slopes do not differ.
@@ -165,9 +165,7 @@ def closed(
 
 
 @np.errstate(all="ignore")  # orbits that run away, which are left out
-def _closed(
-    params: Any, x: Array, side: Ints, scale: float, slopes: Slopes, *, seams: bool
-) -> Iterable[Closed]:
+def _closed(params: Any, x: Array, side: Ints, scale: float, slopes: Slopes, *, seams: bool) -> list[Closed]:
     measured = _beside(params, slopes, side, scale)
     x = corrected(measured, x, scale, 3)
     after, slope = measured(x)
@@ -191,6 +189,7 @@ def _closed(
         done |= good
         if done.all():
             break
+    kept: list[Closed] = []
     for k in np.flatnonzero(done).tolist():
         slope_of = _slopes(slopes, points[k : k + 1], side[k : k + 1], branches[k : k + 1])[0]
         about = np.abs(_inverse(slope[k : k + 1])[0]) @ rounding[k].ravel()
@@ -201,7 +200,8 @@ def _closed(
         at = turned[0][:, 0] if x.shape[-1] == 1 else turned[0]
         most = float(missed[k].max()), float(rounding[k].max())
         cycle = Cycle(at, turned[1], turned[2], _multiplier(turned[3]), *most)
-        yield Closed(cycle, turned[3], jump, near)
+        kept.append(Closed(cycle, turned[3], jump, near))
+    return kept
 
 
 def _multiplier(slopes: Array) -> float:
