@@ -43,7 +43,8 @@ def require_corners(lower: Any, upper: Any) -> None:
 
 def _require(low: Any, high: Any, name: str) -> None:
     if isinstance(low, tuple) and type(high) is type(low):
-        for field, a, b in zip(low._fields, low, high, strict=True):
+        names: tuple[str, ...] = getattr(low, "_fields")  # noqa: B009  # a tuple of parameters is a NamedTuple
+        for field, a, b in zip(names, low, high, strict=True):
             _require(a, b, f"{name}.{field}" if name else field)
     elif isinstance(low, float | np.ndarray) and type(high) is type(low) and np.shape(low) == np.shape(high):
         if not (np.asarray(low) <= np.asarray(high)).all():

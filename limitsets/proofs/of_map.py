@@ -156,7 +156,7 @@ class ProofOfMap(Tabled):
     def functions(self, claim: str) -> str:
         """Name the functions of the map that a claim is proved of: `image` may be another, but for a sample."""
         kind = kind_of(self.map)
-        names = ("image_box",) if kind.own_box else ()
+        names: tuple[str, ...] = ("image_box",) if kind.own_box else ()
         if not kind.own_box or claim in OF_SLOPES:
             names += kind.formulas
         return " and ".join(filter(None, (", ".join(names[:-1]), names[-1])))

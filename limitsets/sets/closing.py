@@ -6,8 +6,8 @@ so that no point inherits the errors of those before it.  A computed step differ
     a_j = 64 eps (scale + |f(x_j)| + |S_j| |x_j|) + 4 noise ,
 
 where noise is how far images of points very near the orbit are from the tangents there, for formulas that cancel.  The
-orbit counts where |f(x_j) - x_j+1| <= a_j for each j, with f the kernel `image` on whatever branch it takes.  Its points
-are then known to |J^-1| a, with J the matrix of the equations: orbits nearer than that are one.
+orbit counts where |f(x_j) - x_j+1| <= a_j for each j, with f the kernel `image` on whatever branch it takes.  Then its
+points are known to |J^-1| a, with J the matrix of the equations: orbits nearer than that are one.
 
 A map on a circle or torus has a seam, where a formula jumps by one turn.  A point on it has two names, 0 and 1, and
 rounding chooses.  Two such orbits are one if their points differ by the jump and their slopes do not differ.
