@@ -214,7 +214,7 @@ class Analysis(Tabled):
             cycles=[
                 picked(cycle, "period", "x")
                 | {"sides": cycle.side}
-                | picked(cycle, "multiplier", "admissible")
+                | picked(cycle, "multiplier", "residual", "rounding")
                 for cycle in self.cycles
             ],
             goal=None

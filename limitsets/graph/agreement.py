@@ -26,6 +26,7 @@ from limitsets.interval import rounding_is_sound
 from limitsets.maps import coerce, images, images_on, kind_of
 from limitsets.maps.bisection import bisected, hidden, sign_code
 from limitsets.maps.contract import require_codes
+from limitsets.maps.corners import between, require_corners
 from limitsets.maps.critical import margins
 from limitsets.maps.drivers import columns
 
@@ -33,8 +34,8 @@ __all__ = ["require_agreement"]
 
 Floats = NDArray[np.float64]
 
-# Samples of a side, and changes of branch between them that are looked at.
-POINTS, CHANGES = 512, 64
+# Samples of a side, changes of branch between them that are looked at, and parameters between two corners.
+POINTS, CHANGES, BETWEEN = 512, 64, 4
 
 # Two ways to compute one image may differ by rounding, this much relative to the domain and the numbers met.
 SAME = 1e-7
@@ -133,15 +134,24 @@ def _points(params: Any, domain: Domain, side: int) -> tuple[Floats, int]:
 
 
 def require_agreement(params: Any, domain: Domain, boxes: bool, upper: Any = None) -> None:
-    """Ask the kernels of a class from outside the package, at both corners of its parameters; `boxes`: `image_box` too.
+    """Ask the kernels of a class from outside the package; `boxes`: `image_box` too.
+
+    Of a box of parameters both corners are asked, and some parameters between: their images lie in the boxes that are
+    proved of all.
 
     Raises
     ------
+    AnswerError
+        `upper` is no upper corner.
     MapError
         They contradict each other, or a parameter is nan.
     """
     cls, kind = type(params), kind_of(params)
-    corners = [params, coerce(upper)] if type(upper) is cls and upper is not params else [params]
+    corners, ends = [params], (params, params)
+    if upper is not None and upper is not params:
+        require_corners(params, upper)
+        ends, random = (coerce(params), coerce(upper)), np.random.default_rng(0)
+        corners = [*ends, *(between(*ends, random.random) for _ in range(BETWEEN))]
     for name, value in ((name, value) for corner in corners for name, value in corner._asdict().items()):
         if isinstance(value, float | int) and math.isnan(value):
             raise MapError(f"the field {name} of {kind.name}", value, "a number", "give it a value")
@@ -159,7 +169,7 @@ def require_agreement(params: Any, domain: Domain, boxes: bool, upper: Any = Non
         if kind.has_image_on:
             _ask_forced(corner, points, side, (after, found.side, found.code), usable, size)
         if boxes and kind.has_image_box and rounding_is_sound():
-            _ask_boxes(corner, domain, points, side, (after, found.side, found.code), usable, size)
+            _ask_boxes(ends, domain, points, side, (after, found.side, found.code), usable, size)
 
 
 def _ask_margin(params: Any, points: Floats, side: int, code: Any, count: int) -> None:
@@ -203,13 +213,12 @@ def _ask_forced(params: Any, starts: Any, side: int, seen: Any, usable: Any, siz
             )
 
 
-def _ask_boxes(
-    params: Any, domain: Domain, starts: Any, side: int, seen: Any, usable: Any, size: Any
-) -> None:
-    """Compare the boxes of single points."""
+def _ask_boxes(ends: Any, domain: Domain, starts: Any, side: int, seen: Any, usable: Any, size: Any) -> None:
+    """Compare the boxes of single points, for all parameters between two, with images for some of them."""
     after, to, code = seen
+    params, upper = ends
     points = columns(starts, starts.shape[1])
-    found = BoxImages(params, params, side, points, points)
+    found = BoxImages(params, upper, side, points, points)
     inside = np.zeros(code.size, dtype=bool)
     for slot in range(2):
         lo, hi = (np.stack(corner, axis=1) for corner in found.slots[slot])

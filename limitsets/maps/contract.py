@@ -15,7 +15,8 @@ written once, here and in the rooms above, and know maps only through these func
 ``on_side(params, side)``               gathers what one side needs, once for a whole batch; the class of what it
                                         returns then has the methods `image`, `image_on` and so on
 ``fallback(params, x, side)``           as `image`, slow and sure; asked where `image` answers ``UNSETTLED``
-``margin(params, x, side)``             a number whose sign decides between branch 0 (not positive) and branch 1
+``margin(params, x, side)``             a number whose sign decides between branch 0 (not positive) and branch 1, of a
+                                        map of two branches
 ``displacement(params, x, side)``       x' - x computed without cancellation
 ``scattered(params, start, step)``      the parameters as they are at step number `step` of start number `start`, where
                                         they differ at every step; asked by orbits, not by the images of cells
@@ -77,6 +78,8 @@ class MapKind:
         Names and codes of the ways out, in the order of the sinks of a graph; "undefined" is the last.
     has_image_on, has_image_box, has_margin, has_displacement : bool
         Which of the optional kernels exist.
+    own_box : bool
+        Whether `image_box` was registered, and not derived.
     """
 
     name: str
@@ -87,6 +90,13 @@ class MapKind:
     has_image_box: bool
     has_margin: bool
     has_displacement: bool
+    own_box: bool = False
+
+    @property
+    def formulas(self) -> tuple[str, ...]:
+        """Names of the kernels that derived boxes and slopes are of."""
+        one = "image_on" if self.has_image_on else "image"
+        return (one, "margin") if self.has_margin else (one,)
 
 
 _KINDS: dict[type, MapKind] = {}
@@ -138,7 +148,8 @@ def register(
     Raises
     ------
     MapError
-        For a class that is no NamedTuple, is registered already, or a kernel that is no module-level function.
+        For a class that is no NamedTuple, is registered already, a kernel that is no module-level function, or a
+        `margin` of a map of one branch, or of more than two, between which no sign decides.
 
     Examples
     --------
@@ -165,6 +176,13 @@ def register(
         )
     if dimension not in (1, 2, 3):
         raise MapError("the dimension of the map", dimension, "1, 2 or 3", "pass dimension=1, 2 or 3")
+    if margin is not None and len(branches) != 2:
+        raise MapError(
+            "the number of branches of a map with margin",
+            len(branches),
+            "2: its sign chooses between branch 0 and branch 1",
+            'name both, branches=("left", "right"), or leave margin out',
+        )
     given = {
         "image": image,
         "image_on": image_on,
@@ -211,6 +229,7 @@ def register(
         boxes,
         margin is not None,
         displacement is not None,
+        image_box is not None,
     )
     return cls
 

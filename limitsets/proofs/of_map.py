@@ -2,9 +2,11 @@
 
 *Invariant, trapping*: no image of an attracting component meets a cell outside; cells are closed, so the images lie in
 the interior of the component, relative to the domain.
-*Attracts all*: besides, no image leaves the domain and every recurrent component attracts: then the rank of a cell, the
-longest path to an attracting cell, falls along every orbit outside.
-*Expanding*, in one dimension: |dx'/dx| > 1 on every attracting cell, on every branch that is possible there.
+*Attracts all*: besides, no image leaves the domain and every recurrent component attracts, or orbits pass through: its
+cells, cut finer, do not recur.  Then the rank of a cell, the longest path to an attracting cell, falls along every
+orbit outside, but for the stays where orbits pass, which are bounded.
+*Expanding*, in one dimension: |dx'/dx| > 1 on every attracting cell, on every branch that is possible there; refuted
+where it is below 1 on all of them.
 *Cycles*: for the points x_0 .. x_p-1 of an orbit along an itinerary, F_k = f(x_k) - x_k+1 and boxes X_k around them,
 K(X) = m - C F(m) + (1 - C DF(X)) (X - m) lies in the interior of X.  Then F has one root in X, whatever the matrix C,
 and it is no multiple one (Krawczyk; Neumaier, "Interval Methods for Systems of Equations", 1990, section 5.1).  All
@@ -30,23 +32,28 @@ from numpy.typing import NDArray
 from limitsets.arguments import arguments_checked_as
 from limitsets.cells import CellSet, Grid
 from limitsets.errors import AnswerError
+from limitsets.files import as_table, picked
 from limitsets.graph import TransitionGraph, transitions
 from limitsets.graph.components import ranks
 from limitsets.graph.condensation import attracting_of
 from limitsets.interval import guard
-from limitsets.maps import coerce, has_slope, kind_of
+from limitsets.maps import coerce, has_slope, kernels, kind_of
+from limitsets.maps.corners import between
 from limitsets.maps.derived import NEVER, SURE, UNKNOWN, branch_boxes
 from limitsets.progress import Progress, shown_in_notebooks
 from limitsets.proofs.intervals import Intervals
 from limitsets.proofs.proof import Claim
 from limitsets.sets import Cycle, Cycles, cycles, cycles_of
-from limitsets.sets.passing import passing
+from limitsets.sets.passing import longest_stays, passing
 from limitsets.tables import Column, Table, Tabled, bands_of
 
 __all__ = ["CLAIMS_OF_MAP", "CycleOfMap", "ProofOfMap", "certify_map"]
 
 Floats: TypeAlias = NDArray[np.float64]
 Matrix: TypeAlias = list[list[Intervals]]
+
+# Claims that are about slopes too, which are derived even where boxes are written by hand.
+OF_SLOPES = ("cycles", "expanding")
 
 # Largest period of the search for cycles.
 UP_TO = 16
@@ -146,10 +153,39 @@ class ProofOfMap(Tabled):
             "keep .to_csv(file) or .to_json(), and the lines that call limitsets.certify",
         )
 
+    def functions(self, claim: str) -> str:
+        """Name the functions of the map that a claim is proved of: `image` may be another, but for a sample."""
+        kind = kind_of(self.map)
+        names: tuple[str, ...] = ("image_box",) if kind.own_box else ()
+        if not kind.own_box or claim in OF_SLOPES:
+            names += kind.formulas
+        return " and ".join(filter(None, (", ".join(names[:-1]), names[-1])))
+
+    def to_json(self) -> list[dict[str, Any]]:
+        """Give it as plain tables for JSON, one per claim."""
+        return [
+            as_table(
+                **picked(claim, "claim", "verdict"),
+                of=self.functions(claim.claim),
+                reason=claim.reason or None,
+                map=type(self.map).__name__,
+                parameters=[end._asdict() for end in (self.map, self.upper)],
+                cells=self.graph.n_cells,
+                attracting=len(self.cells),
+                section=claim.section or None,
+                cycles=self.cycles if claim.claim == "cycles" else None,
+                timings={"certify": self.seconds},
+            )
+            for claim in self.claims
+        ]
+
     def tables(self) -> tuple[Table, ...]:
         """Give the tables that show it, the one that is saved as CSV first."""
-        rows = [(each.claim, each.verdict, _missing(each)) for each in self.claims]
-        claims = Table(("claim", "verdict", "missing"), rows, f"Proofs of {type(self.map).__name__}")
+        rows = [
+            (each.claim, each.verdict, self.functions(each.claim), _missing(each)) for each in self.claims
+        ]
+        caption = f"Proofs of {type(self.map).__name__}, of {self.functions('invariant')}"
+        claims = Table(("claim", "verdict", "of", "missing"), rows, caption)
         if not len(self.cells):
             return (claims,)
         kept = _region(self.cells, "Attracting cells", "no image leads out")
@@ -191,15 +227,14 @@ def _place(grid: Grid, cell: int) -> str:
     return f"side {side}, x in {spans}" if grid.sides > 1 else f"x in {spans}"
 
 
-def _components(graph: TransitionGraph) -> tuple[NDArray[np.int32], NDArray[np.int64]]:
-    """Attracting component of each cell, and the recurrent cells that do not attract."""
+def _components(graph: TransitionGraph) -> NDArray[np.int32]:
+    """Attracting component of each cell."""
     sets = graph.recurrent_components()
     good = attracting_of(graph.ranges, graph.components(), sets)
     component = np.full(graph.n_cells, -1, dtype=np.int32)
     for number, cells in enumerate(k for k, attracts in zip(sets, good, strict=True) if attracts):
         component[cells] = number
-    lost = [cells for cells, attracts in zip(sets, good, strict=True) if not attracts]
-    return component, np.concatenate([np.zeros(0, np.int64), *lost])
+    return component
 
 
 def _invariant(proof: ProofOfMap) -> Claim:
@@ -214,23 +249,34 @@ def _trapping(proof: ProofOfMap) -> Claim:
 
 
 def _attracts_all(proof: ProofOfMap) -> Claim:
-    graph = proof.graph
-    _, lost = _components(graph)
+    graph, attracting = proof.graph, proof.component >= 0
+    sets, parts = graph.recurrent_components(), graph.components()
     leaving = np.flatnonzero(graph.ranges.exits)
-    reason = ""
+    attracts = np.array([attracting[cells[0]] for cells in sets], dtype=bool)
     if leaving.size:
-        reason = (
-            f"the image of {_place(graph.grid, int(leaving[0]))} may leave the domain, or is not enclosed"
+        place = _place(graph.grid, int(leaving[0]))
+        return Claim(
+            "attracts-all", "undecided", f"the image of {place} may leave the domain, or is not enclosed", {}
         )
-    elif lost.size:
-        reason = f"{lost.size} recurrent cells do not attract: first {_place(graph.grid, int(lost.min()))}"
-    elif not len(proof.cells):
-        reason = "there are no attracting cells"
-    if reason:
-        return Claim("attracts-all", "undecided", reason, {})
-    parts = graph.components()
-    rank = ranks(graph.ranges, parts, np.asarray(parts.recurrent))
-    return Claim("attracts-all", "proved", "", {"max_rank": int(rank.max())})
+    if not attracts.any():
+        return Claim("attracts-all", "undecided", "there are no attracting cells", {})
+    stays = np.zeros(len(sets), np.int64) if attracts.all() else longest_stays(graph)
+    lost = np.concatenate(
+        [
+            np.zeros(0, np.int64),
+            *(cells for cells, good in zip(sets, attracts | (stays > 0), strict=True) if not good),
+        ]
+    )
+    if lost.size:
+        place = _place(graph.grid, int(lost.min()))
+        return Claim(
+            "attracts-all", "undecided", f"{lost.size} recurrent cells do not attract: first {place}", {}
+        )
+    settled = np.zeros(parts.count, dtype=bool)
+    settled[np.flatnonzero(parts.recurrent)[attracts]] = True
+    # a rank falls with every step, but for those within a recurrent component, through which orbits pass
+    most = int(ranks(graph.ranges, parts, settled).max()) + int((stays[stays > 0] - 1).sum())
+    return Claim("attracts-all", "proved", "", {"max_rank": most})
 
 
 def _expanding(proof: ProofOfMap) -> Claim:
@@ -241,7 +287,7 @@ def _expanding(proof: ProofOfMap) -> Claim:
     if not len(proof.cells):
         return Claim("expanding", "undecided", "there are no attracting cells", {})
     numbers = proof.cells.numbers()
-    sides, least, place = grid.side_of(numbers), np.inf, ""
+    sides, least, most, place = grid.side_of(numbers), np.inf, 0.0, ""
     for side in np.unique(sides).tolist():
         mine = numbers[sides == side]
         lo, hi = grid.boxes(mine, side)
@@ -251,9 +297,15 @@ def _expanding(proof: ProofOfMap) -> Claim:
             slope = np.where(low > 0.0, low, np.where(high < 0.0, -high, 0.0))
             slope[found.state == UNKNOWN] = 0.0
             slope[found.state == NEVER] = np.inf
+            largest = np.maximum(np.abs(low), np.abs(high))
+            largest[found.state == UNKNOWN] = np.inf
+            most = max(most, float(largest[found.state != NEVER].max(initial=0.0)))
             worst = int(slope.argmin())
             if slope[worst] < least:
                 least, place = float(slope[worst]), _place(grid, int(mine[worst]))
+    if most < 1.0:
+        reason = f"on all attracting cells the slope is at most {most:.6g} in modulus"
+        return Claim("expanding", "refuted", reason, {}, final=True)
     if not least > 1.0:
         return Claim("expanding", "undecided", f"slope {least:.6g} at {place}", {})
     return Claim("expanding", "proved", "", {"least_slope": least.hex()})
@@ -401,16 +453,9 @@ def _within(cells: CellSet, lo: Floats, hi: Floats, side: int) -> bool:
     return bool(mine[tuple(slice(a, b + 1) for a, b in zip(first, last, strict=True))].all())
 
 
-def _between(lower: Any, upper: Any) -> Any:
-    """Parameters half way between two corners."""
-    if isinstance(lower, tuple):
-        return type(lower)(*map(_between, lower, upper))
-    return lower if lower is None or isinstance(lower, bool) else 0.5 * (lower + upper)
-
-
 def _candidates(proof: ProofOfMap) -> tuple[Cycles, list[str]]:
     """Find cycles in floats for the parameters in the middle, and say what was left out."""
-    cells, middle = proof.cells, _between(proof.map, proof.upper)
+    cells, middle = proof.cells, between(proof.map, proof.upper)
     if cells.grid.dimension > 1:
         return cycles(replace(proof.graph, map=middle), UP_TO, cells), []
     found = cycles_of(middle, cells.extents(), cells.grid.domain, UP_TO, most_words=MOST_WORDS)
@@ -454,6 +499,17 @@ CLAIMS_OF_MAP = (*PROVERS, "cycles")
 """What can be claimed of any map."""
 
 
+def _require_provable(lower: Any) -> None:
+    """Refuse maps whose boxes are not of what its orbits follow."""
+    kind = kind_of(lower)
+    for name in ("scattered", "on_side"):
+        if type(lower) in getattr(kernels, name).methods:
+            mine = type(lower).__module__.split(".")[0] != "limitsets"
+            way = f"register the map without {name}" if mine else "pass the scene: limitsets.certify(scene)"
+            allowed = "a map of image, image_on, margin or image_box alone"
+            raise AnswerError("the map", f"{kind.name}, which has {name}", allowed, way)
+
+
 @shown_in_notebooks
 @arguments_checked_as("certify")
 def certify_map(
@@ -486,7 +542,8 @@ def certify_map(
     Raises
     ------
     AnswerError
-        For a word that is no claim of a map, or a thread that does not round to nearest.
+        For a word that is no claim of a map, a map with `scattered` or `on_side`, corners that differ in anything but
+        numbers and arrays of numbers, or a thread that does not round to nearest.
     MapError
         For a map whose images cannot be enclosed: the line names the function and the way out.
     """
@@ -500,13 +557,13 @@ def certify_map(
         way = "limitsets.certify(map, limitsets.grid([(lo, hi)], cells=1024))"
         raise AnswerError("the grid", None, "the cells to prove the claims on", f"pass {way}")
     guard()
+    _require_provable(map)
     lower = coerce(map)
     upper = lower if upper is None else coerce(upper)
     if progress is not None:
         progress("transitions", 0, 1)
     graph = transitions(lower, grid, "boxes", upper=upper)
-    component, _ = _components(graph)
-    proof = ProofOfMap(lower, upper, graph, component, (), (), 0.0)
+    proof = ProofOfMap(lower, upper, graph, _components(graph), (), (), 0.0)
     found: tuple[CycleOfMap, ...] = ()
     answers = []
     for word in wanted:

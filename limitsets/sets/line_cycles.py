@@ -7,16 +7,15 @@ word's length, which is why a word repeated once is closed too.
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from limitsets.maps.bisection import Flags, bisected
 from limitsets.maps.critical import Sides
-from limitsets.maps.drivers import images
 from limitsets.maps.forced import along
-from limitsets.sets.cycle import NEAR, Array, Cycle, Cycles, Ints, distinct, require_period
+from limitsets.sets.closing import Closed, closed, corrected, distinct
+from limitsets.sets.cycle import NEAR, Array, Cycles, Ints, require_period
 from limitsets.sets.itineraries import Alphabet, Words, alphabet_of, grown, letters_alone, solved
 from limitsets.sets.unions import EPS, Extents
 
@@ -65,27 +64,28 @@ def _roots(alphabet: Alphabet, letters: Ints, lo: Array, hi: Array) -> tuple[Int
     )
 
 
-def _polished(alphabet: Alphabet, letters: Ints, x: float) -> Cycle:
-    """Find the cycle of a word near x; Newton's method at every point of it, so that no point inherits errors."""
-    period = letters.size
-    rotated = letters[(np.arange(period)[:, None] + np.arange(period)) % period]
+def _orbits(alphabet: Alphabet, letters: Ints, x: Array) -> list[Closed]:
+    """Cycles near the starts x, one of each word, that close under the map itself."""
     branches, sides = alphabet.branch[letters], alphabet.side[letters]
-    points = np.empty(period)
-    points[0] = x
-    for j in range(1, period):
-        points[j] = along(alphabet.params, points[j - 1 : j], sides[j - 1], branches[j - 1 : j])[0][0]
-    for _ in range(3):
-        y, _, slope = alphabet.follow(rotated, points)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            move = (y - points) / (1.0 - slope)
-        good = np.isfinite(move) & (np.abs(move) < NEAR * alphabet.scale)
-        points = np.where(good, points + move, points)
-    after, _, slopes = along(alphabet.params, points, sides, branches[:, None])
-    residual = float(np.abs(after - np.roll(points, -1)).max())
-    return Cycle.through(points, sides, branches, float(np.prod(slopes)), residual)
+    points = np.empty((*letters.shape, 1))
+    points[:, 0, 0] = x
+    for j in range(1, letters.shape[1]):
+        points[:, j, 0] = along(
+            alphabet.params, points[:, j - 1, 0], sides[:, j - 1], branches[:, j - 1, None]
+        )[0]
+
+    def slopes(at: Array, side: Ints, branch: Ints) -> Array:
+        return along(alphabet.params, at[:, 0], side, branch[:, None])[2]
+
+    def forced(at: Array) -> tuple[Array, Array]:
+        after, _, slope = along(alphabet.params, at.ravel(), sides.ravel(), branches.reshape(-1, 1))
+        return after.reshape(at.shape), slope.reshape(*at.shape, 1)
+
+    points = corrected(forced, points, alphabet.scale, 3)
+    return closed(alphabet.params, points, sides, alphabet.scale, slopes)
 
 
-def _closed(alphabet: Alphabet, words: Words) -> list[Cycle]:
+def _closed(alphabet: Alphabet, words: Words) -> list[Closed]:
     """Cycles of the words of one length."""
     whole = (words.length % words.repeat == 0) & (words.length <= 2 * words.repeat)
     a, to, _ = alphabet.follow(words.letters, words.lo)
@@ -96,21 +96,9 @@ def _closed(alphabet: Alphabet, words: Words) -> list[Cycle]:
     if k.size == 0:
         return []
     rows, roots = _roots(alphabet, words.letters[k], words.lo[k], words.hi[k])
-    return [_polished(alphabet, words.letters[k[row]], x) for row, x in zip(rows, roots, strict=True)]
-
-
-def _judged(params: Any, found: list[Cycle]) -> list[Cycle]:
-    """Ask the map itself whether it takes the branches of the orbits."""
-    if not found:
+    if rows.size == 0:
         return []
-    x, side, branch = (
-        np.concatenate([getattr(cycle, name) for cycle in found]) for name in ("x", "side", "branches")
-    )
-    right = np.empty(side.size, dtype=bool)
-    for s in np.unique(side):
-        right[side == s] = images(params, x[side == s], int(s)).code == branch[side == s]
-    parts = np.split(right, np.cumsum([cycle.period for cycle in found])[:-1])
-    return [replace(cycle, admissible=bool(ok.all())) for cycle, ok in zip(found, parts, strict=True)]
+    return _orbits(alphabet, words.letters[k[rows]], roots)
 
 
 def cycles_of(
@@ -152,7 +140,7 @@ def cycles_of(
     require_period(up_to)
     alphabet = alphabet_of(params, extents, domain)
     words = letters_alone(alphabet)
-    found: list[Cycle] = []
+    found: list[Closed] = []
     while words.lo.size and words.lo.size <= most_words:
         found += _closed(alphabet, words)
         if words.length == up_to:
@@ -162,4 +150,4 @@ def cycles_of(
     how = "by itinerary"
     if not complete:
         how += f" up to period {words.length - 1}: too many words; raise most_words"
-    return Cycles(distinct(_judged(params, found), NEAR * alphabet.scale), complete=complete, how=how)
+    return Cycles(distinct(found), complete=complete, how=how)

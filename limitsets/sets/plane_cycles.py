@@ -14,16 +14,16 @@ from numpy.typing import ArrayLike
 from limitsets.errors import AnswerError
 from limitsets.jit import kernel
 from limitsets.maps.contract import has_slope, kind_of
-from limitsets.maps.drivers import images, step
+from limitsets.maps.drivers import step
 from limitsets.maps.kernels import image_on
-from limitsets.sets.cycle import NEAR, Array, Cycle, Cycles, Ints, distinct, require_period
+from limitsets.sets.closing import Closed, closed, distinct
+from limitsets.sets.cycle import NEAR, Array, Cycles, Ints, require_period
 
 __all__ = ["cycles_from"]
 
 NEWTON_STEPS = 60
-# Relative to the extent of x: a Newton step this small has arrived, and an orbit closed to this is one.
-ARRIVED = 1e-13
-CLOSED = 1e-6
+# Relative to the extent of x: after a Newton step this small the next one, at all points, ends the search.
+ARRIVED = 1e-7
 
 
 @kernel(entry=True)
@@ -77,20 +77,16 @@ def _newton(params: Any, count: int, x: Array, side: Ints, scale: float) -> tupl
     return np.concatenate(roots), np.concatenate(sides)
 
 
-def _through(params: Any, x: Array, side: int, period: int) -> Cycle | None:
-    """Follow one root around and measure it; None where it leaves."""
-    points, sides, branches = np.empty((period, 2)), np.empty(period, np.int64), np.empty(period, np.int64)
-    at, on = x, side
+def _orbits(params: Any, roots: Array, side: Ints, period: int) -> tuple[Array, Ints]:
+    """Follow roots around: points (n, period, 2) and sides of those that do not leave."""
+    points, sides = np.empty((len(roots), period, 2)), np.empty((len(roots), period), np.int64)
+    stays = np.ones(len(roots), dtype=bool)
+    at, on = roots, side
     for j in range(period):
-        points[j], sides[j] = at, on
-        found = images(params, at[None, :], on)
-        branches[j] = found.code[0]
-        if found.code[0] < 0:
-            return None
-        at, on = found.x[0], int(found.side[0])
-    _, jacobian, _ = _returned(params, period, points[:1], sides[:1])
-    size = float(np.abs(np.linalg.eigvals(jacobian.reshape(2, 2))).max())
-    return Cycle.through(points, sides, branches, size, float(np.abs(at - points[0]).max()))
+        points[:, j], sides[:, j] = at, on
+        at, _, on = _returned(params, 1, at, np.maximum(on, 0))
+        stays &= on >= 0
+    return points[stays], sides[stays]
 
 
 def cycles_from(params: Any, starts: ArrayLike, side: ArrayLike, up_to: int) -> Cycles:
@@ -132,12 +128,17 @@ def cycles_from(params: Any, starts: ArrayLike, side: ArrayLike, up_to: int) -> 
     x = np.asarray(starts, dtype=np.float64).reshape(-1, 2)
     sides = np.array(np.broadcast_to(np.asarray(side, dtype=np.int64), (len(x),)))
     scale = float(np.abs(x).max())
-    found: list[Cycle] = []
+    found: list[Closed] = []
+
+    def slopes(at: Array, on: Ints, _: Ints) -> Array:
+        return _returned(params, 1, at, on)[1]
+
     for period in range(1, up_to + 1):
         roots, on = _newton(params, period, x, sides, scale)
         keys = np.column_stack([np.round(roots / (NEAR * scale)), on])
         _, one_of_each = np.unique(keys, axis=0, return_index=True)
-        orbits = [_through(params, roots[k], int(on[k]), period) for k in one_of_each]
-        found += [orbit for orbit in orbits if orbit is not None and orbit.residual <= CLOSED * scale]
-    kept = distinct(found, 1e3 * NEAR * scale)
-    return Cycles(kept, complete=False, how="by Newton's method from many starts: completeness not claimed")
+        orbits = _orbits(params, roots[one_of_each], on[one_of_each], period)
+        found += closed(params, *orbits, scale, slopes, seams=len(kind.branches) == 1)
+    return Cycles(
+        distinct(found), complete=False, how="by Newton's method from many starts: completeness not claimed"
+    )

@@ -84,7 +84,7 @@ def test_a_fixed_point_attracts_all():
         "invariant": "proved",
         "trapping": "proved",
         "attracts-all": "proved",
-        "expanding": "undecided",
+        "expanding": "refuted",  # the slope is 1 - r there
         "cycles": "proved",
     }
     (cycle,) = proof.cycles

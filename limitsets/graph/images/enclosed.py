@@ -102,7 +102,7 @@ class Enclosures:
     lost: NDArray[np.bool_]
 
 
-def _check(map: Any, upper: Any) -> None:  # noqa: A002  # the field's word
+def _check(map: Any) -> None:  # noqa: A002  # the field's word
     kind = kind_of(map)
     if not kind.has_image_box:
         given = {"image_on": kind.has_image_on, "margin": kind.has_margin}
@@ -111,14 +111,6 @@ def _check(map: Any, upper: Any) -> None:  # noqa: A002  # the field's word
         branches = f"{kind.name}, of the branches {', '.join(kind.branches)}"
         allowed = "one with image_on and margin, of two branches; or with image_box"
         raise AnswerError("the map", branches, allowed, f"{way}, or sample instead")
-    if type(upper) is not type(map):
-        allowed = f"parameters of {kind_of(map).name}"
-        raise AnswerError("the upper corner of the parameters", type(upper).__name__, allowed, "pass such")
-    for name, low, high in zip(map._fields, map, upper, strict=True):
-        if isinstance(low, (int, float, np.ndarray)) and (np.asarray(low) > np.asarray(high)).any():
-            raise AnswerError(
-                f"the upper corner of {name}", high, f"at least the lower one, {low}", "swap them"
-            )
     guard()
 
 
@@ -145,9 +137,9 @@ def enclosures(
     Raises
     ------
     AnswerError
-        For a map without `image_box`, an upper corner that is none, or a thread that does not round to nearest.
+        For a map without `image_box`, or a thread that does not round to nearest.
     """
-    _check(map, upper)
+    _check(map)
     axes = edges if isinstance(edges, tuple) else (edges,)
     lo = tuple(m.ravel() for m in np.meshgrid(*(axis[:-1] for axis in axes), indexing="ij"))
     hi = tuple(m.ravel() for m in np.meshgrid(*(axis[1:] for axis in axes), indexing="ij"))
