@@ -15,7 +15,7 @@ from limitsets.errors import AnswerError, DataError
 from limitsets.fitting.fit_result import Fit, Fitted, Scatter, fitted_scene
 from limitsets.fitting.further import Question, further_throws
 from limitsets.fitting.likelihood import SCATTERS, Likelihood
-from limitsets.fitting.maximising import Maximum
+from limitsets.fitting.maximising import End, Maximum
 from limitsets.fitting.misfit import misfit_of
 from limitsets.fitting.rows import Rows, as_recorded
 from limitsets.fitting.searching import LEVEL, largest, profiles, threshold_of
@@ -133,33 +133,37 @@ def _answer(
     scene: Scene,
     own: Likelihood,
     best: Maximum,
-    ends: list[tuple[float, float]],
+    ends: list[tuple[End, End]],
     start: Start,
     threshold: float,
     begin: float,
 ) -> Fit:
     values = own.values(best.at)[0]
-    held, quantities = dict(start.held), []
+    held, undetermined, quantities = dict(start.held), dict(start.undetermined), []
     for k, name in enumerate(own.names):
-        lo, hi = (float(own.centre[k] + own.scale[k] * end) for end in ends[k])
-        if name == RADIUS and math.isinf(lo) and math.isinf(hi):
-            held[name] = "no decision between jog and flip depends on it closely enough"
+        lo, hi = (float(own.centre[k] + own.scale[k] * end.at) for end in ends[k])
+        open_ends = sum(end.wall or math.isinf(end.at) for end in ends[k])
+        if name == RADIUS and open_ends == len(ends[k]):
+            others = undetermined.pop(name, "")
+            why = "no decision between jog and flip depends on it closely enough"
+            held[name] = f"the decisions do not tell it apart from {others}" if others else why
             values[k] = scene.value(name)
             continue
         value = float(values[k])
         if name == RADIUS:  # between a jog and a flip nothing is more likely than the rest
-            value = 0.5 * (lo + hi) if math.isfinite(hi - lo) else min(max(scene.value(name), lo), hi)
-        quantities.append(Fitted(name, value, lo, hi, base_unit(find(name).dimension, scene.unit)))
+            value = min(max(scene.value(name), lo), hi) if open_ends else 0.5 * (lo + hi)
+        unit = base_unit(find(name).dimension, scene.unit)
+        quantities.append(Fitted(name, value, lo, hi, unit, not open_ends))
     scatters = []
     for k in range(SCATTERS):
         j = len(own.names) + k
-        lo, hi = (float(own.scale[j] * end) for end in ends[j])
+        lo, hi = (float(own.scale[j] * end.at) for end in ends[j])
         if math.isinf(lo) and values[j] < NOTHING * hi:
             values[j] = 0.0
         scatters.append(Scatter(float(values[j]), max(lo, 0.0), hi, not own.rows.known))
     found = tuple(quantities)
     speed, landing = scatters
-    new = fitted_scene(scene, found, speed.value, landing.value)
+    new = fitted_scene(scene, found, speed, landing)
     told = own.told(values[None])
     loose = np.sqrt(values[None, -1:] ** 2 + (1e-7 * scene.arm_length) ** 2)
     misses = own.rows.throws.x_after - told.after[0]
@@ -173,7 +177,7 @@ def _answer(
     if not own.rows.known:  # what the answer may be sharpened to is then told with all scatter as one
         error = np.full(len(error), landing.value / math.sqrt(2.0))
     throws = own.rows.throws
-    asked = Question(new, names, units_of_change(new, names), (speed.value, landing.value))
+    asked = Question(new, names, units_of_change(new, names), (speed.value, landing.value), throws.corner)
     more = further_throws(asked, throws.x_before, own.rows.side, error)
     return Fit(
         new,
@@ -181,6 +185,7 @@ def _answer(
         own.rows,
         found,
         held,
+        undetermined,
         speed,
         landing,
         float(np.mean(own.rows.error)) if own.rows.known else None,

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from math import isfinite
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -15,6 +14,10 @@ def lines_of(found: Fit) -> list[str]:
     """Write the sentences, one a line."""
     unit = found.scene.unit
     lines = [f"{name} is kept as it was: {why}" for name, why in found.held.items()]
+    lines += [
+        f"{name} is not determined by these throws: its value goes with that of {others}, which they do not tell"
+        for name, others in found.undetermined.items()
+    ]
     if found.error is None:
         lines.append(
             "no measurement error is given: the scatter is an upper bound (give --error or a column error)"
@@ -32,10 +35,12 @@ def lines_of(found: Fit) -> list[str]:
         )
     else:
         lines.append(f"the model fits: such residuals or larger ones have probability {test.p:.2g}")
+        lines += [f"row {row}: the landing is far off what is predicted" for row in test.strange]
     for each in found.further[:1]:
         name, factor = max(each.shrinks.items(), key=lambda pair: pair[1])
         gain = f"ten of them shorten the interval of {name} {factor:.2g} times"
-        if not isfinite(found[name].half):
-            gain = f"they tell most of {name}, whose interval is open"
-        lines.append(f"film next: throws from x = {each.x:.3g} {unit} on side {each.side}; {gain}")
+        if not found[name].bounded:
+            gain = f"they tell most of {name}, which these throws do not bound"
+        where = "the left corner at" if found.rows.throws.corner else "x ="
+        lines.append(f"film next: throws from {where} {each.x:.3g} {unit} on side {each.side}; {gain}")
     return lines

@@ -211,8 +211,9 @@ def test_further_throws_sharpen_as_they_say():
     for x, side in ((best.x, best.side), (4.0, 0)):
         more = film_from(draw, truth, np.full(10, x), side)
         both = {
-            key: np.concatenate([getattr(throws, key), getattr(more, key)]) if key != "file" else ""
-            for key in vars(throws)
+            key: np.concatenate([each, getattr(more, key)])
+            for key, each in vars(throws).items()
+            if isinstance(each, np.ndarray)
         }
         halves.append(ls.fit(aimed_at(), type(throws)(**both))[name].half)
     assert halves[0] < halves[1]
