@@ -108,6 +108,8 @@ class Fit(Tabled):
         Their share of all recorded sides, and its 95 % interval.
     misfit : Misfit
         Whether the model fits.
+    explained : str
+        Which origin or scale of places would make a film fit that does not; empty if none.
     residuals, deviations : ndarray, shape (n,)
         What was measured less what is predicted, and its standard deviation [length].
     further : tuple of Further
@@ -130,6 +132,7 @@ class Fit(Tabled):
     misread: tuple[tuple[int, str, int, int], ...]
     misread_rate: tuple[float, float, float]
     misfit: Misfit
+    explained: str
     residuals: Array
     deviations: Array
     further: tuple[Further, ...]
@@ -202,6 +205,7 @@ class Fit(Tabled):
                 **picked(self.misfit, "p", "outliers", "structure", "lacking"),
                 "rows": self.misfit.strange,
             },
+            explained=self.explained or None,
             further=self.further,
             residuals=[
                 {
@@ -240,7 +244,9 @@ def fitted_scene(given: Scene, quantities: tuple[Fitted, ...], speed: Scatter, l
         per = (0.5 if each.name == "throw.kappa" else 1.0) / each.value if share else 1.0
         half = per * each.half
         if each.bounded and half < (MOST if share else math.inf):
-            size, unit = (100.0 * half, "%") if share else (in_unit_of(given, name, half), unit_of(given, name))
+            size, unit = (
+                (100.0 * half, "%") if share else (in_unit_of(given, name, half), unit_of(given, name))
+            )
             tolerance[name] = f"{rounded_up(size)} {unit}"
     kept = {name: text for name, text in tree.get("tolerance", {}).items() if name not in tolerance}
     tree["tolerance"] = kept | tolerance

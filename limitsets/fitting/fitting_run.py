@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from limitsets.arguments import arguments_checked
 from limitsets.errors import AnswerError, DataError
+from limitsets.fitting.explaining import explained
 from limitsets.fitting.fit_result import Fit, Fitted, Scatter, fitted_scene
 from limitsets.fitting.further import Question, further_throws
 from limitsets.fitting.likelihood import SCATTERS, Likelihood
@@ -26,7 +27,7 @@ from limitsets.fitting.starting import (
     spread_of,
     units_of_change,
 )
-from limitsets.fitting.throws import Throws, length_of, read_throws
+from limitsets.fitting.throws import Throws, length_of, read_throws, throws_in
 from limitsets.progress import shown_in_notebooks
 from limitsets.scene import Scene, load
 from limitsets.scene.quantities import base_unit, find
@@ -95,7 +96,7 @@ def fit(
         raise AnswerError(
             "the scene's effects", ", ".join(chosen.effects.on()), "the minimal model", "leave [effects] out"
         )
-    film = throws if isinstance(throws, Throws) else read_throws(throws, chosen)
+    film, refused = _film(throws, chosen)
     known, errors = _errors(film, error, chosen)
 
     def tell(step: str, done: int, of: int) -> None:
@@ -103,13 +104,30 @@ def fit(
             progress(step, done, of)
 
     tell("robust least squares", 0, 3)
-    start = robust_start(chosen, as_recorded(film, errors, known, len(chosen.sides)))
+    start = None
+    if refused is None:
+        try:
+            start = robust_start(chosen, as_recorded(film, errors, known, len(chosen.sides)))
+        except DataError as error_found:
+            refused = error_found
+    remark = explained(chosen, film, errors, known, start, refused)
+    assert start is not None
     tell("maximum likelihood", 1, 3)
     own, best = largest(chosen, start)
     tell("profiles", 2, 3)
     threshold = threshold_of(1, len(film), len(start.names))
     best, ends = profiles(own, best, threshold, start)
-    return _answer(chosen, own, best, ends, start, threshold, begin)
+    return _answer(chosen, own, best, ends, start, threshold, remark, begin)
+
+
+def _film(throws: Throws | str | Path, scene: Scene) -> tuple[Throws, DataError | None]:
+    """Return the throws, and what is wrong with their places and sides if something is."""
+    if isinstance(throws, Throws):
+        return throws, None
+    try:
+        return read_throws(throws, scene), None
+    except DataError as refused:
+        return throws_in(throws, scene, anywhere=True), refused
 
 
 def _errors(film: Throws, error: float | str | None, scene: Scene) -> tuple[bool, Array]:
@@ -136,6 +154,7 @@ def _answer(
     ends: list[tuple[End, End]],
     start: Start,
     threshold: float,
+    remark: str,
     begin: float,
 ) -> Fit:
     values = own.values(best.at)[0]
@@ -191,6 +210,7 @@ def _answer(
         float(np.mean(own.rows.error)) if own.rows.known else None,
         *_misread(own.rows, len(scene.sides)),
         misfit_of(scene, start),
+        remark,
         misses,
         sizes,
         more,

@@ -79,7 +79,7 @@ def _best_radius(own: Likelihood, at: Array) -> Array:
 
 
 def largest_radius(scene: Scene) -> float:
-    """Return the largest radius of gyration about the centre of mass: all mass in vertices, as far out as it balances."""
+    """Return the largest radius of gyration about the centre of mass: all mass in vertices, far out, in balance."""
     from scipy.optimize import linprog
 
     arms = scene.vertices - np.array(scene.centre)

@@ -181,7 +181,13 @@ def _undetermined(
 
 
 def _require_flight(scene: Scene, rows: Rows) -> None:
-    throws = rows.throws
+    throws, count = rows.throws, len(scene.sides)
+    strange = np.flatnonzero(np.maximum(throws.side_before, throws.side_after) >= count)
+    if strange.size:
+        k = int(strange[0])
+        sides = f"{throws.side_before[k]} and {throws.side_after[k]}"
+        allowed = f"sides of this part, 0 to {count - 1}"
+        raise DataError("the sides", sides, allowed, "count them in flip order", key=f"row {throws.row[k]}")
     least = np.zeros(len(throws)) if throws.corner else scene.sides.a[throws.side_before]
     short = np.flatnonzero(throws.x_before <= least)
     if short.size:

@@ -148,12 +148,16 @@ def throws_in(file: str | Path, scene: Scene, *, anywhere: bool = False) -> Thro
             key = f"row {line}, column {head}"
             values[column].append(_cell(cell, column, unit, key, scene, name))
             if not anywhere:
-                _require_possible(values[column][-1], f"{cell.strip()} {unit}".strip(), column, key, scene, name)
+                _require_possible(
+                    values[column][-1], f"{cell.strip()} {unit}".strip(), column, key, scene, name
+                )
     if len(lines) < LEAST_ROWS:
         raise DataError("the number of throws", len(lines), f"{LEAST_ROWS} at least", "film more", file=name)
     error = values.get("error", [np.nan] * len(lines))
     units = {unit for column, (_, unit) in heads.items() if column in (*PLACES, *CORNERS)}
-    return _throws(values, [float(each) for each in error], lines, name, units.pop() if len(units) == 1 else "")
+    return _throws(
+        values, [float(each) for each in error], lines, name, units.pop() if len(units) == 1 else ""
+    )
 
 
 def _throws(
@@ -222,7 +226,9 @@ def _heads(cells: Sequence[str], name: str) -> dict[str, tuple[str, str]]:
     corners = [column for column in CORNERS if column in heads]
     if corners and any(column in heads for column in PLACES):
         allowed = "two places of one kind: x_before and x_after, or corner_before and corner_after"
-        raise DataError("the columns", ", ".join(heads), allowed, "leave the others out", key="row 1", file=name)
+        raise DataError(
+            "the columns", ", ".join(heads), allowed, "leave the others out", key="row 1", file=name
+        )
     for column in (*(CORNERS if corners else PLACES), *SIDES):
         if column not in heads:
             raise DataError("the column", f"{column} missing", _header(), "add it", key="row 1", file=name)

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from limitsets.fitting.explaining import MOST_MISREAD
+
 if TYPE_CHECKING:
     from limitsets.fitting import Fit
 
@@ -26,16 +28,23 @@ def lines_of(found: Fit) -> list[str]:
         lines.append(f"measurement error: {found.error:.3g} {unit} (standard deviation of a measured place)")
     for row, column, recorded, fits in found.misread:
         lines.append(f"row {row}: {column} is recorded as {recorded}, but the part landed as on side {fits}")
+    if found.misread_rate[0] > MOST_MISREAD:
+        lines.append(
+            f"{100.0 * found.misread_rate[0]:.0f} % of the sides do not fit where parts landed, and no other reading of"
+            " the columns explains it: the sides are recorded wrong, or the part is another one"
+        )
     test = found.misfit
     if test.lacking:
-        rows = f" (look at row{'s' if len(test.strange) > 1 else ''} {', '.join(map(str, test.strange))})"
+        why = "the throws do something that it leaves out, like rolling or slipping, or a number is wrong"
         lines.append(
-            f"the model does not fit (p = {test.p:.2g}): the throws do something that it leaves out, like rolling or"
-            f" slipping, or a number is wrong{rows if test.strange else ''}; do not trust the values"
+            f"the model does not fit (p = {test.p:.2g}): {found.explained or why}; do not trust the values"
         )
     else:
         lines.append(f"the model fits: such residuals or larger ones have probability {test.p:.2g}")
-        lines += [f"row {row}: the landing is far off what is predicted" for row in test.strange]
+    if test.strange:
+        lines.append(
+            f"far off: the landings of row{'s' * (len(test.strange) > 1)} {', '.join(map(str, test.strange))}"
+        )
     for each in found.further[:1]:
         name, factor = max(each.shrinks.items(), key=lambda pair: pair[1])
         gain = f"ten of them shorten the interval of {name} {factor:.2g} times"
