@@ -112,5 +112,5 @@ def test_a_bad_header_of_corners_is_one_line(tmp_path, head, said):
 def test_a_throw_from_the_joint_names_the_row(tmp_path):
     path = tmp_path / "throws.csv"
     path.write_text("\n".join([HEAD, *["127,2,130,2"] * 8, "-1,2,5,2"]), encoding="utf-8")
-    with pytest.raises(DataError, match="row 10: the place before is '-0.0393701 in'.*beyond the joint"):
+    with pytest.raises(DataError, match=r"row 10: the place before is '-0\.0393701 in'.*beyond the joint"):
         ls.fit("paper-designed", path)

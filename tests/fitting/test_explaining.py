@@ -7,9 +7,9 @@ import pytest
 
 import limitsets as ls
 from limitsets.errors import DataError
-from limitsets.fitting.starting import robust_start
 from limitsets.fitting.explaining import explained
 from limitsets.fitting.rows import as_recorded
+from limitsets.fitting.starting import robust_start
 from limitsets.report.fits import lines_of
 from tests.fitting.machines import film, machine
 from tests.fitting.test_fit import aimed_at
