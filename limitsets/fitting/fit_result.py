@@ -191,7 +191,9 @@ class Fit(Tabled):
             scene=self.scene.as_dict(),
             unit=self.scene.unit,
             throws=len(rows.throws),
-            quantities={each.name: picked(each, "value", "lo", "hi", "unit", "bounded") for each in self.quantities},
+            quantities={
+                each.name: picked(each, "value", "lo", "hi", "unit", "bounded") for each in self.quantities
+            },
             held=self.held,
             undetermined=self.undetermined,
             scatter={"throw.speed": self.speed, "landing.x": self.landing},

@@ -122,7 +122,7 @@ def profiles(
                     pair.append(End(way * math.inf))
                     continue
                 end = end_of_profile(own, best, k, way, threshold, first, limit)
-                if math.isinf(end.at) and quantity and own.names[k] == RADIUS:
+                if (math.isinf(end.at) or end.wall) and quantity and own.names[k] == RADIUS:
                     end = End(float(best.at[k]) + way * limit, wall=True)
                 pair.append(end)
                 better = end.better or better

@@ -269,6 +269,14 @@ def test_intervals_end_where_no_part_exists(seed):
         assert least - 1e-9 <= found[name].lo <= found[name].value <= found[name].hi <= most + 1e-9, name
 
 
+def test_an_end_that_the_throws_do_not_set_is_that_of_the_part():
+    draw = np.random.default_rng(80)
+    found = ls.fit(aimed_at(), film(draw, machine(draw), corner=True))
+    radius = found[RADIUS]
+    assert (radius.lo, radius.bounded) == (pytest.approx(0.0, abs=1e-12), False)
+    assert RADIUS not in found.scene.tolerance
+
+
 def test_the_largest_radius_of_gyration_is_that_of_all_mass_in_the_vertices():
     given = aimed_at()
     corners, centre = np.array(given.vertices), np.array(given.centre)
