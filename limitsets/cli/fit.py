@@ -15,7 +15,10 @@ if TYPE_CHECKING:
 
 __all__ = ["fit"]
 
-HELP_FILE = "Throws: x_before [mm], side_before, x_after [mm], side_after, and, if known, error [mm], run."
+HELP_FILE = (
+    "Throws: x_before [mm], side_before, x_after [mm], side_after, and, if known, error [mm], run; corner_before [mm], "
+    "corner_after [mm] for x where the film shows the left corner."
+)
 HELP_ERROR = "Standard deviation of a measured place: '0.5 mm', or a number in the scene's unit."
 HELP_OUT = "Write fitted.toml, fit.json and figures."
 HELP_NO_MARGIN = "Do not ask whether the goal's margin is large enough (proofs: a minute)."

@@ -29,6 +29,7 @@ def simulated_throws(
     speed: float = 0.0,
     landing: float = 0.0,
     misread: float = 0.0,
+    corner: bool = False,
     seed: int = 0,
 ) -> Throws:
     """Throw a part once from each place, and film it.
@@ -38,13 +39,15 @@ def simulated_throws(
     scene : Scene
         The machine, in the minimal model.
     x, side : array_like, shape (n,)
-        Where the part really lies [length], and on which side.
+        Where the centre of mass of the part really is [length], and on which side the part lies.
     error : float
         Standard deviation of each measured place [length].
     speed, landing : float
         Of the speed of a throw (share), and of where it lands [length].
     misread : float
         Probability that a side after a throw is recorded wrong.
+    corner : bool
+        Whether the film shows the left corner of the side that the part rests on, not the centre of mass.
     seed : int
         Of the random numbers.
 
@@ -72,6 +75,8 @@ def simulated_throws(
     after = np.where(flipped, flips, jogs) + landing * draw.standard_normal(n)
     ends = (sides + flipped) % count
     wrong = draw.random(n) < misread
+    if corner:
+        places, after = places - scene.sides.a[sides], after - scene.sides.a[ends]
     return Throws(
         places + error * draw.standard_normal(n),
         sides,
@@ -80,6 +85,7 @@ def simulated_throws(
         np.full(n, error if error > 0.0 else np.nan),
         np.zeros(n, dtype=bool),
         np.arange(2, n + 2),
+        corner=corner,
     )
 
 
@@ -115,7 +121,9 @@ def bootstrap(found: Fit, count: int = 200, *, seed: int = 0, progress: Progress
     """
     rows, own = found.rows, found.likelihood
     scene = found.given.with_values({each.name: each.value for each in found.quantities})
-    inside = np.clip(rows.throws.x_before, None, scene.arm_length)
+    corner = rows.throws.corner
+    read = rows.throws.x_before + (scene.sides.a[rows.side] if corner else 0.0)
+    inside = np.clip(read, None, scene.arm_length)
     truth = {name: scene.value(name) for name in own.names}
     covered = dict.fromkeys((each.name for each in found.quantities), 0)
     for number in range(count):
@@ -128,6 +136,7 @@ def bootstrap(found: Fit, count: int = 200, *, seed: int = 0, progress: Progress
             error=found.error or 0.0,
             speed=found.speed.value,
             landing=found.landing.value,
+            corner=corner,
             seed=seed + number,
         )
         again = fit(scene, replace(film, row=rows.throws.row))

@@ -18,7 +18,7 @@ from limitsets.fitting.misfit import Misfit
 from limitsets.fitting.rows import Rows
 from limitsets.robust.margins.deviations import deviation_scale
 from limitsets.scene import Scene
-from limitsets.scene.quantities import base_unit, find
+from limitsets.scene.spelling import in_unit_of, in_units_of, unit_of
 from limitsets.tables import Column, Table, Tabled
 
 __all__ = ["Fit", "Fitted", "Scatter"]
@@ -40,9 +40,11 @@ class Fitted:
     value : float
         The most likely value; of an interval within which nothing is more likely, a value in it [scene's units].
     lo, hi : float
-        The 95 % interval; infinite where the data set no bound.
+        The 95 % interval, which ends where no part exists; infinite where there is no bound.
     unit : str
         Of all three.
+    bounded : bool
+        Whether the throws set both ends.
     """
 
     name: str
@@ -50,6 +52,7 @@ class Fitted:
     lo: float
     hi: float
     unit: str
+    bounded: bool = True
 
     @property
     def half(self) -> float:
@@ -93,6 +96,8 @@ class Fit(Tabled):
         What the data tell.
     held : dict of str to str
         What they do not tell, and why: it is as in the scene.
+    undetermined : dict of str to str
+        What has no interval, for the throws do not tell it apart from quantities that are held: these.
     speed, landing : Scatter
         Scatter of the speed (share), and of landings [length].
     error : float or None
@@ -103,6 +108,8 @@ class Fit(Tabled):
         Their share of all recorded sides, and its 95 % interval.
     misfit : Misfit
         Whether the model fits.
+    explained : str
+        Which origin or scale of places would make a film fit that does not; empty if none.
     residuals, deviations : ndarray, shape (n,)
         What was measured less what is predicted, and its standard deviation [length].
     further : tuple of Further
@@ -118,12 +125,14 @@ class Fit(Tabled):
     rows: Rows
     quantities: tuple[Fitted, ...]
     held: dict[str, str]
+    undetermined: dict[str, str]
     speed: Scatter
     landing: Scatter
     error: float | None
     misread: tuple[tuple[int, str, int, int], ...]
     misread_rate: tuple[float, float, float]
     misfit: Misfit
+    explained: str
     residuals: Array
     deviations: Array
     further: tuple[Further, ...]
@@ -182,8 +191,11 @@ class Fit(Tabled):
             scene=self.scene.as_dict(),
             unit=self.scene.unit,
             throws=len(rows.throws),
-            quantities={each.name: picked(each, "value", "lo", "hi", "unit") for each in self.quantities},
+            quantities={
+                each.name: picked(each, "value", "lo", "hi", "unit", "bounded") for each in self.quantities
+            },
             held=self.held,
+            undetermined=self.undetermined,
             scatter={"throw.speed": self.speed, "landing.x": self.landing},
             error=self.error,
             misread=[
@@ -195,6 +207,7 @@ class Fit(Tabled):
                 **picked(self.misfit, "p", "outliers", "structure", "lacking"),
                 "rows": self.misfit.strange,
             },
+            explained=self.explained or None,
             further=self.further,
             residuals=[
                 {
@@ -220,9 +233,10 @@ def rounded_up(value: float) -> str:
     return f"{Context(prec=3, rounding=ROUND_CEILING).create_decimal(Decimal(repr(value))):f}"
 
 
-def fitted_scene(given: Scene, quantities: tuple[Fitted, ...], speed: float, landing: float) -> Scene:
-    """Return the scene with the values, the intervals as [tolerance], and the scatter in [world]."""
+def fitted_scene(given: Scene, quantities: tuple[Fitted, ...], speed: Scatter, landing: Scatter) -> Scene:
+    """Return the scene with the values, the intervals as [tolerance], and the scatter in [world], in its own units."""
     scene = given.with_values({each.name: each.value for each in quantities})
+    scene = in_units_of(scene, given, [each.name for each in quantities])
     tree = scene.as_dict()
     tolerance = {}
     for each in quantities:
@@ -231,13 +245,20 @@ def fitted_scene(given: Scene, quantities: tuple[Fitted, ...], speed: float, lan
         # the speed goes as the inverse square root of kappa
         per = (0.5 if each.name == "throw.kappa" else 1.0) / each.value if share else 1.0
         half = per * each.half
-        if half < (MOST if share else math.inf):
-            unit = "%" if share else base_unit(find(name).dimension, given.unit)
-            tolerance[name] = f"{rounded_up(100.0 * half if share else half)} {unit}"
+        if each.bounded and half < (MOST if share else math.inf):
+            size, unit = (
+                (100.0 * half, "%") if share else (in_unit_of(given, name, half), unit_of(given, name))
+            )
+            tolerance[name] = f"{rounded_up(size)} {unit}"
     kept = {name: text for name, text in tree.get("tolerance", {}).items() if name not in tolerance}
     tree["tolerance"] = kept | tolerance
-    scatter = {"landing": f"{rounded_up(landing)} {given.unit}"}
-    if speed < MOST:
-        scatter["speed"] = f"{rounded_up(100.0 * speed)} %"
+    # where none is most likely, but some is not ruled out, the most that is possible is written
+    length, rate = (each.value or each.hi for each in (landing, speed))
+    scatter = {}
+    if math.isfinite(length):
+        of_places = unit_of(given, "landing.x")
+        scatter["landing"] = f"{rounded_up(in_unit_of(given, 'landing.x', length))} {of_places}"
+    if rate < MOST:
+        scatter["speed"] = f"{rounded_up(100.0 * rate)} %"
     tree["world"] = {**tree.get("world", {}), "scatter": scatter}
     return Scene.of(tree, given.file)

@@ -12,10 +12,11 @@ from numpy.typing import NDArray
 
 from limitsets.arguments import arguments_checked
 from limitsets.errors import AnswerError, DataError
+from limitsets.fitting.explaining import explained
 from limitsets.fitting.fit_result import Fit, Fitted, Scatter, fitted_scene
 from limitsets.fitting.further import Question, further_throws
 from limitsets.fitting.likelihood import SCATTERS, Likelihood
-from limitsets.fitting.maximising import Maximum
+from limitsets.fitting.maximising import End, Maximum
 from limitsets.fitting.misfit import misfit_of
 from limitsets.fitting.rows import Rows, as_recorded
 from limitsets.fitting.searching import LEVEL, largest, profiles, threshold_of
@@ -26,7 +27,7 @@ from limitsets.fitting.starting import (
     spread_of,
     units_of_change,
 )
-from limitsets.fitting.throws import Throws, length_of, read_throws
+from limitsets.fitting.throws import Throws, length_of, read_throws, throws_in
 from limitsets.progress import shown_in_notebooks
 from limitsets.scene import Scene, load
 from limitsets.scene.quantities import base_unit, find
@@ -95,7 +96,7 @@ def fit(
         raise AnswerError(
             "the scene's effects", ", ".join(chosen.effects.on()), "the minimal model", "leave [effects] out"
         )
-    film = throws if isinstance(throws, Throws) else read_throws(throws, chosen)
+    film, refused = _film(throws, chosen)
     known, errors = _errors(film, error, chosen)
 
     def tell(step: str, done: int, of: int) -> None:
@@ -103,13 +104,30 @@ def fit(
             progress(step, done, of)
 
     tell("robust least squares", 0, 3)
-    start = robust_start(chosen, as_recorded(film, errors, known, len(chosen.sides)))
+    start = None
+    if refused is None:
+        try:
+            start = robust_start(chosen, as_recorded(film, errors, known, len(chosen.sides)))
+        except DataError as error_found:
+            refused = error_found
+    remark = explained(chosen, film, errors, known, start, refused)
+    assert start is not None
     tell("maximum likelihood", 1, 3)
     own, best = largest(chosen, start)
     tell("profiles", 2, 3)
     threshold = threshold_of(1, len(film), len(start.names))
     best, ends = profiles(own, best, threshold, start)
-    return _answer(chosen, own, best, ends, start, threshold, begin)
+    return _answer(chosen, own, best, ends, start, threshold, remark, begin)
+
+
+def _film(throws: Throws | str | Path, scene: Scene) -> tuple[Throws, DataError | None]:
+    """Return the throws, and what is wrong with their places and sides if something is."""
+    if isinstance(throws, Throws):
+        return throws, None
+    try:
+        return read_throws(throws, scene), None
+    except DataError as refused:
+        return throws_in(throws, scene, anywhere=True), refused
 
 
 def _errors(film: Throws, error: float | str | None, scene: Scene) -> tuple[bool, Array]:
@@ -133,33 +151,38 @@ def _answer(
     scene: Scene,
     own: Likelihood,
     best: Maximum,
-    ends: list[tuple[float, float]],
+    ends: list[tuple[End, End]],
     start: Start,
     threshold: float,
+    remark: str,
     begin: float,
 ) -> Fit:
     values = own.values(best.at)[0]
-    held, quantities = dict(start.held), []
+    held, undetermined, quantities = dict(start.held), dict(start.undetermined), []
     for k, name in enumerate(own.names):
-        lo, hi = (float(own.centre[k] + own.scale[k] * end) for end in ends[k])
-        if name == RADIUS and math.isinf(lo) and math.isinf(hi):
-            held[name] = "no decision between jog and flip depends on it closely enough"
+        lo, hi = (float(own.centre[k] + own.scale[k] * end.at) for end in ends[k])
+        open_ends = sum(end.wall or math.isinf(end.at) for end in ends[k])
+        if name == RADIUS and open_ends == len(ends[k]):
+            others = undetermined.pop(name, "")
+            why = "no decision between jog and flip depends on it closely enough"
+            held[name] = f"the decisions do not tell it apart from {others}" if others else why
             values[k] = scene.value(name)
             continue
         value = float(values[k])
         if name == RADIUS:  # between a jog and a flip nothing is more likely than the rest
-            value = 0.5 * (lo + hi) if math.isfinite(hi - lo) else min(max(scene.value(name), lo), hi)
-        quantities.append(Fitted(name, value, lo, hi, base_unit(find(name).dimension, scene.unit)))
+            value = min(max(scene.value(name), lo), hi) if open_ends else 0.5 * (lo + hi)
+        unit = base_unit(find(name).dimension, scene.unit)
+        quantities.append(Fitted(name, value, lo, hi, unit, not open_ends))
     scatters = []
     for k in range(SCATTERS):
         j = len(own.names) + k
-        lo, hi = (float(own.scale[j] * end) for end in ends[j])
+        lo, hi = (float(own.scale[j] * end.at) for end in ends[j])
         if math.isinf(lo) and values[j] < NOTHING * hi:
             values[j] = 0.0
         scatters.append(Scatter(float(values[j]), max(lo, 0.0), hi, not own.rows.known))
     found = tuple(quantities)
     speed, landing = scatters
-    new = fitted_scene(scene, found, speed.value, landing.value)
+    new = fitted_scene(scene, found, speed, landing)
     told = own.told(values[None])
     loose = np.sqrt(values[None, -1:] ** 2 + (1e-7 * scene.arm_length) ** 2)
     misses = own.rows.throws.x_after - told.after[0]
@@ -173,7 +196,7 @@ def _answer(
     if not own.rows.known:  # what the answer may be sharpened to is then told with all scatter as one
         error = np.full(len(error), landing.value / math.sqrt(2.0))
     throws = own.rows.throws
-    asked = Question(new, names, units_of_change(new, names), (speed.value, landing.value))
+    asked = Question(new, names, units_of_change(new, names), (speed.value, landing.value), throws.corner)
     more = further_throws(asked, throws.x_before, own.rows.side, error)
     return Fit(
         new,
@@ -181,11 +204,13 @@ def _answer(
         own.rows,
         found,
         held,
+        undetermined,
         speed,
         landing,
         float(np.mean(own.rows.error)) if own.rows.known else None,
         *_misread(own.rows, len(scene.sides)),
         misfit_of(scene, start),
+        remark,
         misses,
         sizes,
         more,

@@ -35,7 +35,7 @@ class Further:
     Attributes
     ----------
     x, side : float, int
-        Where the part is laid down [length].
+        Where the part is laid down [length]: what the film shows, the left corner or the centre of mass.
     gain : float
         Gain in information by one such throw [nats]: logarithm of the ratio of volumes of the region, before and after.
     shrinks : dict of str to float
@@ -49,23 +49,29 @@ class Further:
 
 
 class Question(NamedTuple):
-    """Quantities of a scene that are to be known, the units of their change, and the scatter of speed and place."""
+    """Quantities of a scene that are to be known, the units of their change, the scatter of speed and place.
+
+    With `corner` places are those of the left corner, else of the centre of mass.
+    """
 
     scene: Scene
     names: tuple[str, ...]
     units: Array
     scatter: tuple[float, float]
+    corner: bool
 
 
 def information(asked: Question, x: Array, side: NDArray[np.int64], error: Array) -> Array:
     """Return the information of single throws about quantities in their units of change; shape (n, p, p)."""
     from scipy.stats import norm
 
-    scene, names, units, scatter = asked
+    scene, names, units, scatter, corner = asked
     centre = np.array([scene.value(name) for name in names])
     moves = np.concatenate([np.zeros((1, len(names))), np.diag(units), -np.diag(units)]) * STEP
     points = dict(zip(names, (centre + moves).T, strict=True))
-    jog, flip = (predicted(scene, points, x, side, np.full(side.size, b, np.int64)) for b in (0, 1))
+    jog, flip = (
+        predicted(scene, points, x, side, np.full(side.size, b, np.int64), corner=corner) for b in (0, 1)
+    )
     speed, landing = scatter[0], max(scatter[1], SHARPEST * scene.arm_length)
     size = np.sqrt((jog.decides_slope * error) ** 2 + (jog.decides_per_log_speed * speed) ** 2)[0]
     z = jog.decides / np.maximum(size, 1e-9)
@@ -90,8 +96,8 @@ def further_throws(asked: Question, x: Array, side: NDArray[np.int64], error: Ar
     found = []
     size = float(np.mean(error)) if np.mean(error) > 0 else asked.scatter[1]
     for own in range(len(scene.sides)):
-        least = scene.sides.a[own] + 0.02 * (scene.arm_length - scene.sides.a[own])
-        places = np.linspace(least, scene.arm_length, PLACES)
+        near, far = scene.sides.a[own], scene.arm_length
+        places = np.linspace(near + 0.02 * (far - near), far, PLACES) - (near if asked.corner else 0.0)
         there = information(asked, places, np.full(PLACES, own), np.full(PLACES, size))
         gains = np.linalg.slogdet(known + there)[1] - np.linalg.slogdet(known)[1]
         best = int(np.argmax(gains))

@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from limitsets.fitting.predicting import Predicted, predicted
+from limitsets.fitting.predicting import Predicted
 from limitsets.fitting.rows import Rows
 from limitsets.scene import Scene
 
@@ -108,7 +108,7 @@ class Likelihood:
         points = dict(zip(self.names, values.T[: len(self.names)], strict=True))
         if not points:
             points = {"arm.surface_height": np.full(len(values), self.scene.surface_height)}
-        return predicted(self.scene, points, self.rows.throws.x_before, self.rows.side, self.rows.branch)
+        return self.rows.told(self.scene, points)
 
     def decision(self, told: Predicted, speed: Array, landing: Array) -> Array:
         """Return by how many of its standard deviations each decision is on the side where it fell; (m, n)."""

@@ -24,6 +24,7 @@ GAIN, ROUGHLY = 1e-6, 1e-3
 LONGEST = 3.0
 FLATTEST = 1e-3
 SHARES = np.array([0.5, 0.25, 0.1, 0.03, 0.01, 0.001])
+SHARES_BACK = np.array([1.0, 0.7, 0.4, 0.1, 0.0])
 # The end of a profile is found to this share of its distance.
 CLOSE = 0.01
 # Below this a point is as bad as one where there is nothing.
@@ -100,10 +101,13 @@ class End(NamedTuple):
         Where the deviance reaches its threshold; infinite, with the way's sign, where it does not within the limit.
     better : Maximum or None
         A larger value of the function that was met on the way.
+    wall : bool
+        Whether the function ends there, before the deviance reaches its threshold.
     """
 
     at: float
     better: Maximum | None = None
+    wall: bool = False
 
 
 def end_of_profile(
@@ -134,21 +138,26 @@ def end_of_profile(
     along = (axes / np.maximum(bend, FLATTEST)) @ axes[k]
     along *= way / along[k]
     near, near_root, far, far_root = 0.0, 0.0, math.inf, math.inf
-    distance = min(first, limit)
+    last, distance, wall = best.at, min(first, limit), False
     for _ in range(40):
-        start = best.at + distance * along
+        # where the others went along so far that there is nothing they stay nearer to where they were
+        starts = last + SHARES_BACK[:, None] * (best.at + distance * along - last)
+        starts[:, k] = best.at[k] + way * distance
+        start = starts[int(np.argmax(f(starts) > WORST))]
         found = maximised(f, start, held=k, gain=ROUGHLY)
-        along = (found.at - best.at) / distance
+        nothing = found.value <= WORST
+        if not nothing:
+            along = (found.at - best.at) / distance
         loss = 2.0 * (best.value - found.value)
         if loss < -0.01:
             return End(start[k], maximised(f, found.at))
         root = math.sqrt(max(loss, 0.0))
         if root < wanted:
-            near, near_root = distance, root
+            near, near_root, last = distance, root, found.at
             if distance >= limit:
                 return End(way * math.inf)
         else:
-            far, far_root = distance, root
+            far, far_root, wall = distance, root, nothing
         if abs(root - wanted) < CLOSE * wanted or far - near < CLOSE * far:
             break
         if math.isinf(far):
@@ -157,4 +166,6 @@ def end_of_profile(
         else:
             share = (wanted - near_root) / (far_root - near_root) if far_root < 10.0 * wanted else 0.5
             distance = near + min(max(share, 0.1), 0.9) * (far - near)
+    if wall:
+        return End(best.at[k] + way * near, wall=True)
     return End(best.at[k] + way * (distance if math.isinf(far) else min(distance, far)))

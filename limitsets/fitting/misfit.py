@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from limitsets.fitting.likelihood import whitened
-from limitsets.fitting.predicting import predicted
 from limitsets.fitting.starting import Start, jacobian, units_of_change
 from limitsets.scene import Scene
 
@@ -69,7 +68,7 @@ def misfit_of(scene: Scene, start: Start) -> Misfit:
     """Test the model by the robust fit: the most likely machine leans towards throws that no machine makes."""
     rows = start.rows
     points = {name: np.array([value]) for name, value in zip(start.names, start.values, strict=True)}
-    told = predicted(scene, points, rows.throws.x_before, rows.side, rows.branch)
+    told = rows.told(scene, points)
     slopes = jacobian(scene, rows, start.names, start.values, units_of_change(scene, start.names))
     # of speed and of landings: the scatter that is most likely for the landings that are not far off
     sizes = start.spread * np.linspace(0.0, WIDEST, SIZES)

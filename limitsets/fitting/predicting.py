@@ -29,7 +29,7 @@ class Predicted(NamedTuple):
     Attributes
     ----------
     after : ndarray
-        Where the throw ends [length].
+        Where the throw ends: the place that is read there [length].
     slope, per_log_speed : ndarray
         Its derivatives with respect to the start [1] and to ln w [length].
     decides : ndarray
@@ -52,13 +52,20 @@ class Predicted(NamedTuple):
 def predicted(
     scene: Scene,
     values: Mapping[str, Array],
-    x: Array,
+    before: Array,
     side: NDArray[np.int64],
     branch: NDArray[np.int64],
+    *,
+    corner: bool,
 ) -> Predicted:
-    """Predict throws from x on a side that take a branch, for a scene at m values of its quantities."""
+    """Predict throws from places on a side that take a branch, for a scene at m values of its quantities.
+
+    Places are those of the centre of mass, or, with `corner`, of the left corner of the side that the part rests on.
+    How far this corner is from the centre of mass is the part's geometry, which varies with the quantities.
+    """
     stack = throw_stack(scene, values)
     params, move = stack.params, STEP * scene.arm_length
+    x = before + params.a[:, side] if corner else before
     after, slope, decides = at_points(params, x, side, branch)
     fast, _, fast_decides = at_points(
         params._replace(kappa=params.kappa * np.exp(-2 * STEP)), x, side, branch
@@ -66,6 +73,8 @@ def predicted(
     slow, _, slow_decides = at_points(params._replace(kappa=params.kappa * np.exp(2 * STEP)), x, side, branch)
     _, _, beyond = at_points(params, x + move, side, branch)
     _, _, short = at_points(params, x - move, side, branch)
+    if corner:
+        after = after - params.a[:, (side + branch) % len(scene.sides)]
     return Predicted(
         after,
         slope,

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from limitsets.fitting.predicting import predicted
+from limitsets.fitting.predicting import Predicted, predicted
 from limitsets.fitting.throws import Throws
 from limitsets.scene import Scene
 
@@ -52,6 +52,11 @@ class Rows:
     branch: Whole
     error: Array
     known: bool
+
+    def told(self, scene: Scene, values: Mapping[str, Array]) -> Predicted:
+        """Predict these throws for a scene at m values of its quantities: the places that were read."""
+        throws = self.throws
+        return predicted(scene, values, throws.x_before, self.side, self.branch, corner=throws.corner)
 
     def side_after(self, sides: int) -> Whole:
         """Return the side on which each throw ended."""
@@ -101,6 +106,7 @@ def assigned(rows: Rows, scene: Scene, values: Mapping[str, float], spread: floa
         np.tile(throws.x_before, side.size),
         np.repeat(side, count),
         np.repeat(branch, count),
+        corner=throws.corner,
     )
     miss = (throws.x_after - told.after[0].reshape(side.size, count)) / spread
     after = ((side + branch) % sides)[:, None]

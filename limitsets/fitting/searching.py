@@ -18,8 +18,8 @@ __all__ = ["LEVEL", "largest", "profiles", "threshold_of"]
 
 # Share of the region's volume over all repetitions of the film.
 LEVEL = 0.95
-# Values of the radius of gyration that are tried first, as shares of the scene's.
-RADII = np.linspace(0.4, 1.8, 57)
+# Values of the radius of gyration that are tried first, as shares of the largest one.
+RADII = np.linspace(0.05, 1.0, 77)
 # Rounds of taking the rows anew, and of better maxima met on the way along a profile.
 ROUNDS = 4
 
@@ -71,28 +71,42 @@ def _best_radius(own: Likelihood, at: Array) -> Array:
     if RADIUS not in own.names:
         return at
     k = own.names.index(RADIUS)
-    tries = np.repeat(at[None], RADII.size + 1, axis=0)
-    tries[1:, k] = (RADII * own.scene.value(RADIUS) - own.centre[k]) / own.scale[k]
+    most = largest_radius(own.scene)
+    radii = np.append(min(own.scene.value(RADIUS), most), RADII * most)
+    tries = np.repeat(at[None], radii.size, axis=0)
+    tries[:, k] = (radii - own.centre[k]) / own.scale[k]
     return np.asarray(tries[int(np.argmax(own(tries)))])
+
+
+def largest_radius(scene: Scene) -> float:
+    """Return the largest radius of gyration about the centre of mass: all mass in vertices, far out, in balance."""
+    from scipy.optimize import linprog
+
+    arms = scene.vertices - np.array(scene.centre)
+    shares = np.vstack([arms.T, np.ones(len(arms))])
+    found = linprog(-(arms**2).sum(axis=1), A_eq=shares, b_eq=[0.0, 0.0, 1.0])
+    return math.sqrt(max(-float(found.fun), 0.0))
 
 
 def _limits(own: Likelihood, best: Maximum, k: int, way: float) -> float:
     """Return how far a number may be followed: a radius of gyration within the part, a scatter to 0."""
-    value = float(own.values(best.at)[0, k])
+    values = own.values(best.at)[0]
     if k >= len(own.names):
         return abs(float(best.at[k])) if way < 0 else 1e4
     if own.names[k] == RADIUS:
-        scene = own.scene
-        farthest = float(np.hypot(*(scene.vertices - np.array(scene.centre)).T).max())
-        room = value * 0.98 if way < 0 else max(farthest - value, 0.02 * value)
-        return room / float(own.scale[k])
+        scene = own.scene.with_values(dict(zip(own.names[:k], values.tolist(), strict=False)))
+        room = values[k] if way < 0 else max(largest_radius(scene) - values[k], 0.0)
+        return float(room / own.scale[k])
     return 1e4
 
 
 def profiles(
     own: Likelihood, best: Maximum, threshold: float, start: Start
-) -> tuple[Maximum, list[tuple[float, float]]]:
-    """Follow every number both ways; from the start again where a larger likelihood is met."""
+) -> tuple[Maximum, list[tuple[End, End]]]:
+    """Follow every number both ways; from the start again where a larger likelihood is met.
+
+    What goes with a quantity that is held has no ends.
+    """
     for left in reversed(range(ROUNDS)):
         best = best._replace(at=np.append(best.at[:-SCATTERS], np.abs(best.at[-SCATTERS:])))
         bend = np.linalg.eigh(-best.hessian)
@@ -102,15 +116,19 @@ def profiles(
             first = math.sqrt(threshold * variance[k])
             pair: list[End] = []
             for way in (-1.0, 1.0):
-                limit = _limits(own, best, k, way)
-                if k >= len(own.names) and way < 0 and limit < 1e-3:
-                    pair.append(End(-math.inf))
+                quantity = k < len(own.names)
+                limit = 0.0 if quantity and own.names[k] in start.undetermined else _limits(own, best, k, way)
+                if limit < (1e-9 if quantity else 1e-3):
+                    pair.append(End(way * math.inf))
                     continue
-                pair.append(end_of_profile(own, best, k, way, threshold, first, limit))
-                better = pair[-1].better or better
+                end = end_of_profile(own, best, k, way, threshold, first, limit)
+                if (math.isinf(end.at) or end.wall) and quantity and own.names[k] == RADIUS:
+                    end = End(float(best.at[k]) + way * limit, wall=True)
+                pair.append(end)
+                better = end.better or better
             if better is not None and left:
                 break
-            ends.append((pair[0].at, pair[1].at))
+            ends.append((pair[0], pair[1]))
         if better is None or not left:
             break
         best = better

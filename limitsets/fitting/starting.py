@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from limitsets.errors import DataError
-from limitsets.fitting.predicting import predicted
 from limitsets.fitting.rows import Rows, assigned
 from limitsets.scene import Scene
 
@@ -22,6 +21,8 @@ RADIUS = "part.mass.radius_of_gyration"
 QUANTITIES = ("part.mass.center.along", "part.mass.center.above", "arm.surface_height")
 # A direction is told by the landings if they fix it to this share of the speed, or of the part.
 TOLD = 0.2
+# What moves by this share of its standard error with a quantity that is held is not determined.
+MOVED = 0.2
 STEP = 1e-5
 # One after the other: towards the machine, away from outliers for good, and once more with the sides set right.
 LOSSES = ("soft_l1", "cauchy", "huber")
@@ -46,6 +47,8 @@ class Start(NamedTuple):
         Their values, and roughly how well they are known.
     held : dict of str to str
         What they do not tell, and which others it goes with.
+    undetermined : dict of str to str
+        What has a value only because another quantity is held, and which one.
     spread : float
         Robust standard deviation of the landings [length].
     """
@@ -55,6 +58,7 @@ class Start(NamedTuple):
     values: Array
     errors: Array
     held: dict[str, str]
+    undetermined: dict[str, str]
     spread: float
 
 
@@ -78,11 +82,13 @@ def spread_of(residual: Array) -> float:
 
 def jacobian(scene: Scene, rows: Rows, names: tuple[str, ...], values: Array, units: Array) -> Array:
     """Return the derivatives of the landings by quantities, each in its unit of change; shape (n, p)."""
-    moves = np.concatenate([np.diag(units), -np.diag(units)]) * STEP
-    points = dict(zip(names, (values + moves).T, strict=True))
-    told = predicted(scene, points, rows.throws.x_before, rows.side, rows.branch).after
     count = len(names)
-    found: Array = (told[:count] - told[count:]).T / (2.0 * STEP)
+    moves = np.concatenate([np.diag(units), -np.diag(units), np.zeros((1, count))]) * STEP
+    told = rows.told(scene, dict(zip(names, (values + moves).T, strict=True)))
+    # a step that leads out of what can be is not made: the difference is one-sided there
+    after = np.where(told.possible, told.after, told.after[-1])
+    steps = STEP * (told.possible[:count] * 1.0 + told.possible[count:-1])
+    found: Array = ((after[:count] - after[count:-1]) / np.maximum(steps, STEP)).T
     return found
 
 
@@ -94,7 +100,7 @@ def _least_squares(
 
     def misses(at: Array) -> Array:
         points = dict(zip(names, (values + units * at)[:, None], strict=True))
-        told = predicted(scene, points, rows.throws.x_before, rows.side, rows.branch)
+        told = rows.told(scene, points)
         miss = (rows.throws.x_after - told.after[0]) / scale
         refused = np.full(miss.size, 1e6)
         return np.where(np.isfinite(miss), miss, 1e6) if told.possible[0, 0] else refused
@@ -118,7 +124,7 @@ def robust_start(scene: Scene, rows: Rows) -> Start:
     DataError
         A throw begins where a part on its side cannot fly, or the landings tell nothing.
     """
-    names, held = quantities_of(scene), {}
+    names, held, together = quantities_of(scene), {}, {}
     values, units = np.array([scene.value(name) for name in names]), units_of_change(scene, names)
     _require_flight(scene, rows)
     while True:
@@ -126,7 +132,7 @@ def robust_start(scene: Scene, rows: Rows) -> Start:
         for loss in LOSSES:
             values = _least_squares(scene, rows, names, values, units, spread, loss)
             here = dict(zip(names, values.tolist(), strict=True))
-            told = predicted(scene, {k: np.array([v]) for k, v in here.items()}, *_thrown(rows))
+            told = rows.told(scene, {k: np.array([v]) for k, v in here.items()})
             spread = max(spread_of(rows.throws.x_after - told.after[0]), 1e-9 * scene.arm_length)
             if loss != LOSSES[0]:  # a machine that is not yet near explains nothing
                 rows = assigned(rows, scene, here, spread)
@@ -136,6 +142,7 @@ def robust_start(scene: Scene, rows: Rows) -> Start:
             break
         out = int(np.argmax(np.abs(axes[-1])))
         others = [n for k, n in enumerate(names) if k != out and abs(axes[-1][k]) > 0.1]
+        together[names[out]] = others
         held[names[out]] = (
             f"the landings do not tell it apart from {', '.join(others)}" if others else "no landing tells it"
         )
@@ -151,23 +158,45 @@ def robust_start(scene: Scene, rows: Rows) -> Start:
         names, units = tuple(names[k] for k in keep), units[keep]
         values = np.array([scene.value(name) for name in names])
     covariance = np.linalg.inv(slopes.T @ slopes / spread**2)
-    errors = np.sqrt(np.diag(covariance)) * units
-    return Start(rows, names, values, errors, held, spread)
+    errors = np.sqrt(np.diag(covariance))
+    known = scene.with_values(dict(zip(names, values.tolist(), strict=True)))
+    undetermined = _undetermined(known, rows, names, together, slopes, errors)
+    return Start(rows, names, values, errors * units, held, undetermined, spread)
 
 
-def _thrown(rows: Rows) -> tuple[Array, NDArray[np.int64], NDArray[np.int64]]:
-    return rows.throws.x_before, rows.side, rows.branch
+def _undetermined(
+    scene: Scene, rows: Rows, names: tuple[str, ...], held: dict[str, list[str]], slopes: Array, errors: Array
+) -> dict[str, str]:
+    """Find what goes with a quantity that is held, or moves when that one moves within what the landings leave open."""
+    found: dict[str, list[str]] = {}
+    for one, others in held.items():
+        own = np.array([scene.value(one)])
+        moved = jacobian(scene, rows, (one,), own, units_of_change(scene, (one,)))[:, 0]
+        follows = np.linalg.lstsq(slopes, moved)[0]
+        # a decision depends on all quantities, so that the radius of gyration goes with each
+        for name, size in zip((*names, RADIUS), (*np.abs(follows) * TOLD / errors, np.inf), strict=True):
+            if size > MOVED or name in others:
+                found.setdefault(name, []).append(one)
+    return {name: ", ".join(others) for name, others in found.items()}
 
 
 def _require_flight(scene: Scene, rows: Rows) -> None:
-    throws, a = rows.throws, scene.sides.a
-    short = np.flatnonzero(throws.x_before <= a[throws.side_before])
+    throws, count = rows.throws, len(scene.sides)
+    strange = np.flatnonzero(np.maximum(throws.side_before, throws.side_after) >= count)
+    if strange.size:
+        k = int(strange[0])
+        sides = f"{throws.side_before[k]} and {throws.side_after[k]}"
+        allowed = f"sides of this part, 0 to {count - 1}"
+        raise DataError("the sides", sides, allowed, "count them in flip order", key=f"row {throws.row[k]}")
+    least = np.zeros(len(throws)) if throws.corner else scene.sides.a[throws.side_before]
+    short = np.flatnonzero(throws.x_before <= least)
     if short.size:
         k, unit = int(short[0]), scene.unit
         side = int(throws.side_before[k])
+        beyond = f"beyond the left vertex of side {side}, above {least[k]:.4g} {unit}"
         raise DataError(
             "the place before", f"{throws.x_before[k]:g} {unit}",
-            f"beyond the left vertex of side {side}, above {a[side]:.4g} {unit}",
+            "beyond the joint, above 0" if throws.corner else beyond,
             "a part nearer to the joint is not thrown: correct the place or the side", key=f"row {throws.row[k]}",
             file=throws.file,
         )  # fmt: skip

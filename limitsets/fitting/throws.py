@@ -16,13 +16,17 @@ from limitsets.errors import DataError, SceneError, shown
 from limitsets.scene import Scene
 from limitsets.scene.units import UNITS, convert, parse
 
-__all__ = ["Throws", "length_of", "read_throws"]
+__all__ = ["SLACK", "Throws", "length_of", "read_throws", "throws_in"]
 
 PLACES = ("x_before", "x_after")
+CORNERS = ("corner_before", "corner_after")
 SIDES = ("side_before", "side_after")
 OPTIONAL = ("error", "run")
-WITH_UNIT = (*PLACES, "error")
-COLUMNS = (*PLACES, *SIDES, *OPTIONAL)
+WITH_UNIT = (*PLACES, *CORNERS, "error")
+COLUMNS = (*PLACES, *CORNERS, *SIDES, *OPTIONAL)
+BEFORE = (PLACES[0], CORNERS[0])
+# A measured place may lie off the arm by this share of its length.
+SLACK = 0.05
 # With fewer throws nothing is left to judge the fit by.
 LEAST_ROWS = 8
 
@@ -39,7 +43,7 @@ class Throws:
     Attributes
     ----------
     x_before, x_after : ndarray, shape (n,)
-        Measured places of the centre of mass before and after [length, in the scene's unit].
+        Measured places before and after [length, in the scene's unit]: x of what `corner` says.
     side_before, side_after : ndarray of int, shape (n,)
         The sides as they were recorded.
     error : ndarray, shape (n,)
@@ -50,6 +54,10 @@ class Throws:
         Line of the file, the header being line 1.
     file : str
         For messages; empty for throws that are in no file.
+    corner : bool
+        Whether places are those of the left corner of the side that the part rests on, not of the centre of mass.
+    unit : str
+        In which places are written in the file; empty for throws that are in no file.
     """
 
     x_before: Array
@@ -60,6 +68,8 @@ class Throws:
     follows: NDArray[np.bool_]
     row: Whole
     file: str = ""
+    corner: bool = False
+    unit: str = ""
 
     def __len__(self) -> int:
         return self.row.size
@@ -88,7 +98,8 @@ def read_throws(file: str | Path, scene: Scene) -> Throws:
     file : str or Path
         Columns `x_before`, `side_before`, `x_after`, `side_after`, and, if known, `error` (the standard deviation of
         one measured place) and `run` (rows of one run that follow each other are consecutive throws).  Places and the
-        error have their unit in the header: ``x_before [mm]``.
+        error have their unit in the header: ``x_before [mm]``.  Where a film shows corners, not the centre of mass,
+        `corner_before` and `corner_after` stand for x: the place of the left corner of the side that the part rests on.
     scene : Scene
         The part that was thrown: it has the sides, and its unit is that of the answer.
 
@@ -113,6 +124,11 @@ def read_throws(file: str | Path, scene: Scene) -> Throws:
     >>> len(throws), float(throws.x_after[0])
     (8, 8.26)
     """
+    return throws_in(file, scene)
+
+
+def throws_in(file: str | Path, scene: Scene, *, anywhere: bool = False) -> Throws:
+    """Read throws; `anywhere` takes places off the arm and sides that the part does not have, too."""
     name = str(file).encode("utf-8", "backslashreplace").decode()  # what no terminal can print
     rows = _rows(Path(file), name)
     heads = _heads(rows[0][1], name) if rows else {}
@@ -129,20 +145,31 @@ def read_throws(file: str | Path, scene: Scene) -> Throws:
             raise DataError("the number of cells", len(cells), allowed, remedy, key=f"row {line}", file=name)
         lines.append(line)
         for (column, (head, unit)), cell in zip(heads.items(), cells, strict=True):
-            values[column].append(_cell(cell, column, unit, f"row {line}, column {head}", scene, name))
+            key = f"row {line}, column {head}"
+            values[column].append(_cell(cell, column, unit, key, scene, name))
+            if not anywhere:
+                _require_possible(
+                    values[column][-1], f"{cell.strip()} {unit}".strip(), column, key, scene, name
+                )
     if len(lines) < LEAST_ROWS:
         raise DataError("the number of throws", len(lines), f"{LEAST_ROWS} at least", "film more", file=name)
     error = values.get("error", [np.nan] * len(lines))
-    return _throws(values, [float(each) for each in error], lines, name)
+    units = {unit for column, (_, unit) in heads.items() if column in (*PLACES, *CORNERS)}
+    return _throws(
+        values, [float(each) for each in error], lines, name, units.pop() if len(units) == 1 else ""
+    )
 
 
-def _throws(values: dict[str, list[float | str]], error: list[float], lines: list[int], name: str) -> Throws:
+def _throws(
+    values: dict[str, list[float | str]], error: list[float], lines: list[int], name: str, unit: str
+) -> Throws:
     run = np.array(values.get("run", lines), dtype=object)
     follows = np.zeros(len(lines), dtype=bool)
     follows[1:] = (run[1:] == run[:-1]) & (run[1:] != "")
-    before, after = (np.array(values[each], dtype=np.float64) for each in PLACES)
+    corner = CORNERS[0] in values
+    before, after = (np.array(values[each], dtype=np.float64) for each in (CORNERS if corner else PLACES))
     start, end = (np.array(values[each], dtype=np.int64) for each in SIDES)
-    return Throws(before, start, after, end, np.array(error), follows, np.array(lines), name)
+    return Throws(before, start, after, end, np.array(error), follows, np.array(lines), name, corner, unit)
 
 
 def _rows(path: Path, name: str) -> list[tuple[int, list[str]]]:
@@ -167,7 +194,10 @@ def _rows(path: Path, name: str) -> list[tuple[int, list[str]]]:
 
 
 def _header() -> str:
-    return "x_before [mm], side_before, x_after [mm], side_after, and, if known, error [mm], run"
+    return (
+        "x_before [mm], side_before, x_after [mm], side_after, and, if known, error [mm], run; corner_before, "
+        "corner_after for x_before, x_after where the left corner was read"
+    )
 
 
 def _heads(cells: Sequence[str], name: str) -> dict[str, tuple[str, str]]:
@@ -193,7 +223,13 @@ def _heads(cells: Sequence[str], name: str) -> dict[str, tuple[str, str]]:
         elif unit is not None:
             raise DataError("the unit", unit, "none in this column", "leave it out", key=key, file=name)
         heads[column] = (cell.strip(), unit or "")
-    for column in (*PLACES, *SIDES):
+    corners = [column for column in CORNERS if column in heads]
+    if corners and any(column in heads for column in PLACES):
+        allowed = "two places of one kind: x_before and x_after, or corner_before and corner_after"
+        raise DataError(
+            "the columns", ", ".join(heads), allowed, "leave the others out", key="row 1", file=name
+        )
+    for column in (*(CORNERS if corners else PLACES), *SIDES):
         if column not in heads:
             raise DataError("the column", f"{column} missing", _header(), "add it", key="row 1", file=name)
     return heads
@@ -213,12 +249,8 @@ def _cell(cell: str, column: str, unit: str, key: str, scene: Scene, name: str) 
             file=name,
         )
     if column in SIDES:
-        count = len(scene.sides)
-        if not (text.isascii() and text.isdigit() and int(text) < count):
-            allowed = f"a side of this part, 0 to {count - 1}"
-            raise DataError(
-                "the side", shown(text), allowed, "count the sides in flip order", key=key, file=name
-            )
+        if not (text.isascii() and text.isdigit()):
+            raise _not_a_side(text, key, scene, name)
         return float(text)
     try:
         value = convert(parse(f"{text} {unit}", "length"), scene.unit)
@@ -227,11 +259,24 @@ def _cell(cell: str, column: str, unit: str, key: str, scene: Scene, name: str) 
         raise DataError("the number", shown(text), allowed, "correct it", key=key, file=name) from None
     if column == "error" and value <= 0:
         raise DataError("the error", shown(text), "above 0", "give a standard deviation", key=key, file=name)
-    if column in PLACES and not 0 < value <= 1.05 * scene.arm_length:  # it is measured
-        allowed = f"above 0 and up to the arm's length, {scene.arm_length:g} {scene.unit}"
-        remedy = "correct it" if column == "x_before" else "correct it, or leave out a throw off the arm"
-        raise DataError("the place", f"{text} {unit}", allowed, remedy, key=key, file=name)
     return value
+
+
+def _not_a_side(text: str, key: str, scene: Scene, name: str) -> DataError:
+    allowed = f"a side of this part, 0 to {len(scene.sides) - 1}"
+    return DataError("the side", shown(text), allowed, "count the sides in flip order", key=key, file=name)
+
+
+def _require_possible(value: float | str, text: str, column: str, key: str, scene: Scene, name: str) -> None:
+    """Refuse a side that the part does not have, and a place off the arm."""
+    if column in SIDES and float(value) >= len(scene.sides):
+        raise _not_a_side(text, key, scene, name)
+    # places are measured: with errors, and a corner may lie at the joint itself
+    least = -SLACK * scene.arm_length if column in CORNERS else 0.0
+    if column in (*PLACES, *CORNERS) and not least < float(value) <= (1.0 + SLACK) * scene.arm_length:
+        allowed = f"above 0 and up to the arm's length, {scene.arm_length:g} {scene.unit}"
+        remedy = "correct it" if column in BEFORE else "correct it, or leave out a throw off the arm"
+        raise DataError("the place", text, allowed, remedy, key=key, file=name)
 
 
 def length_of(value: float | str, scene: Scene, thing: str) -> float:

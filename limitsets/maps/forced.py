@@ -76,10 +76,10 @@ def along(
 def _at_points(stack: Any, x: Any, sides: Any, branches: Any, after: Any, slope: Any, decides: Any) -> None:
     for k in range(after.shape[0]):
         params = row_of(stack, k)
-        for j in range(x.size):
-            at, _, factor = image_on(params, x[j], sides[j], branches[j])
+        for j in range(x.shape[1]):
+            at, _, factor = image_on(params, x[k, j], sides[j], branches[j])
             after[k, j], slope[k, j] = at, factor
-            decides[k, j] = margin(params, x[j], sides[j])
+            decides[k, j] = margin(params, x[k, j], sides[j])
 
 
 def at_points(
@@ -91,8 +91,10 @@ def at_points(
     ----------
     stack : NamedTuple
         Stacked parameters (`limitsets.maps.stacks`) of a one-dimensional map with `image_on`, m points.
-    x, side, branch : array_like, shape (n,)
-        States and the branch that each takes, the same at all points.
+    x : array_like, shape (n,) or (m, n)
+        States, the same at all points or those of each.
+    side, branch : array_like, shape (n,)
+        Their sides and the branch that each takes, the same at all points.
 
     Returns
     -------
@@ -108,10 +110,11 @@ def at_points(
     array([[0.5 ],
            [0.75]])
     """
-    starts = np.ascontiguousarray(x, dtype=np.float64)
     sides, words = (np.ascontiguousarray(each, dtype=np.int64) for each in (side, branch))
+    shape = (size_of(stack), sides.size)
+    starts = np.ascontiguousarray(np.broadcast_to(np.asarray(x, dtype=np.float64), shape))
     if sides.size:
         require_sides(point_of(stack, 0), int(sides.min()), int(sides.max()))
-    after, slope, decides = (np.empty((size_of(stack), starts.size)) for _ in range(3))
+    after, slope, decides = (np.empty(shape) for _ in range(3))
     _at_points(stack, starts, sides, words, after, slope, decides)
     return after, slope, decides

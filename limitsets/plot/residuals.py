@@ -54,7 +54,9 @@ def fit_residuals(found: Fit) -> Figure:
             look: dict[str, Any] = {"mfc": "none", "mec": style.INK, "mew": 1.1}
             axes.plot(x[some], found.residuals[some], ls="", marker=marker, ms=size, zorder=4, **look)
         axes.set_title(f"side {side}: {int(own.sum())} throws", loc="left", fontsize=style.TEXT)
-        axes.set_xlabel(f"x before [{unit}]", fontsize=style.SMALL)
+        axes.set_xlabel(
+            f"{'left corner' if rows.throws.corner else 'x'} before [{unit}]", fontsize=style.SMALL
+        )
         axes.tick_params(labelsize=style.SMALL)
         style.open_frame(axes)
     panels[0].set_ylabel(f"landing, measured less predicted [{unit}]", fontsize=style.SMALL)

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import math
 from pathlib import Path
 from typing import Any
 
@@ -58,7 +59,7 @@ def many(count: int, seed: int, flipped: float) -> dict[str, Any]:
         found = fit(aimed, film(truth, draw, flipped))
         for each in found.quantities:
             held.setdefault(each.name, []).append(each.lo <= truth.value(each.name) <= each.hi)
-            half.setdefault(each.name, []).append(0.5 * (each.hi - each.lo))
+            half.setdefault(each.name, []).append(0.5 * (each.hi - each.lo) if each.bounded else math.inf)
     return {
         name: {"told": len(held[name]), "held": int(sum(held[name])), "half": float(np.median(half[name]))}
         for name in NAMES

@@ -47,7 +47,7 @@ def one_machine(seed: tuple[int, int]) -> dict[str, Any]:
         }
         answer[f"{share:g}"] = {
             "held": held_by(found, truth),
-            "open": [each.name for each in found.quantities if not np.isfinite(each.half)],
+            "open": [each.name for each in found.quantities if not each.bounded],
             "kept": sorted(found.held),
             "misfit": found.misfit.lacking,
             "off": {name: (value - truth[name]) / size for name, (value, size) in values[share].items()},

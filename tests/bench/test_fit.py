@@ -10,6 +10,7 @@ from scipy.stats import binom
 from tests.bench.fitted_machines import EFFECTS, measured
 from tests.bench.measure import limit
 from tests.fitting.machines import RADIUS
+from tests.fitting.test_corners import FIVE, covered
 from tests.fitting.test_fit import PLACES
 
 pytestmark = pytest.mark.bench
@@ -46,3 +47,10 @@ def test_a_thousand_machines(table):
         table.append(limit(f"misfit test: {effect} told apart, of {FILMS}", found["power"][effect], "", None))
         assert found["power"][effect] >= 0.9 * FILMS
     table.append(limit("fit of fifty throws", found["seconds"]["fit, median"], "s", None))
+
+
+def test_two_hundred_films_of_corners(table):
+    held = covered(200, 3)
+    for name in FIVE:
+        table.append(limit(f"fit, corners: {name} held, of 200", held[name], "", None))
+        assert held[name] >= 184

@@ -45,7 +45,7 @@ def test_json_has_the_keys_of_the_docs(capfd, throws):
     assert record["unit"] == "in"
     assert record["error"] == 0.02
     assert record["throws"] == len(record["residuals"]) == 50
-    assert set(record["quantities"]["throw.speed"]) == {"value", "lo", "hi", "unit"}
+    assert set(record["quantities"]["throw.speed"]) == {"value", "lo", "hi", "unit", "bounded"}
     assert set(record["scatter"]["landing.x"]) == {"value", "lo", "hi", "at_most"}
     assert set(record["misread_rate"]) == {"value", "lo", "hi"}
     assert set(record["misfit"]) == {"p", "outliers", "structure", "lacking", "rows"}

@@ -43,14 +43,21 @@ def thrown(plain: Plain, x, side, kappa):
     return after, (side + flips) % 3
 
 
-def film(draw, truth, n=50, *, error=0.02, speed=0.002, landing=0.01, flipped=0.0, known=True) -> Throws:
-    """Film single throws from places all over the arm; a share of the sides after is recorded wrong."""
+def film(
+    draw, truth, n=50, *, error=0.02, speed=0.002, landing=0.01, flipped=0.0, known=True, corner=False
+) -> Throws:
+    """Film single throws from places all over the arm; a share of the sides after is recorded wrong.
+
+    With `corner` the film shows where the left corner lies, by the true part, not the centre of mass.
+    """
     plain = Plain(described(truth))
     side = draw.integers(0, 3, n)
     x = draw.uniform(plain.a[side] + 2.0, ARM - 1.0)
     kappa = truth[KAPPA] / (1.0 + speed * draw.standard_normal(n)) ** 2
     after, ends = thrown(plain, x, side, kappa)
     after = after + landing * draw.standard_normal(n)
+    if corner:
+        x, after = x - plain.a[side], after - plain.a[ends]
     wrong = draw.random(n) < flipped
     return Throws(
         x + error * draw.standard_normal(n),
@@ -60,6 +67,7 @@ def film(draw, truth, n=50, *, error=0.02, speed=0.002, landing=0.01, flipped=0.
         np.full(n, error if known else np.nan),
         np.zeros(n, dtype=bool),
         np.arange(2, n + 2),
+        corner=corner,
     )
 
 

@@ -5,7 +5,8 @@ import pytest
 from scipy.stats import binom
 
 import limitsets as ls
-from limitsets.fitting.searching import threshold_of
+from limitsets.fitting.searching import largest_radius, threshold_of
+from limitsets.report.fits import lines_of
 from tests.fitting.machines import ABOVE, ALONG, HEIGHT, KAPPA, RADIUS, described, film, machine, run_film
 from tests.proofs.forge import scene
 
@@ -211,8 +212,9 @@ def test_further_throws_sharpen_as_they_say():
     for x, side in ((best.x, best.side), (4.0, 0)):
         more = film_from(draw, truth, np.full(10, x), side)
         both = {
-            key: np.concatenate([getattr(throws, key), getattr(more, key)]) if key != "file" else ""
-            for key in vars(throws)
+            key: np.concatenate([each, getattr(more, key)])
+            for key, each in vars(throws).items()
+            if isinstance(each, np.ndarray)
         }
         halves.append(ls.fit(aimed_at(), type(throws)(**both))[name].half)
     assert halves[0] < halves[1]
@@ -233,3 +235,74 @@ def film_from(draw, truth, x, side):
     return Throws(
         x + noise[0], np.full(n, side), landed + noise[1], ends, np.full(n, 0.02), np.zeros(n, bool), rows
     )
+
+
+def test_what_goes_with_a_held_quantity_has_no_interval():
+    draw = np.random.default_rng(5)
+    truth = machine(draw)
+    found = ls.fit(aimed_at(), film(draw, truth, 10, error=0.5))
+    assert found.held[KAPPA].startswith("the landings do not tell it apart from arm.surface_height")
+    assert found.undetermined[HEIGHT] == KAPPA
+    height = found[HEIGHT]
+    assert (height.lo, height.hi, height.bounded) == (-np.inf, np.inf, False)
+    assert HEIGHT not in found.scene.tolerance
+    assert any(line.startswith(f"{HEIGHT} is not determined by these throws") for line in lines_of(found))
+    assert found.to_json()["quantities"][HEIGHT]["lo"] is None
+
+
+@pytest.mark.parametrize("seed", [3, 4, pytest.param(6, marks=pytest.mark.sweep)])
+def test_intervals_end_where_no_part_exists(seed):
+    draw = np.random.default_rng(seed)
+    truth = machine(draw)
+    found = ls.fit(aimed_at(), film(draw, truth, 10, error=0.5, corner=True))
+    base, left, right = 6.75, 5.75, 3.6
+    foot = (base**2 + left**2 - right**2) / (2.0 * base)
+    top = np.sqrt(left**2 - foot**2)
+    for name, least, most in (
+        (ALONG, 0.0, base),
+        (ABOVE, 0.0, top),
+        (RADIUS, 0.0, base / 2.0),
+        (KAPPA, 0.0, np.inf),
+    ):
+        if name in found.held or name in found.undetermined:
+            continue
+        assert least - 1e-9 <= found[name].lo <= found[name].value <= found[name].hi <= most + 1e-9, name
+
+
+def test_an_end_that_the_throws_do_not_set_is_that_of_the_part():
+    draw = np.random.default_rng(80)
+    found = ls.fit(aimed_at(), film(draw, machine(draw), corner=True))
+    radius = found[RADIUS]
+    assert (radius.lo, radius.bounded) == (pytest.approx(0.0, abs=1e-12), False)
+    assert RADIUS not in found.scene.tolerance
+
+
+def test_the_largest_radius_of_gyration_is_that_of_all_mass_in_the_vertices():
+    given = aimed_at()
+    corners, centre = np.array(given.vertices), np.array(given.centre)
+    shares = np.linalg.solve(np.vstack([corners.T, np.ones(3)]), np.append(centre, 1.0))
+    square = float(shares @ ((corners - centre) ** 2).sum(axis=1))
+    assert largest_radius(given) == pytest.approx(np.sqrt(square))
+
+
+def test_the_scene_is_written_in_the_units_of_the_file():
+    draw = np.random.default_rng(15)
+    truth = machine(draw)
+    given = ls.load("paper-designed").with_values({ALONG: "107.33 mm", "throw.speed": "26.3 rpm"})
+    found = ls.fit(given, film(draw, truth, speed=0.0))
+    text = found.scene.as_dict()
+    assert text["part"]["mass"]["center"]["along"].endswith(" mm")
+    assert text["throw"]["speed"].endswith(" rpm")
+    assert text["tolerance"][ALONG].endswith(" mm")
+    assert found.scene.value(ALONG) == pytest.approx(found[ALONG].value)
+    assert found.scene.tolerance[ALONG].of(1.0) == pytest.approx(found[ALONG].half, rel=0.01)
+
+
+def test_a_scatter_that_may_be_above_0_is_not_written_as_0():
+    draw = np.random.default_rng(5)
+    found = ls.fit(aimed_at(), film(draw, machine(draw), 12, error=0.3, speed=0.0, landing=0.0))
+    assert 0.0 in (found.speed.value, found.landing.value)
+    written = found.scene.world.scatter
+    for size, scatter in ((written.speed.value, found.speed), (written.landing.value, found.landing)):
+        assert size == pytest.approx(scatter.value or scatter.hi, rel=0.01)
+        assert size > 0.0
