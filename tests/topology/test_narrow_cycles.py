@@ -64,7 +64,7 @@ def periods(f, slope, critical, throws=20_000):
             z += move
             if not abs(z - x[k]) <= 0.1 * abs(x[k]) or abs(move) <= 1e-13 * abs(z):
                 break
-        if abs(z - x[k]) <= 0.1 * abs(x[k]) and abs(move) <= 1e-12 * abs(z) and abs(rate) < 1.0:
+        if abs(z - x[k]) <= 0.1 * abs(x[k]) and abs(move) <= 1e-9 * abs(z) and abs(rate) < 1.0:
             found[k] = period
     return found
 
