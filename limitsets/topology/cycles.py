@@ -21,8 +21,9 @@ __all__ = ["DOUBTFUL", "NO_CYCLE", "one_cycle"]
 
 # Throws before a cycle is sought, and further ones before it is sought once more; the longest that is found.
 SHORT, LONG, MOST_PERIOD = 1000, 8000, 512
-# Of the largest side: a return from which Newton's method begins, how far it may lead, and when it has come to rest.
-NEAR, FAR, REST = 1e-3, 1e-2, 1e-13
+# Of the largest side: a return from which Newton's method begins, how far it may lead, and when it has come to rest;
+# where the multiplier is 1 or -1 to rounding it does not.
+NEAR, FAR, REST = 1e-3, 1e-2, 1e-10
 # Beyond this multiplier no attracting cycle is near; steps of Newton's method.
 STEEP, MOST_STEPS = 8.0, 40
 # Of the largest side: cycles are one that have points this near to each other.
@@ -33,20 +34,19 @@ NO_CYCLE, DOUBTFUL = 0, -1
 @kernel(entry=True, counting=False)
 def _closes(params: Any, x: float, side: int, length: int, scale: float, u: Unions) -> bool:
     """Whether the branches in `u.seen` have an attracting cycle near a state; PUSHED becomes its points."""
-    first = x
-    for _ in range(MOST_STEPS):
+    first, move, steps = x, scale, 0
+    while abs(move) > REST * scale:
+        steps += 1
         y, on, slope = x, side, 1.0
         for k in range(length):
             y, on, factor = image_on(params, y, on, u.seen[k])
             slope *= factor
-        if not abs(slope) < STEEP or slope == 1.0:
+        if not abs(slope) < STEEP or slope == 1.0 or steps > MOST_STEPS:
             return False
         move = (y - x) / (1.0 - slope)
         x += move
         if not abs(x - first) <= FAR * scale:
             return False
-        if abs(move) <= REST * scale:
-            break
     y, on, slope = x, side, 1.0
     u.size[PUSHED] = 0
     for _ in range(length):
@@ -124,7 +124,7 @@ def _of_ends(params: Any, inside: bool, scale: float, p: Pieces, u: Unions) -> t
                         end == 0
                         and q > first
                         and p.to[q - 1] == to
-                        and abs(p.y_hi[q - 1] - x) <= REST * scale
+                        and abs(p.y_hi[q - 1] - x) <= CLOSES * scale
                     ):
                         continue  # a turning point: one orbit
                 count += 1
@@ -154,6 +154,6 @@ def one_cycle(params: Any, x: float, side: int, scale: float, p: Pieces, u: Unio
         u.size[SET] = 0
         for i in range(known):
             put(u, SET, u.side[COVERED, i], u.lo[COVERED, i], u.hi[COVERED, i])
-        if not merge(u, SET, 0.0) or u.size[SET] != known:
+        if not merge(u, SET, CLOSES * scale) or u.size[SET] != known:
             return DOUBTFUL
     return known

@@ -112,6 +112,13 @@ def test_no_cycle_of_the_logistic_map_is_told_as_chaos():
     assert (~told & (period > 0)).sum() <= 0.005 * r.size
 
 
+@pytest.mark.parametrize(("r", "period"), [(3.0, 1), (1.0 + math.sqrt(6.0), 2), (1.0 + math.sqrt(8.0), 3)])
+def test_at_a_bifurcation_no_longer_cycle_is_told(r, period):
+    # the multiplier is 1 or -1 to rounding: orbits close as slowly as 1 / sqrt(throws)
+    t = topologies(stacked([maps.Logistic(r)]), [[0.0]], [[1.0]])
+    assert t.undecided[0] or t.period[0, 0] == period
+
+
 @pytest.mark.parametrize("cubic", [1.5, 2.4, 2.9])
 def test_two_attractors_of_two_critical_points_stay_two(cubic):
     # x' = r x - x^3 is odd: its two critical points have mirrored orbits, to one symmetric attractor or to two
