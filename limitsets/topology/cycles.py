@@ -26,6 +26,8 @@ SHORT, LONG, MOST_PERIOD = 1000, 8000, 512
 NEAR, FAR, REST = 1e-3, 1e-2, 1e-10
 # Beyond this multiplier no attracting cycle is near; steps of Newton's method.
 STEEP, MOST_STEPS = 8.0, 40
+# From this multiplier on rounding decides what is a cycle.
+NEUTRAL = 1.0 - 1e-7
 # Of the largest side: cycles are one that have points this near to each other.
 SAME = 1e-6
 NO_CYCLE, DOUBTFUL = 0, -1
@@ -56,7 +58,7 @@ def _closes(params: Any, x: float, side: int, length: int, scale: float, u: Unio
             return False
         _, _, factor = image_on(params, y, on, code)
         y, on, slope = after, to, slope * factor
-    return on == side and abs(y - x) <= CLOSES * scale and abs(slope) < 1.0
+    return on == side and abs(y - x) <= CLOSES * scale and abs(slope) < NEUTRAL
 
 
 @kernel(entry=True, counting=False)
