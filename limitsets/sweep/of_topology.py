@@ -11,11 +11,14 @@ import numpy.typing as npt
 from limitsets.cells import Domain
 from limitsets.errors import AnswerError
 from limitsets.goals import OrientedBeyond, Reaches
+from limitsets.maps import advance
 from limitsets.maps.stacks import point_of
-from limitsets.sets import limit_set_of
 from limitsets.sets.entropy import topological_entropy
+from limitsets.sets.interval_map import IntervalMap
 from limitsets.sweep.checking import ABOUT, CODES, NOT_CHECKED, checks
 from limitsets.sweep.classes import classes
+from limitsets.sweep.continuation.growth import grown
+from limitsets.sweep.continuation.path import SAMPLES
 from limitsets.sweep.float_margins import float_margins, threshold_of, unit_of_margin
 from limitsets.sweep.subjects import SceneSubject, Subject
 from limitsets.sweep.tasks import Block, Coded, Variable, block_task
@@ -34,8 +37,10 @@ _CODES = {
     "staying": STAYING,
     "unsure_exit": UNSURE_EXIT,
 }
-_AVERAGES = frozenset({"flips_per_throw", "lyapunov", "lyapunov_error"})
+_AVERAGES = frozenset({"flips_per_throw", "flips_per_throw_error", "lyapunov", "lyapunov_error"})
 THROWS = 10_000
+# Throws after which a state is taken to be where it stays.
+BEFORE = 100
 
 
 def _variables(
@@ -62,6 +67,7 @@ def _variables(
         "leaves": Variable(about="of the starts, those that leave"),
         "collapses": Variable(about=f"of the starts, those that {back}"),
         "flips_per_throw": Variable(dims=each, about="mean along one orbit", default=False),
+        "flips_per_throw_error": Variable(dims=each, about="its standard error", default=False),
         "lyapunov": Variable(dims=each, about="Lyapunov exponent per throw", default=False),
         "lyapunov_error": Variable(dims=each, about="its standard error", default=False),
         "entropy": Variable(
@@ -120,20 +126,28 @@ def _kept(values: npt.NDArray[Any], decided: npt.NDArray[np.bool_], empty: float
 
 
 def _entropies(block: Block, told: Topologies) -> npt.NDArray[np.float64]:
-    """Topological entropy of every attractor, from its bands."""
+    """Topological entropy of every attractor; nan where its bands are not found again."""
     found = np.full(told.period.shape, np.nan)
-    for k, a in zip(*np.nonzero(told.period >= 0), strict=True):
-        if told.undecided[k] != DECIDED:
-            continue
+    found[(told.period > 0) & (told.undecided == DECIDED)[:, None]] = 0.0
+    for k, a in zip(*np.nonzero((told.period == 0) & (told.undecided == DECIDED)[:, None]), strict=True):
         points = block.points
         anchor = None if points.anchor is None else points.anchor[k]
         domain = Domain(points.lo[k][:, None], points.hi[k][:, None], anchor)
-        sides = np.flatnonzero(told.bands[k, a] > 0)
-        hulls = {int(s): [(told.lowest[k, a, s], told.reach[k, a, s])] for s in sides}
         params = point_of(points.params, k)
-        bands = limit_set_of(params, hulls, domain, tolerance=1e-11).extents
-        found[k, a] = topological_entropy(params, bands, domain)
+        bands = _bands(params, domain, told.start[k, a], told.start_side[k, a])
+        if [len(bands.get(side, ())) for side in range(domain.lo.size)] == told.bands[k, a].tolist():
+            found[k, a] = topological_entropy(params, bands, domain)
     return found
+
+
+def _bands(params: Any, domain: Domain, x: float, side: int) -> dict[int, list[tuple[float, float]]]:
+    """Bands of the attractor that a state belongs to, from inside.
+
+    Between its ends on a side there are gaps, and in these cycles that attract nothing.
+    """
+    at, on, _, _ = advance(params, [x], [side], BEFORE)
+    forward = IntervalMap(params, domain, SAMPLES)
+    return grown(forward, at, on, float(np.max(domain.hi - domain.lo))) or {}
 
 
 def _goal_of(subject: Subject) -> OrientedBeyond | Reaches | None:

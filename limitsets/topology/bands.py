@@ -18,6 +18,7 @@ __all__ = [
     "COVERED",
     "GAP",
     "IMAGE",
+    "MOVES",
     "NOTHING",
     "PUSHED",
     "SET",

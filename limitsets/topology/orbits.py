@@ -1,4 +1,4 @@
-"""Orbits that check what cells and intervals say: they stay, visit every band, close a cycle.  Means along orbits."""
+"""Orbits that check what cells and intervals say: they stay, and they visit every band.  Means along orbits."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from limitsets.topology.bands import SET
 from limitsets.topology.cells import cell_of
 from limitsets.topology.work import Cells, Components, Starts, Unions
 
-__all__ = ["CLOSES", "INNER", "averages", "cycle_length", "remaining", "visits_all"]
+__all__ = ["CLOSES", "INNER", "STRETCHES", "averages", "mean_of", "remaining", "visits_all"]
 
 # Throws of the orbits from cells that recur though they are left, and those between two looks at where they are.
 THROWS, LOOKED = 160, 8
-# Throws until every band has to be visited; throws before a cycle is sought, and the longest one that is found.
-MOST_VISITS, BEFORE, MOST_PERIOD = 20_000, 1000, 4096
-# Throws before means are taken.
-SKIPPED = 200
+# Throws until every band has to be visited.
+MOST_VISITS = 20_000
+# Throws before means are taken; stretches of an orbit, and how many of them count together at most for an error.
+SKIPPED, STRETCHES, MOST_TOGETHER = 200, 16, 4
 # An orbit closes where it comes back this near, as a share of the largest side.
 CLOSES = 1e-9
 # Golden ratio: multiples of it, modulo 1, fill an interval evenly.
@@ -114,42 +114,19 @@ def visits_all(params: Any, slack: float, u: Unions) -> bool:
 
 
 @kernel(entry=True, counting=False)
-def cycle_length(params: Any, x: float, side: int, scale: float) -> int:
-    """Length of the attracting cycle that an orbit comes to, 0 where it closes none."""
-    for _ in range(BEFORE):
-        x, side, code = step(params, x, side)
-        if code < 0:
-            return 0
-    at, on, length, since, slope = x, side, 1, 0, 1.0
-    while length <= MOST_PERIOD:
-        after, side_after, code = step(params, x, side)
-        if code < 0:
-            return 0
-        _, _, factor = image_on(params, x, side, code)
-        x, side, slope, since = after, side_after, slope * factor, since + 1
-        if side == on and abs(x - at) <= CLOSES * scale and abs(slope) < 1.0:
-            return since
-        if since == length:  # Brent's method: a later state to come back to
-            at, on, length, since, slope = x, side, 2 * length, 0, 1.0
-    return 0
-
-
-@kernel(entry=True, counting=False)
 def averages(params: Any, x: float, side: int, throws: int, out: Any) -> None:
-    """Fill `out`: share of the throws that change sides, mean logarithm of the slopes, and its standard error.
+    """Fill `out` with means over stretches of one orbit: share of throws that change sides, logarithm of the slopes.
 
-    The error is that of the means of 16 stretches of the orbit; nan where the orbit leaves.
+    nan where the orbit leaves.
     """
+    out[:] = math.nan
     for _ in range(SKIPPED):
         x, side, code = step(params, x, side)
         if code < 0:
-            out[:] = math.nan
             return
-    stretches = 16
-    flips, total, squares = 0, 0.0, 0.0
-    length = max(throws // stretches, 1)
-    for _ in range(stretches):
-        growth, size = 0.0, 1.0
+    length = max(throws // STRETCHES, 1)
+    for k in range(STRETCHES):
+        flips, growth, size = 0, 0.0, 1.0
         for _ in range(length):
             after, side_after, code = step(params, x, side)
             if code < 0:
@@ -162,10 +139,27 @@ def averages(params: Any, x: float, side: int, throws: int, out: Any) -> None:
                 size = 1.0
             flips += side_after != side
             x, side = after, side_after
-        mean = (growth + math.log(size)) / length
-        total += mean
-        squares += mean * mean
-    mean = total / stretches
-    out[0] = flips / (stretches * length)
-    out[1] = mean
-    out[2] = math.sqrt(max(squares / stretches - mean * mean, 0.0) / (stretches - 1))
+        out[0, k], out[1, k] = flips / length, (growth + math.log(size)) / length
+
+
+@kernel
+def mean_of(values: Any) -> tuple[float, float]:
+    """Return the mean over stretches and its standard error: the largest of those by one, two and four together.
+
+    Stretches that follow each other are alike where an orbit stays long in one part of its attractor; longer ones
+    then scatter more than shorter ones tell.
+    """
+    n, total, error, together = values.size, 0.0, 0.0, 1
+    for value in values:
+        total += value
+    mean = total / n
+    while together <= MOST_TOGETHER:
+        squares, count = 0.0, n // together
+        for k in range(count):
+            off = 0.0
+            for j in range(together):
+                off += values[k * together + j] - mean
+            squares += (off / together) ** 2
+        error = max(error, math.sqrt(squares / count / (count - 1)))
+        together *= 2
+    return mean, error if mean == mean else math.nan

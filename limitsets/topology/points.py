@@ -15,10 +15,11 @@ from limitsets.jit import kernel, row_of
 from limitsets.maps.contract import has_slope, kind_of
 from limitsets.maps.kernels import on_side
 from limitsets.maps.stacks import point_of, size_of
-from limitsets.topology.bands import NOTHING, SET, begin_union, push_through, settle, stays_around
+from limitsets.topology.bands import MOVES, NOTHING, SET, begin_union, push_through, settle, stays_around
 from limitsets.topology.cells import fill_cells
+from limitsets.topology.cycles import DOUBTFUL, NO_CYCLE, one_cycle
 from limitsets.topology.inner import fills
-from limitsets.topology.orbits import CLOSES, INNER, averages, cycle_length, remaining, visits_all
+from limitsets.topology.orbits import CLOSES, INNER, STRETCHES, averages, mean_of, remaining, visits_all
 from limitsets.topology.pieces import find_pieces
 from limitsets.topology.records import (
     BANDS_JOIN,
@@ -49,17 +50,22 @@ def _attractor(params: Any, a: int, r: Region, scale: float, w: Work, t: Topolog
     """Fill the fields of one attractor of point i; DECIDED, or a doubt."""
     sides, u = r.lo.size, w.unions
     expands = begin_union(sides, a, w.cells, w.components, u)
-    if settle(params, r, w.pieces, u) != NOTHING:
+    settled, widest, cycle = settle(params, r, w.pieces, u), 0.0, NO_CYCLE
+    if settled not in (NOTHING, MOVES):
         return MOVING
-    widest = 0.0
     for k in range(u.size[SET]):
         widest = max(widest, u.hi[SET, k] - u.lo[SET, k])
-        if k > 0 and u.side[SET, k] == u.side[SET, k - 1] and u.lo[SET, k] - u.hi[SET, k - 1] < GAP * scale:
-            return BANDS_JOIN
     x, side = u.lo[SET, 0] + INNER * (u.hi[SET, 0] - u.lo[SET, 0]), u.side[SET, 0]
-    t.period[i, a] = u.size[SET] if widest <= POINT * scale else 0
-    if t.period[i, a] == 0 and not expands and cycle_length(params, x, side, scale) > 0:
-        return NOT_ONE
+    if settled == MOVES or (widest > POINT * scale and not expands):
+        cycle = one_cycle(params, x, side, scale, w.pieces, u)
+    if cycle == DOUBTFUL or (cycle == NO_CYCLE and settled == MOVES):
+        return NOT_ONE if cycle == DOUBTFUL else MOVING
+    for k in range(1, u.size[SET] if cycle == NO_CYCLE else 0):
+        if u.side[SET, k] == u.side[SET, k - 1] and u.lo[SET, k] - u.hi[SET, k - 1] < GAP * scale:
+            return BANDS_JOIN
+    t.period[i, a] = u.size[SET] if cycle > 0 or widest <= POINT * scale else 0
+    if cycle > 0:
+        x, side = u.lo[SET, 0], u.side[SET, 0]
     if not visits_all(params, CLOSES * scale, u):
         return NOT_ONE
     if t.period[i, a] == 0 and not fills(params, x, side, scale, w.pieces, u):
@@ -135,7 +141,8 @@ def _means(stack: Any, throws: int, t: Topologies, out: Any) -> None:
         params = row_of(stack, i)
         for a in range(t.attractors[i] if t.undecided[i] == DECIDED else 0):
             averages(params, t.start[i, a], t.start_side[i, a], throws, out)
-            t.flips_per_throw[i, a], t.lyapunov[i, a], t.lyapunov_error[i, a] = out[0], out[1], out[2]
+            t.flips_per_throw[i, a], t.flips_per_throw_error[i, a] = mean_of(out[0])
+            t.lyapunov[i, a], t.lyapunov_error[i, a] = mean_of(out[1])
 
 
 def topologies(
@@ -205,7 +212,7 @@ def topologies(
             break
     _tidy(found)
     if throws:
-        _means(stack, throws, found, np.zeros(3))
+        _means(stack, throws, found, np.zeros((2, STRETCHES)))
     return found
 
 

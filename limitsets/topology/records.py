@@ -60,8 +60,10 @@ class Topologies(NamedTuple):
         Of the starts, those that come to the attractor.
     leaves, collapses : ndarray, shape (n,)
         Of the starts, those that leave the domain, and those that come back to the joint.
-    flips_per_throw, lyapunov, lyapunov_error : ndarray, shape (n, K)
-        Means along one orbit and the standard error of the second; nan where they were not asked for.
+    flips_per_throw, lyapunov : ndarray, shape (n, K)
+        Means along one orbit; nan where they were not asked for.
+    flips_per_throw_error, lyapunov_error : ndarray, shape (n, K)
+        Their standard errors.
     start, start_side : ndarray, shape (n, K)
         A state of the attractor.
     """
@@ -79,6 +81,7 @@ class Topologies(NamedTuple):
     leaves: Floats
     collapses: Floats
     flips_per_throw: Floats
+    flips_per_throw_error: Floats
     lyapunov: Floats
     lyapunov_error: Floats
     start: Floats
@@ -108,6 +111,7 @@ def empty(points: int, sides: int) -> Topologies:
         floats(n, k),
         floats(n),
         floats(n),
+        floats(n, k),
         floats(n, k),
         floats(n, k),
         floats(n, k),

@@ -2,6 +2,7 @@
 
 import json
 import math
+import re
 from typing import NamedTuple
 
 import numpy as np
@@ -11,7 +12,9 @@ import limitsets as ls
 from limitsets import maps
 from limitsets.errors import AnswerError, MapError, SceneError
 from limitsets.files import as_json
+from limitsets.maps import advance
 from limitsets.sets import limit_set_of
+from limitsets.sweep.continuation.path import Place, between
 from tests.maps_of_tests import TwoState
 from tests.sets.part import Part, mp
 
@@ -323,10 +326,68 @@ def test_births_and_deaths_on_cells():
     assert sorted(event.kind for event in found.events) == ["birth", "birth", "death"]
     for event in found.events:
         assert event.values[0]["r"] < 0.5 <= event.values[1]["r"]
-        assert event.t[1] - event.t[0] <= 1e-9
+        assert event.t[1] - event.t[0] <= 1e-4
+        # not more digits than the cells allow: both ends
+        assert " at r = 0.4999" in str(event) or " at r = 0.5000" in str(event)
+        assert " to 0.500" in str(event)
     assert set(found.attractors[0]) == {0}
     assert set(found.attractors[-1]) == {1, 2}
     assert found.critical[0] == {}
+
+
+class DelayedLogistic(NamedTuple):
+    """x' = a x (1 - y), y' = x: a circle about (1 - 1/a, 1 - 1/a) attracts from a = 2 to beyond 2.26."""
+
+    a: float = 2.1
+
+
+def _delayed_logistic(p, x, side):
+    return (p.a * x[0] * (1.0 - x[1]), x[0]), side, 0
+
+
+ls.register(DelayedLogistic, image=_delayed_logistic, dimension=2)
+
+
+@pytest.mark.parametrize("domain", [(0.0, 1.0), (0.0, 1.2), (0.01, 1.0)])
+def test_what_coarse_cells_lose_is_no_death(domain):
+    """On 128 cells no set is closed from about a = 2.1 on, though orbits stay."""
+    x = np.full((4, 2), [0.4, 0.5]) + 0.01 * np.arange(4)[:, None]
+    for a in (2.1, 2.15, 2.2):
+        there, _, _, _ = advance(DelayedLogistic(a), x, np.zeros(4, np.int64), 100_000)
+        assert (there > 0.01).all()
+        assert (there < 1.0).all()
+    found = ls.continuation(
+        DelayedLogistic(2.0), {"a": (2.05, 2.2)}, steps=4, cells=128, domain=[domain, domain]
+    )
+    assert found.events == ()
+    assert found.numbers == (0,)
+    assert all(list(states) == [0] for states in found.attractors)
+
+
+def test_a_death_on_cells_has_the_bracket_that_they_allow():
+    # beyond a = 2.28 orbits leave; before 2.26 they stay (100 000 steps)
+    x = np.full((4, 2), [0.4, 0.5]) + 0.01 * np.arange(4)[:, None]
+    stay, leave = (advance(DelayedLogistic(a), x, np.zeros(4, np.int64), 100_000)[0] for a in (2.26, 2.29))
+    assert (stay > 0.0).all()
+    assert not (leave > 0.0).any()
+    found = ls.continuation(
+        DelayedLogistic(2.0), {"a": (2.2, 2.4)}, steps=2, cells=128, domain=[(0.0, 1.0), (0.0, 1.0)]
+    )
+    (death,) = found.events
+    assert death.kind == "death"
+    assert death.values[0]["a"] < 2.29
+    assert death.values[1]["a"] > 2.26
+    assert re.search(r"at a = 2\.\d{1,4} to 2\.\d{1,4}:", str(death))
+
+
+def test_ends_of_a_bracket_are_rounded_outward():
+    def place(value):
+        return Place(0.0, {"a": value}, {"a": (value, " in")}, None, None)
+
+    assert between(place(2.25234), place(2.28611)) == "a = 2.252 to 2.287 in"
+    assert between(place(2.28611), place(2.25234)) == "a = 2.287 to 2.252 in"
+    assert between(place(1234.0), place(5678.0)) == "a = 1200 to 5700 in"
+    assert between(place(2.0), place(2.0 + 1e-10)) == "a = 2 in"
 
 
 def test_any_curve_and_its_forms():

@@ -6,6 +6,7 @@ from itertools import pairwise
 from typing import NamedTuple
 
 from limitsets.sweep.continuation.matching import REACH, Group, distance
+from limitsets.sweep.continuation.path import between
 from limitsets.sweep.continuation.result import LEAST, Event, State
 from limitsets.sweep.continuation.snapshot import Found, Snapshot, arrivals
 from limitsets.sweep.continuation.stepping import Follower, Met
@@ -60,7 +61,8 @@ class _Between(NamedTuple):
         before = tuple(self.old[position] for position in group.before)
         after = tuple(self.new[position] for position in group.after)
         collision = None if met is None else met.collision
-        return Event(kind, t, values, before, after, change, jump, collision, self.before.place.words)
+        words = between(self.before.place, self.after.place)
+        return Event(kind, t, values, before, after, change, jump, collision, words)
 
     def of_group(self, group: Group, met: Met | None) -> Event | None:
         """Tell what happens to one group of attractors, None for nothing."""
@@ -94,17 +96,19 @@ def events_of(follower: Follower, numbers: list[list[int]]) -> tuple[Event, ...]
     place_of = {t: k for k, t in enumerate(steps)}
     found: list[Event] = []
     for k, (lo, hi) in enumerate(pairwise(steps)):
-        between = _Between(follower.at(lo), follower.at(hi), numbers[k], numbers[k + 1])
+        if not (follower.is_sure(lo) and follower.is_sure(hi)):
+            continue
+        pair = _Between(follower.at(lo), follower.at(hi), numbers[k], numbers[k + 1])
         here = [met for met in follower.met if met.t == (lo, hi)]
-        for group in follower.match(between.before, between.after).groups:
+        for group in follower.match(pair.before, pair.after).groups:
             mine: list[Met | None] = [
                 met for met in here if met.owner[1] in (group.before if met.owner[0] == lo else group.after)
             ]
-            found += [event for met in mine or [None] if (event := between.of_group(group, met)) is not None]
+            found += [event for met in mine or [None] if (event := pair.of_group(group, met)) is not None]
     for met in follower.met:
         if place_of[met.t[1]] != place_of[met.t[0]] + 1:  # a touch, with steps in its bracket
             number = numbers[place_of[met.owner[0]]][met.owner[1]]
             one, other = (follower.at(t).place for t in met.t)
-            values, words = (one.values, other.values), one.words
+            values, words = (one.values, other.values), between(one, other)
             found.append(Event(met.kind, met.t, values, (number,), (number,), "", 0.0, met.collision, words))
     return tuple(sorted(found, key=lambda event: event.t))

@@ -7,6 +7,7 @@ from typing import NamedTuple
 import networkx as nx
 import numpy as np
 
+from limitsets.cells import CellSet
 from limitsets.sweep.continuation.snapshot import Found, Snapshot, arrivals
 
 __all__ = ["REACH", "Group", "Match", "distance", "matched"]
@@ -64,11 +65,22 @@ def _directed(one: Found, other: Found) -> float:
 
 def _overlap(one: Found, other: Found, reach: float) -> bool:
     if one.cells is not None and other.cells is not None:
-        return bool((one.cells.mask & other.cells.mask).any())
+        return _share(*sorted((one.cells, other.cells), key=lambda each: each.grid.n_cells))
     for side, parts in one.extents.items():
         for lo, hi in parts:
             if any(lo - reach <= top and bottom <= hi + reach for bottom, top in other.extents.get(side, ())):
                 return True
+    return False
+
+
+def _share(coarse: CellSet, fine: CellSet) -> bool:
+    """Whether the middle of a cell of one set lies in the other."""
+    numbers = fine.numbers()
+    owner = fine.grid.side_of(numbers)
+    for side in np.unique(owner).tolist():
+        lo, hi = fine.grid.boxes(numbers[owner == side], side)
+        if coarse.holds(0.5 * (lo + hi), side).any():
+            return True
     return False
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
@@ -19,7 +20,7 @@ from limitsets.scene.quantities import in_units
 from limitsets.scene.spelling import in_unit_of, unit_of
 from limitsets.sets.interval_map import IntervalMap
 
-__all__ = ["LEAVING", "Border", "Curve", "Path", "Place", "read_path"]
+__all__ = ["LEAVING", "Border", "Curve", "Path", "Place", "between", "read_path"]
 
 Values: TypeAlias = Mapping[str, Any]
 Curve: TypeAlias = Mapping[str, tuple[Any, Any]] | Callable[[float], Any]
@@ -27,6 +28,9 @@ Curve: TypeAlias = Mapping[str, tuple[Any, Any]] | Callable[[float], Any]
 # Samples per side in which changes of branch are looked for; pairs between two samples are found all the same.
 SAMPLES = 512
 
+
+# Of a value: ends of a bracket that are so near are told as one number.
+AGREE = 2e-9
 
 # Kinds of ends of pieces that another piece follows.
 KINDS = ("critical", "turning", "jump")
@@ -59,8 +63,8 @@ class Place:
         Where on the path.
     values : dict of str to float
         The values that the path sets.
-    words : str
-        Likewise, as people read them: a scene's in the units of its text.
+    shown : dict of str to (float, str)
+        Likewise, as people read them, each with what follows it: a scene's in the units of its text.
     params : NamedTuple
         The map.
     domain : Domain
@@ -69,7 +73,7 @@ class Place:
 
     t: float
     values: dict[str, float]
-    words: str
+    shown: dict[str, tuple[float, str]]
     params: Any
     domain: Domain
 
@@ -111,6 +115,27 @@ class Place:
         return found
 
 
+def between(lo: Place, hi: Place) -> str:
+    """Say where on the path a bracket is: one value where its ends agree to nine digits, else both, rounded outward."""
+    parts = []
+    for name, (one, unit) in lo.shown.items():
+        other = hi.shown[name][0]
+        width = abs(other - one)
+        if width <= AGREE * max(abs(one), abs(other)):
+            parts.append(f"{name} = {one:.10g}{unit}")
+            continue
+        digits = 1 - math.floor(math.log10(width))
+        step = 10.0**-digits
+        ends = (way(each / step) * step for way, each in _outward(one, other))
+        parts.append(f"{name} = {' to '.join(f'{each:.{max(digits, 0)}f}' for each in ends)}{unit}")
+    return ", ".join(parts)
+
+
+def _outward(one: float, other: float) -> list[tuple[Callable[[float], int], float]]:
+    ways = (math.floor, math.ceil) if one < other else (math.ceil, math.floor)
+    return list(zip(ways, (one, other), strict=True))
+
+
 class Path(NamedTuple):
     """A curve: what it is a curve of, and the place at each t.
 
@@ -141,10 +166,6 @@ def _straight(ends: Mapping[str, tuple[float, float]]) -> Callable[[float], dict
     return values
 
 
-def _words(values: Mapping[str, str]) -> str:
-    return ", ".join(f"{name} = {value}" for name, value in values.items())
-
-
 def _ends(path: Curve) -> dict[str, tuple[Any, Any]] | None:
     """Read first and last values of a straight path; None for a function."""
     if callable(path):
@@ -172,11 +193,11 @@ def _of_scene(scene: Scene, path: Curve) -> Path:
     def at(t: float) -> Place:
         values = read(curve(t))
         there = scene.with_values(values)
-        written = {
-            name: f"{in_unit_of(scene, name, value):.10g} {unit_of(scene, name)}"
+        shown = {
+            name: (in_unit_of(scene, name, value), f" {unit_of(scene, name)}")
             for name, value in values.items()
         }
-        return Place(t, values, _words(written), there.map, there.domain)
+        return Place(t, values, shown, there.map, there.domain)
 
     return Path(scene.name, scene.unit, at)
 
@@ -202,7 +223,7 @@ def _of_map(params: Any, path: Curve, domain: Any) -> Path:
         there = coerce(there)
         kept = given if isinstance(given, Mapping) else there._asdict()
         values = {name: float(value) for name, value in kept.items() if np.ndim(value) == 0}
-        return Place(t, values, _words({name: f"{value:.10g}" for name, value in values.items()}), there, box)
+        return Place(t, values, {name: (value, "") for name, value in values.items()}, there, box)
 
     return Path(kind_of(params).name, None, at)
 

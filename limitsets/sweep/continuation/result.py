@@ -34,7 +34,8 @@ class State:
     period : int
         Period of the attracting cycle, 0 where there is none (up to period 128).
     decided : bool
-        False where the bands are those of an enclosure by cells: gaps narrower than a cell may be missing.
+        False where the bands are those of an enclosure by cells: gaps narrower than a cell may be missing.  In two
+        and three dimensions: where orbits stay outside the attracting cells; it is the cells that they visit.
     """
 
     extents: dict[int, list[tuple[float, float]]]
@@ -121,7 +122,8 @@ class Event:
     collision : Collision or None
         Of a border collision or a touch, and of a birth or death at which an end leaves the domain.
     words : str
-        The values at the lower end, as people read them: a scene's in the units of its text.
+        The values, as people read them, a scene's in the units of its text: one number where the bracket has nine
+        digits, else both of its ends.
     """
 
     kind: str

@@ -8,12 +8,12 @@ another one is no attractor: its orbits were still on their way.
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
-from limitsets.cells import CellSet, grid
+from limitsets.cells import CellSet, Grid, grid
 from limitsets.graph import TransitionGraph, transitions
 from limitsets.maps import advance, kind_of
 from limitsets.maps.bisection import Array
@@ -28,7 +28,7 @@ from limitsets.sweep.continuation.attracting_cycles import (
 from limitsets.sweep.continuation.growth import carried, grown
 from limitsets.sweep.continuation.path import Place
 
-__all__ = ["Found", "Snapshot", "arrivals", "snapshot_at"]
+__all__ = ["Found", "Snapshot", "arrivals", "confirmed", "snapshot_at"]
 
 Intervals = dict[int, list[tuple[float, float]]]
 
@@ -38,6 +38,9 @@ TRANSIENT, STARTS, STARTS_PER_SET = 1000, 12, 4
 TRIED, STATES = 3, 8
 # Images until the ends of a set are critical orbits.
 MOST_IMAGES = 300
+# On cells: starts all over a side, their steps; how much finer cells are that confirm, and how many there may be.
+SPREAD, RESTED = 256, 3000
+FINER, MOST_CELLS = 1.6, 1_000_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,10 +90,21 @@ class Found:
 
 @dataclass(frozen=True, eq=False)
 class Snapshot:
-    """The attractors at one place."""
+    """The attractors at one place.
+
+    Attributes
+    ----------
+    place : Place
+        Where.
+    found : tuple of Found
+        The attractors.
+    cells : int
+        Cells per axis on which they were found.
+    """
 
     place: Place
     found: tuple[Found, ...]
+    cells: int
 
     @property
     def t(self) -> float:
@@ -188,17 +202,93 @@ def _order(found: Found) -> tuple[int, float]:
 
 def snapshot_at(place: Place, cells: int) -> Snapshot:
     """Find the attractors at one place; `cells` per axis."""
-    graph = transitions(place.params, grid(place.domain, cells))
-    sets = _cell_sets(graph)
     if not place.on_line:
-        return Snapshot(place, tuple(Found(each.extents(), (), None, each, True) for each in sets))
+        return _on_cells(place, cells)
+    sets = _cell_sets(transitions(place.params, grid(place.domain, cells)))
     x, side = _starts(place, sets)
     x, side, code, _ = advance(place.params, x, side, TRANSIENT)
     rows = recorded(place, x[code >= 0], side[code >= 0], MOST_PERIOD)
     cycles, left = attracting_cycles(place, rows)
     found = [_of_cycle(cycle) for cycle in cycles]
     found += _grown_sets(place, rows.rows(left), sets)
-    return Snapshot(place, tuple(sorted(_least(found, 1e-9 * place.extent), key=_order)))
+    return Snapshot(place, tuple(sorted(_least(found, 1e-9 * place.extent), key=_order)), cells)
+
+
+def _on_cells(place: Place, cells: int) -> Snapshot:
+    """Find the attracting cells, on finer ones where orbits stay elsewhere; on the finest add the cells they visit."""
+    cover = grid(place.domain, cells)
+    sets = _cell_sets(transitions(place.params, cover))
+    found = Snapshot(place, tuple(Found(each.extents(), (), None, each, True) for each in sets), cells)
+    x, side, label = _rested(found)
+    if (label >= 0).all():
+        return found
+    if (finer := _finer(place, cells)) is not None:
+        return _on_cells(place, finer)
+    visited = _visited(place, cover, x[label < 0], side[label < 0], sets)
+    return replace(
+        found, found=(*found.found, *(Found(each.extents(), (), None, each, False) for each in visited))
+    )
+
+
+def _finer(place: Place, cells: int) -> int | None:
+    """Give a number of cells whose edges are others; None where they would be too many."""
+    finer = round(FINER * cells) | 1
+    return finer if place.domain.sides * finer**place.domain.dimension <= MOST_CELLS else None
+
+
+def _rested(snapshot: Snapshot) -> tuple[Array, Ints, Ints]:
+    """Last states of orbits from all over the domain that stay, and the attractor that each is at, else -1."""
+    domain = snapshot.place.domain
+    per_axis = max(2, round(SPREAD ** (1.0 / domain.dimension)))
+    starts = grid(domain, per_axis)
+    x = np.concatenate([starts.centres(side) for side in range(domain.sides)])
+    side = starts.side_of(np.arange(len(x)))
+    x, side, code, _ = advance(snapshot.place.params, x, side, RESTED)
+    inside = code >= 0
+    for s in range(domain.sides):
+        here = side == s
+        inside[here] &= ((x[here] >= domain.lo[s]) & (x[here] <= domain.hi[s])).all(axis=1)
+    x, side = x[inside], side[inside]
+    return x, side, _label(snapshot, x, side, 0.0)
+
+
+def _visited(place: Place, cover: Grid, x: Array, side: Ints, sets: list[CellSet]) -> list[CellSet]:
+    """Cells that orbits visit, those together that share one; without the orbits that come to a set after all."""
+    rows = []
+    for _ in range(TRANSIENT):
+        x, side, code, _ = advance(place.params, x, side, 1)
+        cells = np.full(side.size, -1)
+        for s in np.unique(side[code >= 0]).tolist():
+            here = np.flatnonzero((side == s) & (code >= 0))
+            cells[here] = cover.index(x[here], s)
+        rows.append(cells)
+    found: list[CellSet] = []
+    for orbit in np.stack(rows, axis=1):
+        if (orbit < 0).any():
+            continue
+        new = CellSet.of(cover, np.unique(orbit))
+        if any(each.mask[orbit].any() for each in sets):
+            continue
+        for other in [each for each in found if (each.mask & new.mask).any()]:
+            found.remove(other)
+            new = new | other
+        found.append(new)
+    return found
+
+
+def confirmed(snapshot: Snapshot) -> Snapshot | None:
+    """Find the attractors that two sizes of cells agree on, by the orbits that come to them; None where none do."""
+    place, cells = snapshot.place, _finer(snapshot.place, snapshot.cells)
+    if cells is None or not all(each.decided for each in snapshot.found):
+        return None
+    finer = snapshot_at(place, cells)
+    x, side, fine = _rested(finer)
+    coarse = _label(snapshot, x, side, 0.0)
+    pairs = set(zip(coarse.tolist(), fine.tolist(), strict=True))
+    one_to_one = len({a for a, _ in pairs}) == len({b for _, b in pairs}) == len(pairs)
+    if len(finer.found) == len(snapshot.found) and one_to_one and (fine >= 0).all() and (coarse >= 0).all():
+        return finer
+    return confirmed(finer)
 
 
 def _sampled(found: Found, count: int = 9) -> tuple[Array, Ints]:

@@ -9,12 +9,14 @@ from limitsets.sweep.continuation.collisions import Approach, approaches, crossi
 from limitsets.sweep.continuation.matching import Match, matched
 from limitsets.sweep.continuation.path import Path
 from limitsets.sweep.continuation.result import Collision
-from limitsets.sweep.continuation.snapshot import Snapshot, snapshot_at
+from limitsets.sweep.continuation.snapshot import Snapshot, confirmed, snapshot_at
 
 __all__ = ["Follower", "Met"]
 
 # Width of the brackets, as a share of the path.
 BRACKET = 1e-9
+# The same where cells decide: two sizes of cells that agree on a place do not agree on the last digits of an event.
+CELL_BRACKET = 1e-4
 # A gap this small, of the extent, is a touch where it does not change its sign.
 TOUCH = 1e-9
 # Width of the bracket of a touch: where a parabola is flat to rounding.
@@ -36,7 +38,8 @@ class Follower:
     def __init__(self, path: Path, cells: int, most: int) -> None:
         self.path, self.cells, self.most = path, cells, most
         self.snapshots: dict[float, Snapshot] = {}
-        self.matches: dict[tuple[float, float], Match] = {}
+        self.matches: dict[tuple[Snapshot, Snapshot], Match] = {}
+        self.sure: dict[float, bool] = {}
         self.met: list[Met] = []
         self.left = most
 
@@ -49,10 +52,13 @@ class Follower:
 
     def match(self, lo: Snapshot, hi: Snapshot) -> Match:
         """Match of two places, found once."""
-        key = (lo.t, hi.t)
-        if key not in self.matches:
-            self.matches[key] = matched(lo, hi)
-        return self.matches[key]
+        if (lo, hi) not in self.matches:
+            self.matches[lo, hi] = matched(lo, hi)
+        return self.matches[lo, hi]
+
+    def is_sure(self, t: float) -> bool:
+        """Whether an event may begin or end at a place: where cells decide, finer ones have to agree."""
+        return self.at(t).place.on_line or self.sure.get(t, False)
 
     def step(self, first: float, last: float) -> None:
         """Halve a step until nothing happens in its parts, or what happens is bracketed."""
@@ -66,9 +72,39 @@ class Follower:
             if met is not None:
                 self.met.append(met)
                 stack += [pair for pair in ((met.t[1], hi.t), (lo.t, met.t[0])) if pair[0] < pair[1]]
-            elif hi.t - lo.t > BRACKET and self.left > 0 and not self.match(lo, hi).smooth:
-                middle = 0.5 * (lo.t + hi.t)
-                stack += [(middle, hi.t), (lo.t, middle)]
+            elif self.left > 0 and not self._is_done(lo, hi):
+                middle = self._middle(lo, hi)
+                stack += [] if middle is None else [(middle, hi.t), (lo.t, middle)]
+
+    def _is_done(self, lo: Snapshot, hi: Snapshot) -> bool:
+        """Whether a step is short enough, or nothing happens in it, on finer cells either."""
+        if lo.place.on_line:
+            return hi.t - lo.t <= BRACKET or self.match(lo, hi).smooth
+        if self.match(lo, hi).smooth:
+            return True
+        for t in (lo.t, hi.t):
+            self._confirm(t)
+        return hi.t - lo.t <= CELL_BRACKET or self.match(self.at(lo.t), self.at(hi.t)).smooth
+
+    def _confirm(self, t: float) -> bool:
+        """Look at a place again on finer cells, once; whether they agree."""
+        if t not in self.sure:
+            found = confirmed(self.at(t))
+            self.sure[t] = found is not None
+            if found is not None:
+                self.snapshots[t] = found
+        return self.sure[t]
+
+    def _middle(self, lo: Snapshot, hi: Snapshot) -> float | None:
+        """Place that cuts a step; on cells one that finer ones confirm, None where there is none."""
+        if lo.place.on_line:
+            return 0.5 * (lo.t + hi.t)
+        for share in (0.5, 0.25, 0.75):
+            t = lo.t + share * (hi.t - lo.t)
+            if self.sure.get(t, True) and self._confirm(t):
+                return t
+            self.snapshots.pop(t, None)
+        return None
 
     def _collision(self, lo: Snapshot, hi: Snapshot) -> Met | None:
         """First border collision between two places."""
@@ -123,7 +159,12 @@ class Follower:
                 self.step(lo, hi)
 
     def settle(self) -> None:
-        """Halve steps beside places that were only looked at on the way to something else."""
+        """Halve steps beside places that were only looked at on the way to something else.
+
+        Places inside the path at which finer cells do not agree are left out.
+        """
+        for t in [t for t, sure in self.sure.items() if not sure and 0.0 < t < 1.0]:
+            self.snapshots.pop(t, None)
         brackets = {met.t for met in self.met}
         pairs = [
             (lo, hi)
