@@ -59,7 +59,7 @@ def read_refutation(section: dict[str, Any], n_sides: int) -> dict[str, Any]:
 
 
 def read_broken_goal(value: object, n_sides: int) -> tuple[dict[str, Any], list[list[Span]] | None]:
-    """Read the section of the goal that is refuted, its counts set to 0, and the ranges of its starts, if it has any."""
+    """Read the section of the refuted goal, its counts set to 0, and the ranges of its starts if it has any."""
     kind = value.get("kind") if isinstance(value, dict) else None
     require(isinstance(kind, str) and kind in BROKEN, "refuted.goal: not a kind that an orbit refutes")
     goal = dict(table(value, "refuted.goal", BROKEN[str(kind)][0], "from_anywhere starts"))

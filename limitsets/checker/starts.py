@@ -3,6 +3,7 @@
 docs/certificates.md, "For which starts": falling, passing and thin cells, starts that are lost, and those laid down.
 """
 
+import itertools
 import math
 from dataclasses import replace
 from fractions import Fraction
@@ -30,7 +31,7 @@ Span = tuple[float, float]
 
 
 class Starts(NamedTuple):
-    """The starts for which a goal is claimed: "every", "almost-every", "from" (beyond x on each side), "cells", "within".
+    """The starts of a goal: "every", "almost-every", "from" (beyond x on each side), "cells", "within" (some ranges).
 
     `thinning` counts its rounds; `near` has factors and fixed points where starts before the first cells are claimed; a
     worst sequence of landings takes starts up to `lost`, by side, to the joint; `only` the starts in the attracting
@@ -89,7 +90,7 @@ def read_laid(value: object, n_sides: int) -> list[list[Span]]:
     for i in range(n_sides):
         pairs = rows(known[str(i)], "ranges", 1, 100) if str(i) in known else []
         ends = [hex_float(end, "a range") for pair in pairs for end in rows(pair, "a range", 2, 2)]
-        ascending = all(a < b for a, b in zip(ends, ends[1:], strict=False))
+        ascending = all(a < b for a, b in itertools.pairwise(ends))
         require(ascending, "the ranges of the starts are empty, or do not ascend")
         found.append(list(zip(ends[::2], ends[1::2], strict=True)))
     return found

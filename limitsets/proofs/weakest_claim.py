@@ -32,10 +32,8 @@ def weakest_of(claims: Sequence[Claim], found: Sequence[Attraction]) -> Claim:
         section["least_slope"] = min((other["least_slope"] for other in sections), key=float.fromhex)
     if claims[0].starts is None:
         return Claim(claims[0].claim, "proved", "", section)
-    weakest = max(
-        claims,
-        key=lambda claim: STARTS.index(claim.starts if isinstance(claim.starts, str) else [*claim.starts][0]),
-    )
+    words = [one.starts if isinstance(one.starts, str) else next(iter(one.starts)) for one in claims]
+    weakest = max(zip(words, claims, strict=True), key=lambda each: STARTS.index(each[0]))[1]
     starts = weakest.starts
     section.pop("lost", None)
     if isinstance(starts, dict) and "from" in starts:
