@@ -145,16 +145,9 @@ def laid_down(c: Cells, scene: Scene, starts: Starts) -> tuple[Cells, str]:
     Any other cell gets neither rank nor component nor targets, so that nothing is asked of it and nothing rests on it.
     No orbit from the ranges meets such a cell: the cells kept hold the ranges, and all targets of the cells kept.
     """
-    begin = np.zeros(len(c.rank), dtype=bool)
-    for i, (edges, ranges) in enumerate(zip(c.edges, starts.laid or [], strict=True)):
-        for lo, hi in ranges:
-            if not lo >= edges[0]:
-                return c, f"side {i}: starts are claimed that lie before the cells"
-            if Fraction(lo) >= scene.arm[0]:
-                return c, f"side {i}: starts are claimed that lie beyond arm.length"
-            if Fraction(float(edges[-1])) < min(Fraction(hi), scene.arm[1]):
-                return c, f"side {i}: the cells end before the starts do"
-            begin[c.start[i] : c.start[i + 1]] |= (edges[1:] > lo) & (edges[:-1] < hi)
+    begin, bad = cells_of_ranges(c, scene, starts.laid or [])
+    if bad:
+        return c, bad
     if starts.kind == "cells":
         begin &= c.rank >= 0
     if not begin.any():
@@ -164,6 +157,32 @@ def laid_down(c: Cells, scene: Scene, starts: Starts) -> tuple[Cells, str]:
     jog, flip = (np.where(met[:, None], array, -1) for array in (c.jog, c.flip))
     rank, component = np.where(met, c.rank, -1), np.where(met, c.component, -1)
     return replace(c, jog=jog, flip=flip, rank=rank, component=component), bad
+
+
+def cells_of_ranges(c: Cells, scene: Scene, laid: list[list[Span]]) -> tuple[Array, str]:
+    """Find the cells that hold the starts of some ranges, as far as these lie on the arm; and "" or why they do not."""
+    begin = np.zeros(len(c.rank), dtype=bool)
+    for i, (edges, ranges) in enumerate(zip(c.edges, laid, strict=True)):
+        for lo, hi in ranges:
+            if not lo >= edges[0]:
+                return begin, f"side {i}: starts are claimed that lie before the cells"
+            if Fraction(lo) >= scene.arm[0]:
+                return begin, f"side {i}: starts are claimed that lie beyond arm.length"
+            if Fraction(float(edges[-1])) < min(Fraction(hi), scene.arm[1]):
+                return begin, f"side {i}: the cells end before the starts do"
+            begin[c.start[i] : c.start[i + 1]] |= (edges[1:] > lo) & (edges[:-1] < hi)
+    return begin, ""
+
+
+def share_of_ranges(c: Cells, laid: list[list[Span]], cells: Array, end: float) -> float:
+    """Bound from below the share of some ranges that lies in some cells, up to some x."""
+    claimed = whole = 0.0
+    for i, (edges, ranges) in enumerate(zip(c.edges, laid, strict=True)):
+        for lo, hi in ranges:
+            whole += float_above(exact(Fraction(hi) - Fraction(lo)))
+            inside = np.minimum(edges[1:], min(hi, end)) - np.maximum(edges[:-1], lo)
+            claimed += float(np.clip(inside, 0.0, None)[cells[c.start[i] : c.start[i + 1]]].sum())
+    return claimed / whole * (1 - 2.0**-30)  # against the rounding of these sums
 
 
 def led_to(c: Cells, cells: Array) -> Array:
@@ -329,13 +348,7 @@ def shares(c: Cells, scene: Scene, starts: Starts, cells: Array) -> tuple[float,
     whole = claimed = explained = 0.0
     end = float_below(exact(scene.arm[0]))
     if starts.laid is not None:
-        for i, (edges, ranges) in enumerate(zip(c.edges, starts.laid, strict=True)):
-            own = cells[c.start[i] : c.start[i + 1]]
-            for lo, hi in ranges:
-                whole += float_above(exact(Fraction(hi) - Fraction(lo)))
-                inside = np.minimum(edges[1:], min(hi, end)) - np.maximum(edges[:-1], lo)
-                claimed += float(np.clip(inside, 0.0, None)[own].sum())
-        return claimed / whole * (1 - 2.0**-30), 0.0
+        return share_of_ranges(c, starts.laid, cells, end), 0.0
     for i, s in enumerate(scene.sides):
         begin, fixed = float_above(s.a), starts.fixed(i)
         whole += float_above(exact(scene.arm[1])) - float_below(s.a)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from limitsets.cli.arguments import HELP_NO_RECHECK, deviations
+from limitsets.cli.arguments import HELP_LAID, HELP_NO_RECHECK, deviations, laid_ranges
 from limitsets.cli.certificates import certified, said_of
 from limitsets.cli.output import Csv, Form, Format, Json, Scene, Words, answer, opened, option, progress, show
 
@@ -35,6 +35,7 @@ def feed(
         str, option("--law", "LAW", "Of --scatter: gaussian (standard deviations) or bounded.")
     ] = "gaussian",
     noise: Annotated[Words, option("--noise", "Q=DEV", HELP_NOISE)] = None,
+    laid: Annotated[Words, option("--laid", "SIDE=LO:HI", HELP_LAID)] = None,
     trials: Annotated[int, option("--trials", "N", "Parts thrown from random starts.", min=1)] = 10_000,
     seed: Annotated[int, option("--seed", "N", "Of the trials.", min=0)] = 0,
     cells: Annotated[
@@ -78,6 +79,7 @@ def feed(
             chosen,
             scattering_from(chosen, random, law) if random else None,
             side=side,
+            laid=laid_ranges(laid),
             noise=deviations("--noise", noise),
             prove=not no_proof,
             level=not no_level,
@@ -123,10 +125,16 @@ def _text(found: Feeding, files: list[Path], written: dict[str, Any] | None) -> 
     end, unit = found.end, found.end.scene.unit
     note = "".join(f"; {said}" for said in [_unused(found)] if said)
     typer.echo(f"{end.scene.name}: the arm ends at x = {end.x:g} {unit}, side {end.side} is wanted{note}")
+    if end.laid:
+        from limitsets.goals import laid_words
+
+        typer.echo(
+            f"all starts, proved and random, are where parts are laid down: {laid_words(end.laid, unit)}"
+        )
     parts = ", ".join(f"{lo:.4g} to {hi:.4g} {unit}" for lo, hi in end.clear) or "nowhere"
     typer.echo(f"clear of the wall beyond the end: {parts}")
     if found.safe is not None and found.fed is not None:
-        for line in (*found.safe.lines(end.side), *found.fed.lines(unit)):
+        for line in (*found.safe.lines(end.side, laid=bool(end.laid)), *found.fed.lines(unit)):
             typer.echo(line)
     show(found.table())
     if found.brackets is not None:

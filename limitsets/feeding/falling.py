@@ -13,7 +13,6 @@ What is assumed stands in docs/feeding.md.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
 from itertools import pairwise
@@ -24,8 +23,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from limitsets.errors import AnswerError
 from limitsets.geometry.polygon import above_side, side_ends
-from limitsets.goals import OrientedBeyond, Reaches
+from limitsets.goals import Laid, OrientedBeyond, Reaches
 from limitsets.robust.noise.chain_solution import starts_from
+from limitsets.robust.noise.sampling import uniform_starts
+from limitsets.scene.laid import LaidLike, read_laid
 from limitsets.scene.scene import require_rests
 
 if TYPE_CHECKING:
@@ -193,6 +194,8 @@ class ArmEnd:
         How far beyond the end a part on that side clears the wall [length].
     starts : ndarray, shape (n_sides,)
         Random starts lie from here to the end, equally likely per length on all sides [length].
+    laid : Laid
+        Where parts are laid down, before the end: all starts, of proofs too; () for the whole arm.
     """
 
     scene: Scene
@@ -200,6 +203,19 @@ class ArmEnd:
     side: int
     clear: tuple[tuple[float, float], ...]
     starts: NDArray[np.float64]
+    laid: Laid = ()
+
+    @property
+    def ranges(self) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]]:
+        """Lower ends, upper ends and sides of the ranges in which random starts lie."""
+        whole = [(side, lo, self.x) for side, lo in enumerate(self.starts.tolist())]
+        side, lo, hi = zip(*(self.laid or whole), strict=True)
+        return np.array(lo), np.array(hi), np.array(side)
+
+    def drawn(self, random: np.random.Generator, count: int) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+        """Draw random starts: places and sides."""
+        lo, hi, side = self.ranges
+        return uniform_starts(random, lo, hi, count, side)
 
     def fate(self, x: NDArray[np.float64], side: NDArray[np.int64]) -> NDArray[np.int64]:
         """Say what becomes of parts at rest: a number of `FATES`, -1 of those that stay on the arm."""
@@ -211,8 +227,8 @@ class ArmEnd:
         return np.where(beyond >= 0.0, fed, -1)
 
 
-def arm_end_of(scene: Scene, side: int | None = None, starts: Mapping[int, float] | None = None) -> ArmEnd:
-    """Read what is asked: the end of the arm, the side wanted, by default the goal's, and where random starts begin.
+def arm_end_of(scene: Scene, side: int | None = None, laid: LaidLike | None = None) -> ArmEnd:
+    """Read what is asked: the end of the arm, the side wanted, by default the goal's, and where parts are laid down.
 
     Raises
     ------
@@ -231,10 +247,10 @@ def arm_end_of(scene: Scene, side: int | None = None, starts: Mapping[int, float
         allowed = f"above the cavity's position, {x:g} {scene.unit}"
         remedy = "arm.length is how far landings are followed: lengthen it by a part's length"
         raise AnswerError("the length of the arm", scene.arm_length, allowed, remedy)
-    begin = starts_from(scene)
-    for number, least in (starts or {}).items():
-        if number not in range(begin.size) or not scene.sides.a[number] <= least < x:
-            allowed = f"by side, from a of that side to below {x:g} {scene.unit}"
-            raise AnswerError("the starts", f"{number}: {least}", allowed, "name places on the arm")
-        begin[number] = least
-    return ArmEnd(scene, x, side, clear_beyond(scene, side), begin)
+    ranges = read_laid(scene, laid)
+    for on, lo, hi in ranges:
+        if not hi <= x:
+            allowed = f"up to the end of the arm, {x:g} {scene.unit}"
+            remedy = "lay parts down before it"
+            raise AnswerError("the range", f"{lo:g} to {hi:g} on side {on}", allowed, remedy, key="laid")
+    return ArmEnd(scene, x, side, clear_beyond(scene, side), starts_from(scene), ranges)

@@ -105,7 +105,7 @@ class FeedingProblem:
         chain = self.chain.chain(cover, scatter)
         x = np.concatenate([cover.centres(side) for side in range(cover.sides)])
         fate = self.end.fate(x, cover.side_of(np.arange(cover.n_cells)))
-        masses = random_starts(cover, self.chain.starts, self.end.x)
+        masses = random_starts(cover, *self.end.ranges)
         rows: list[list[float]] = []
         while masses.sum() > UNDER_WAY and len(rows) < MOST_THROWS:
             left = float((masses @ chain.sinks).sum())

@@ -17,7 +17,7 @@ from limitsets.maps import codes
 from limitsets.proofs.attraction import Attraction
 from limitsets.proofs.cover import targets
 from limitsets.proofs.goals.kind import Answer, Kind, against, begins, common, throws_to_reach, undecided
-from limitsets.proofs.goals.recurrent_orbits import Loop, cycle_that
+from limitsets.proofs.goals.recurrent_orbits import Loop, cycle_that, meets
 from limitsets.scene import Scene
 
 __all__ = ["KIND"]
@@ -54,8 +54,13 @@ def _refute(found: Attraction, scene: Scene, goal: FlipOrder) -> Answer:
     if common(found, anywhere=False):
         return undecided(common(found, anywhere=False))
     if not _is_cycle(goal.order, found.cover.grid.sides):
-        return against(cycle_that(found, scene, lambda loop: _flips_otherwise(loop, goal.order)), AGAINST)
-    return against(cycle_that(found, scene, lambda loop: not loop.branches.any()))
+        return against(
+            cycle_that(
+                found, scene, lambda loop: meets(loop, goal.laid) and _flips_otherwise(loop, goal.order)
+            ),
+            AGAINST,
+        )
+    return against(cycle_that(found, scene, lambda loop: meets(loop, goal.laid) and not loop.branches.any()))
 
 
 def _rolls(found: Attraction) -> list[NDArray[np.int32]]:

@@ -25,7 +25,7 @@ from limitsets.proofs.goals.reaches import not_null
 from limitsets.proofs.near_hinge import NO_STARTS
 from limitsets.scene import Scene
 
-__all__ = ["hexed", "laid_only", "narrowed", "prove_laid", "starts_in"]
+__all__ = ["hexed", "laid_only", "narrowed", "prove_laid", "reached_from", "starts_in"]
 
 
 def starts_in(found: Attraction, laid: Laid) -> tuple[Mask, bool]:
@@ -39,7 +39,7 @@ def starts_in(found: Attraction, laid: Laid) -> tuple[Mask, bool]:
     return meets, inside
 
 
-def _after(found: Attraction, cells: Mask) -> Mask:
+def reached_from(found: Attraction, cells: Mask) -> Mask:
     """Return the cells to which an orbit from the given ones can come, these included."""
     met, new, ways = cells.copy(), cells.copy(), everywhere(found.cover)
     while new.any():
@@ -55,7 +55,7 @@ def _after(found: Attraction, cells: Mask) -> Mask:
 
 def narrowed(found: Attraction, cells: Mask) -> Attraction:
     """Keep what orbits from some cells can come to: other cells have no images, and neither attract nor recur."""
-    keep, cover = _after(found, cells), found.cover
+    keep, cover = reached_from(found, cells), found.cover
     grid, ranges = cover.grid, cover.graph.ranges
     images = []
     for side, one in enumerate(cover.images):

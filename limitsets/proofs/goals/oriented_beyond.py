@@ -76,7 +76,7 @@ def section_of(goal: OrientedBeyond, scene: Scene) -> dict[str, Any]:
 def _refute(found: Attraction, scene: Scene, goal: OrientedBeyond) -> Answer:
     wrong = goal.wrong()
     if not goal.from_anywhere:
-        refutation = recurrent_violation(found, scene, wrong)
+        refutation = recurrent_violation(found, scene, wrong, goal.laid)
         again = _again(found, goal) if refutation.of == "every" else {}
         if again:
             refutation = refutation._replace(of="almost-every", recurs={**refutation.recurs, **again})

@@ -24,7 +24,7 @@ from limitsets.proofs.goals.kind import (
     throws_to_reach,
     undecided,
 )
-from limitsets.proofs.goals.recurrent_orbits import Loop, Refutation, cycle_that
+from limitsets.proofs.goals.recurrent_orbits import Loop, Refutation, cycle_that, meets
 from limitsets.proofs.goals.violating_orbits import sample_passage
 from limitsets.proofs.perron_frobenius import perron_frobenius_bound
 from limitsets.scene import Scene
@@ -44,7 +44,7 @@ def _refute(found: Attraction, scene: Scene, goal: Reaches) -> Answer:
     every = goal.every_orbit
 
     def refutes(loop: Loop) -> bool:
-        return (every or loop.attracts) and not _arrives(loop, goal)
+        return (every or loop.attracts) and meets(loop, goal.laid) and not _arrives(loop, goal)
 
     never = cycle_that(found, scene, refutes, attracting=not every)
     short = falls_short(found, goal)

@@ -110,15 +110,22 @@ def with_border(grid: Grid, x: float) -> Grid:
     return Grid(grid.domain, tuple(sides))
 
 
-def random_starts(grid: Grid, lo: NDArray[np.float64], hi: float) -> Array:
-    """Masses of starts that lie anywhere from `lo[side]` to `hi`, equally likely per length on all sides."""
-    parts = []
-    for side, (edges,) in enumerate(grid.edges):
-        overlap = np.minimum(edges[1:], hi) - np.maximum(edges[:-1], lo[side])
-        parts.append(np.maximum(overlap, 0.0))
-    masses = np.concatenate(parts)
+def random_starts(
+    grid: Grid,
+    lo: NDArray[np.float64],
+    hi: float | NDArray[np.float64],
+    sides: NDArray[np.int64] | None = None,
+) -> Array:
+    """Masses of starts in ranges `lo` to `hi` on some sides, by default one on each, equally likely per length."""
+    masses = np.zeros(grid.n_cells)
+    on = np.arange(lo.size) if sides is None else sides
+    for side, low, high in zip(on.tolist(), lo, np.broadcast_to(hi, lo.shape), strict=True):
+        (edges,) = grid.edges[side]
+        overlap = np.minimum(edges[1:], high) - np.maximum(edges[:-1], low)
+        masses[grid.of_side(side)] += np.maximum(overlap, 0.0)
     if not masses.sum() > 0.0:
-        raise GridError("the range of the starts", (lo.tolist(), hi), "places on the arm", "move its ends")
+        ends = (lo.tolist(), np.asarray(hi).tolist())
+        raise GridError("the range of the starts", ends, "places on the arm", "move its ends")
     return masses / masses.sum()  # type: ignore[no-any-return]  # numpy types a quotient as Any
 
 
