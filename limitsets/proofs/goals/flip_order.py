@@ -53,14 +53,15 @@ def _prove(found: Attraction, _: Scene, goal: FlipOrder) -> Answer:
 def _refute(found: Attraction, scene: Scene, goal: FlipOrder) -> Answer:
     if common(found, anywhere=False):
         return undecided(common(found, anywhere=False))
+
+    def otherwise(loop: Loop) -> bool:
+        return meets(loop, goal.laid) and _flips_otherwise(loop, goal.order)
+
     if not _is_cycle(goal.order, found.cover.grid.sides):
-        return against(
-            cycle_that(
-                found, scene, lambda loop: meets(loop, goal.laid) and _flips_otherwise(loop, goal.order)
-            ),
-            AGAINST,
-        )
-    return against(cycle_that(found, scene, lambda loop: meets(loop, goal.laid) and not loop.branches.any()))
+        return against(cycle_that(found, scene, otherwise), AGAINST)
+    return against(
+        cycle_that(found, scene, lambda loop: meets(loop, goal.laid) and not loop.branches.any())
+    )
 
 
 def _rolls(found: Attraction) -> list[NDArray[np.int32]]:
