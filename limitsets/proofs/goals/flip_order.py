@@ -59,9 +59,7 @@ def _refute(found: Attraction, scene: Scene, goal: FlipOrder) -> Answer:
 
     if not _is_cycle(goal.order, found.cover.grid.sides):
         return against(cycle_that(found, scene, otherwise), AGAINST)
-    return against(
-        cycle_that(found, scene, lambda loop: meets(loop, goal.laid) and not loop.branches.any())
-    )
+    return against(cycle_that(found, scene, lambda loop: meets(loop, goal.laid) and not loop.branches.any()))
 
 
 def _rolls(found: Attraction) -> list[NDArray[np.int32]]:
