@@ -68,7 +68,9 @@ def read_starts(section: dict[str, Any], goal: dict[str, Any], n_sides: int) -> 
             x = [hex_float(each, "goal.starts") for each in by_side(value, "from", n_sides)]
         else:
             laid = read_laid(value, n_sides)
-    require(kind in ("every", "almost-every", "from", "cells") or laid, "goal.starts is none that is known")
+    require(
+        kind in ("every", "almost-every", "from", "cells") or bool(laid), "goal.starts is none that is known"
+    )
     thinning = section.get("thinning", 0)
     fits = type(thinning) is int and (0 < thinning < MOST_COUNTED if "thinning" in section else True)
     require(fits, "goal.thinning is not a number of rounds")
