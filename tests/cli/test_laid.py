@@ -25,9 +25,9 @@ def test_certify_exits_with_0_where_all_that_is_laid_down_is_proved(capfd):
 
 
 def test_certify_says_where_parts_are_laid_down(capfd):
-    code, out, _ = run(capfd, "certify", "paper-designed", "--laid", "0=8:20", "--laid", "2=10:40 cm")
+    code, out, _ = run(capfd, "certify", "paper-designed", "--laid", "0=8:20", "--laid", "2=12:40 cm")
     assert code == 0
-    assert "x = 8 to 20 in on side 0, x = 3.93701 to 15.748 in on side 2" in out
+    assert "x = 8 to 20 in on side 0, x = 4.72441 to 15.748 in on side 2" in out
     assert "attracts-all" not in out
 
 
