@@ -38,8 +38,9 @@ def run_goal(
 
         scene, _ = opened(name, None if out and out.suffix == ".toml" else out)
         given = bounds_of(scene, bounds)
-        about = {"vary": vary, "bounds": given, "laid": laid, "evaluations": evaluations}
-        found = design_for_goal(scene, **about, progress=tell)
+        found = design_for_goal(
+            scene, vary=vary, bounds=given, laid=laid, evaluations=evaluations, progress=tell
+        )
         files = [] if out is None else _written(found, out, form)
     answer(found, json, lambda: _text(found, files, evaluations), csv=(csv, found.table))
     return 0 if found.verdict == "proved" else 1

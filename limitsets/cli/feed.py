@@ -101,10 +101,10 @@ def feed(
         if out is not None:
             from limitsets import plot
             from limitsets.files import as_json
-            from limitsets.report.writing import laid
+            from limitsets.report.writing import laid as files_laid
 
             drawn = [("part", plot.part(chosen)), ("feeding", plot.feeding(found))]
-            files = laid(out, drawn, lambda _: {"feeding.json": as_json(record)}, form)
+            files = files_laid(out, drawn, lambda _: {"feeding.json": as_json(record)}, form)
     if json and (note := _unused(found)):
         print(f"limitsets: {note}", file=sys.stderr, flush=True)
     answer(record, json, lambda: _text(found, files, written), csv=(csv, found.table))

@@ -109,7 +109,7 @@ def proved_feeding(
         if step == 0 and fed.verdict != "proved":
             tell("an orbit that is never fed", len(LADDER), len(LADDER) + 2)
             never = cycle_that(
-                found, scene, lambda loop: meets(loop, end.laid) and (loop.hi < below(end.x)).all()
+                found, scene, lambda loop: meets(loop, end.laid) and bool((loop.hi < below(end.x)).all())
             )
         if never.states:
             cycle, reason = never.recurs.get("cycle", {}), "a periodic orbit is never fed"

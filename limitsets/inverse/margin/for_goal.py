@@ -293,8 +293,8 @@ def design_for_goal(
         start.goal,
         *([Reaches(start.goal.x, start.goal.side)] if isinstance(start.goal, OrientedBeyond) else []),
     )
-    asked = tuple(laid_goal(goal, start.goal.laid) for goal in asked)
-    verdict = Query.of(found, asked).prove().verdict if room > 0.0 else "undecided"
+    goals = tuple(laid_goal(goal, start.goal.laid) for goal in asked)
+    verdict = Query.of(found, goals).prove().verdict if room > 0.0 else "undecided"
     lost = why in (LOST, NO_PART)
     return GoalDesign(
         found, start, ends, room, None if lost else room_before, why, _leaving(found, start.goal.laid), verdict,

@@ -179,7 +179,7 @@ def _of_laid(section: Mapping[str, Any], said: str) -> str:
     """Put a goal of parts that are laid down in words."""
     ((word, spans),) = section["starts"].items()
     laid = tuple(
-        (int(side), *(float.fromhex(end) for end in pair)) for side, pairs in spans.items() for pair in pairs
+        (int(side), float.fromhex(lo), float.fromhex(hi)) for side, pairs in spans.items() for lo, hi in pairs
     )
     which = "Every start" if word == "within" else "Each start in the cells named"
     but = ", but for starts of total length zero" if "thinning" in section else ""

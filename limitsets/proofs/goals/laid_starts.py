@@ -25,6 +25,9 @@ from limitsets.proofs.goals.reaches import not_null
 from limitsets.proofs.near_hinge import NO_STARTS
 from limitsets.scene import Scene
 
+# Of whose starts so small a share is open, while others leave, finer cells are not asked.
+LITTLE = 1e-3
+
 __all__ = ["hexed", "laid_only", "narrowed", "prove_laid", "reached_from", "starts_in"]
 
 
@@ -123,7 +126,7 @@ def prove_laid(found: Attraction, scene: Scene, goal: Goal, kind: Kind) -> Answe
         shares = {"share": 1.0, "leaves": 0.0, "creeps": 0.0, "open": 0.0}
         return answer._replace(section=section, starts={"within": spans}, shares=shares)
     # finer cells do not bring back starts that leave
-    final = shares["leaves"] + shares["creeps"] > 0.0 and shares["open"] < ROUNDING * 10.0
+    final = shares["leaves"] + shares["creeps"] > 0.0 and shares["open"] < LITTLE
     return answer._replace(
         verdict="proved-on-cells", reason=missing, section=section, starts="cells", shares=shares, final=final
     )
