@@ -9,7 +9,6 @@ import numpy as np
 from limitsets.assembly.pairing import Pair, Start, are_apart
 from limitsets.errors import AnswerError
 from limitsets.robust.noise.laws import Gaussian, Uniform
-from limitsets.robust.noise.sampling import uniform_starts
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -57,7 +56,7 @@ class Draws:
 
     def _start(self, number: int) -> Start:
         end = self.pair.ends[number]
-        x, side = uniform_starts(self.random, end.starts, end.x, 1)
+        x, side = end.drawn(self.random, 1)
         return float(x[0]), int(side[0])
 
     def throw(self) -> tuple[float, tuple[float, float]]:

@@ -12,7 +12,7 @@ from .cells import Crew, check_components, check_ranks, check_structure, tasks_o
 from .end_points import check_ends, ends_statement, read_ends
 from .feeding import FEEDS_KEYS, check_feeds, feeds_statement, read_feeds
 from .file import Cells
-from .goals import GOALS, check_goal, read_goal_claim, statement_of_goal
+from .goals import GOALS, check_goal, is_laid, read_goal_claim, statement_of_goal
 from .near_hinge import check_below_cells, fixed_points_in_words, read_near_hinge
 from .orbits import check_orbits, orbits_statement, read_orbits
 from .refutations import check_refuted, read_refutation, statement_of_refutation
@@ -110,7 +110,9 @@ def check_cell_claims(
         bad = check_goal(c, scene, goal)
         if bad:
             failed.append((["goal"], bad))
-        elif (first_version and goal["all"]) or (goal["anywhere"] and goal["kind"] != "attracts_all"):
+        elif not is_laid(goal) and (
+            (first_version and goal["all"]) or (goal["anywhere"] and goal["kind"] != "attracts_all")
+        ):
             wide.append("goal")
         elif not first_version:
             some.append("goal")

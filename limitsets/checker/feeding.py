@@ -5,6 +5,7 @@ docs/certificates.md, "Feeding", and number 17.
 
 import math
 from collections.abc import Iterator
+from fractions import Fraction
 from typing import Any
 
 import numpy as np
@@ -15,19 +16,21 @@ from .cells import Crew, check_structure, extents, first_bad, tasks_of
 from .file import Cells
 from .near_hinge import check_thrown_out
 from .orbits import read_orbits
-from .refutations import periodic, read_passing, thrown_again
+from .refutations import lies_within, periodic, read_passing, thrown_again
 from .scene import Scene
-from .starts import MOST_COUNTED
+from .starts import MOST_COUNTED, Span, cells_of_ranges, led_to, ranges_in_words, read_laid, share_of_ranges
 from .texts import by_side, decimal, hex_float, read_side, require, table
 from .thinning import check_null, check_thinning
 
-FEEDS_KEYS = "safety wrong progress almost never_fed"  # the parts of the claim: a file has some of them
+PARTS = "safety wrong progress almost never_fed"  # of the claim: a file has some of them
+FEEDS_KEYS = f"{PARTS} laid"  # and where parts are laid down: all that is said is then of these starts
 
 
 def read_feeds(section: dict[str, Any], n_sides: int) -> dict[str, Any]:
     """Read the section of feeds."""
     feeds: dict[str, Any] = {"side": read_side(section["side"], n_sides)}
-    require(len(section) > 1, "feeds: nothing is claimed")
+    require(bool(set(PARTS.split()) & set(section)), "feeds: nothing is claimed")
+    feeds["laid"] = read_laid(section["laid"], n_sides) if "laid" in section else None
     if "safety" in section:
         feeds["safety"] = section["safety"]
         require(feeds["safety"] in ("every", "cells"), "feeds.safety is none of the starts that are known")
@@ -38,7 +41,8 @@ def read_feeds(section: dict[str, Any], n_sides: int) -> dict[str, Any]:
             if isinstance(starts, dict):
                 since = by_side(table(starts, "feeds: starts", "from")["from"], "from", n_sides)
                 starts = [hex_float(x, "from") for x in since]
-            require(isinstance(starts, list) or starts == every, f"feeds.{name}: starts that are not known")
+            known = starts == every or (isinstance(starts, list) and feeds["laid"] is None)
+            require(known, f"feeds.{name}: starts that are not known")
             fits = type(number) is int and 0 <= number < MOST_COUNTED
             require(fits, f"feeds.{name}.{count} is not a whole number as it should be")
             feeds[name] = (None if starts == every else starts, number)
@@ -62,6 +66,13 @@ def check_feeds(scene: Scene, c: Cells, box: int, feeds: dict[str, Any], crew: C
     if bad:
         return bad
     feeds["x"] = f"{decimal(scene.end)} {scene.unit}"
+    feeds["begin"] = None
+    if feeds["laid"] is not None:
+        feeds["begin"], bad = cells_of_ranges(c, scene, feeds["laid"])
+        if any(Fraction(hi) > scene.end for ranges in feeds["laid"] for _, hi in ranges):
+            bad = bad or "starts are claimed that lie beyond the end of the arm"
+        if bad:
+            return bad
     feeds["shares"] = {}
     end, used = arm_end(c, scene), np.zeros(len(c.side), dtype=bool)
     for check in (check_safety, check_progress, check_almost):
@@ -85,15 +96,20 @@ def check_safety(end: ArmEnd, scene: Scene, feeds: dict[str, Any]) -> tuple[str,
     if "safety" not in feeds:
         return "", none
     bad, gaps = unsafe_starts(end, scene, feeds["side"])
-    safe = end.before & ~bad
+    safe, begin = end.before & ~bad, feeds["begin"]
     if feeds["safety"] == "every":
         what = f"a part may come to rest beyond the end of the arm on another side than {feeds['side']}"
+        if begin is not None:
+            feeds["shares"]["safety"] = 1.0
+            return first_bad(end.c, [(safe | ~begin | end.fed, what)]), safe
         for i, gap in enumerate(gaps):
             if gap:
                 return f"side {i}, before the first cell: {what}", none
         feeds["shares"]["safety"] = 1.0
         return first_bad(end.c, [(safe | end.fed, what)]), safe
     feeds["shares"]["safety"] = share_of(end, scene, safe)
+    if begin is not None:
+        feeds["shares"]["safety"] = share_of_ranges(end.c, feeds["laid"], safe, math.inf)
     whole = end.c.upper() <= float_below(exact(end.x))  # not the cell that X lies in
     feeds["safe"] = extents(end.c, safe & whole, inward=True)
     return "", safe
@@ -106,7 +122,7 @@ def check_progress(end: ArmEnd, scene: Scene, feeds: dict[str, Any]) -> tuple[st
     since, throws = feeds["progress"]
     late = late_within(end, throws)
     what = f"{throws} throws are not proved to be enough"
-    bad = check_named(end, scene, since, late, what)
+    bad = check_named(end, scene, since, late, what, feeds["begin"])
     if not bad:
         feeds["shares"]["progress"] = share_from(end, scene, since)
     return bad, end.before & ~late
@@ -122,9 +138,12 @@ def check_almost(end: ArmEnd, scene: Scene, feeds: dict[str, Any]) -> tuple[str,
         return "", np.zeros_like(end.before)
     since, rounds = feeds["almost"]
     leaves = leading_off(end)
-    bad = check_named(end, scene, since, leaves, "a part may leave the arm")
+    begin = feeds["begin"]
+    bad = check_named(end, scene, since, leaves, "a part may leave the arm", begin)
     stay = late_within(end, len(leaves)) & ~leaves
-    if not bad and since is None:  # before the first cells
+    if begin is not None:
+        stay &= led_to(end.c, begin)
+    elif not bad and since is None:  # before the first cells
         bad = check_null(end.c, scene, np.zeros_like(leaves), True)
     if not bad:
         bad = check_thinning(end.c, scene, stay, rounds, np.zeros(len(leaves), dtype=np.int32))
@@ -133,9 +152,16 @@ def check_almost(end: ArmEnd, scene: Scene, feeds: dict[str, Any]) -> tuple[str,
     return bad, end.before & ~leaves
 
 
-def check_named(end: ArmEnd, scene: Scene, since: list[float] | None, late: Array, what: str) -> str:
-    """Check that the starts that are named, beyond some x on each side or all, lie in no bad cell; "" or the reason."""
+def check_named(
+    end: ArmEnd, scene: Scene, since: list[float] | None, late: Array, what: str, begin: Array | None
+) -> str:
+    """Check that the starts that are named, beyond some x on each side or all, lie in no bad cell; "" or the reason.
+
+    Where parts are laid down these are the starts in the cells `begin`.
+    """
     c = end.c
+    if begin is not None:
+        return first_bad(c, [(~(begin & end.before & late), what)])
     for i, edges in enumerate(c.edges):
         own = slice(int(c.start[i]), int(c.start[i + 1]))
         needed = end.before[own].copy()
@@ -163,10 +189,11 @@ def share_from(end: ArmEnd, scene: Scene, since: list[float] | None) -> float:
 
 def check_shown(end: ArmEnd, scene: Scene, feeds: dict[str, Any]) -> str:
     """Check the orbit that comes to rest on another side, and the one that never comes to X; "" or the reason."""
-    x = exact(end.x)
+    x, laid = exact(end.x), feeds["laid"]
     try:
         if "wrong" in feeds:
             *states, (side, lo, hi) = thrown_again(scene, feeds["wrong"])
+            prove(laid is None or lies_within(laid, states[0]), "no part is laid down where it starts")
             prove(
                 all(each[2] < x for each in states), "it may come to rest beyond the end of the arm earlier"
             )
@@ -174,6 +201,8 @@ def check_shown(end: ArmEnd, scene: Scene, feeds: dict[str, Any]) -> str:
             prove(beyond, "it is not proved to come to rest beyond the end of the arm on another side")
         if "never_fed" in feeds:
             states = periodic(scene, feeds["never_fed"])
+            lies = laid is None or any(lies_within(laid, state) for state in states)
+            prove(lies, "no part is laid down at a place of the periodic orbit")
             prove(all(each[2] < x for each in states), "the periodic orbit may come to the end of the arm")
     except UnprovedError as error:
         return f"an orbit: {error}"
@@ -185,6 +214,7 @@ def verdict_of_feeds(feeds: dict[str, Any], most_open: float) -> tuple[str, str]
     if "wrong" in feeds or ("never_fed" in feeds and "almost" not in feeds):
         return "refuted", ""
     shares, open_parts = feeds["shares"], []
+    most_open = most_open if feeds["laid"] is None else 0.0
     progress = max(shares.get("progress", 0.0), shares.get("almost", 0.0))
     for name, share in (("safety", shares.get("safety", 0.0)), ("progress", progress)):
         if share < 1 - most_open:
@@ -205,11 +235,14 @@ def feeds_statement(feeds: dict[str, Any], noisy: bool) -> str:
 
 def parts_in_words(feeds: dict[str, Any], x: str, noisy: bool) -> Iterator[str]:
     """Put each part in words."""
-    side, there = feeds["side"], f"comes to rest at x >= {x}"
+    side, there, laid = feeds["side"], f"comes to rest at x >= {x}", feeds["laid"]
     if "safety" in feeds:
         some = (
-            named_in_words(None, x) if feeds["safety"] == "every" else f"the starts {feeds.get('safe', '')}"
+            named_in_words(None, x, laid)
+            if feeds["safety"] == "every"
+            else f"the starts {feeds.get('safe', '')}"
         )
+        some += f", of those with {ranges_in_words(laid)}" if laid and feeds["safety"] == "cells" else ""
         yield f"safety: from {some}, the first rest at x >= {x}, if there is one, is on side {side}"
     if "wrong" in feeds:
         orbit = feeds["wrong"]
@@ -219,12 +252,12 @@ def parts_in_words(feeds: dict[str, Any], x: str, noisy: bool) -> Iterator[str]:
     if "progress" in feeds:
         since, throws = feeds["progress"]
         near = " where x is in the cells; nearer to the joint x - a_i grows with every throw"
-        within = f"within {throws} throws{near if since is None else ''}"
-        yield f"progress: {named_in_words(since, x)} {there}, {within}"
+        within = f"within {throws} throws{near if since is None and not laid else ''}"
+        yield f"progress: {named_in_words(since, x, laid)} {there}, {within}"
     if "almost" in feeds:
         others = ", others for other throws" if noisy else ""
         but = f", but for starts of total length zero{others},"
-        yield f"progress: {named_in_words(feeds['almost'][0], x)}{but} {there}"
+        yield f"progress: {named_in_words(feeds['almost'][0], x, laid)}{but} {there}"
     if "never_fed" in feeds:
         o = feeds["never_fed"]
         place = f"with a place x in [{o.lo!r}, {o.hi!r}] on side {o.side}"
@@ -233,8 +266,10 @@ def parts_in_words(feeds: dict[str, Any], x: str, noisy: bool) -> Iterator[str]:
     yield "whether a part that comes to rest there clears the wall of the cavity is not claimed"
 
 
-def named_in_words(since: list[float] | None, x: str) -> str:
+def named_in_words(since: list[float] | None, x: str, laid: list[list[Span]] | None) -> str:
     """Name the starts."""
+    if laid is not None:
+        return f"every start with {ranges_in_words(laid)}"
     if since is None:
         return f"every start a_i < x < {x} on every side i"
     return "every start with " + ", or ".join(f"{lo!r} < x < {x} on side {i}" for i, lo in enumerate(since))

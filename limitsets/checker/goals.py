@@ -19,6 +19,7 @@ from .starts import (
     Starts,
     check_starts,
     explained_in_words,
+    laid_down,
     read_starts,
     starts_in_words,
 )
@@ -107,9 +108,13 @@ def content_of_goal(goal: dict[str, Any]) -> tuple[Any, ...]:
 
 def check_goal(c: Cells, scene: Scene, goal: dict[str, Any]) -> str:
     """Check a goal by the integers, given that all images are what the certificate says; "" or the reason."""
-    starts = goal["starts"]
+    starts, laid = goal["starts"], is_laid(goal)
+    if laid:  # the goal is asked of what these starts can come to
+        c, bad = laid_down(c, scene, starts)
+        if bad:
+            return bad
     everywhere = goal["all"] if starts is None else goal["anywhere"] and goal["kind"] != "attracts_all"
-    bad = check_everywhere(c, scene) if everywhere else ""
+    bad = check_everywhere(c, scene) if everywhere and not laid else ""
     if not bad and starts is not None:
         bad = check_starts(c, scene, goal, starts)
     elif not bad and goal["all"] and goal["kind"] in ("attracts_all", "flip_order"):
@@ -125,6 +130,11 @@ def check_goal(c: Cells, scene: Scene, goal: dict[str, Any]) -> str:
     if goal["kind"] == "flip_order":
         return check_flip_order(c, goal)
     return ""  # stays_on_arm says only that images lie in cells
+
+
+def is_laid(goal: dict[str, Any]) -> bool:
+    """Whether the goal is claimed for starts that are laid down in some ranges."""
+    return goal["starts"] is not None and goal["starts"].laid is not None
 
 
 def check_oriented(c: Cells, scene: Scene, goal: dict[str, Any]) -> str:
@@ -148,7 +158,7 @@ def check_oriented(c: Cells, scene: Scene, goal: dict[str, Any]) -> str:
         bad = first_bad(c, [(good, f"a {what} may end beyond x = {float(beyond)!r} on another side")])
         if bad:
             return bad
-    for i, edges in enumerate(c.edges):
+    for i, edges in enumerate(c.edges if not is_laid(goal) else ()):
         edge = float(edges[0])
         if i != goal["side"] and not near_landing(scene.sides[i], scene.k_lo, scene.k_hi, edge) <= x:
             return f"side {i}, near the joint: a throw may end beyond x = {float(beyond)!r}"
@@ -164,8 +174,7 @@ def check_reaches(c: Cells, scene: Scene, goal: dict[str, Any]) -> str:
     wanted = (c.side == goal["side"]) & (c.lower() >= x)
     inside = c.component >= 0
     if goal["every"]:
-        everything = np.ones(len(inside), dtype=bool)
-        cells = everything if goal["anywhere"] else inside
+        cells = c.rank >= 0 if goal["anywhere"] else inside
         late = not_arriving(c, [c.jog, c.flip], cells, wanted, goal["throws"])
         return first_bad(c, [(~late, f"{goal['throws']} throws are not proved to be enough")])
     if goal["anywhere"] and goal["starts"] is None:
@@ -215,15 +224,17 @@ def statement_of_goal(goal: dict[str, Any], noisy: bool) -> str:
     """Put a goal in words; its `starts` are those for which it is proved."""
     starts = goal["starts"] or (Starts("every") if goal["all"] else ATTRACTING)
     place = starts_in_words(starts, noisy)
+    those = "the attracting cells" + (" to which starts laid down can come" if is_laid(goal) else "")
     into = f"; into the attracting cells comes, and there stays, {place}"
     if starts.only:
         place, into = "every start in the attracting cells", ""
     if goal["anywhere"]:
         into = ""
-    here = place if goal["anywhere"] else "every start in the attracting cells"
+    here = place if goal["anywhere"] else f"every start in {those}"
     if goal["kind"] == "oriented_beyond":
         cells = "after two throws with the same parameters in" if goal["throws"] else "in"
-        where = f"after a throw from {place}" if goal["anywhere"] else f"{cells} the attracting cells"
+        after = "after every throw of an orbit from" if is_laid(goal) else "after a throw from"
+        where = f"{after} {place}" if goal["anywhere"] else f"{cells} {those}"
         words = f"{where}, x > {goal['text']} implies side {goal['side']}{into}"
     elif goal["kind"] == "reaches":
         there = f"comes to rest on side {goal['side']} at x >= {goal['text']}"

@@ -13,7 +13,7 @@ from .end_points import Throws
 from .goals import read_goal
 from .orbits import Orbit, prove_orbit, read_orbits
 from .scene import Scene, quantities, read_scene
-from .starts import INSIDE
+from .starts import INSIDE, Span, ranges_in_words, read_laid
 from .texts import KINDS, LENGTHS, hex_float, plain, quantity, read_side, require, rows, table
 
 MOST_THROWS = 100_000  # throws of an orbit that refutes
@@ -35,11 +35,17 @@ State = tuple[int, Arb, Arb]  # side, and bounds of x
 def read_refutation(section: dict[str, Any], n_sides: int) -> dict[str, Any]:
     """Read an orbit that refutes a goal: why it comes back, and either a cycle or a start with its throws."""
     nominal, tolerance = section["nominal"], section["tolerance"]
-    goal = read_broken_goal(section["goal"])
+    goal, laid = read_broken_goal(section["goal"], n_sides)
     same = isinstance(nominal, dict) and isinstance(tolerance, dict) and set(nominal) == set(tolerance)
     fits = same and len(nominal) <= 64
     require(fits, "refuted: nominal values and tolerance do not name the same quantities")
-    found = {"goal": read_goal(goal, n_sides), "nominal": nominal, "tolerance": tolerance, "why": ""}
+    found = {
+        "goal": read_goal(goal, n_sides),
+        "nominal": nominal,
+        "tolerance": tolerance,
+        "why": "",
+        "laid": laid,
+    }
     if "recurs" in section:
         recurs = table(section["recurs"], "refuted.recurs", "", " ".join(RECURS))
         require(len(recurs) == 1, "refuted.recurs is not one of cycle, closed and once")
@@ -52,13 +58,15 @@ def read_refutation(section: dict[str, Any], n_sides: int) -> dict[str, Any]:
     return found | read_passing(section, found["why"], n_sides)
 
 
-def read_broken_goal(value: object) -> dict[str, Any]:
-    """Read the section of the goal that is refuted; the counts of throws and jogs in it are set to 0."""
+def read_broken_goal(value: object, n_sides: int) -> tuple[dict[str, Any], list[list[Span]] | None]:
+    """Read the section of the refuted goal, its counts set to 0, and the ranges of its starts if it has any."""
     kind = value.get("kind") if isinstance(value, dict) else None
     require(isinstance(kind, str) and kind in BROKEN, "refuted.goal: not a kind that an orbit refutes")
-    goal = table(value, "refuted.goal", BROKEN[str(kind)][0], "from_anywhere")
+    goal = dict(table(value, "refuted.goal", BROKEN[str(kind)][0], "from_anywhere starts"))
     counts: dict[str, Any] = {"reaches": {"throws": 0}, "flip_order": {"jogs": 0}}.get(str(kind), {})
-    return counts | goal
+    starts = goal.pop("starts", None)
+    laid = None if starts is None else read_laid(table(starts, "refuted.starts", "within")["within"], n_sides)
+    return counts | goal, laid
 
 
 def read_passing(section: dict[str, Any], why: str, n_sides: int) -> dict[str, Any]:
@@ -128,6 +136,12 @@ def check_refuted(scene: Scene, section: dict[str, Any]) -> str:
         return "once is not enough: the goal does not speak of every throw from every start"
     try:
         states = periodic(scene, section["orbit"]) if why == "cycle" else thrown_again(scene, section)
+        if section["laid"] is not None:
+            begins = (
+                states[:1] if why == "once" else states
+            )  # an orbit that comes back begins with each of its states
+            laid = any(lies_within(section["laid"], state) for state in begins)
+            prove(laid, "no state of the orbit is proved to be one in which a part is laid down")
         if why == "once":
             return left_or_beyond(scene, goal, states[-1])
         prove(breaks(scene, goal, states), "no state of the orbit violates the goal")
@@ -136,6 +150,12 @@ def check_refuted(scene: Scene, section: dict[str, Any]) -> str:
     if goal["kind"] == "reaches" and not goal["every"] and not (why == "cycle" and section["orbit"].attracts):
         return "the goal speaks of almost every start, and the orbit is not proved to attract"
     return ""
+
+
+def lies_within(laid: list[list[Span]], state: State) -> bool:
+    """Whether a state is proved to lie inside one of the ranges of its side, so that its neighbours lie there too."""
+    side, low, high = state
+    return any(bool(low > lo and high < hi) for lo, hi in laid[side])
 
 
 def periodic(scene: Scene, orbit: Orbit) -> list[State]:
@@ -261,4 +281,8 @@ def statement_of_refutation(section: dict[str, Any]) -> str:
             )
         else:
             what = f"not from every start on the arm: the orbit from {start}, of {number}, {broken}"
-    return f"refuted: {what}" + (f"; {near}" if near else "")
+    laid = section["laid"]
+    begins = (
+        "" if laid is None else f"; one of its states lies where parts are laid down: {ranges_in_words(laid)}"
+    )
+    return f"refuted: {what}{begins}" + (f"; {near}" if near else "")

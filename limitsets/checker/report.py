@@ -66,7 +66,8 @@ class Report:
     starts : str, dict or None
         Those of the goal, as the certificate has them.
     share : float or None
-        Share of the arm with the starts for which the goal is proved: a lower bound.
+        Share of the arm, or of the ranges in which parts are laid down, for whose starts the goal is proved: a lower
+        bound.
     explained : float or None
         Share of the arm with the starts that are proved to be lost or to creep to the joint: a lower bound.
     open : float or None
@@ -435,7 +436,7 @@ def state_of(report: Report, name: str, section: dict[str, Any], failed: dict[st
     if name == "feeds":
         return verdict_of_feeds(section, MOST_OPEN)
     if name == "goal" and (report.starts == "cells" or (report.open or 0.0) > MOST_OPEN):
-        return "proved-on-cells", on_cells_in_words(report)
+        return "proved-on-cells", on_cells_in_words(report, laid=section["starts"].laid is not None)
     return "proved", ""
 
 
@@ -448,14 +449,17 @@ def tell_starts(report: Report, goal: dict[str, Any], scenes: list[Scene], cells
         both.append(shares(c, scene, starts, some))
     beyond = None if starts.x is None else {str(i): x for i, x in enumerate(starts.x)}
     report.starts = starts.kind if beyond is None else {"from": beyond}
+    if starts.kind == "within":
+        report.starts = {"within": {str(i): spans for i, spans in enumerate(starts.laid or ()) if spans}}
     report.share, report.explained = (math.floor(min(each) * 1e6) / 1e6 for each in zip(*both, strict=True))
     report.open = math.ceil((1 - min(claimed + known for claimed, known in both)) * 1e6) / 1e6
 
 
-def on_cells_in_words(report: Report) -> str:
+def on_cells_in_words(report: Report, *, laid: bool) -> str:
     """Say for which starts a goal is proved, where that is not for all starts."""
     which = "in the cells" if report.starts == "cells" else "from some x on"
-    return f"proved for starts {which} only, {100 * (report.share or 0.0):.4g} % of the arm or more: the rest is open"
+    of = "the ranges in which parts are laid down" if laid else "the arm"
+    return f"proved for starts {which} only, {100 * (report.share or 0.0):.4g} % of {of} or more: the rest is open"
 
 
 def value_in_words(value: object, name: str) -> str:

@@ -1,9 +1,11 @@
 """For which starts a goal holds: those proved to come to the attracting cells.
 
-docs/certificates.md, "For which starts": falling, passing and thin cells, and starts that are lost.
+docs/certificates.md, "For which starts": falling, passing and thin cells, starts that are lost, and those laid down.
 """
 
+import itertools
 import math
+from dataclasses import replace
 from fractions import Fraction
 from typing import Any, NamedTuple
 
@@ -16,7 +18,7 @@ from .file import Cells
 from .model import at_angle, landing_at, over_angles, ratios, rise_of_jog, root_above
 from .near_hinge import check_below_cells, near_angle, near_landing, read_near_hinge
 from .scene import MOST_HALVES, Scene, Side, over_halves, quantities
-from .texts import Quantity, by_side, hex_float, require, table
+from .texts import Quantity, by_side, hex_float, require, rows, table
 from .thinning import check_null, check_thinning
 
 MOST_COUNTED = 100_000  # throws, or rounds, that a goal may count
@@ -25,12 +27,16 @@ INSIDE = arb(2) ** -80
 VARYING = ("throw", "gravi")  # how the names of the quantities begin that kappa is computed from
 
 
+Span = tuple[float, float]
+
+
 class Starts(NamedTuple):
-    """The starts for which a goal is claimed: "every", "almost-every", "from" (beyond x on each side) or "cells".
+    """The starts of a goal: "every", "almost-every", "from" (beyond x on each side), "cells", "within" (some ranges).
 
     `thinning` counts its rounds; `near` has factors and fixed points where starts before the first cells are claimed; a
     worst sequence of landings takes starts up to `lost`, by side, to the joint; `only` the starts in the attracting
-    cells are claimed.
+    cells are claimed.  `laid` has by side the ranges of x in which all starts lie: "within" claims all of these starts,
+    "cells" those in cells with a rank.
     """
 
     kind: str
@@ -39,6 +45,7 @@ class Starts(NamedTuple):
     near: tuple[list[float], list[Pair | None]] | None = None
     lost: list[float] | None = None
     only: bool = False
+    laid: list[list[Span]] | None = None
 
     def fixed(self, side: int) -> Pair | None:
         """Return the bracket of the jog's fixed point on a side, where one is named."""
@@ -52,11 +59,18 @@ def read_starts(section: dict[str, Any], goal: dict[str, Any], n_sides: int) -> 
     """Read for which starts a goal is claimed."""
     require("starts" in section, "goal.starts is missing")
     said, kind = section["starts"], section["starts"]
-    x = None
+    x = laid = None
     if isinstance(said, dict):
-        table(said, "goal.starts", "from")
-        kind, x = "from", [hex_float(each, "goal.starts") for each in by_side(said["from"], "from", n_sides)]
-    require(kind in ("every", "almost-every", "from", "cells"), "goal.starts is none that is known")
+        table(said, "goal.starts", "", "from within cells")
+        require(len(said) == 1, "goal.starts is not one of from, within and cells")
+        ((kind, value),) = said.items()
+        if kind == "from":
+            x = [hex_float(each, "goal.starts") for each in by_side(value, "from", n_sides)]
+        else:
+            laid = read_laid(value, n_sides)
+    require(
+        kind in ("every", "almost-every", "from", "cells") or bool(laid), "goal.starts is none that is known"
+    )
     thinning = section.get("thinning", 0)
     fits = type(thinning) is int and (0 < thinning < MOST_COUNTED if "thinning" in section else True)
     require(fits, "goal.thinning is not a number of rounds")
@@ -65,9 +79,23 @@ def read_starts(section: dict[str, Any], goal: dict[str, Any], n_sides: int) -> 
     if "lost" in section:
         lost = [hex_float(each, "lost") for each in by_side(section["lost"], "lost", n_sides)]
     almost = goal["kind"] == "reaches" and not goal["every"]
-    starts = Starts(kind, x, thinning, near, lost, only=almost and kind == "cells")
+    starts = Starts(kind, x, thinning, near, lost, almost and kind == "cells" and laid is None, laid)
     require_fitting(starts, goal, almost, [starts.fixed(i) for i in range(n_sides)])
     return starts
+
+
+def read_laid(value: object, n_sides: int) -> list[list[Span]]:
+    """Read by side the ranges in which parts are laid down: ascending, apart, and one at least."""
+    known = table(value, "the ranges of the starts", "", " ".join(map(str, range(n_sides))))
+    require(bool(known), "there are no ranges of the starts")
+    found: list[list[Span]] = []
+    for i in range(n_sides):
+        pairs = rows(known[str(i)], "ranges", 1, 100) if str(i) in known else []
+        ends = [hex_float(end, "a range") for pair in pairs for end in rows(pair, "a range", 2, 2)]
+        ascending = all(a < b for a, b in itertools.pairwise(ends))
+        require(ascending, "the ranges of the starts are empty, or do not ascend")
+        found.append(list(zip(ends[::2], ends[1::2], strict=True)))
+    return found
 
 
 def require_fitting(starts: Starts, goal: dict[str, Any], almost: bool, points: list[Pair | None]) -> None:
@@ -84,6 +112,9 @@ def require_fitting(starts: Starts, goal: dict[str, Any], almost: bool, points: 
         require(point is None or x >= point[1], "starts before the end of a fixed point are claimed")
     require(not (almost and kind == "every"), "a goal of almost every orbit is claimed for every start")
     of = "almost-every" if almost else "every"
+    if starts.laid is not None:
+        require(starts.near is None and starts.lost is None, "starts laid down are those in cells")
+        return
     require(kind == of or not anywhere, f"this goal from anywhere is one of starts {of}")
     require(kind != "cells" or goal["kind"] != "attracts_all", "attracts_all of some cells")
 
@@ -101,13 +132,73 @@ def check_starts(c: Cells, scene: Scene, goal: dict[str, Any], starts: Starts) -
     almost = goal["kind"] == "reaches" and not goal["every"]
     if goal["kind"] == "attracts_all" and starts.near is not None and any(starts.near[1]):
         return "parts near the joint creep to it: there are two basins"
-    for side in range(len(c.edges)):
+    for side in range(len(c.edges) if starts.laid is None else 0):
         bad = check_starts_of_side(c, scene, starts, side)
         if bad:
             return bad
     if goal["anywhere"] and not (goal["kind"] == "flip_order" or almost):
         return ""  # the goal asks something of every throw, or of a number of throws: no orbit has to arrive
     return check_arrival(c, scene, starts, almost)
+
+
+def laid_down(c: Cells, scene: Scene, starts: Starts) -> tuple[Cells, str]:
+    """Keep of the cells what starts laid down in the ranges can come to; all of it has to have a rank.
+
+    Any other cell gets neither rank nor component nor targets, so that nothing is asked of it and nothing rests on it.
+    No orbit from the ranges meets such a cell: the cells kept hold the ranges, and all targets of the cells kept.
+    """
+    begin, bad = cells_of_ranges(c, scene, starts.laid or [])
+    if bad:
+        return c, bad
+    if starts.kind == "cells":
+        begin &= c.rank >= 0
+    if not begin.any():
+        return c, "no start is claimed that lies in a cell with a rank"
+    met = led_to(c, begin)
+    bad = first_bad(c, [(~met | (c.rank >= 0), "a part laid down may come to it, and its rank is -1")])
+    jog, flip = (np.where(met[:, None], array, -1) for array in (c.jog, c.flip))
+    rank, component = np.where(met, c.rank, -1), np.where(met, c.component, -1)
+    return replace(c, jog=jog, flip=flip, rank=rank, component=component), bad
+
+
+def cells_of_ranges(c: Cells, scene: Scene, laid: list[list[Span]]) -> tuple[Array, str]:
+    """Find the cells that hold the starts of some ranges, as far as these lie on the arm; and "" or why they do not."""
+    begin = np.zeros(len(c.rank), dtype=bool)
+    for i, (edges, ranges) in enumerate(zip(c.edges, laid, strict=True)):
+        for lo, hi in ranges:
+            if not lo >= edges[0]:
+                return begin, f"side {i}: starts are claimed that lie before the cells"
+            if Fraction(lo) >= scene.arm[0]:
+                return begin, f"side {i}: starts are claimed that lie beyond arm.length"
+            if Fraction(float(edges[-1])) < min(Fraction(hi), scene.arm[1]):
+                return begin, f"side {i}: the cells end before the starts do"
+            begin[c.start[i] : c.start[i + 1]] |= (edges[1:] > lo) & (edges[:-1] < hi)
+    return begin, ""
+
+
+def share_of_ranges(c: Cells, laid: list[list[Span]], cells: Array, end: float) -> float:
+    """Bound from below the share of some ranges that lies in some cells, up to some x."""
+    claimed = whole = 0.0
+    for i, (edges, ranges) in enumerate(zip(c.edges, laid, strict=True)):
+        for lo, hi in ranges:
+            whole += float_above(exact(Fraction(hi) - Fraction(lo)))
+            inside = np.minimum(edges[1:], min(hi, end)) - np.maximum(edges[:-1], lo)
+            claimed += float(np.clip(inside, 0.0, None)[cells[c.start[i] : c.start[i + 1]]].sum())
+    return claimed / whole * (1 - 2.0**-30)  # against the rounding of these sums
+
+
+def led_to(c: Cells, cells: Array) -> Array:
+    """Find the cells given, and all to which some orbit from them may come, by the targets of the cells."""
+    found, new = cells.copy(), cells.copy()
+    while new.any():
+        marks = np.zeros(len(found) + 1, dtype=np.int64)
+        for array in (c.jog, c.flip):
+            q = np.flatnonzero((array[:, 0] >= 0) & new)
+            np.add.at(marks, array[q, 0], 1)
+            np.add.at(marks, array[q, 1] + 1, -1)
+        new = (np.cumsum(marks[:-1]) > 0) & ~found
+        found |= new
+    return found
 
 
 def check_starts_of_side(c: Cells, scene: Scene, starts: Starts, side: int) -> str:
@@ -254,10 +345,12 @@ def check_short(s: Side, lo: Arb, hi: Arb) -> str:
 
 def shares(c: Cells, scene: Scene, starts: Starts, cells: Array) -> tuple[float, float]:
     """Bound from below the shares of the arm whose starts are claimed, and whose starts are lost or creep inward."""
-    if starts.kind in ("every", "almost-every"):
+    if starts.kind in ("every", "almost-every", "within"):
         return 1.0, 0.0
     whole = claimed = explained = 0.0
     end = float_below(exact(scene.arm[0]))
+    if starts.laid is not None:
+        return share_of_ranges(c, starts.laid, cells, end), 0.0
     for i, s in enumerate(scene.sides):
         begin, fixed = float_above(s.a), starts.fixed(i)
         whole += float_above(exact(scene.arm[1])) - float_below(s.a)
@@ -297,11 +390,21 @@ def starts_in_words(starts: Starts, noisy: bool) -> str:
     if starts.x is not None:
         beyond = [f"{x!r} < x <= arm.length on side {i}" for i, x in enumerate(starts.x)]
         some = f"every start with {', or '.join(beyond)}"
+    elif starts.laid is not None:
+        some = f"every start on the arm with {ranges_in_words(starts.laid)}"
+        some += " that lies in a cell with a rank" if starts.kind == "cells" else ""
     elif starts.kind == "cells":
         before = ", and before the first cells" if starts.near is not None else ""
         some = f"every start in the cells that have a rank{before}"
     others = ", others for other throws" if noisy else ""
     return some + (f", but for starts of total length zero{others}" if starts.thinning else "")
+
+
+def ranges_in_words(laid: list[list[Span]]) -> str:
+    """Name the ranges in which parts are laid down."""
+    return ", or ".join(
+        f"{lo!r} <= x <= {hi!r} on side {i}" for i, ranges in enumerate(laid) for lo, hi in ranges
+    )
 
 
 def explained_in_words(starts: Starts) -> list[str]:

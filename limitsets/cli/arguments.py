@@ -10,9 +10,24 @@ from limitsets.errors import LimitsetsError
 if TYPE_CHECKING:
     from limitsets.scene import Scene
 
-__all__ = ["HELP_NO_RECHECK", "bounds_of", "deviations", "number", "place", "places_of", "position"]
+__all__ = [
+    "HELP_LAID",
+    "HELP_NO_RECHECK",
+    "bounds_of",
+    "deviations",
+    "laid_ranges",
+    "number",
+    "place",
+    "places_of",
+    "position",
+]
 
 HELP_NO_RECHECK = "Write certificates without checking them first."
+
+HELP_LAID = (
+    "Where parts are laid down, like 0=8:20 or 0='8 in:20 in'; repeatable. The goal's starts are these; "
+    "default: the whole arm."
+)
 
 _BARE = re.compile(r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]{1,3})?")
 
@@ -68,6 +83,25 @@ def deviations(option: str, words: list[str] | None) -> dict[str, str]:
             raise LimitsetsError(option.lstrip("-"), word, "QUANTITY=DEVIATION", remedy, key=option)
         found[name] = text.strip()
     return found
+
+
+def laid_ranges(words: list[str] | None) -> dict[int, list[tuple[float | str, float | str]]] | None:
+    """Read the words of --laid, SIDE=LO:HI each; bare numbers are in the scene's unit.
+
+    A unit behind one end is that of both.
+    """
+    found: dict[int, list[tuple[float | str, float | str]]] = {}
+    for word in words or []:
+        side, sign, text = word.partition("=")
+        ends = [number(end.strip("'\" ")) for end in text.split(":")]
+        units = [end.lstrip("+-.0123456789eE").strip() for end in ends if isinstance(end, str)]
+        if not sign or not side.strip().isascii() or not side.strip().isdigit() or len(ends) != 2:
+            remedy = "name a side, the sign =, and two places with : between them, like 0=8:20"
+            raise LimitsetsError("where parts are laid down", word, "SIDE=LO:HI", remedy, key="--laid")
+        if len(units) == 1:
+            ends = [f"{end!r} {units[0]}" if isinstance(end, float) else end for end in ends]
+        found.setdefault(int(side), []).append((ends[0], ends[1]))
+    return found or None
 
 
 def _ends_of(words: list[str] | None) -> dict[str, _Ends]:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from limitsets.cli.arguments import HELP_NO_RECHECK, deviations
+from limitsets.cli.arguments import HELP_LAID, HELP_NO_RECHECK, deviations, laid_ranges
 from limitsets.cli.certificates import with_ending
 from limitsets.cli.output import Csv, Json, Scene, Words, answer, option, progress, saved, stem_of, table
 from limitsets.proposals import proposed
@@ -42,6 +42,7 @@ def certify(
     claim: Annotated[Words, option("--claim", "C", HELP_CLAIM)] = None,
     tolerance: Annotated[Words, option("--tolerance", "Q=DEV", HELP_TOLERANCE)] = None,
     noise: Annotated[Words, option("--noise", "Q=DEV", HELP_NOISE)] = None,
+    laid: Annotated[Words, option("--laid", "SIDE=LO:HI", HELP_LAID)] = None,
     out: Annotated[
         Path | None,
         option("--out -o", "FILE", "The certificate, NAME.proof.zip; ./ and the scene's name by default."),
@@ -55,6 +56,7 @@ def certify(
     Exit 1 where a claim is not proved.
     """
     fixed, varying = deviations("--tolerance", tolerance), deviations("--noise", noise)
+    begins = laid_ranges(laid)
     with progress() as tell:
         from limitsets.scene import load
 
@@ -64,7 +66,7 @@ def certify(
         from limitsets.proofs.confirm import DeniedError
 
         with saved(file) as draft:
-            proof = run(chosen, claim or None, noise=varying, tolerance=fixed, progress=tell)
+            proof = run(chosen, claim or None, noise=varying, tolerance=fixed, laid=begins, progress=tell)
             written = any(each.written for each in proof.claims) and not proof.effects
             begin = time.perf_counter()
             kept = ""
@@ -91,6 +93,10 @@ def _text(proof: Proof, file: Path | None, kept: str, seconds: float | None) -> 
     for name, text in proof.noise.items():
         value = "the model's place" if name == "landing.x" else "its value"
         typer.echo(f"for every sequence of throws, {name} within {text} of {value}, anew at every throw")
+    if proof.laid:
+        from limitsets.goals import laid_words as places
+
+        typer.echo(f"for parts that are laid down at {places(proof.laid, proof.scene.unit)}")
     if proof.effects:
         typer.echo(f"with the effects {', '.join(proof.effects)}")
     for claim in proof.claims:
@@ -178,10 +184,9 @@ def _goal(proof: Proof, claim: Claim) -> list[str]:
             ),
             (f"of {bound(100.0 * shares['open'], '%', up=True)} nothing is proved", shares["open"]),
         ]
+        of = "that are laid down" if proof.laid else "on the arm"
         told = "; ".join(text for text, share in others if share > 0.0)
-        lines.append(
-            f"It is proved for {bound(100.0 * shares['share'], '%')} of all starts on the arm; {told}."
-        )
+        lines.append(f"It is proved for {bound(100.0 * shares['share'], '%')} of all starts {of}; {told}.")
     if "starts" in claim.section and proof.noise and "thinning" in claim.section:
         lines.append("Which starts are excepted may depend on the sequence of the noise.")
     if claim.verdict != "proved":

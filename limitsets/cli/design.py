@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from limitsets.cli.arguments import HELP_NO_RECHECK, bounds_of, number
+from limitsets.cli.arguments import HELP_LAID, HELP_NO_RECHECK, bounds_of, laid_ranges, number
 from limitsets.cli.output import (
     Csv,
     Form,
@@ -57,6 +57,7 @@ def design(
     goal: Annotated[bool, typer.Option("--goal", help=HELP_GOAL)] = False,
     vary: Annotated[Words, option("--vary", "Q,Q", HELP_VARY)] = None,
     bounds: Annotated[Words, option("--bounds", "Q=LO:HI", HELP_BOUNDS)] = None,
+    laid: Annotated[Words, option("--laid", "SIDE=LO:HI", f"With --goal or --robust: {HELP_LAID}")] = None,
     evaluations: Annotated[
         int | None, option("--evaluations", "N", HELP_EVALUATIONS, min=1, max=1_000_000)
     ] = None,
@@ -88,11 +89,18 @@ def design(
             "--critical-points R,R,R, --goal or --robust",
             "give one of them",
         )
+    begins = laid_ranges(laid)
+    if begins and critical_points is not None:
+        raise LimitsetsError(
+            "laid", laid, "with --goal or --robust", "critical points have no starts", key="--laid"
+        )
     names = [name.strip() for words in vary or [] for name in words.split(",")]
     if goal:
         from limitsets.cli.design_goal import run_goal
 
-        raise typer.Exit(run_goal(scene, names, bounds, evaluations or 600, out, form, csv, json=json))
+        raise typer.Exit(
+            run_goal(scene, names, bounds, begins, evaluations or 600, out, form, csv, json=json)
+        )
     if critical_points is None:
         from limitsets.cli.design_robust import run_robust
 
@@ -101,6 +109,7 @@ def design(
                 scene,
                 names,
                 bounds,
+                begins,
                 evaluations or 1200,
                 seconds,
                 out,

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from limitsets.inverse.margin.for_goal import GoalDesign
+    from limitsets.scene.laid import LaidLike
 
 __all__ = ["run_goal"]
 
@@ -23,6 +24,7 @@ def run_goal(
     name: str,
     vary: Sequence[str],
     bounds: list[str] | None,
+    laid: LaidLike | None,
     evaluations: int,
     out: Path | None,
     form: str,
@@ -36,7 +38,9 @@ def run_goal(
 
         scene, _ = opened(name, None if out and out.suffix == ".toml" else out)
         given = bounds_of(scene, bounds)
-        found = design_for_goal(scene, vary=vary, bounds=given, evaluations=evaluations, progress=tell)
+        found = design_for_goal(
+            scene, vary=vary, bounds=given, laid=laid, evaluations=evaluations, progress=tell
+        )
         files = [] if out is None else _written(found, out, form)
     answer(found, json, lambda: _text(found, files, evaluations), csv=(csv, found.table))
     return 0 if found.verdict == "proved" else 1

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from limitsets.inverse import RobustDesign
     from limitsets.inverse.margin.for_margin import NoDesignError
     from limitsets.scene import Scene
+    from limitsets.scene.laid import LaidLike
 
 __all__ = ["run_robust"]
 
@@ -26,6 +27,7 @@ def run_robust(
     name: str,
     vary: Sequence[str],
     bounds: list[str] | None,
+    laid: LaidLike | None,
     evaluations: int,
     seconds: float,
     out: Path | None,
@@ -46,6 +48,7 @@ def run_robust(
             found = robust_design(
                 scene,
                 vary=(dict.fromkeys(vary, (None, None)) | bounds_of(scene, bounds)) or None,
+                laid=laid,
                 evaluations=evaluations,
                 prove=seconds,
                 progress=tell,

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from limitsets.cli.arguments import HELP_NO_RECHECK, deviations
+from limitsets.cli.arguments import HELP_LAID, HELP_NO_RECHECK, deviations, laid_ranges
 from limitsets.cli.certificates import certified, said_of
 from limitsets.cli.output import Csv, Form, Format, Json, Scene, Words, answer, opened, option, progress, show
 
@@ -39,6 +39,7 @@ def feed(
         str, option("--law", "LAW", "Of --scatter: gaussian (standard deviations) or bounded.")
     ] = "gaussian",
     noise: Annotated[Words, option("--noise", "Q=DEV", HELP_NOISE)] = None,
+    laid: Annotated[Words, option("--laid", "SIDE=LO:HI", HELP_LAID)] = None,
     trials: Annotated[int | None, option("--trials", "N", HELP_TRIALS, min=1)] = None,
     seed: Annotated[int, option("--seed", "N", "Of the trials.", min=0)] = 0,
     brackets: Annotated[
@@ -80,6 +81,7 @@ def feed(
             chosen,
             scattering_from(chosen, random, law) if random else None,
             side=side,
+            laid=laid_ranges(laid),
             noise=deviations("--noise", noise),
             prove=not no_proof,
             seconds=seconds,
@@ -101,10 +103,10 @@ def feed(
         if out is not None:
             from limitsets import plot
             from limitsets.files import as_json
-            from limitsets.report.writing import laid
+            from limitsets.report.writing import laid as files_laid
 
             drawn = [("part", plot.part(chosen)), ("feeding", plot.feeding(found))]
-            files = laid(out, drawn, lambda _: {"feeding.json": as_json(record)}, form)
+            files = files_laid(out, drawn, lambda _: {"feeding.json": as_json(record)}, form)
     if json and (note := _unused(found)):
         print(f"limitsets: {note}", file=sys.stderr, flush=True)
     answer(record, json, lambda: _text(found, files, written), csv=(csv, found.table))
@@ -125,10 +127,16 @@ def _text(found: Feeding, files: list[Path], written: dict[str, Any] | None) -> 
     end, unit = found.end, found.end.scene.unit
     note = "".join(f"; {said}" for said in [_unused(found)] if said)
     typer.echo(f"{end.scene.name}: the arm ends at x = {end.x:g} {unit}, side {end.side} is wanted{note}")
+    if end.laid:
+        from limitsets.goals import laid_words
+
+        typer.echo(
+            f"all starts, proved and random, are where parts are laid down: {laid_words(end.laid, unit)}"
+        )
     parts = ", ".join(f"{lo:.4g} to {hi:.4g} {unit}" for lo, hi in end.clear) or "nowhere"
     typer.echo(f"clear of the wall beyond the end: {parts}")
     if found.safe is not None and found.fed is not None:
-        for line in (*found.safe.lines(end.side), *found.fed.lines(unit)):
+        for line in (*found.safe.lines(end.side, laid=bool(end.laid)), *found.fed.lines(unit)):
             typer.echo(line)
     show(found.table())
     if edge := found.shares.shares["edge"]:

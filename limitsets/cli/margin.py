@@ -7,8 +7,20 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from limitsets.cli.arguments import HELP_NO_RECHECK, place
-from limitsets.cli.output import Csv, Form, Format, Json, Scene, answer, opened, option, progress, table
+from limitsets.cli.arguments import HELP_LAID, HELP_NO_RECHECK, laid_ranges, place
+from limitsets.cli.output import (
+    Csv,
+    Form,
+    Format,
+    Json,
+    Scene,
+    Words,
+    answer,
+    opened,
+    option,
+    progress,
+    table,
+)
 from limitsets.errors import LimitsetsError
 from limitsets.files import as_json
 from limitsets.tables import joined
@@ -30,6 +42,7 @@ def margin(
     ] = None,
     reading: Annotated[str | None, option("--reading", "R", "fixed (but unknown) or per-throw.")] = None,
     x: Annotated[str | None, option("--x", "X", "Ask the goal at another X: 20, or '50 cm'.")] = None,
+    laid: Annotated[Words, option("--laid", "SIDE=LO:HI", HELP_LAID)] = None,
     width: Annotated[float, option("--width", "W", "How close the two ends have to be, as a share.")] = 0.01,
     out: Annotated[
         Path | None, option("--out -o", "DIR", "Write margins.json, certificates, orbits, a figure.")
@@ -46,9 +59,12 @@ def margin(
     with progress() as tell:
         from limitsets.robust.margins.finding import margin as run
 
+        begins = laid_ranges(laid)
         chosen, _ = opened(scene, out)
         goal = None if x is None else _goal_at(chosen, x)
-        found = run(chosen, *(quantity or ()), reading=reading, goal=goal, width=width, progress=tell)
+        found = run(
+            chosen, *(quantity or ()), reading=reading, goal=goal, laid=begins, width=width, progress=tell
+        )
         records = [each.to_json() for each in found]
         if out is not None:
             tell("files", len(found), len(found) + 1)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from limitsets.cli.arguments import HELP_NO_RECHECK, deviations
+from limitsets.cli.arguments import HELP_LAID, HELP_NO_RECHECK, deviations, laid_ranges
 from limitsets.cli.output import (
     Csv,
     Form,
@@ -44,6 +44,7 @@ def robustness(
     reading: Annotated[
         str | None, option("--reading", "R", "fixed (but unknown) or per-throw; default both.")
     ] = None,
+    laid: Annotated[Words, option("--laid", "SIDE=LO:HI", HELP_LAID)] = None,
     tolerance: Annotated[Words, option("--tolerance", "Q=DEV", HELP_TOLERANCE)] = None,
     scatter: Annotated[Words, option("--scatter", "Q=DEV", HELP_SCATTER)] = None,
     law: Annotated[
@@ -84,6 +85,7 @@ def robustness(
         found = run(
             chosen,
             *(quantity or ()),
+            laid=laid_ranges(laid),
             reading=reading,
             tolerance=vector or None,
             scatter=scattering_from(chosen, noise, law) if noise else None,

@@ -39,7 +39,11 @@ def fate_brackets(
     if not scatter.given():
         remedy = "give the scene a scatter, or pass one: without noise safety and progress are proved instead"
         raise AnswerError("the noise of the brackets", None, "of speed or landing place", remedy)
-    starts = [(side, float(lo), end.x) for side, lo in enumerate(end.starts) if lo < end.x]
+    starts = [
+        (side, lo, hi)
+        for lo, hi, side in zip(*(each.tolist() for each in end.ranges), strict=True)
+        if lo < hi
+    ]
     return absorption_brackets(
         still(end.scene),
         scatter,

@@ -23,7 +23,6 @@ from limitsets.feeding.falling import FATES, ArmEnd
 from limitsets.files import as_table
 from limitsets.robust.noise.laws import Gaussian, Law, Uniform
 from limitsets.robust.noise.proportions import binomial_interval
-from limitsets.robust.noise.sampling import uniform_starts
 from limitsets.robust.noise.scattering import Scattering
 
 __all__ = ["BATCHES", "CrowdTrials", "run_crowd"]
@@ -233,7 +232,7 @@ class _Batch:
         d = end.scene.sides.d
         for number in range(len(crowd.members)):
             for _ in range(DRAWS):
-                xs, sides = uniform_starts(self.random, end.starts, end.x, 1)
+                xs, sides = end.drawn(self.random, 1)
                 x, side = float(xs[0]), int(sides[0])
                 lo, hi = self._reach(x, side)
                 if all(hi <= left or right <= lo for left, right in row):

@@ -6,7 +6,6 @@ How long it takes to tip: `tipping`.  What is assumed stands in docs/feeding.md.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
@@ -17,8 +16,10 @@ from numpy.typing import NDArray
 from limitsets.errors import AnswerError
 from limitsets.feeding.tipping import tipping_times
 from limitsets.geometry.polygon import above_side, side_ends
-from limitsets.goals import OrientedBeyond, Reaches
+from limitsets.goals import Laid, OrientedBeyond, Reaches
 from limitsets.robust.noise.chain_solution import starts_from
+from limitsets.robust.noise.sampling import uniform_starts
+from limitsets.scene.laid import LaidLike, read_laid
 from limitsets.scene.scene import require_rests
 
 if TYPE_CHECKING:
@@ -140,6 +141,8 @@ class ArmEnd:
         centre of mass, finds no arm below [length].
     starts : ndarray, shape (n_sides,)
         Random starts lie from here to the end, equally likely per length on all sides [length].
+    laid : Laid
+        Where parts are laid down, before the end: all starts, of proofs too; () for the whole arm.
     """
 
     scene: Scene
@@ -148,6 +151,19 @@ class ArmEnd:
     clear: tuple[tuple[float, float], ...]
     edges: NDArray[np.float64]
     starts: NDArray[np.float64]
+    laid: Laid = ()
+
+    @property
+    def ranges(self) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]]:
+        """Lower ends, upper ends and sides of the ranges in which random starts lie."""
+        whole = [(side, lo, self.x) for side, lo in enumerate(self.starts.tolist())]
+        side, lo, hi = zip(*(self.laid or whole), strict=True)
+        return np.array(lo), np.array(hi), np.array(side)
+
+    def drawn(self, random: np.random.Generator, count: int) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+        """Draw random starts: places and sides."""
+        lo, hi, side = self.ranges
+        return uniform_starts(random, lo, hi, count, side)
 
     def fate(self, x: NDArray[np.float64], side: NDArray[np.int64]) -> NDArray[np.int64]:
         """Say what becomes of parts at rest: a number of `FATES`, -1 of those that stay on the arm."""
@@ -163,8 +179,8 @@ class ArmEnd:
         return (x > self.edges[side]) & (x < self.x)
 
 
-def arm_end_of(scene: Scene, side: int | None = None, starts: Mapping[int, float] | None = None) -> ArmEnd:
-    """Read what is asked: the end of the arm, the side wanted, by default the goal's, and where random starts begin.
+def arm_end_of(scene: Scene, side: int | None = None, laid: LaidLike | None = None) -> ArmEnd:
+    """Read what is asked: the end of the arm, the side wanted, by default the goal's, and where parts are laid down.
 
     Raises
     ------
@@ -183,13 +199,13 @@ def arm_end_of(scene: Scene, side: int | None = None, starts: Mapping[int, float
         allowed = f"above the cavity's position, {x:g} {scene.unit}"
         remedy = "arm.length is how far landings are followed: lengthen it by a part's length"
         raise AnswerError("the length of the arm", scene.arm_length, allowed, remedy)
-    begin = starts_from(scene)
-    for number, least in (starts or {}).items():
-        if number not in range(begin.size) or not scene.sides.a[number] <= least < x:
-            allowed = f"by side, from a of that side to below {x:g} {scene.unit}"
-            raise AnswerError("the starts", f"{number}: {least}", allowed, "name places on the arm")
-        begin[number] = least
-    return ArmEnd(scene, x, side, clear_beyond(scene, side), _edges(scene, x), begin)
+    ranges = read_laid(scene, laid)
+    for on, lo, hi in ranges:
+        if not hi <= x:
+            allowed = f"up to the end of the arm, {x:g} {scene.unit}"
+            remedy = "lay parts down before it"
+            raise AnswerError("the range", f"{lo:g} to {hi:g} on side {on}", allowed, remedy, key="laid")
+    return ArmEnd(scene, x, side, clear_beyond(scene, side), _edges(scene, x), starts_from(scene), ranges)
 
 
 def _edges(scene: Scene, x: float) -> NDArray[np.float64]:

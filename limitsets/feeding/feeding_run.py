@@ -23,12 +23,14 @@ from limitsets.feeding.trials import Trials, run_trials, trials_within
 from limitsets.feeding.verdicts import Fed, Safe
 from limitsets.feeding.writing import holds, write_proof
 from limitsets.files import as_table, picked
+from limitsets.goals import by_side
 from limitsets.progress import shown_in_notebooks
 from limitsets.robust.brackets.result import AbsorptionBrackets
 from limitsets.robust.noise.sampling import require_seed
 from limitsets.robust.noise.scattering import Scattering, scattering_of
 from limitsets.robust.sheet.noise_input import still
 from limitsets.scene import Scene, load
+from limitsets.scene.laid import LaidLike
 from limitsets.tables import Column, Table, Tabled
 
 __all__ = ["Feeding", "feed"]
@@ -200,7 +202,8 @@ class Feeding(Tabled):
             unit=scene.unit,
             position=self.end.x,
             side=self.end.side,
-            starts_from=self.end.starts,
+            starts_from=None if self.end.laid else self.end.starts,
+            laid=by_side(self.end.laid) or None,
             throw_rate=rate,
             clear=self.clear,
             tipping=self.tipping,
@@ -233,7 +236,7 @@ def feed(
     scatter: Scattering | None = None,
     *,
     side: int | None = None,
-    starts: Mapping[int, float] | None = None,
+    laid: LaidLike | None = None,
     noise: Mapping[str, str] | None = None,
     prove: bool = True,
     seconds: float = SECONDS,
@@ -257,8 +260,10 @@ def feed(
         `[effects] spread`, or none.
     side : int, optional
         The side wanted; default the goal's.
-    starts : mapping of int to float, optional
-        By side the x from which random starts lie, up to the end of the arm; default a twentieth of the arm beyond a.
+    laid : mapping of int to sequence of (float, float), optional
+        By side the ranges of x where parts are laid down, as for `limitsets.certify`: the proofs are of these starts,
+        and random starts lie there, equally likely per length.  Default: the proofs are of the whole arm, and random
+        starts lie from a twentieth of the arm beyond a on.
     noise : mapping of str to str, optional
         ``{"throw.speed": "0.3 %"}``: what may differ at every throw in the proofs, whatever the sequence.
     prove : bool
@@ -304,7 +309,7 @@ def feed(
     1000
     """
     read = load(scene)
-    end = arm_end_of(read, side, starts)
+    end = arm_end_of(read, side, laid)
     if trials is not None and trials < 1:
         raise AnswerError("the trials", trials, "1 or more", "throw some parts")
     require_seed(seed)

@@ -18,8 +18,10 @@ from limitsets.feeding.verdicts import Extents, Fed, Safe
 from limitsets.graph.components import ranks, reach, strong_components
 from limitsets.graph.ranges import RUN
 from limitsets.proofs.attraction import Attraction
+from limitsets.proofs.basin import ROUNDING
 from limitsets.proofs.cover import everywhere
 from limitsets.proofs.goals.kind import above, below
+from limitsets.proofs.goals.laid_starts import reached_from, starts_in
 from limitsets.proofs.near_hinge import SCATTERED
 from limitsets.proofs.perron_frobenius import perron_frobenius_bound
 
@@ -72,6 +74,11 @@ class Paths:
     late: Mask
     steps: NDArray[np.int32]
 
+    @property
+    def begins(self) -> Mask:
+        """Cells in which starts lie: before X, and where parts are laid down."""
+        return self.starts & starts_in(self.found, self.end.laid)[0] if self.end.laid else self.starts
+
     @classmethod
     def of(cls, found: Attraction, end: ArmEnd) -> Paths:
         """Find them."""
@@ -115,11 +122,26 @@ class Paths:
         return CellSet(self.found.cover.grid, some & self.starts).extents()
 
     def share(self, some: Mask, near: Mask) -> float:
-        """Share of the arm before X: of the starts in some cells, and before the first cells of some sides."""
+        """Share of the starts before X, or laid down there: of those in some cells, and before the first cells."""
+        if self.end.laid:
+            return self._laid_share(some)
         grid, a = self.found.cover.grid, self.found.cover.box.bare[0].a
         before = sum(float(edges[0] - a[side]) for side, (edges,) in enumerate(grid.edges) if near[side])
         inside = float(grid.measure[some & self.starts].sum())
         return (inside + before) / float((self.end.x - a).sum())
+
+    def _laid_share(self, some: Mask) -> float:
+        """Share of the ranges where parts are laid down that lies in some cells; 1.0 where all of it does."""
+        meets, inside = starts_in(self.found, self.end.laid)
+        if inside and some[meets & self.starts].all():
+            return 1.0
+        grid, total, claimed = self.found.cover.grid, 0.0, 0.0
+        for side, lo, hi in self.end.laid:
+            (edges,) = grid.edges[side]
+            overlap = np.minimum(edges[1:], hi) - np.maximum(edges[:-1], lo)
+            claimed += float(np.maximum(overlap, 0.0)[some[grid.of_side(side)]].sum())
+            total += hi - lo
+        return min(claimed / total, 1.0 - ROUNDING)
 
     def near_to(self, bad: Mask) -> Mask:
         """Of which sides the starts before the first cells come to cells, and to no bad ones."""
@@ -136,13 +158,14 @@ class Paths:
         possible = {side: self.extents(self.ends_on >> side & 1 > 0) for side in sides}
         whole = not (bad & self.starts).any() and bool(near.all())
         share = 1.0 if whole else self.share(~bad, near)
+        begins = self.begins
         measure = self.found.cover.grid.measure
         return Safe(
-            verdict_of_share(share),
+            self.verdict_of(share),
             {side: found for side, found in possible.items() if any(found.values())},
             self.extents(~bad),
             share,
-            float(measure[self.leaves & self.starts].sum()) / float(measure[self.starts].sum()),
+            float(measure[self.leaves & begins].sum()) / float(measure[begins].sum()),
         )
 
     def from_on(self, bad: Mask) -> tuple[dict[int, float], Mask]:
@@ -156,8 +179,33 @@ class Paths:
             good[int(grid.offset[side]) + first : int(grid.offset[side]) + edges.size - 1] = True
         return beyond, good & self.starts
 
+    def verdict_of(self, share: float) -> str:
+        """Give the verdict on a claim that is proved for a share of the starts; of those laid down all are asked."""
+        if self.end.laid and share < 1.0:
+            return "proved-on-cells" if share > 0.0 else "undecided"
+        return verdict_of_share(share)
+
+    def _laid(self, bad: Mask) -> tuple[float, str]:
+        """Share of the starts laid down that lie in no bad cell, and what is missing where that is not all."""
+        share = self._laid_share(~bad)
+        if share == 1.0:
+            return share, ""
+        cells = np.flatnonzero(bad & self.begins)
+        place = (
+            self.found.cover.place(int(cells[0]))
+            if cells.size
+            else "nearer to the joint than the first cells"
+        )
+        return share, f"it is proved for {100 * share:.2f} % of the starts laid down, and not for {place}"
+
     def fed(self) -> Fed:
         """Prove of every start that it is fed."""
+        if self.end.laid:
+            share, missing = self._laid(self.late)
+            throws = int(self.steps[self.begins & ~self.late].max(initial=0))
+            if missing:
+                return Fed("undecided", None, {}, share, reason=missing)
+            return Fed("proved", throws, {}, share)
         beyond, good = self.from_on(self.late)
         if not good.any():
             place = self.found.cover.place(int(np.flatnonzero(self.late & self.starts)[0]))
@@ -176,6 +224,16 @@ class Paths:
 
     def almost(self, fed: Fed) -> Fed:
         """Prove of almost every start that it is fed: those that are late thin out, where they cannot leave the arm."""
+        if self.end.laid:
+            share, missing = self._laid(self.leaves)
+            met = reached_from(self.found, self.begins & ~self.leaves)
+            thinned = perron_frobenius_bound(self.found.cover, self.late & self.starts & ~self.leaves & met)
+            if missing or thinned.reason:
+                return replace(fed, almost_every="undecided", reason=missing or thinned.reason)
+            rounds = thinned.throws + thinned.throws // 8 + 1
+            return replace(
+                fed, almost_every="proved", almost_from="almost-every", almost_share=1.0, thinning=rounds
+            )
         beyond, good = self.from_on(self.leaves)
         # what cannot leave the arm comes to no cell that can, and what is not late never comes to be
         left = self.late & self.starts & ~self.leaves

@@ -26,7 +26,7 @@ from limitsets.proofs.certify import spelled_deviations
 from limitsets.proofs.cover import cover
 from limitsets.proofs.goals import State
 from limitsets.proofs.goals.kind import above, below
-from limitsets.proofs.goals.recurrent_orbits import Refutation, cycle_that
+from limitsets.proofs.goals.recurrent_orbits import Refutation, cycle_that, meets
 from limitsets.proofs.goals.violating_starts import one_throw
 from limitsets.proofs.parameters import parameter_box
 from limitsets.proofs.simulated import joined, scattered
@@ -97,7 +97,11 @@ def proved_feeding(
         )
     tell = progress or (lambda stage, done, of: None)
     every = joined(spelled_deviations(scene, noise), spelled_deviations(scene, scattered(scene)))
-    box, cuts = parameter_box(scene, noise=every), (below(end.x), above(end.x))
+    box, borders = parameter_box(scene, noise=every), [below(end.x), above(end.x)]
+    cuts = {
+        side: borders + [place for on, *ends in end.laid if on == side for place in ends]
+        for side in range(len(scene.sides))
+    }
     wrong = OrientedBeyond(end.x, end.side, from_anywhere=True).wrong()
     shown: tuple[State, ...] = ()
     never = Refutation()
@@ -105,11 +109,11 @@ def proved_feeding(
     for step, cells in enumerate(LADDER):
         began = time.perf_counter()
         tell(f"proof on {cells} cells a side{proved}", step, len(LADDER) + 2)
-        found = attraction(cover(box, cells, dict.fromkeys(range(len(scene.sides)), cuts)))
+        found = attraction(cover(box, cells, cuts))
         paths = Paths.of(found, end)
         safe, fed = paths.safe(), paths.fed()
         if safe.verdict != "proved":
-            shown = shown or one_throw(found, wrong, up_to=end.x)
+            shown = shown or one_throw(found, wrong, up_to=end.x, laid=end.laid)
         if shown:
             safe = replace(safe, verdict="refuted", counterexample=shown)
         if fed.verdict != "proved":
@@ -117,7 +121,9 @@ def proved_feeding(
             fed = paths.almost(fed)
         if step == 0 and fed.verdict != "proved":
             tell("an orbit that is never fed", len(LADDER), len(LADDER) + 2)
-            never = cycle_that(found, scene, lambda loop: bool((loop.hi < below(end.x)).all()))
+            never = cycle_that(
+                found, scene, lambda loop: meets(loop, end.laid) and bool((loop.hi < below(end.x)).all())
+            )
         if never.states:
             cycle, reason = never.recurs.get("cycle", {}), "a periodic orbit is never fed"
             fed = replace(fed, verdict="refuted", never_fed=never.states, cycle=cycle, reason=reason)

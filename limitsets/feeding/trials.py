@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from limitsets.feeding.falling import FATES, ArmEnd
 from limitsets.files import as_table
 from limitsets.robust.noise.proportions import binomial_interval
-from limitsets.robust.noise.sampling import ManyParts, scattering_map, uniform_starts
+from limitsets.robust.noise.sampling import ManyParts, scattering_map
 from limitsets.robust.noise.scattering import Scattering, still_map
 
 __all__ = ["SERIES", "Trials", "creeping_below", "run_trials", "trials_within"]
@@ -145,7 +145,7 @@ def run_trials(
     """
     scene = end.scene
     random = np.random.Generator(np.random.Philox(seed))
-    many = ManyParts(scattering_map(scene, scatter, seed), *uniform_starts(random, end.starts, end.x, count))
+    many = ManyParts(scattering_map(scene, scatter, seed), *end.drawn(random, count))
     fate = np.full(count, NEVER, dtype=np.int64)
     throws = np.full(count, MOST_THROWS, dtype=np.int64)
     beyond = np.zeros(count, dtype=bool)

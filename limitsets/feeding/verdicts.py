@@ -43,11 +43,11 @@ class Safe:
     leaving: float
     counterexample: tuple[State, ...] = ()
 
-    def lines(self, side: int) -> list[str]:
-        """Put it in words, for the side wanted."""
+    def lines(self, side: int, *, laid: bool = False) -> list[str]:
+        """Put it in words, for the side wanted; of the whole arm, or of where parts are laid down."""
         if self.verdict == "proved":
             starts = (
-                "no start on the arm"
+                f"no start {'that is laid down' if laid else 'on the arm'}"
                 if self.share == 1.0
                 else f"none of {100 * self.share:.4f} % of the starts"
             )
@@ -72,7 +72,7 @@ class Fed:
     throws : int or None
         Throws after which every start from `beyond` on is fed, at most; None where that is not proved.
     beyond : dict of int to float
-        By side the x from which on it is proved [length].
+        By side the x from which on it is proved; empty where parts are laid down in ranges [length].
     share : float
         Share of the starts on the arm for which it is proved.
     almost_every : str or None
@@ -117,6 +117,8 @@ class Fed:
             words = self.verdict.upper().replace("-", " ")
             whole = "every start on the arm is fed, " if self.share >= 1.0 else ""
             within = f"every start beyond {_places(self.beyond, unit)} within {self.throws} throws"
+            if not self.beyond:
+                whole, within = "", f"every start that is laid down is fed within {self.throws} throws"
             found = [f"progress: {words}, {whole}{within}"]
         if self.almost_every is not None:
             words = self.almost_every.upper().replace("-", " ")

@@ -12,6 +12,7 @@ from limitsets.feeding.paths import verdict_of_share
 from limitsets.feeding.proving import FeedingProof
 from limitsets.feeding.verdicts import Fed
 from limitsets.proofs.certificate import write
+from limitsets.proofs.goals import hexed
 from limitsets.proofs.refutation import thrown_orbit
 
 __all__ = ["holds", "section_of", "verdict_of", "write_proof"]
@@ -22,7 +23,8 @@ PROVED = ("proved", "proved-on-cells")
 def section_of(proof: FeedingProof, end: ArmEnd) -> dict[str, Any]:
     """Write what a recheck needs: the side, and for each part that is proved its starts and counts, or its orbit."""
     safe, fed, found = proof
-    section: dict[str, Any] = {"side": end.side}
+    section: dict[str, Any] = {"side": end.side} | ({"laid": hexed(end.laid)} if end.laid else {})
+    bare = len(section)
     if safe.share > 0.0:
         section["safety"] = "every" if safe.share == 1.0 else "cells"
     if safe.counterexample:
@@ -35,19 +37,20 @@ def section_of(proof: FeedingProof, end: ArmEnd) -> dict[str, Any]:
         section["almost"] = {"starts": _starts(starts), "thinning": fed.thinning}
     if fed.cycle:
         section["never_fed"] = dict(fed.cycle)
-    return section
+    return section if len(section) > bare else {}
 
 
 def _starts(given: str | dict[str, float]) -> Any:
     return given if isinstance(given, str) else {"from": {side: float(x).hex() for side, x in given.items()}}
 
 
-def verdict_of(proof: FeedingProof) -> str:
-    """Give the verdict on safety and progress together, as the checker comes to it."""
+def verdict_of(proof: FeedingProof, *, laid: bool = False) -> str:
+    """Give the verdict on safety and progress together, of all starts or of those laid down, as the checker does."""
     safe, fed, _ = proof
     if safe.counterexample or (fed.never_fed and fed.almost_every not in PROVED):
         return "refuted"
-    return verdict_of_share(min(safe.share, _progress(fed)))
+    share = min(safe.share, _progress(fed))
+    return "proved-on-cells" if laid and 0.0 < share < 1.0 else verdict_of_share(share)
 
 
 def _progress(fed: Fed) -> float:
@@ -59,7 +62,7 @@ def _progress(fed: Fed) -> float:
 
 def holds(proof: FeedingProof, end: ArmEnd) -> bool:
     """Whether a certificate can hold something of it."""
-    return not proof.found.cover.box.effects and len(section_of(proof, end)) > 1
+    return not proof.found.cover.box.effects and bool(section_of(proof, end))
 
 
 def write_proof(
@@ -82,14 +85,14 @@ def write_proof(
             "the minimal model, and noise",
             "nothing rechecks other maps; the proof stands in .safe and .fed",
         )
-    if len(section) == 1:
+    if not section:
         remedy = "see the reason in .fed; a part without a proof is in no certificate"
         raise AnswerError("the certificate", "without a proved claim", "safety or progress", remedy)
     try:
         producer = {"limitsets": version("limitsets")}
     except PackageNotFoundError:  # sources that are not installed
         producer = {}
-    claim = {"claim": "feeds", "section": section, "verdict": verdict_of(proof)}
+    claim = {"claim": "feeds", "section": section, "verdict": verdict_of(proof, laid=bool(end.laid))}
     write(
         path,
         [proof.found],

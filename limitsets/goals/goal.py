@@ -19,12 +19,15 @@ __all__ = [
     "Extents",
     "Found",
     "Goal",
+    "Laid",
     "Place",
     "Side",
     "Sides",
     "Verdict",
     "as_written",
+    "by_side",
     "declare",
+    "laid_words",
     "words_of",
 ]
 
@@ -36,6 +39,9 @@ Side: TypeAlias = Annotated[int, "side"]
 
 Sides: TypeAlias = Annotated[tuple[int, ...], "sides"]
 """A field that is a list of sides."""
+
+Laid: TypeAlias = tuple[tuple[int, float, float], ...]
+"""Where parts are laid down: side and both ends of each range of x, ascending [length]; () for the whole arm."""
 
 Extents: TypeAlias = Mapping[int, Sequence[tuple[float, float]]]
 
@@ -89,12 +95,15 @@ class Goal(ABC):
         Whether it speaks of every start by what it says, not only with `from_anywhere`.
     from_anywhere : bool
         Whether it is asked of every start, not only of the limit set.
+    laid : Laid
+        Its starts, where parts are laid down; () for every start on the arm.
     """
 
     __dataclass_fields__: ClassVar[dict[str, Any]]  # every kind of goal is a dataclass
     kind: ClassVar[str]
     of_every_start: ClassVar[bool] = False
     from_anywhere: bool = False
+    laid: Laid = ()
 
     @abstractmethod
     def decide(self, found: Found) -> Verdict:
@@ -139,21 +148,47 @@ def words_of(goal: type[Goal]) -> dict[str, str]:
     {'x': 'place', 'side': 'side', 'every_orbit': 'flag'}
     """
     hints = _hints_of(goal)
-    names = [each.name for each in fields(goal) if each.name != "from_anywhere"]
+    names = [each.name for each in fields(goal) if each.name not in ("from_anywhere", "laid")]
     return {name: getattr(hints[name], "__metadata__", ("flag",))[0] for name in names}
 
 
 def as_written(goal: Goal, unit: str) -> dict[str, Any]:
-    """Give a goal as a scene would write it."""
+    """Give a goal as a scene would write it; `laid`, which no scene has, by side, where parts are laid down."""
     table: dict[str, Any] = asdict(goal)
     anywhere, words = table.pop("from_anywhere"), words_of(type(goal))
+    laid = by_side(table.pop("laid", ()))
     for name, word in words.items():
         if word == "place":
             table[name] = f"{table[name]!r} {unit}"
         if word == "sides":
             table[name] = list(table[name])
     alone = next(iter(table.values())) if len(table) == 1 else table or True
-    return {goal.kind: alone, "from_anywhere": anywhere}
+    return {goal.kind: alone, "from_anywhere": anywhere} | ({"laid": laid} if laid else {})
+
+
+def by_side(laid: Laid) -> dict[str, list[list[float]]]:
+    """Give ranges by side, as in JSON.
+
+    Examples
+    --------
+    >>> by_side(((0, 8.0, 12.0), (0, 14.0, 16.0)))
+    {'0': [[8.0, 12.0], [14.0, 16.0]]}
+    """
+    found: dict[str, list[list[float]]] = {}
+    for side, lo, hi in laid:
+        found.setdefault(str(side), []).append([lo, hi])
+    return found
+
+
+def laid_words(laid: Laid, unit: str) -> str:
+    """Name ranges for people.
+
+    Examples
+    --------
+    >>> laid_words(((0, 8.0, 12.0), (2, 14.0, 16.0)), "in")
+    'x = 8 to 12 in on side 0, x = 14 to 16 in on side 2'
+    """
+    return ", ".join(f"x = {lo:.6g} to {hi:.6g} {unit} on side {side}" for side, lo, hi in laid)
 
 
 def declare(goal: type[Goal]) -> type[Goal]:

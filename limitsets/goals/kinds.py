@@ -10,7 +10,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from limitsets.errors import AnswerError
-from limitsets.goals.goal import GOALS, Extents, Found, Goal, Place, Side, Sides, Verdict, declare
+from limitsets.goals.goal import GOALS, Extents, Found, Goal, Laid, Place, Side, Sides, Verdict, declare
 
 __all__ = [
     "AttractsAll",
@@ -61,6 +61,7 @@ class OrientedBeyond(Goal):
     x: Place
     side: Side
     from_anywhere: bool = False
+    laid: Laid = ()
 
     def decide(self, found: Found) -> Verdict:
         """Compare with the farthest place on any other side."""
@@ -108,6 +109,7 @@ class Reaches(Goal):
     side: Side
     every_orbit: bool = False
     from_anywhere: bool = False
+    laid: Laid = ()
 
     def decide(self, found: Found) -> Verdict:
         """Compare with the farthest place on the side."""
@@ -133,6 +135,7 @@ class AttractsAll(Goal):
     kind: ClassVar[str] = "attracts_all"
     of_every_start: ClassVar[bool] = True
     from_anywhere: bool = False
+    laid: Laid = ()
 
     def decide(self, found: Found) -> Verdict:
         """Look for one attractor with all starts."""
@@ -159,6 +162,7 @@ class FlipOrder(Goal):
     kind: ClassVar[str] = "flip_order"
     order: Sides
     from_anywhere: bool = False
+    laid: Laid = ()
 
     def decide(self, found: Found) -> Verdict:
         """Compare with the one order found, wherever it begins."""
@@ -177,6 +181,7 @@ class StaysOnArm(Goal):
 
     kind: ClassVar[str] = "stays_on_arm"
     from_anywhere: bool = False
+    laid: Laid = ()
 
     def decide(self, found: Found) -> Verdict:
         """Look for starts that leave."""
@@ -209,6 +214,7 @@ class Predicate(Goal):
     name: str = "the predicate"
     cuts: tuple[float, ...] = ()
     from_anywhere: bool = False
+    laid: Laid = ()
 
     def decide(self, found: Found) -> Verdict:
         """Ask the caller of every interval."""

@@ -38,7 +38,7 @@ from limitsets.thrower.side_box import gather_box, with_kappa
 from limitsets.thrower.throw_box import throw_box
 from limitsets.thrower.turn_box import turn_box, turn_point
 
-__all__ = ["ROUNDING", "Basin", "basin", "shares_of"]
+__all__ = ["ROUNDING", "Basin", "basin", "leaving_cells", "shares_of"]
 
 Mask = NDArray[np.bool_]
 Floats = NDArray[np.float64]
@@ -83,6 +83,8 @@ class Basin:
         Whether the starts beyond `start`, on all sides, are claimed: what lies below is explained, or little.
     missing : str
         The first place of which nothing is proved, and why; empty if there is none.
+    thin : ndarray of bool, shape (n_cells,)
+        The thin cells.
     """
 
     rank: NDArray[np.int32]
@@ -96,6 +98,7 @@ class Basin:
     open: float
     from_start: bool
     missing: str
+    thin: Mask
 
     @property
     def shares(self) -> dict[str, float]:
@@ -214,7 +217,14 @@ def basin(found: Cover, component: NDArray[np.int32], joint: Sequence[NearHinge]
     # a little more, so that other arithmetic can confirm it
     throws = throws + throws // 8 + 1 if thin.any() else 0
     return Basin(
-        rank, throws, near, start, explained, *shares_of(found, joint, shut, near, start, explained), missing
+        rank,
+        throws,
+        near,
+        start,
+        explained,
+        *shares_of(found, joint, shut, near, start, explained),
+        missing,
+        thin,
     )
 
 
@@ -296,15 +306,16 @@ def shares_of(
     if found.box.landing > 0.0:
         leaves = explains
     else:
-        leaves = _leaving(found) if shut.any() else 0.0
+        widths = np.concatenate([np.diff(edges) for (edges,) in found.grid.edges])
+        leaves = float(widths[leaving_cells(found)].sum()) if shut.any() else 0.0
     if near and not creeps and not shut.any():
         return 1.0, 0.0, 0.0, 0.0, from_start
     share, gone, crept = (max(0.0, x / wide - ROUNDING) for x in (claimed, leaves, creeps))
     return share, gone, crept, min(1.0, max(0.0, 1.0 - share - gone - crept) + ROUNDING), from_start
 
 
-def _leaving(found: Cover) -> float:
-    """Total length of the cells all of whose orbits are proved to leave the arm.
+def leaving_cells(found: Cover) -> Mask:
+    """Return the cells all of whose orbits are proved to leave the arm.
 
     From these no recurrent cell can be reached, and no cell whose image may lie, in part, between the foot
     and the cells.
@@ -315,6 +326,5 @@ def _leaving(found: Cover) -> float:
         own = stays[found.grid.of_side(side)]
         for (to, _), (low, high) in images.hulls.items():
             own |= (low <= high) & (low < found.grid.edges[to][0][0]) & (high > foot[to])
-    gone = ~_reaching(found, stays)
-    widths = np.concatenate([np.diff(edges) for (edges,) in found.grid.edges])
-    return float(widths[gone].sum())
+    gone: Mask = ~_reaching(found, stays)
+    return gone

@@ -18,7 +18,7 @@ from limitsets.proofs.attraction import Attraction, attraction, near_section
 from limitsets.proofs.cover import cover
 from limitsets.proofs.end_points import proved_ends
 from limitsets.proofs.expansion import least_slope
-from limitsets.proofs.goals import borders, prove, prove_or_refute
+from limitsets.proofs.goals import cuts, prove, prove_or_refute
 from limitsets.proofs.goals.violating_starts import start_that_leaves
 from limitsets.proofs.of_map import ProofOfMap, certify_map
 from limitsets.proofs.orbits import proved_cycles
@@ -29,6 +29,7 @@ from limitsets.proofs.tolerance import SceneBox, whole
 from limitsets.proofs.trapping import trapping
 from limitsets.proofs.weakest_claim import weakest_of
 from limitsets.scene import Scene, load
+from limitsets.scene.laid import LaidLike, laid_goals
 from limitsets.scene.quantities import deviation, find
 from limitsets.scene.units import parse
 
@@ -179,6 +180,8 @@ CLAIMS = tuple(PROVERS)
 
 def _chosen(scene: Scene, claims: Sequence[str] | None) -> tuple[str, ...]:
     if claims is None:
+        if scene.goal is not None and scene.goal.laid:
+            return ("goal",)  # attracts-all is about the whole arm
         return ("attracts-all",) if scene.goal is None else ("attracts-all", "goal")
     for claim in claims:
         if claim not in CLAIMS:
@@ -205,6 +208,7 @@ def certify(
     *,
     noise: Mapping[str, str] | None = None,
     tolerance: Mapping[str, str] | None = None,
+    laid: LaidLike | None = None,
     progress: Progress | None = None,
 ) -> Proof: ...
 @overload
@@ -223,6 +227,7 @@ def certify(
     *,
     noise: Mapping[str, str] | None = None,
     tolerance: Mapping[str, str] | None = None,
+    laid: LaidLike | None = None,
     upper: Any = None,
     progress: Progress | None = None,
 ) -> Proof | ProofOfMap:
@@ -247,6 +252,9 @@ def certify(
     tolerance : mapping of str to str, optional
         Of a scene alone: ``{"throw.speed": "0.7 %"}``: what is fixed but unknown; the claims are then proved for every
         such value.
+    laid : mapping of int to sequence of (float, float), optional
+        Of a scene alone: by side the ranges of x where parts are laid down, numbers in the scene's unit or texts with a
+        unit, ``{0: [(8.0, 20.0)]}``: the goal's starts are these.  The goal alone is then claimed by default.
     upper : NamedTuple, optional
         Of a map alone: the upper corner of a box of parameters, whose lower corner is `scene`; the claims are then
         proved for every map between.
@@ -277,12 +285,17 @@ def certify(
     'proved'
     """
     if isinstance(scene, tuple | type):
-        _require_none({"noise": noise, "tolerance": tolerance}, "beside a map")
+        _require_none({"noise": noise, "tolerance": tolerance, "laid": laid}, "beside a map")
         return certify_map(scene, grid, claims, upper=upper, progress=progress)
     twice = isinstance(grid, Grid) or claims is not None  # else the claims stand in its place
     _require_none({"upper": upper, "grid": grid if twice else None}, "beside a scene")
     return certify_scene(
-        scene, claims if grid is None else grid, noise=noise, tolerance=tolerance, progress=progress
+        scene,
+        claims if grid is None else grid,
+        noise=noise,
+        tolerance=tolerance,
+        laid=laid,
+        progress=progress,
     )
 
 
@@ -302,10 +315,11 @@ def certify_scene(
     *,
     noise: Mapping[str, str] | None = None,
     tolerance: Mapping[str, str] | None = None,
+    laid: LaidLike | None = None,
     progress: Progress | None = None,
 ) -> Proof:
     """Prove claims about a scene, by the arguments of `certify`."""
-    loaded = load(scene)
+    loaded, _ = laid_goals(load(scene), laid)
     wanted = _chosen(loaded, claims)
     noise = joined(spelled_deviations(loaded, noise), spelled_deviations(loaded, scattered(loaded)))
     tolerance = spelled_deviations(loaded, tolerance)
@@ -332,11 +346,11 @@ def _attempt(
 
     What refutes the goal is searched for with the first cells and with the last: it hardly depends on them.
     """
-    cuts = {side: borders(scene.goal) for side in range(box.lo.a.size)}
+    wanted_cuts = cuts(() if scene.goal is None else (scene.goal,), box.lo.a.size)
     for step, cells in enumerate(ladder):
         if progress is not None:
             progress(f"{cells} cells a side", step, len(ladder))
-        found = attraction(cover(box, cells, cuts))
+        found = attraction(cover(box, cells, wanted_cuts))
         now = search and step in (0, len(ladder) - 1)
         answers = tuple(
             _goal(found, scene, search=now) if word == "goal" else PROVERS[word](found, scene)

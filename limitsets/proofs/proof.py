@@ -13,6 +13,7 @@ import numpy as np
 
 from limitsets.errors import AnswerError
 from limitsets.files import as_table, picked
+from limitsets.goals import Laid, by_side
 from limitsets.proofs.attraction import Attraction
 from limitsets.proofs.certificate import write
 from limitsets.proofs.goals import State, rechecked
@@ -49,11 +50,13 @@ class Claim:
     final : bool
         Whether finer cells cannot change the verdict.
     starts : str, dict or None
-        Of a goal that is proved, for which starts: "every", "almost-every", ``{"from": {"0": x}}`` or "cells"; of one
-        that is refuted, of which starts it is not true.  None for other claims.
+        Of a goal that is proved, for which starts: "every", "almost-every", ``{"from": {"0": x}}``,
+        ``{"within": {"0": [[lo, hi]]}}`` where parts are laid down, or "cells"; of one that is refuted, of which starts
+        it is not true.  None for other claims.
     shares : dict of str to float
         Of a goal that is proved: shares of the arm for whose starts it is (`share`), whose starts are proved to leave
-        (`leaves`) or to creep to the joint (`creeps`), and of whose starts nothing is proved (`open`).
+        (`leaves`) or to creep to the joint (`creeps`), and of whose starts nothing is proved (`open`); shares of where
+        parts are laid down, if that is given.
     note : str
         What a reader of a proved goal should know, empty if nothing.
     recurs : dict
@@ -92,6 +95,9 @@ def _starts(starts: Any) -> str | None:
     """Write for which starts a goal is proved."""
     if not isinstance(starts, dict):
         return None if starts is None else str(starts)
+    if "within" in starts:
+        spans = [(side, *pair) for side, pairs in starts["within"].items() for pair in pairs]
+        return "within " + ", ".join(f"x = {lo:.6g} to {hi:.6g} on side {side}" for side, lo, hi in spans)
     return "from " + ", ".join(f"x = {x:.6g} on side {side}" for side, x in starts["from"].items())
 
 
@@ -137,6 +143,11 @@ class Proof(Tabled):
         return whole(self.scene, self.tolerance).texts() if self.tolerance else {}
 
     @property
+    def laid(self) -> Laid:
+        """Where parts are laid down: the starts of the goal; () for the whole arm."""
+        return () if self.scene.goal is None else self.scene.goal.laid
+
+    @property
     def effects(self) -> tuple[str, ...]:
         """The effects of the scene that the proof is about, but for a spread, which is noise."""
         return tuple(name for name in self.scene.effects.on() if name != "spread")
@@ -179,6 +190,7 @@ class Proof(Tabled):
             effects=self.effects or None,
             noise=self.noise or None,
             tolerance=self.tolerance or None,
+            laid=by_side(self.laid) or None,
             max_throws=self.max_throws() if proved and claim.claim == "attracts-all" else None,
             jog_fixed_points=claim.jog_fixed_points,
             extents=self._extents(claim) if proved else None,

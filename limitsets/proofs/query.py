@@ -16,8 +16,9 @@ from limitsets.errors import AnswerError
 from limitsets.goals import Goal, Reaches
 from limitsets.proofs.attraction import Attraction, attraction
 from limitsets.proofs.cover import cover
-from limitsets.proofs.goals import Answer, borders, prove, prove_or_refute
+from limitsets.proofs.goals import Answer, cuts, prove, prove_or_refute
 from limitsets.proofs.goals.kind import against, undecided
+from limitsets.proofs.goals.laid_starts import laid_only, narrowed, starts_in
 from limitsets.proofs.goals.reaches import falls_short
 from limitsets.proofs.parameters import ParameterBox, parameter_box
 from limitsets.proofs.proof import Claim
@@ -160,9 +161,8 @@ class Query:
         reason = missing.reason
         if missing.verdict == "proved-on-cells":
             share = 100.0 * missing.shares["share"]
-            reason = (
-                f"the goal is proved for {math.floor(10.0 * share) / 10.0:g} % of the starts only: {reason}"
-            )
+            laid = " laid down" if any(goal.laid for goal in self.goals) else ""
+            reason = f"the goal is proved for {math.floor(10.0 * share) / 10.0:g} % of the starts{laid} only: {reason}"
         if not (found.component >= 0).any():
             reason = f"{reason}: from some of them, parts may leave the arm"
         return Outcome("undecided", reason, found, piece=piece, noise=noise)
@@ -198,29 +198,25 @@ class Query:
         box = self.box(piece, {})
         return self._finer(self._coarse(box), box, step)
 
-    def _cuts(self, sides: int) -> dict[int, list[float]]:
-        wanted = [float(x) for goal in self.goals for x in borders(goal)]
-        return dict.fromkeys(range(sides), wanted)
-
     def _coarse(self, box: ParameterBox, bases: int = len(BASES), base: int = BASE) -> Attraction:
         for cells in (base, *(more for more in BASES[:bases] if more > base)):
-            found = attraction(cover(box, cells, self._cuts(box.lo.a.size), PIECES[0]))
+            found = attraction(cover(box, cells, cuts(self.goals, box.lo.a.size), PIECES[0]))
             if (found.component >= 0).any():
                 break
         return found
 
     def _finer(self, found: Attraction, box: ParameterBox, step: int, base: int = BASE) -> Attraction:
         """Cut what attracts into more cells; or everything, where a goal is about every start."""
-        cuts = self._cuts(box.lo.a.size)
+        borders = cuts(self.goals, box.lo.a.size)
         if self.anywhere:
-            return attraction(cover(box, LADDER[step], cuts, PIECES[step]))
+            return attraction(cover(box, LADDER[step], borders, PIECES[step]))
         extents = found.cells.extents()
         total = sum(hi - lo for parts in extents.values() for lo, hi in parts)
         for side, parts in extents.items():
             for lo, hi in parts:
                 count = max(2, round(FINE[step] * (hi - lo) / total))
-                cuts[side] = [*cuts[side], *np.linspace(lo, hi, count).tolist()]
-        return attraction(cover(box, base, cuts, PIECES[step]))
+                borders[side] = [*borders[side], *np.linspace(lo, hi, count).tolist()]
+        return attraction(cover(box, base, borders, PIECES[step]))
 
     def refute(self, piece: SceneBox | None = None, noise: Mapping[str, str] | None = None) -> Outcome:
         """Search for an orbit of one scene that violates one of the goals.
@@ -253,13 +249,16 @@ class Query:
         wrong = goal.wrong()
         if isinstance(goal, Reaches) and not goal.every_orbit:
             # refuted by where attracting cells end; a periodic orbit that attracts is not looked for each time
-            return falls_short(self._finer(found, found.cover.box, 2), goal) or undecided("")
+            finer = self._finer(found, found.cover.box, 2)
+            finer = narrowed(finer, starts_in(finer, goal.laid)[0]) if goal.laid else finer
+            return laid_only(falls_short(finer, goal) or undecided(""), finer, goal.laid)
         if wrong is None or not found.cover.box.noise or goal.from_anywhere:
             return prove_or_refute(found, self.scene, goal)
         answer = prove(found, self.scene, goal)
+        found = narrowed(found, starts_in(found, goal.laid)[0]) if goal.laid else found
         if not (found.component >= 0).any():
             return answer
-        return against(worst_orbit(found, wrong), answer.reason)
+        return laid_only(against(worst_orbit(found, wrong), answer.reason), found, goal.laid)
 
 
 def joined_claims(pieces: Sequence[Outcome]) -> tuple[Claim, ...]:

@@ -15,7 +15,7 @@ from limitsets.errors import AnswerError
 from limitsets.goals import Goal
 from limitsets.proofs.attraction import Attraction
 from limitsets.proofs.certificate import write
-from limitsets.proofs.goals import State, rechecked
+from limitsets.proofs.goals import State, hexed, rechecked
 from limitsets.scene import Scene
 from limitsets.scene.quantities import text_at
 
@@ -32,6 +32,8 @@ def _nominal(scene: Scene, name: str) -> str:
 
 def _goal(goal: Goal, scene: Scene) -> dict[str, Any]:
     words: dict[str, Any] = {"kind": goal.kind} | asdict(goal)
+    if words.pop("laid", ()):
+        words["starts"] = {"within": hexed(goal.laid)}
     if "x" in words:
         words["x"] = f"{words['x']!r} {scene.unit}"
     if "order" in words:

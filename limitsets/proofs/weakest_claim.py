@@ -13,7 +13,7 @@ from limitsets.proofs.proof import Claim
 __all__ = ["weakest_of"]
 
 # For which starts a goal holds: the fewer the later.
-STARTS = ("every", "almost-every", "from", "cells")
+STARTS = ("every", "within", "almost-every", "from", "cells")
 
 
 def weakest_of(claims: Sequence[Claim], found: Sequence[Attraction]) -> Claim:
@@ -32,12 +32,11 @@ def weakest_of(claims: Sequence[Claim], found: Sequence[Attraction]) -> Claim:
         section["least_slope"] = min((other["least_slope"] for other in sections), key=float.fromhex)
     if claims[0].starts is None:
         return Claim(claims[0].claim, "proved", "", section)
-    weakest = max(
-        claims, key=lambda claim: STARTS.index(claim.starts if isinstance(claim.starts, str) else "from")
-    )
+    words = [one.starts if isinstance(one.starts, str) else next(iter(one.starts)) for one in claims]
+    weakest = max(zip(words, claims, strict=True), key=lambda each: STARTS.index(each[0]))[1]
     starts = weakest.starts
     section.pop("lost", None)
-    if isinstance(starts, dict):
+    if isinstance(starts, dict) and "from" in starts:
         given = [claim.starts["from"] for claim in claims if isinstance(claim.starts, dict)]
         if len(near) < len(sections):  # of starts before the cells nothing is claimed then
             first = [[float(edges[0]) for (edges,) in one.cover.grid.edges] for one in found]
@@ -51,7 +50,7 @@ def weakest_of(claims: Sequence[Claim], found: Sequence[Attraction]) -> Claim:
             }
         most, whole = zip(*(one.shares_from(section) for one in found), strict=True)
     else:
-        section["starts"] = starts
+        section["starts"] = weakest.section["starts"]
         most, whole = tuple(claim.shares for claim in claims), (True,)
     least = {"share": min, "leaves": min, "creeps": min, "open": max}
     shares = {key: pick(each[key] for each in most) for key, pick in least.items()}

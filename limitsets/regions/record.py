@@ -21,7 +21,7 @@ from limitsets.goals import OrientedBeyond
 from limitsets.proofs.attraction import Attraction, attraction
 from limitsets.proofs.certificate import arrays_of
 from limitsets.proofs.cover import cover
-from limitsets.proofs.goals import borders, prove
+from limitsets.proofs.goals import cuts, prove
 from limitsets.proofs.goals.kind import throws_to_reach
 from limitsets.proofs.parameters import ParameterBox, parameter_box
 from limitsets.proofs.rational import RationalInterval
@@ -168,9 +168,9 @@ def certify_cell(
 
 def _coarse(box: ParameterBox, scene: Scene) -> tuple[Attraction, int]:
     """Find about where the attracting blocks are, and with how many cells a side."""
-    cuts = dict.fromkeys(range(box.lo.a.size), borders(scene.goal))
+    wanted = cuts(() if scene.goal is None else (scene.goal,), box.lo.a.size)
     for number in COARSE:
-        found = attraction(cover(box, number, cuts, PIECES))
+        found = attraction(cover(box, number, wanted, PIECES))
         if (found.component >= 0).any():
             break
     return found, number
@@ -182,16 +182,15 @@ def _finer(coarse: tuple[Attraction, int], scene: Scene, number: int) -> Attract
     extents, step = found.cells.extents(), float(found.cover.box.lo.arm_length) / number
     if not extents:
         return found
-    cuts = {}
+    wanted = cuts(() if scene.goal is None else (scene.goal,), found.cover.grid.sides)
     for side, (edges,) in enumerate(found.cover.grid.edges):
-        cuts[side] = list(borders(scene.goal))
         for lo, hi in extents.get(side, ()):
             at = np.arange(math.ceil(lo / step), math.floor(hi / step) + 1) * step
             k = np.clip(np.searchsorted(edges, at), 1, edges.size - 1)
             # none so near to another border that the images of a cell had no room in the digits of x
             apart = np.minimum(np.abs(at - edges[k - 1]), np.abs(edges[k] - at)) > APART * step
-            cuts[side] += at[apart].tolist()
-    return attraction(cover(found.cover.box, base, cuts, PIECES))
+            wanted[side] += at[apart].tolist()
+    return attraction(cover(found.cover.box, base, wanted, PIECES))
 
 
 def _middle(piece: SceneBox) -> SceneBox:

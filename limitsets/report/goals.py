@@ -6,7 +6,7 @@ import math
 from typing import TYPE_CHECKING
 
 from limitsets.errors import AnswerError
-from limitsets.goals import Goal, OrientedBeyond, Reaches, StaysOnArm, unknown_goal
+from limitsets.goals import Goal, OrientedBeyond, Reaches, StaysOnArm, laid_words, unknown_goal
 from limitsets.proofs.simulated import simulated
 from limitsets.proposals import proposed
 from limitsets.report.tables import percent
@@ -47,9 +47,12 @@ def goal_sentence(goal: Goal, unit: str) -> str:
     """
     if not isinstance(goal, Goal):
         raise unknown_goal(goal)
+    laid = f"parts laid down at {laid_words(goal.laid, unit)}" if goal.laid else ""
     if goal.of_every_start:
-        return goal.question(unit)
+        return f"{goal.question(unit)} (asked of {laid})" if laid else goal.question(unit)
     where = "every throw from every start" if goal.from_anywhere else "the limit set"
+    if laid:
+        where = f"every throw of {laid}" if goal.from_anywhere else f"where {laid} come to"
     return f"{goal.question(unit)} (asked of {where})"
 
 

@@ -134,7 +134,7 @@ def main(seed: int = 0, out: Path = HERE, trials: int = 100_000, *, level: bool 
         found = ls.feed(
             case.scene,
             case.scatter,
-            starts=case.starts(),
+            laid=case.laid(),
             noise=case.noise,
             trials=trials,
             seed=seed,

@@ -20,7 +20,7 @@ import numpy as np
 
 from limitsets.errors import AnswerError, SceneError
 from limitsets.files import as_table, picked
-from limitsets.goals import OrientedBeyond, Reaches
+from limitsets.goals import Laid, OrientedBeyond, Reaches
 from limitsets.inverse.margin.bounds import Ends, bounds_of, of_the_arm
 from limitsets.inverse.margin.model_validity import validity_slack
 from limitsets.inverse.margin.search import ASSUMPTION, LEAVES, LOST, NO_PART, Tell, said
@@ -28,6 +28,7 @@ from limitsets.maps import advance
 from limitsets.proofs.query import Query
 from limitsets.robust.margins.invariant_set import invariant_intervals, least_slack
 from limitsets.scene import Scene, load
+from limitsets.scene.laid import LaidLike, laid_goal, laid_goals
 from limitsets.scene.scene import require_rests
 from limitsets.scene.spelling import in_unit_of, in_units_of, unit_of
 from limitsets.tables import Column, Table, Tabled
@@ -158,7 +159,7 @@ class _GoalSearch:
     def __init__(self, scene: Scene, bounds: Mapping[str, tuple[float, float]], tell: Tell, of: int) -> None:
         assert isinstance(scene.goal, OrientedBeyond | Reaches)
         self.scene, self.bounds, self.tell, self.of = scene, dict(bounds), tell, of
-        self.x, self.side = scene.goal.x, scene.goal.side
+        self.x, self.side, self.laid = scene.goal.x, scene.goal.side, scene.goal.laid
         self.ruled_out, self.evaluations = Counter[str](), 0
         self.best: tuple[float, float, Scene] = (-math.inf, -math.inf, scene)
 
@@ -168,7 +169,7 @@ class _GoalSearch:
         room, why = self._room(scene)
         if scene is None or why:
             return room, room, why
-        slack = least_slack(scene.bare_map)
+        slack = 0.0 if self.laid else least_slack(scene.bare_map)
         if slack < 0.0:  # after all designs that none leaves, and before those that do not meet the goal
             return end + max(slack, -end), room, LEAVES
         return end + room, room, ""
@@ -234,6 +235,7 @@ def design_for_goal(
     *,
     vary: Sequence[str] | None = None,
     bounds: Mapping[str, Ends] | None = None,
+    laid: LaidLike | None = None,
     evaluations: int = 600,
     seed: int = 0,
     progress: Tell | None = None,
@@ -248,6 +250,9 @@ def design_for_goal(
         Quantities to vary; default the throw and the surface's height, and where these do not meet the goal the mass.
     bounds : mapping of str to (float or None, float or None), optional
         Bounds of some of them [scene's units]; what is left out has usual ones, which hold the scene's own value.
+    laid : mapping of int to sequence of (float, float), optional
+        Where parts are laid down, as for `limitsets.certify`: the goal is proved of these starts, and starts elsewhere
+        may leave the arm.  Default: the whole arm.
     evaluations : int
         Designs to look at.
     seed : int
@@ -271,7 +276,7 @@ def design_for_goal(
     >>> found.verdict, found.scene.goal == found.before.goal
     ('proved', True)
     """
-    begin, start = time.perf_counter(), load(scene)
+    begin, start = time.perf_counter(), laid_goals(load(scene), laid)[0]
     if not isinstance(start.goal, OrientedBeyond | Reaches):
         kind = None if start.goal is None else start.goal.kind
         remedy = "add one to [goal], or ask for --critical-points"
@@ -298,22 +303,25 @@ def design_for_goal(
         start.goal,
         *([Reaches(start.goal.x, start.goal.side)] if isinstance(start.goal, OrientedBeyond) else []),
     )
-    verdict = Query.of(found, asked).prove().verdict if room > 0.0 else "undecided"
+    goals = tuple(laid_goal(goal, start.goal.laid) for goal in asked)
+    verdict = Query.of(found, goals).prove().verdict if room > 0.0 else "undecided"
     lost = why in (LOST, NO_PART)
     return GoalDesign(
-        found, start, ends, room, None if lost else room_before, why, _leaving(found), verdict, dict(search.ruled_out),
-        search.evaluations, time.perf_counter() - begin,
+        found, start, ends, room, None if lost else room_before, why, _leaving(found, start.goal.laid), verdict,
+        dict(search.ruled_out), search.evaluations, time.perf_counter() - begin,
     )  # fmt: skip
 
 
-def _leaving(scene: Scene) -> float | None:
+def _leaving(scene: Scene, laid: Laid) -> float | None:
     """Give the share of random starts from which parts leave the arm; None where no throw from anywhere does."""
     if least_slack(scene.bare_map) >= 0.0:
         return None
-    rng, a = np.random.default_rng(0), scene.sides.a
-    room = scene.arm_length - a
-    sides = rng.choice(a.size, STARTS, p=room / room.sum())
-    code = advance(scene.bare_map, a[sides] + rng.random(STARTS) * room[sides], sides, THROWS)[2]
+    whole = [(side, a, scene.arm_length) for side, a in enumerate(scene.sides.a.tolist())]
+    side, lo, hi = (np.array(column) for column in zip(*(laid or whole), strict=True))
+    rng = np.random.default_rng(0)
+    drawn = rng.choice(side.size, STARTS, p=(hi - lo) / (hi - lo).sum())
+    starts = lo[drawn] + rng.random(STARTS) * (hi - lo)[drawn]
+    code = advance(scene.bare_map, starts, side[drawn], THROWS)[2]
     return float((code < 0).mean())
 
 

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from limitsets.arguments import arguments_checked
 from limitsets.errors import AnswerError
 from limitsets.geometry import triangle
-from limitsets.goals import Goal, OrientedBeyond, Reaches
+from limitsets.goals import Goal, Laid, OrientedBeyond, Reaches
 from limitsets.inverse.margin.bounds import Ends, bounds_of
 from limitsets.inverse.margin.counterweight import counterweight_of
 from limitsets.inverse.margin.design_result import RobustDesign
@@ -35,6 +35,7 @@ from limitsets.robust.margins.estimate import Estimate, on_all_corners
 from limitsets.robust.margins.joint import joint_margin
 from limitsets.robust.margins.vector import Tolerance
 from limitsets.scene import Scene, load
+from limitsets.scene.laid import LaidLike, read_laid
 from limitsets.scene.scene import require_rests
 from limitsets.scene.spelling import in_units_of
 
@@ -61,9 +62,9 @@ POLISHED, POLISH = 3, 8
 SECONDS = 240.0
 
 
-def fed_at(x: float, side: int) -> tuple[Goal, Goal]:
+def fed_at(x: float, side: int, laid: Laid = ()) -> tuple[Goal, Goal]:
     """Give both goals of feeding at x: nothing else gets there, and the part does."""
-    return OrientedBeyond(x, side), Reaches(x, side)
+    return OrientedBeyond(x, side, laid=laid), Reaches(x, side, laid=laid)
 
 
 def tolerance_of(scene: Scene, tolerance: Mapping[str, str] | None) -> dict[str, str]:
@@ -183,6 +184,7 @@ def robust_design(
     tolerance: Mapping[str, str] | None = None,
     orders: bool = True,
     everywhere: bool = True,
+    laid: LaidLike | None = None,
     evaluations: int = 1200,
     seed: int = 0,
     prove: float = SECONDS,
@@ -207,6 +209,9 @@ def robust_design(
         Whether a triangle's sides may be put in another order.
     everywhere : bool
         Whether no start on the arm may be lost, in the scene as it is.  The goals ask about the limit set only.
+    laid : mapping of int to sequence of (float, float), optional
+        Where parts are laid down, as for `limitsets.certify`: the proofs are of these starts, `everywhere` and `orders`
+        are then off.  Default: the whole arm.
     evaluations : int
         Designs to look at, besides those drawn at first.
     seed : int
@@ -241,6 +246,8 @@ def robust_design(
     on = _side(start, side)
     if evaluations < 1:
         raise AnswerError("the evaluations", evaluations, "1 or more", "allow for some designs")
+    ranges = read_laid(start, laid)
+    orders, everywhere = orders and not ranges, everywhere and not ranges
     tell: Tell = progress if progress is not None else lambda what, done, of: None
     texts, begin = tolerance_of(start, tolerance), time.perf_counter()
     vector = Tolerance.of(start, texts)
@@ -285,13 +292,13 @@ def robust_design(
     margins: tuple[Margin, ...] = ()
     own: tuple[Margin, ...] = ()
     if prove > 0.0:
-        margins = _proved(design, fed_at(x, on), texts, prove, tell, "the design")
+        margins = _proved(design, fed_at(x, on, ranges), texts, prove, tell, "the design")
         if before is not None and known:
-            goals = fed_at(round(before.x, DECIMALS_OF_X), on)
+            goals = fed_at(round(before.x, DECIMALS_OF_X), on, ranges)
             own = _proved(start, goals, texts, prove, tell, "the scene before")
     return RobustDesign(
         scene=design,
-        goals=fed_at(x, on),
+        goals=fed_at(x, on, ranges),
         x=x,
         side=on,
         varied=tuple(search.bounds),

@@ -13,15 +13,27 @@ from typing import Any
 
 import numpy as np
 
-from limitsets.goals import Goal, unknown_goal
+from limitsets.goals import Goal, laid_words, unknown_goal
 from limitsets.proofs.attraction import Attraction, near_section
 from limitsets.proofs.goals import attracts_all, flip_order, oriented_beyond, predicate, reaches, stays_on_arm
 from limitsets.proofs.goals.kind import Answer, Kind, undecided
+from limitsets.proofs.goals.laid_starts import hexed, laid_only, narrowed, prove_laid, starts_in
 from limitsets.proofs.goals.reaches import not_null
 from limitsets.proofs.goals.violating_orbits import State
 from limitsets.scene import Scene
 
-__all__ = ["KINDS", "Answer", "Kind", "State", "borders", "prove", "prove_or_refute", "rechecked", "sentence"]
+__all__ = [
+    "KINDS",
+    "Answer",
+    "Kind",
+    "State",
+    "cuts",
+    "hexed",
+    "prove",
+    "prove_or_refute",
+    "rechecked",
+    "sentence",
+]
 
 # A goal of whose starts so small a share is open, while others leave, is not asked again with finer cells.
 LITTLE = 1e-3
@@ -71,8 +83,8 @@ def prove(found: Attraction, scene: Scene, goal: Goal) -> Answer:
     Returns
     -------
     Answer
-        "proved" for every start, almost every start, or the starts from some x on; "proved-on-cells" where the goal is
-        proved for the starts in some cells only; else "undecided".
+        "proved" for every start, almost every start, or the starts from some x on, or for all where parts are laid
+        down; "proved-on-cells" where the goal is proved for the starts in some cells only; else "undecided".
 
     Raises
     ------
@@ -82,6 +94,8 @@ def prove(found: Attraction, scene: Scene, goal: Goal) -> Answer:
     if not isinstance(goal, Goal):  # whatever it calls itself
         raise unknown_goal(goal)
     kind = _kind(goal)
+    if goal.laid:
+        return prove_laid(found, scene, goal, kind)
     answer = kind.prove(found, scene, goal)
     if answer.verdict != "proved":
         return answer
@@ -96,7 +110,11 @@ def prove_or_refute(found: Attraction, scene: Scene, goal: Goal) -> Answer:
     answer = prove(found, scene, goal)
     if answer.verdict == "proved":
         return answer
+    if goal.laid:
+        found = narrowed(found, starts_in(found, goal.laid)[0])
     against = _kind(goal).refute(found, scene, goal)
+    if goal.laid:
+        against = laid_only(against, found, goal.laid)
     if against.verdict == "refuted":
         return against._replace(reason=against.reason or answer.reason)
     return answer
@@ -131,15 +149,19 @@ def _for_starts(found: Attraction, answer: Answer, *, almost: bool) -> Answer:
     )
 
 
-def borders(goal: Goal | None) -> Sequence[float]:
-    """Borders of cells that the goal needs on every side."""
-    return () if goal is None else _kind(goal).borders(goal)
+def cuts(goals: Sequence[Goal], sides: int) -> dict[int, list[float]]:
+    """Borders of cells that some goals need, by side: their places, and the ends of where parts are laid down."""
+    wanted = [float(x) for goal in goals for x in _kind(goal).borders(goal)]
+    laid = [each for goal in goals for each in goal.laid]
+    return {side: wanted + [end for on, *ends in laid if on == side for end in ends] for side in range(sides)}
 
 
 def sentence(section: Mapping[str, Any]) -> str:
     """Put a proved goal in words for people, from its section of the certificate."""
     said = KINDS[section["kind"]].sentence(section)
     starts = section.get("starts")
+    if isinstance(starts, dict) and "from" not in starts:
+        return _of_laid(section, said)
     if section.get("from_anywhere") or starts is None:
         return said
     if starts == "every":
@@ -151,3 +173,15 @@ def sentence(section: Mapping[str, Any]) -> str:
     beyond = ", ".join(f"x > {float.fromhex(x):.6g} on side {side}" for side, x in starts["from"].items())
     but = ", but for starts of total length zero" if "thinning" in section else ""
     return f"{said} Every start with {beyond} comes to the attracting cells{but}."
+
+
+def _of_laid(section: Mapping[str, Any], said: str) -> str:
+    """Put a goal of parts that are laid down in words."""
+    ((word, spans),) = section["starts"].items()
+    laid = tuple(
+        (int(side), float.fromhex(lo), float.fromhex(hi)) for side, pairs in spans.items() for lo, hi in pairs
+    )
+    which = "Every start" if word == "within" else "Each start in the cells named"
+    but = ", but for starts of total length zero" if "thinning" in section else ""
+    comes = "" if section.get("from_anywhere") else f" {which} comes to attracting cells{but}."
+    return f"Parts are laid down at {laid_words(laid, '').replace('  ', ' ')}. {said}{comes}"

@@ -34,17 +34,19 @@ def _prove(found: Attraction, _: Scene, goal: AttractsAll) -> Answer:
     if found.basin.creeps:
         return undecided(TWO_BASINS, final=True)
     starts = found.basin.starts
+    if goal.laid:
+        starts = "almost-every" if found.basin.thinning else "every"
     if starts != "every" and (goal.from_anywhere or starts != "almost-every"):
         return undecided(found.missing)
     return Answer("proved", "", {"kind": goal.kind})
 
 
-def _refute(found: Attraction, _: Scene, __: AttractsAll) -> Answer:
+def _refute(found: Attraction, _: Scene, goal: AttractsAll) -> Answer:
     if found.basin.creeps:
         side = int(np.argmax([point.lo for point in found.cover.points]))
         x = 0.5 * (float(found.cover.box.bare[1].a[side]) + found.cover.points[side].lo)
         return against(Refutation((State(x, x, side, None),), "almost-every"), TWO_BASINS)
-    return once(start_that_leaves(found), found.missing)
+    return once(start_that_leaves(found, goal.laid), found.missing)
 
 
 def _sentence(_: Mapping[str, Any]) -> str:

@@ -16,8 +16,8 @@ from limitsets.goals import FlipOrder
 from limitsets.maps import codes
 from limitsets.proofs.attraction import Attraction
 from limitsets.proofs.cover import targets
-from limitsets.proofs.goals.kind import Answer, Kind, against, common, throws_to_reach, undecided
-from limitsets.proofs.goals.recurrent_orbits import Loop, cycle_that
+from limitsets.proofs.goals.kind import Answer, Kind, against, begins, common, throws_to_reach, undecided
+from limitsets.proofs.goals.recurrent_orbits import Loop, cycle_that, meets
 from limitsets.scene import Scene
 
 __all__ = ["KIND"]
@@ -38,7 +38,7 @@ def _prove(found: Attraction, _: Scene, goal: FlipOrder) -> Answer:
     if not _is_cycle(goal.order, found.cover.grid.sides):
         return undecided(AGAINST, final=True)
     if goal.from_anywhere and found.missing:
-        return undecided(found.missing, final=found.cover.box.landing > 0.0)
+        return undecided(found.missing, final=found.cover.box.landing > 0.0 and not goal.laid)
     if any((ends[inside, 0] >= 0).any() for ends in _rolls(found)):
         return undecided(
             "parts may roll on to other sides than the next, in this version no order is proved then"
@@ -53,9 +53,13 @@ def _prove(found: Attraction, _: Scene, goal: FlipOrder) -> Answer:
 def _refute(found: Attraction, scene: Scene, goal: FlipOrder) -> Answer:
     if common(found, anywhere=False):
         return undecided(common(found, anywhere=False))
+
+    def otherwise(loop: Loop) -> bool:
+        return meets(loop, goal.laid) and _flips_otherwise(loop, goal.order)
+
     if not _is_cycle(goal.order, found.cover.grid.sides):
-        return against(cycle_that(found, scene, lambda loop: _flips_otherwise(loop, goal.order)), AGAINST)
-    return against(cycle_that(found, scene, lambda loop: not loop.branches.any()))
+        return against(cycle_that(found, scene, otherwise), AGAINST)
+    return against(cycle_that(found, scene, lambda loop: meets(loop, goal.laid) and not loop.branches.any()))
 
 
 def _rolls(found: Attraction) -> list[NDArray[np.int32]]:
@@ -82,7 +86,7 @@ def _sentence(section: Mapping[str, Any]) -> str:
     order = ", ".join(str(side) for side in section["order"])
     if len(section["order"]) == 1:
         return f"In the attracting cells, a part stays on side {order}."
-    where = "From anywhere on the arm" if section.get("from_anywhere") else "In the attracting cells"
+    where = f"From {begins(section)}" if section.get("from_anywhere") else "In the attracting cells"
     jogs = f"in the attracting cells {section['jogs']} jogs at most follow each other"
     return f"{where}, parts come to lie on sides {order} in turn, again and again; {jogs}."
 

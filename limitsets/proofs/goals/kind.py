@@ -29,6 +29,7 @@ __all__ = [
     "Kind",
     "above",
     "against",
+    "begins",
     "below",
     "common",
     "once",
@@ -112,6 +113,12 @@ def common(found: Attraction, *, anywhere: bool) -> str:
             return f"near the joint on side {side}: {near.reason}"
     leaving = np.flatnonzero(found.cover.graph.ranges.exits)
     return f"the image of {found.cover.place(int(leaving[0]))} may leave the cells" if leaving.size else ""
+
+
+def begins(section: Mapping[str, Any]) -> str:
+    """Say where the orbits begin that a goal from anywhere speaks of."""
+    laid = isinstance(section.get("starts"), dict)
+    return "where they are laid down" if laid else "anywhere on the arm"
 
 
 def thrown_into(found: Attraction, bad: Mask) -> str:

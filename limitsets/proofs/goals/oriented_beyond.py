@@ -17,6 +17,7 @@ from limitsets.proofs.goals.kind import (
     Kind,
     above,
     against,
+    begins,
     below,
     common,
     once,
@@ -75,13 +76,13 @@ def section_of(goal: OrientedBeyond, scene: Scene) -> dict[str, Any]:
 def _refute(found: Attraction, scene: Scene, goal: OrientedBeyond) -> Answer:
     wrong = goal.wrong()
     if not goal.from_anywhere:
-        refutation = recurrent_violation(found, scene, wrong)
+        refutation = recurrent_violation(found, scene, wrong, goal.laid)
         again = _again(found, goal) if refutation.of == "every" else {}
         if again:
             refutation = refutation._replace(of="almost-every", recurs={**refutation.recurs, **again})
         return against(refutation)
     reason = _thrown_there(found, goal, _exceptions(found, goal))
-    return once(one_throw(found, wrong) if reason else (), reason)
+    return once(one_throw(found, wrong, laid=goal.laid) if reason else (), reason)
 
 
 def _again(found: Attraction, goal: OrientedBeyond) -> dict[str, int]:
@@ -117,7 +118,7 @@ def _thrown_there(found: Attraction, goal: OrientedBeyond, bad: NDArray[np.bool_
 def _sentence(section: Mapping[str, Any]) -> str:
     beyond = f"at rest beyond x = {section['x']} lies on side {section['side']}."
     if section.get("from_anywhere"):
-        return f"After a throw from anywhere on the arm, every part {beyond}"
+        return f"After a throw from {begins(section)}, every part {beyond}"
     if section.get("throws"):
         return f"After two throws with the same parameters in the attracting cells, every part {beyond}"
     return f"In the attracting cells, every part {beyond}"

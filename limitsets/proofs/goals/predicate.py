@@ -75,8 +75,8 @@ def _refute(found: Attraction, scene: Scene, goal: Predicate) -> Answer:
         return bad
 
     if not goal.from_anywhere:
-        return against(recurrent_violation(found, scene, wrong))
-    orbit = one_throw(found, wrong)
+        return against(recurrent_violation(found, scene, wrong, goal.laid))
+    orbit = one_throw(found, wrong, laid=goal.laid)
     return once(orbit if orbit and _throughout(goal, orbit[-1]) else ())
 
 

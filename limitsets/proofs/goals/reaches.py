@@ -17,13 +17,14 @@ from limitsets.proofs.goals.kind import (
     Mask,
     above,
     against,
+    begins,
     below,
     common,
     place_text,
     throws_to_reach,
     undecided,
 )
-from limitsets.proofs.goals.recurrent_orbits import Loop, Refutation, cycle_that
+from limitsets.proofs.goals.recurrent_orbits import Loop, Refutation, cycle_that, meets
 from limitsets.proofs.goals.violating_orbits import sample_passage
 from limitsets.proofs.perron_frobenius import perron_frobenius_bound
 from limitsets.scene import Scene
@@ -43,7 +44,7 @@ def _refute(found: Attraction, scene: Scene, goal: Reaches) -> Answer:
     every = goal.every_orbit
 
     def refutes(loop: Loop) -> bool:
-        return (every or loop.attracts) and not _arrives(loop, goal)
+        return (every or loop.attracts) and meets(loop, goal.laid) and not _arrives(loop, goal)
 
     never = cycle_that(found, scene, refutes, attracting=not every)
     short = falls_short(found, goal)
@@ -64,7 +65,7 @@ def _prove(found: Attraction, scene: Scene, goal: Reaches) -> Answer:
         return _every(found, scene, goal, wanted)
     missing = (found.missing or not_null(found)) if goal.from_anywhere else ""
     if missing:
-        return undecided(missing, final=found.cover.box.landing > 0.0)
+        return undecided(missing, final=found.cover.box.landing > 0.0 and not goal.laid)
     throws, _, reason = perron_frobenius_bound(found.cover, inside & ~wanted)
     if reason:
         return undecided(reason)
@@ -88,12 +89,13 @@ def not_null(found: Attraction) -> str:
 
 def _every(found: Attraction, scene: Scene, goal: Reaches, wanted: Mask) -> Answer:
     missing = common(found, anywhere=True) if goal.from_anywhere else ""
-    cells = np.ones_like(wanted) if goal.from_anywhere else found.component >= 0
+    cells = found.basin.rank >= 0 if goal.laid else np.ones_like(wanted)
+    cells = cells if goal.from_anywhere else found.component >= 0
     throws, left = throws_to_reach(found, cells, wanted)
     if left.size:
         return undecided(f"an orbit from {found.cover.place(int(left[0]))} may never get there")
     if missing:
-        return undecided(missing, final=found.cover.box.landing > 0.0)
+        return undecided(missing, final=found.cover.box.landing > 0.0 and not goal.laid)
     return Answer("proved", "", _section(scene, goal, throws))
 
 
@@ -133,7 +135,7 @@ def falls_short(found: Attraction, goal: Reaches) -> Answer | None:
 
 
 def _sentence(section: Mapping[str, Any]) -> str:
-    where = "on the arm" if section.get("from_anywhere") else "in the attracting cells"
+    where = begins(section) if section.get("from_anywhere") else "in the attracting cells"
     there = f"comes to rest on side {section['side']} at x = {section['x']} or beyond"
     if section["every_orbit"]:
         return f"From every start {where} a part {there}, after {section['throws']} throws at most."

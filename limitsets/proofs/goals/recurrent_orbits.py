@@ -19,6 +19,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from limitsets.goals import Laid
 from limitsets.maps import Orbit, along, images, orbit
 from limitsets.proofs.attraction import Attraction
 from limitsets.proofs.goals.violating_orbits import (
@@ -42,7 +43,7 @@ from limitsets.proofs.replay import replay
 from limitsets.scene import Scene
 from limitsets.sets import Cycle
 
-__all__ = ["Loop", "Refutation", "closed", "cycle_near", "cycle_that", "recurrent_violation"]
+__all__ = ["Loop", "Refutation", "closed", "cycle_near", "cycle_that", "meets", "recurrent_violation"]
 
 # Places of a long orbit, and of a short one, from which it is followed back to them; throws until it has come back.
 TRIED, FEW, LONGEST = 48, 6, 80
@@ -98,7 +99,7 @@ class Loop(NamedTuple):
     recurs: Mapping[str, Any]
 
 
-def recurrent_violation(found: Attraction, scene: Scene, wrong: Wrong) -> Refutation:
+def recurrent_violation(found: Attraction, scene: Scene, wrong: Wrong, laid: Laid = ()) -> Refutation:
     """Find an orbit that violates a goal again and again, and prove it.
 
     Parameters
@@ -109,6 +110,8 @@ def recurrent_violation(found: Attraction, scene: Scene, wrong: Wrong) -> Refuta
         The scene.
     wrong : callable
         From places and sides to whether each violates the goal.
+    laid : Laid
+        Where a periodic orbit has to have a place; () for anywhere.
 
     Returns
     -------
@@ -120,7 +123,11 @@ def recurrent_violation(found: Attraction, scene: Scene, wrong: Wrong) -> Refuta
         bad = np.flatnonzero(wrong(path.x * MORE_THAN_ROUNDING, path.side))
         tried = TRIED if path.code.size > SHORT else FEW
         loop = cycle_near(
-            box, path, bad, lambda one: _violates(wrong, one.lo[0], one.hi[0], one.side[0]), tried
+            box,
+            path,
+            bad,
+            lambda one: meets(one, laid) and _violates(wrong, one.lo[0], one.hi[0], one.side[0]),
+            tried,
         )
         if loop is not None:
             return _of(loop, box, found)
@@ -128,6 +135,12 @@ def recurrent_violation(found: Attraction, scene: Scene, wrong: Wrong) -> Refuta
         return Refutation()
     noisy = violating_path(found, wrong)
     return Refutation() if noisy is None else closed(found.cover.box, noisy, wrong)
+
+
+def meets(loop: Loop, laid: Laid) -> bool:
+    """Whether a place of an orbit lies inside one of some ranges; always, where there are none."""
+    inside = [((loop.side == side) & (lo < loop.lo) & (loop.hi < hi)).any() for side, lo, hi in laid]
+    return not laid or bool(np.any(inside))
 
 
 def cycle_that(

@@ -21,12 +21,14 @@ def _prove(found: Attraction, _: Scene, goal: StaysOnArm) -> Answer:
     return Answer("proved", "", {"kind": goal.kind} | ({"from_anywhere": True} if goal.from_anywhere else {}))
 
 
-def _refute(found: Attraction, _: Scene, __: StaysOnArm) -> Answer:
-    return once(start_that_leaves(found), found.missing)
+def _refute(found: Attraction, _: Scene, goal: StaysOnArm) -> Answer:
+    return once(start_that_leaves(found, goal.laid), found.missing)
 
 
 def _sentence(section: Mapping[str, Any]) -> str:
     if section.get("from_anywhere"):
+        if isinstance(section.get("starts"), dict):
+            return "From there no throw ever leads off the arm or into the joint."
         return "From every position on the arm and every side, no throw ever leads off the arm or into the joint."
     return "No throw leads out of the attracting cells, so none leads off the arm."
 

@@ -20,10 +20,11 @@ from limitsets.files import as_table, picked
 from limitsets.goals import Goal, OrientedBeyond, Reaches
 from limitsets.progress import shown_in_notebooks
 from limitsets.proofs.query import Query
-from limitsets.robust.margins.finding import Margin, margin
+from limitsets.robust.margins.finding import Margin, goals_of, margin
 from limitsets.robust.margins.joint import joint_margin
 from limitsets.robust.margins.margin_texts import bound, bound_above
 from limitsets.scene import Scene, load
+from limitsets.scene.laid import LaidLike
 from limitsets.tables import Column, Table, Tabled
 
 __all__ = ["MarginsBeyond", "margins_beyond", "places_beyond"]
@@ -98,6 +99,7 @@ def margins_beyond(
     x: Sequence[float] | None = None,
     places: int = 9,
     tolerance: Mapping[str, str] | None = None,
+    laid: LaidLike | None = None,
     width: float = 0.05,
     seconds: float = 30.0,
     progress: Progress | None = None,
@@ -118,6 +120,8 @@ def margins_beyond(
         How many.
     tolerance : mapping of str to str, optional
         For "joint"; default the scene's.
+    laid : mapping of int to sequence of (float, float), optional
+        Where parts are laid down, as for `limitsets.certify`; default the whole arm.
     width : float
         Of the brackets.
     seconds : float
@@ -141,7 +145,7 @@ def margins_beyond(
     for number, place in enumerate(at.tolist()):
         if progress is not None:
             progress(f"margins beyond x = {place:.4g}", number, at.size)
-        goals: tuple[Goal, ...] = (OrientedBeyond(place, side), Reaches(place, side))
+        goals = goals_of(loaded, (OrientedBeyond(place, side), Reaches(place, side)), laid)
         rows.append(tuple(_one(loaded, name, goals, tolerance, width, seconds) for name in quantities))
     names = tuple(one.quantity for one in rows[0])
     proved = np.array([[one.proved for one in row] for row in rows])

@@ -23,6 +23,7 @@ from limitsets.robust.margins.joint import joint_margin
 from limitsets.robust.margins.margin_result import Margin
 from limitsets.robust.margins.margin_texts import failure
 from limitsets.scene import Scene, load
+from limitsets.scene.laid import LaidLike, laid_goal, read_laid
 from limitsets.scene.units import exact_factor
 
 __all__ = ["Margin", "goals_of", "margin"]
@@ -31,8 +32,15 @@ Progress = Callable[[str, int, int], None]
 GoalLike = Goal | Callable[..., Any]
 
 
-def goals_of(scene: Scene, goal: GoalLike | Sequence[GoalLike] | None) -> tuple[Goal, ...]:
-    """Read what is asked: the scene's goal, another, several, or a function of the caller's."""
+def goals_of(
+    scene: Scene, goal: GoalLike | Sequence[GoalLike] | None, laid: LaidLike | None = None
+) -> tuple[Goal, ...]:
+    """Read what is asked: the scene's goal, another, several, or a function; of all starts or of those laid down."""
+    ranges = read_laid(scene, laid)
+    return tuple(laid_goal(each, ranges) for each in _goals_of(scene, goal))
+
+
+def _goals_of(scene: Scene, goal: GoalLike | Sequence[GoalLike] | None) -> tuple[Goal, ...]:
     if goal is None:
         if scene.goal is None:
             raise AnswerError("the goal", None, "a scene with [goal], or goal=", "say what has to hold")
@@ -58,6 +66,7 @@ def margin(
     *quantities: str,
     reading: str | None = None,
     goal: GoalLike | Sequence[GoalLike] | None = None,
+    laid: LaidLike | None = None,
     width: float = 0.01,
     progress: Progress | None = None,
 ) -> tuple[Margin, ...]:
@@ -75,6 +84,9 @@ def margin(
         Default: "fixed", and "per-throw" of landing.x.
     goal : Goal, callable, or a sequence of them, optional
         What has to hold, all of it; default the scene's goal.  A function is taken as `limitsets.goals.Predicate`.
+    laid : mapping of int to sequence of (float, float), optional
+        By side the ranges of x where parts are laid down, as for `limitsets.certify`: the goal's starts are these.
+        Default: the whole arm.
     width : float
         How close the two ends of a bracket have to be, as a share of the upper one.
     progress : callable, optional
@@ -101,7 +113,7 @@ def margin(
     loaded = load(scene)
     if not 1e-4 <= width < 1:
         raise AnswerError("the width", width, "from 0.0001 to below 1", "0.01 is a hundredth")
-    goals = goals_of(loaded, goal)
+    goals = goals_of(loaded, goal, laid)
     query = Query.of(loaded, goals)
     names: tuple[str, ...] = tuple(dict.fromkeys(quantities))
     todo: list[DeviationScale | str] = []
@@ -193,5 +205,7 @@ def _of_none(query: Query, nominal: Outcome) -> Bracket:
     if against.verdict == "refuted":
         reason = f"the goal fails in the scene as it is: {against.reason}"
         return Bracket(Fraction(0), Fraction(0), [], against, reason)
-    needed = "a margin needs the goal proved of the scene as it is for every start on the arm, beyond the limit set"
+    laid = any(goal.laid for goal in query.goals)
+    starts = "where parts are laid down" if laid else "on the arm, beyond the limit set"
+    needed = f"a margin needs the goal proved of the scene as it is for every start {starts}"
     return Bracket(reason=f"{needed}: {nominal.reason}")

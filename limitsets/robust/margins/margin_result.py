@@ -9,7 +9,7 @@ from typing import Any
 
 from limitsets.errors import AnswerError
 from limitsets.files import as_table, picked
-from limitsets.goals import Goal, Predicate, as_written
+from limitsets.goals import Goal, Predicate, as_written, by_side
 from limitsets.proofs.confirm import DeniedError
 from limitsets.proofs.goals import State, rechecked
 from limitsets.proofs.proof import Proof
@@ -186,7 +186,8 @@ class Margin(Tabled):
 def goal_table(goal: Goal, unit: str) -> dict[str, Any]:
     """Give a goal as a scene would name it; a function by its name."""
     if isinstance(goal, Predicate):
-        return {"predicate": goal.name, "from_anywhere": goal.from_anywhere}
+        laid = {"laid": by_side(goal.laid)} if goal.laid else {}
+        return {"predicate": goal.name, "from_anywhere": goal.from_anywhere} | laid
     return as_written(goal, unit)
 
 

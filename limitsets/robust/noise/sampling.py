@@ -162,12 +162,17 @@ def throw_many(
 
 
 def uniform_starts(
-    random: np.random.Generator, lo: NDArray[np.float64], hi: float, count: int
+    random: np.random.Generator,
+    lo: NDArray[np.float64],
+    hi: float | NDArray[np.float64],
+    count: int,
+    sides: NDArray[np.int64] | None = None,
 ) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    """Draw starts that lie anywhere from `lo[side]` to `hi`, equally likely per length on all sides."""
+    """Draw starts from ranges `lo` to `hi` on some sides, by default one on each, equally likely per length."""
     length = np.maximum(hi - lo, 0.0)
-    side = random.choice(lo.size, size=count, p=length / length.sum())
-    return random.uniform(lo[side], hi), side.astype(np.int64)
+    drawn = random.choice(lo.size, size=count, p=length / length.sum())
+    side = drawn if sides is None else sides[drawn]
+    return random.uniform(lo[drawn], np.broadcast_to(hi, lo.shape)[drawn]), side.astype(np.int64)
 
 
 def _mean(per_part: NDArray[np.float64]) -> tuple[float, float]:

@@ -12,6 +12,7 @@ import numpy as np
 
 from limitsets.robust.margins.beyond import MarginsBeyond, margins_beyond, places_beyond
 from limitsets.scene import Scene
+from limitsets.scene.laid import LaidLike
 
 __all__ = ["curve", "curve_read"]
 
@@ -50,11 +51,10 @@ class _Here(Executor):
 
 
 def _place(
-    scene: Scene, side: int, names: tuple[str, ...], x: float, tolerance: Mapping[str, str], seconds: float
+    scene: Scene, side: int, names: tuple[str, ...], words: Mapping[str, Any], x: float, seconds: float
 ) -> MarginsBeyond:
     """Ask about one place; without the proofs, which would go from process to process."""
-    words: dict[str, Any] = {"tolerance": tolerance, "width": COARSE, "seconds": seconds}
-    return replace(margins_beyond(scene, side, names, x=[x], **words), margins=())
+    return replace(margins_beyond(scene, side, names, x=[x], seconds=seconds, **words), margins=())
 
 
 def curve(
@@ -63,6 +63,7 @@ def curve(
     tolerance: Mapping[str, str],
     known: Mapping[str, Any] | None,
     *,
+    laid: LaidLike | None = None,
     seconds: float = SECONDS,
     executor: Executor | None = None,
     tell: Callable[[str, float], None],
@@ -80,6 +81,8 @@ def curve(
         Of the joint margin; if it is empty, the margin is that of throw.speed.
     known : mapping or None
         What an earlier run kept.
+    laid : mapping of int to sequence of (float, float), optional
+        Where parts are laid down; default the whole arm.
     seconds : float
         Shared by the proofs of all places; no place is begun for which less is left than the dearest took, but the
         middle one always is.
@@ -102,6 +105,7 @@ def curve(
     """
     end = time.perf_counter() + seconds
     names = ("joint",) if tolerance else ("throw.speed",)
+    words = {"tolerance": tolerance, "laid": laid, "width": COARSE}
     places = places_beyond(scene, side, PLACES)
     places = places[np.argsort(np.abs(places - places.mean()), kind="stable")]
     found = None if known is None or known["side"] != side else curve_read(known, scene)
@@ -121,7 +125,7 @@ def curve(
                 break
             x, each = waiting[0], at_once * (end - now) / len(waiting)
             tell(f"margin beyond x = {x:.4g}", 1.0 - len(waiting) / PLACES)
-            one = pool.submit(_place, scene, side, names, x, tolerance, min(EACH, max(each, LEAST)))
+            one = pool.submit(_place, scene, side, names, words, x, min(EACH, max(each, LEAST)))
             begun[one] = now
             del waiting[0]
         if not begun:

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from limitsets.arguments import arguments_checked
 from limitsets.errors import AnswerError
-from limitsets.goals import Goal, OrientedBeyond, Predicate, Reaches
+from limitsets.goals import Goal, OrientedBeyond, Predicate, Reaches, by_side
 from limitsets.progress import GOES_ON, shown_in_notebooks
 from limitsets.proofs.query import Query
 from limitsets.robust.margins.beyond import MarginsBeyond
@@ -30,6 +30,7 @@ from limitsets.robust.sheet.margin_curve import curve
 from limitsets.robust.sheet.noise_input import noise_of, still
 from limitsets.robust.sheet.summary import PARTS, Robustness
 from limitsets.scene import Scene, load
+from limitsets.scene.laid import LaidLike
 
 if TYPE_CHECKING:
     from limitsets.auditing import Audit
@@ -145,6 +146,7 @@ class _SheetRun:
         """Find margins against X; None where the part gets farther out on another side."""
         told: dict[str, Any] = {"tell": self.tell, "keep": self.checkpoint.add_curve, "seconds": self.left()}
         told["executor"] = self.executor
+        told["laid"] = {int(on): pairs for on, pairs in by_side(self.goals[0].laid).items()} or None
         with self.step("margins against X"):
             try:
                 found, left = curve(self.scene, side, self.tolerance, self.checkpoint.curve, **told)
@@ -213,13 +215,15 @@ def _place(goals: Sequence[Goal]) -> tuple[float, int] | None:
     return next(((goal.x, goal.side) for goal in goals if isinstance(goal, OrientedBeyond | Reaches)), None)
 
 
-def _goals(scene: Scene, goal: GoalLike | Sequence[GoalLike] | None) -> tuple[Goal, ...]:
+def _goals(
+    scene: Scene, goal: GoalLike | Sequence[GoalLike] | None, laid: LaidLike | None
+) -> tuple[Goal, ...]:
     if goal is None and scene.goal is None:
         x, last = 0.7 * scene.arm_length, len(scene.sides) - 1
         example = f'oriented_beyond = {{ x = "{x:.4g} {scene.unit}", side = {last} }}'
         remedy = f"say what has to hold: add [goal] with, for instance, {example}"
         raise AnswerError("the goal", None, "a scene with [goal]", remedy, key="goal", file=scene.file)
-    return goals_of(scene, goal)
+    return goals_of(scene, goal, laid)
 
 
 def _todo(scene: Scene, quantities: Sequence[str], reading: str | None) -> list[DeviationScale]:
@@ -238,6 +242,7 @@ def robustness(
     scene: Scene | str | Path,
     *quantities: str,
     goal: GoalLike | Sequence[GoalLike] | None = None,
+    laid: LaidLike | None = None,
     reading: str | None = None,
     tolerance: Mapping[str, str] | None = None,
     scatter: Scattering | None = None,
@@ -260,6 +265,9 @@ def robustness(
         Names of quantities; default all that the scene gives.
     goal : Goal, callable, or a sequence of them, optional
         What has to hold, all of it; default the scene's goal.
+    laid : mapping of int to sequence of (float, float), optional
+        By side the ranges of x where parts are laid down, as for `limitsets.certify`: the goal's starts are these.
+        Default: the whole arm.  The noise keeps the whole arm.
     reading : str, optional
         "fixed" or "per-throw"; default both, of each quantity those that it has.
     tolerance : mapping of str to str, optional
@@ -309,7 +317,7 @@ def robustness(
         if part not in PARTS:
             raise AnswerError("what to leave out", part, ", ".join(PARTS), "correct the word")
     given = load(scene)
-    goals, quiet = _goals(given, goal), still(given)
+    goals, quiet = _goals(given, goal, laid), still(given)
     query = Query.of(quiet, goals)
     query.box(None, {})  # refuses a scene of which nothing can be proved
     todo = _todo(query.scene, quantities, reading)
