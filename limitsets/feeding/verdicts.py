@@ -163,7 +163,8 @@ def without_scatter(found: Answer) -> Answer:
     ['safety: PROVED of the scene without its scatter, no start on the arm feeds another side than 2']
     """
     said = {name: getattr(found, name, None) for name in ("verdict", "almost_every")}
-    return replace(found, **{name: f"{word} {WITHOUT_SCATTER}" for name, word in said.items() if word})
+    changes: dict[str, Any] = {name: f"{word} {WITHOUT_SCATTER}" for name, word in said.items() if word}
+    return replace(found, **changes)
 
 
 def _places(beyond: Mapping[Any, float], unit: str) -> str:

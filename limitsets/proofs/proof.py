@@ -161,7 +161,7 @@ class Proof(Tabled):
             for each in self.claims
         ]
         shares = [Column(word, show=".4f") for word in SHARES]
-        heads = ("claim", "verdict", "starts", *shares, "missing", "not simulated")
+        heads: tuple[Column | str, ...] = ("claim", "verdict", "starts", *shares, "missing", "not simulated")
         claims = Table(heads, rows, f"{self.scene.name}: proofs", self.model.sentence)
         if not any(each.written for each in self.claims):
             return (claims,)

@@ -198,9 +198,7 @@ def test_design_for_the_goal(capfd):
     )
     assert code == 0
     assert "The goal holds of the limit set at X = 20 in (proved), with " in out
-    assert re.search(
-        r"no fact of \[world\] is left out; \d assumptions? breaks? on the limit set: \w+", out
-    )
+    assert re.search(r"no fact of \[world\] is left out; \d assumptions? breaks? on the limit set: \w+", out)
     assert "scene (add -o paper-designed-design.toml to save it):\n\nname = " in out
     code, out, _ = run(
         capfd,

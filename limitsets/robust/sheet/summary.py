@@ -93,11 +93,11 @@ class Robustness(Tabled):
     @property
     def model(self) -> Model:
         """Of which model the proofs are, which facts of the scene that leaves out, and what the audit found."""
-        found = self.audit and [
-            each for each in self.audit.on("limit-set") if each.called_for and not each.simulated
-        ]
-        broken = None if found is None else tuple(each.effect for each in found)
-        return replace(Model.of(self.scene), broken=broken)
+        of = Model.of(self.scene)
+        if self.audit is None:
+            return of
+        found = (each for each in self.audit.on("limit-set") if each.called_for and not each.simulated)
+        return replace(of, broken=tuple(each.effect for each in found))
 
     @property
     def singles(self) -> tuple[Entry, ...]:
