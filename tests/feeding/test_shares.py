@@ -137,7 +137,7 @@ def test_a_level_is_bracketed():
 
 
 KEYS = {
-    "scene", "unit", "position", "side", "starts_from", "throw_rate", "clear", "tipping", "safety",
+    "scene", "unit", "position", "side", "starts_from", "throw_rate", "clear", "tipping", "safety", "vacuous", "model",
     "progress", "noise", "scatter", "brackets", "crowds",
     "probabilities", "throws", "right_per_minute", "noise_cut_off", "success", "trials",
 }  # fmt: skip
