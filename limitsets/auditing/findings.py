@@ -258,9 +258,21 @@ def _prepared(scene: Scene) -> tuple[ParameterBox, list[Row], Places]:
 
 
 def audited(model: Model, scene: Scene) -> Model:
-    """Add to a model which of its assumptions break on the limit set; nothing where no limit set is found.
+    """Add to a model which of its assumptions break on the limit set.
 
     The count is that of `audit`, without the domain and without the proofs that the other assumptions hold.
+
+    Parameters
+    ----------
+    model : Model
+        Of which model an answer is (`limitsets.scene.left_out`).
+    scene : Scene
+        The scene.
+
+    Returns
+    -------
+    Model
+        As it was where no limit set is found.
 
     Examples
     --------
