@@ -159,7 +159,8 @@ def _throws(axes: Axes, found: Feeding) -> None:
     axes.set_title(f"fates (dots: {trials.fate.size} trials)", loc="left", fontsize=style.TEXT)
     axes.set_xlabel("throws", fontsize=style.SMALL)
     axes.set_ylabel("share of random starts", fontsize=style.SMALL)
-    axes.legend(fontsize=style.SMALL, frameon=False)
+    if axes.get_legend_handles_labels()[0]:  # none where all parts stay
+        axes.legend(fontsize=style.SMALL, frameon=False)
     style.open_frame(axes)
 
 
