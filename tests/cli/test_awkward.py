@@ -188,7 +188,7 @@ def test_margins_that_are_all_nothing_are_one_line(capfd):
     """18 rows of zeros were printed."""
     code, out, _ = run(capfd, "margin", "paper-initial")
     assert code == 1
-    assert len(out.splitlines()) == 3
+    assert len(out.splitlines()) == 4  # the last says of which model
     assert "11 margins, all of them 0: the goal fails in the scene as it is" in out
 
 
