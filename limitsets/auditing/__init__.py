@@ -7,7 +7,7 @@ the limit set, a long orbit on it, and the whole domain.  `findings.py` combines
 
 from limitsets.auditing.assumptions import ASSUMPTIONS, Assumption
 from limitsets.auditing.effect_choice import EffectChoice, choose_effects
-from limitsets.auditing.findings import Audit, Finding, audit
+from limitsets.auditing.findings import Audit, Finding, audit, audited
 from limitsets.auditing.stretches import where
 
 __all__ = [
@@ -17,6 +17,7 @@ __all__ = [
     "EffectChoice",
     "Finding",
     "audit",
+    "audited",
     "choose_effects",
     "where",
 ]

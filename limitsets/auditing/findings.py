@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -20,19 +20,24 @@ from limitsets.auditing.assumptions import ASSUMPTIONS, Assumption
 from limitsets.auditing.judging import Row, all_hold, enclosed_at
 from limitsets.auditing.places import Places, Sample, places
 from limitsets.auditing.stretches import where
+from limitsets.errors import LimitsetsError
 from limitsets.files import as_table, picked
 from limitsets.scene.facts import TIPPING
+from limitsets.scene.left_out import Model
 from limitsets.tables import Column, Table, Tabled
 
 if TYPE_CHECKING:
     from limitsets.proofs.parameters import ParameterBox
     from limitsets.scene import Scene
 
-__all__ = ["Audit", "Finding", "audit"]
+__all__ = ["Audit", "Finding", "audit", "audited"]
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 Extents = dict[int, list[tuple[float, float]]]
+
+# Throws that are looked at for a count alone: a second's worth.
+MOST_THROWS = 200_000
 
 
 @dataclass(frozen=True)
@@ -241,6 +246,57 @@ def _findings(
     return tuple(findings)
 
 
+def _prepared(scene: Scene) -> tuple[ParameterBox, list[Row], Places]:
+    """Give what every finding is made of: parameters, assumptions with the scene's facts, throws to look at."""
+    from limitsets.proofs.parameters import parameter_box
+    from limitsets.scene import load
+
+    # what the minimal model assumes is asked of its throws, whichever effects are on
+    without = {} if scene.sides.rests.all() else dict.fromkeys(TIPPING, True)
+    box = parameter_box(load({**scene.as_dict(), "effects": without}))
+    return box, [Row(about, about.terms(scene, box)) for about in ASSUMPTIONS], places(scene, box)
+
+
+def audited(model: Model, scene: Scene) -> Model:
+    """Add to a model which of its assumptions break on the limit set.
+
+    The count is that of `audit`, without the domain and without the proofs that the other assumptions hold.
+
+    Parameters
+    ----------
+    model : Model
+        Of which model an answer is (`limitsets.scene.left_out`).
+    scene : Scene
+        The scene.
+
+    Returns
+    -------
+    Model
+        As it was where no limit set is found.
+
+    Examples
+    --------
+    >>> import limitsets as ls
+    >>> from limitsets.scene.left_out import Model
+    >>> scene = ls.load("paper-initial")
+    >>> audited(Model.of(scene), scene).broken
+    ('pivot', 'pivot', 'roll')
+    """
+    try:
+        box, rows, sites = _prepared(scene)
+    except LimitsetsError:  # of this scene nothing is enclosed, so that nobody can look
+        return model
+    step = -(-sum(sample.x.size for sample in sites.orbits.values()) // MOST_THROWS)
+    seen = {side: enclosed_at(box, side, sample.x[::step]) for side, sample in sites.orbits.items()}
+    broken = [
+        row.about.effect
+        for row in rows
+        if row.about.effect not in model.simulated
+        and any(row.broken(found, side).any() for side, found in seen.items())
+    ]
+    return replace(model, broken=tuple(broken)) if seen else model
+
+
 @arguments_checked
 def audit(scene: str | Path | Mapping[str, Any] | Scene) -> Audit:
     """Find out which of the effects that the minimal model leaves out a scene calls for.
@@ -272,14 +328,9 @@ def audit(scene: str | Path | Mapping[str, Any] | Scene) -> Audit:
     >>> [(each.effect, each.how) for each in found.on("limit-set") if each.called_for is False]
     [('release', 'proved'), ('landing', 'proved'), ('slip', 'proved'), ('arm', 'proved')]
     """
-    from limitsets.proofs.parameters import parameter_box
     from limitsets.scene import load
 
     chosen = load(scene)
-    # what the minimal model assumes is asked of its throws, whichever effects are on
-    without = {} if chosen.sides.rests.all() else dict.fromkeys(TIPPING, True)
-    box = parameter_box(load({**chosen.as_dict(), "effects": without}))
-    rows = [Row(about, about.terms(chosen, box)) for about in ASSUMPTIONS]
-    sites = places(chosen, box)
+    box, rows, sites = _prepared(chosen)
     two = (_findings(place, chosen, box, rows, sites) for place in ("limit-set", "domain"))
     return Audit(chosen, sum(two, ()), sites.extents, sites.enclosed)

@@ -7,7 +7,7 @@ import time
 from dataclasses import asdict
 
 from .report import EXITS, WORDS, Report, recheck
-from .texts import plain
+from .texts import model_in_words, plain
 
 
 def show(report: Report, file: str) -> None:
@@ -22,6 +22,8 @@ def show(report: Report, file: str) -> None:
             print("\n  ".join([f"{title}:", *lines]))
     for name, state, why in report.claims:
         print(f"{name}: {WORDS[state]}" + (f" - {why}" if why else ""))
+    if report.model is not None:
+        print(model_in_words(report.model))
     print(f"{report.cells} cells, {report.seconds:.1f} s")
     print(WORDS[report.verdict] + (f": {report.reason}" if report.reason else ""))
 

@@ -37,9 +37,9 @@ from .plane import (
     read_plane,
 )
 from .policy import Policy, holds_policy, policy_in_words, read_policy
-from .scene import Scene, check_parameters, check_tolerance, over_halves, quantities, read_scene
+from .scene import Scene, check_parameters, check_tolerance, left_out, over_halves, quantities, read_scene
 from .starts import ATTRACTING, first_version_starts, shares
-from .texts import KINDS, BadFileError, plain, quantity, require, rows, table
+from .texts import KINDS, BadFileError, model_in_words, plain, quantity, require, rows, table
 
 MOST_OPEN = 0.01  # the share of the arm that may be open where a goal is proved from some x on
 WORDS = {  # the verdicts, in JSON and for people
@@ -82,6 +82,9 @@ class Report:
         Quantities of the scenes.
     relied_on : list of str
         What the verdict relies on.
+    model : dict, or None
+        ``{"simulated": [...], "left_out": [...], "assumptions_broken": None}``: effects that the verdict has, facts of
+        the scene's [world] that it has not; nobody looked which assumptions the scene breaks.
     reason : str
         Why the certificate fails, empty where it does not.
     seconds : float
@@ -101,6 +104,7 @@ class Report:
     statement: list[str] = field(default_factory=list, repr=False)
     parameters: dict[str, str] = field(default_factory=dict, repr=False)
     relied_on: list[str] = field(default_factory=list, repr=False)
+    model: dict[str, Any] | None = field(default=None, repr=False)
     reason: str = ""
     seconds: float = 0.0
     cells: int = 0
@@ -114,9 +118,9 @@ class Report:
             "<tr>" + "".join(f"<td>{escape(text)}</td>" for text in row) + "</tr>" for row in rows
         )
         heads = "".join(f'<th scope="col">{head}</th>' for head in ("claim", "verdict", "reason"))
-        return (
-            f"<table><caption>Recheck</caption><thead><tr>{heads}</tr></thead><tbody>{lines}</tbody></table>"
-        )
+        caption = "Recheck" if self.model is None else f"Recheck, {model_in_words(self.model)}"
+        body = f"<thead><tr>{heads}</tr></thead><tbody>{lines}</tbody>"
+        return f"<table><caption>{escape(caption)}</caption>{body}</table>"
 
 
 @dataclass
@@ -253,7 +257,7 @@ def recheck_plane(
     """Check regions of a plane, and fill in the report."""
     model = plane.raw["model"]["flight"], plane.raw["model"]["flip"]
     require(model == (header["map"]["flight"], header["map"]["flip"]), "map and scene name different models")
-    tell_model(report, model)
+    tell_model(report, model, plane.raw, None)
     for name, value in quantities(plane.raw):
         report.parameters[plain(name)] = value_in_words(value, name)
     report.parameters |= {axis.name: axis.between(0, len(axis.texts) - 1) for axis in plane.axes}
@@ -280,7 +284,7 @@ def recheck_chances(
     """Check probabilities, and fill in the report."""
     model = c.raw["model"]["flight"], c.raw["model"]["flip"]
     require(model == (header["map"]["flight"], header["map"]["flip"]), "map and scene name different models")
-    tell_model(report, model)
+    tell_model(report, model, c.raw, c.laws)
     for name, value in quantities(c.raw):
         report.parameters[plain(name)] = value_in_words(value, name)
     for name, text in c.laws.items():
@@ -304,7 +308,7 @@ def recheck_policy(
     """Check a policy, and fill in the report."""
     model = policy.raw["model"]["flight"], policy.raw["model"]["flip"]
     require(model == (header["map"]["flight"], header["map"]["flip"]), "map and scene name different models")
-    tell_model(report, model)
+    tell_model(report, model, policy.raw, policy.noise)
     for name, value in quantities(policy.raw):
         if not name.startswith("throw."):  # the throws are those to choose from
             report.parameters[plain(name)] = value_in_words(value, name)
@@ -320,7 +324,7 @@ def recheck_policy(
 
 def describe(report: Report, file: Certificate) -> str:
     """Say what the certificate relies on, and for which scenes; return "" or the gap in its tolerance."""
-    tell_model(report, file.model)
+    tell_model(report, file.model, file.raw[0], file.noise)
     for name, value in quantities(file.raw[0]):
         report.parameters[plain(name)] = value_in_words(value, name)
     ranges, gap = check_tolerance(file.raw, file.tolerance)
@@ -333,8 +337,10 @@ def describe(report: Report, file: Certificate) -> str:
     return gap
 
 
-def tell_model(report: Report, model: tuple[str, str]) -> None:
-    """Say on what formulas and on what arithmetic the report relies."""
+def tell_model(report: Report, model: tuple[str, str], scene: dict[str, Any], noise: object) -> None:
+    """Say on what formulas and on what arithmetic the report relies, and which facts of the scene it leaves out."""
+    on = [name for name, how in scene.get("effects", {}).items() if how]
+    report.model = {"simulated": on, "left_out": left_out(scene, noise), "assumptions_broken": None}
     flight, flip = model
     kind = "exact" if flight == "exact" else "small"
     report.relied_on.append(f"the formulas of the map throw, version 1, flight {flight}, flip {flip}")

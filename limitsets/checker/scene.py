@@ -211,6 +211,7 @@ def complete(side: Side, k_lo: Arb) -> None:
     side.late = (a_lo, float(side.d.upper()), float(side.small_d.upper()), a_hi)
 
 
+FACTS = ("friction", "restitution", "bounce_threshold", "stroke")
 NONE = Quantity(Fraction(0), Fraction(0), False, "")
 SCATTER = {"speed": ("throw.speed", "share speed"), "landing": ("landing.x", "length")}
 
@@ -236,8 +237,14 @@ def check_spread(scene: dict[str, Any], noise: object) -> None:
     )
     known = set(on) <= {"spread"} and on.get("spread", "bounded") == "bounded"
     require(known, "scene: effects are switched on, which the throw map, version 1, has not")
-    facts = "friction restitution bounce_threshold stroke throw_rate scatter"
-    world = table(scene.get("world") or {}, "scene.world", "", facts)
+    more = not_in_noise(scene, noise)
+    require(not on or not more, f"scene: its spread scatters {more}, which is not in the noise claimed")
+
+
+def not_in_noise(scene: dict[str, Any], noise: object) -> str:
+    """Return what the scene scatters at every throw by more than the noise claimed, or ""."""
+    world = table(scene.get("world") or {}, "scene.world", "", " ".join((*FACTS, "throw_rate", "scatter")))
+    more = ""
     for word, text in table(world.get("scatter") or {}, "scene.world.scatter", "", "speed landing").items():
         name, kinds = SCATTER[word]
         scatter, claimed = (
@@ -247,10 +254,20 @@ def check_spread(scene: dict[str, Any], noise: object) -> None:
         require(scatter.lo == scatter.hi >= 0, "scene.world.scatter is not a number that is not negative")
         alike = (scatter.unit == "%", scatter.pi) == (claimed.unit == "%", claimed.pi)
         covered = scatter.lo == 0 or (alike and scatter.lo <= claimed.lo)
-        require(
-            not on or covered,
-            f"scene: its spread scatters {name} by {scatter}, which is not in the noise claimed",
-        )
+        more = more if covered or more else f"{name} by {scatter}"
+    return more
+
+
+def left_out(scene: dict[str, Any], noise: object) -> list[str]:
+    """Name the facts of [world] that the throw map, version 1, has not: all but the rate of throws, which moves none.
+
+    A coefficient of restitution of 0 is the map's own landing; scatter counts where it is not in the noise claimed.
+    """
+    world = scene.get("world") or {}
+    plain_landing = world.get("restitution") == 0
+    stated = [fact for fact in FACTS if world.get(fact) is not None]
+    facts = [f for f in stated if not (plain_landing and f in ("restitution", "bounce_threshold"))]
+    return facts + (["scatter"] if not_in_noise(scene, noise) else [])
 
 
 def share_and_more(dev: Quantity) -> tuple[Arb, Arb]:

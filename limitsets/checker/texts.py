@@ -181,3 +181,16 @@ def hex_float(text: object, where: str) -> float:
         return float.fromhex(str(text))
     except OverflowError:
         raise BadFileError(f"{where} is too large") from None
+
+
+def model_in_words(model: dict[str, Any]) -> str:
+    """Say of which model a verdict is."""
+    kind = f"model with {' and '.join(model['simulated'])}" if model["simulated"] else "minimal model"
+    facts = model["left_out"]
+    if not facts:
+        return f"of the {kind}: no fact of [world] is left out; not audited"
+    also = ", of the scene without its scatter" if "scatter" in facts else ""
+    said = " and ".join(part for part in (", ".join(facts[:-1]), facts[-1]) if part)
+    return (
+        f"of the {kind}{also}: {said} of [world] {'is' if len(facts) == 1 else 'are'} not in it; not audited"
+    )

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from limitsets.cli.about import About
 from limitsets.cli.output import (
     Csv,
     Form,
@@ -94,6 +95,8 @@ def atlas(
         shares = _certified(found, proof, workers, tell) if proof is not None else {}
     place = picture if drawn else None
     answer(found if json else None, json, lambda: _text(found, csv, place), csv=(csv, found.table))
+    if found.model is not None and not json:
+        typer.echo(About(found.model, scene).line())
     if proof is not None and not json:
         said = ", ".join(f"{100 * share:.2f} % {word}" for word, share in shares.items())
         typer.echo(f"regions: {said}: {proof}")

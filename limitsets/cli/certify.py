@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from limitsets.cli.about import About
 from limitsets.cli.arguments import HELP_LAID, HELP_NO_RECHECK, deviations, laid_ranges
 from limitsets.cli.certificates import with_ending
 from limitsets.cli.output import Csv, Json, Scene, Words, answer, option, progress, saved, stem_of, table
@@ -79,7 +80,8 @@ def certify(
             seconds = None if no_recheck or not written else time.perf_counter() - begin
     records = [each | {"timings": each["timings"] | {"recheck": seconds}} for each in proof.to_json()]
     place = file if written else None
-    answer(records, json, lambda: _text(proof, place, kept, seconds), csv=(csv, proof.table))
+    about = About(proof.model, scene, chosen)
+    answer(records, json, lambda: _text(proof, place, kept, seconds), csv=(csv, proof.table), about=about)
     raise typer.Exit(0 if proof.proved else 1)
 
 

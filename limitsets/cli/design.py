@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from limitsets.cli.about import About
 from limitsets.cli.arguments import HELP_LAID, HELP_NO_RECHECK, bounds_of, laid_ranges, number
 from limitsets.cli.output import (
     Csv,
@@ -20,6 +21,7 @@ from limitsets.cli.output import (
     option,
     progress,
     save_scene,
+    scene_file,
     show,
     show_scene,
 )
@@ -132,8 +134,14 @@ def design(
             stages=stages,
             progress=tell,
         )
-        files = [] if out is None else _written(found, out, form, tell)
-    answer(found, json, lambda: _text(found, files), csv=(csv, found.table))
+        about = About(found.model, scene_file(found.scene, out), found.scene)
+        files = [] if out is None else _written(found, out, form, about, tell)
+    answer(
+        about.added(found) if json else found,
+        json,
+        lambda: _text(found, files, about),
+        csv=(csv, found.table),
+    )
     raise typer.Exit(0 if found.reached else 1)
 
 
@@ -141,7 +149,9 @@ def _points(words: str) -> list[float | str | None]:
     return [None if word.strip() == FREE else number(word) for word in words.split(",")]
 
 
-def _written(found: Design, out: Path, form: str, tell: Callable[[str, int, int], None]) -> list[Path]:
+def _written(
+    found: Design, out: Path, form: str, about: About, tell: Callable[[str, int, int], None]
+) -> list[Path]:
     """Write the scene, or a folder with the scene, the answer as JSON and the figure of the way there."""
     from limitsets.scene import dump
 
@@ -152,11 +162,11 @@ def _written(found: Design, out: Path, form: str, tell: Callable[[str, int, int]
     from limitsets.report.writing import laid
 
     drawn = plot.design(found, limit_sets_along(found, tell))
-    texts = {f"{found.scene.name}.toml": dump(found.scene), "design.json": as_json(found)}
+    texts = {f"{found.scene.name}.toml": dump(found.scene), "design.json": as_json(about.added(found))}
     return laid(out, [("part", plot.part(found.scene)), ("design", drawn)], lambda _: texts, form)
 
 
-def _text(found: Design, files: list[Path]) -> None:
+def _text(found: Design, files: list[Path], about: About) -> None:
     """Print what changed, how well it is reached, and the scene."""
     show(found.table())
     typer.echo(found.message[:1].upper() + found.message[1:] + ".")
@@ -167,4 +177,4 @@ def _text(found: Design, files: list[Path]) -> None:
     for side, reason in enumerate(found.jacobian.reasons):
         if reason is not None:
             typer.echo(f"no derivative on side {side}: {reason}")
-    show_scene(found.scene, files, met=found.reached)
+    show_scene(found.scene, files, about if found.reached else None)

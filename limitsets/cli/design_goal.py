@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING
 
 import typer
 
+from limitsets.cli.about import About
 from limitsets.cli.arguments import bounds_of
-from limitsets.cli.output import answer, opened, progress, save_scene, show, show_scene
+from limitsets.cli.output import answer, opened, progress, save_scene, scene_file, show, show_scene
 from limitsets.proposals import proposed
 
 if TYPE_CHECKING:
@@ -41,12 +42,18 @@ def run_goal(
         found = design_for_goal(
             scene, vary=vary, bounds=given, laid=laid, evaluations=evaluations, progress=tell
         )
-        files = [] if out is None else _written(found, out, form)
-    answer(found, json, lambda: _text(found, files, evaluations), csv=(csv, found.table))
+        about = About(found.model, scene_file(found.scene, out), found.scene)
+        files = [] if out is None else _written(found, out, form, about)
+    answer(
+        about.added(found) if json else found,
+        json,
+        lambda: _text(found, files, about, evaluations),
+        csv=(csv, found.table),
+    )
     return 0 if found.verdict == "proved" else 1
 
 
-def _written(found: GoalDesign, out: Path, form: str) -> list[Path]:
+def _written(found: GoalDesign, out: Path, form: str, about: About) -> list[Path]:
     """Write the scene, or a folder with the scene, the answer as JSON and the part."""
     if out.suffix == ".toml":
         return save_scene(found.scene, out)
@@ -55,11 +62,11 @@ def _written(found: GoalDesign, out: Path, form: str) -> list[Path]:
     from limitsets.report.writing import laid
     from limitsets.scene import dump
 
-    texts = {f"{found.scene.name}.toml": dump(found.scene), "design.json": as_json(found)}
+    texts = {f"{found.scene.name}.toml": dump(found.scene), "design.json": as_json(about.added(found))}
     return laid(out, [("part", plot.part(found.scene))], lambda _: texts, form)
 
 
-def _text(found: GoalDesign, files: list[Path], asked: int) -> None:
+def _text(found: GoalDesign, files: list[Path], about: About, asked: int) -> None:
     from limitsets.inverse.margin.for_goal import POPULATION
 
     show(found.table())
@@ -90,4 +97,4 @@ def _text(found: GoalDesign, files: list[Path], asked: int) -> None:
         save = "" if file else "add -o design.toml to this command, then "
         command = proposed("certify", file or "design.toml")
         typer.echo(f"next: {save}{command} (what keeps the design from a proof)")
-    show_scene(found.scene, files, met=met)
+    show_scene(found.scene, files, about if met else None)

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING
 
 import typer
 
+from limitsets.cli.about import About
 from limitsets.cli.arguments import bounds_of
-from limitsets.cli.output import answer, opened, progress, save_scene, show, show_scene
+from limitsets.cli.output import answer, opened, progress, save_scene, scene_file, show, show_scene
 from limitsets.files import as_json, picked
 
 if TYPE_CHECKING:
@@ -61,7 +62,13 @@ def run_robust(
         found, files = (found, []) if out is None else _written(found, out, form, recheck=recheck)
         if so_far is not None and so_far != out:
             so_far.unlink(missing_ok=True)
-    answer(found, json, lambda: _text(found, files), csv=(csv, found.table))
+    about = About(found.model, scene_file(found.scene, out), found.scene)
+    answer(
+        about.added(found) if json else found,
+        json,
+        lambda: _text(found, files, about),
+        csv=(csv, found.table),
+    )
     return 0 if seconds == 0.0 or all(one.proved > 0.0 for one in found.margins) else 1
 
 
@@ -107,7 +114,7 @@ def _missed(
     def text() -> None:
         show(table)
         typer.echo(str(none))
-        show_scene(miss, files, met=False)
+        show_scene(miss, files, None)
 
     answer(record, json, text, csv=(csv, lambda: table))
     return 1
@@ -131,7 +138,7 @@ def _written(found: RobustDesign, out: Path, form: str, *, recheck: bool) -> tup
     return found, [out / name for name in names]
 
 
-def _text(found: RobustDesign, files: list[Path]) -> None:
+def _text(found: RobustDesign, files: list[Path], about: About) -> None:
     """Print what changed, both margins, the throws, the lead weight, and the scene."""
     from limitsets.inverse.margin.design_result import both
     from limitsets.report.tables import in_time
@@ -171,4 +178,4 @@ def _text(found: RobustDesign, files: list[Path]) -> None:
             f"lead weight: {100 * lead.share:.1f} % of the mass at x = {lead.x:.4g}, y = {lead.y:.4g} {unit}"
             " in the frame of the vertices"
         )
-    show_scene(found.scene, files)
+    show_scene(found.scene, files, about)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from limitsets.cli.about import About
 from limitsets.cli.arguments import HELP_LAID, HELP_NO_RECHECK, deviations, laid_ranges
 from limitsets.cli.certificates import certified, said_of
 from limitsets.cli.output import Csv, Form, Format, Json, Scene, Words, answer, opened, option, progress, show
@@ -18,6 +19,12 @@ if TYPE_CHECKING:
     from limitsets.robust import AbsorptionBrackets
 
 __all__ = ["feed"]
+
+# What becomes of parts where none is fed.
+UNFED = {"left": "leave the arm otherwise", "never": "stay on it"}
+
+# Shares below this are what rounding leaves of nothing.
+NOTHING = 1e-9
 
 HELP_SCATTER = (
     "Random noise at every throw, like throw.speed='0.5 %'; repeatable. "
@@ -99,6 +106,7 @@ def feed(
             again = not no_recheck
             found, written = certified(found, certificate, "feeds", proved=found.written, recheck=again)
         record = found.to_json() | {"certificate": written}
+        about = About(found.model, scene, chosen)
         files = []
         if out is not None:
             from limitsets import plot
@@ -106,10 +114,10 @@ def feed(
             from limitsets.report.writing import laid as files_laid
 
             drawn = [("part", plot.part(chosen)), ("feeding", plot.feeding(found))]
-            files = files_laid(out, drawn, lambda _: {"feeding.json": as_json(record)}, form)
+            files = files_laid(out, drawn, lambda _: {"feeding.json": as_json(about.added(record))}, form)
     if json and (note := _unused(found)):
         print(f"limitsets: {note}", file=sys.stderr, flush=True)
-    answer(record, json, lambda: _text(found, files, written), csv=(csv, found.table))
+    answer(record, json, lambda: _text(found, files, written), csv=(csv, found.table), about=about)
     raise typer.Exit(0 if no_proof or found.proved else 1)
 
 
@@ -126,6 +134,14 @@ def _text(found: Feeding, files: list[Path], written: dict[str, Any] | None) -> 
 
     end, unit = found.end, found.end.scene.unit
     note = "".join(f"; {said}" for said in [_unused(found)] if said)
+    if found.vacuous:
+        computed = found.shares.shares
+        ways = ", ".join(
+            f"{100 * computed[name]:.4g} % {how}" for name, how in UNFED.items() if computed[name]
+        )
+        typer.echo(
+            f"{end.scene.name}: nothing is fed, none of {found.trials.fate.size} parts thrown, and of all starts {ways}"
+        )
     typer.echo(f"{end.scene.name}: the arm ends at x = {end.x:g} {unit}, side {end.side} is wanted{note}")
     if end.laid:
         from limitsets.goals import laid_words
@@ -151,10 +167,11 @@ def _text(found: Feeding, files: list[Path], written: dict[str, Any] | None) -> 
     throw_rate = end.scene.world.throw_rate
     until = "" if most is None else f", 95 % of the starts after {most}{in_time(most, throw_rate)}"
     mean = found.shares.mean_throws
-    if math.isnan(mean):
+    if found.vacuous:
         typer.echo("no part comes beyond the end of the arm: limitsets analyse says how far they come")
     else:
-        typer.echo(f"throws until a part is fed: {mean:.1f} in the mean{in_time(mean, throw_rate)}{until}")
+        ended = "is fed" if found.shares.shares["left"] < NOTHING else "is fed or leaves the arm"
+        typer.echo(f"throws until a part {ended}: {mean:.1f} in the mean{in_time(mean, throw_rate)}{until}")
     rate = found.shares.per_minute(throw_rate)
     if rate is not None:
         typer.echo(f"{rate:.2f} parts per minute are fed on the wanted side, one after the other")

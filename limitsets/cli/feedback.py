@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from limitsets.cli.about import About
 from limitsets.cli.arguments import HELP_NO_RECHECK, deviations, place, places_of
 from limitsets.cli.certificates import certified, said_of
 from limitsets.cli.output import (
@@ -109,6 +110,7 @@ def feedback(
         json,
         lambda: _text(found, tried, thrown, out, written),
         csv=(csv if found.solved else None, found.table),
+        about=About(found.model, scene),
     )
     raise typer.Exit(0 if found.solved else 1)
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from limitsets.cli.about import About
 from limitsets.cli.arguments import HELP_LAID, HELP_NO_RECHECK, laid_ranges, place
 from limitsets.cli.output import (
     Csv,
@@ -66,14 +67,16 @@ def margin(
             chosen, *(quantity or ()), reading=reading, goal=goal, laid=begins, width=width, progress=tell
         )
         records = [each.to_json() for each in found]
+        about = About(found[0].model, scene, chosen)
         if out is not None:
             tell("files", len(found), len(found) + 1)
-            found, records = _write(found, out, form, recheck=not no_recheck)
+            found, records = _write(found, out, form, about, recheck=not no_recheck)
     answer(
         records,
         json,
         lambda: _text(chosen, found, out, no_recheck=no_recheck),
         csv=(csv, lambda: joined(found)),
+        about=about,
     )
     raise typer.Exit(
         0 if all(each.proved > 0 and (each.closed or each.refuted is None) for each in found) else 1
@@ -97,7 +100,7 @@ def _goal_at(scene: Any, text: str) -> Any:
 
 
 def _write(
-    given: tuple[Margin, ...], out: Path, form: str, *, recheck: bool
+    given: tuple[Margin, ...], out: Path, form: str, about: About, *, recheck: bool
 ) -> tuple[tuple[Margin, ...], list[dict[str, Any]]]:
     """Write the files; the margins and their JSON without what the checker denies."""
     from limitsets.errors import AnswerError
@@ -118,7 +121,7 @@ def _write(
     drawn = [("part", part(given[0].scene))]
     drawn += [("margins", tornado(single))] if single else []
     drawn += [("joint", tolerance_box(each)) for each in found if each.reading == "tolerance"]
-    laid(out, drawn, lambda _: {"margins.json": as_json(records)}, form)
+    laid(out, drawn, lambda _: {"margins.json": as_json(about.added(records))}, form)
     return tuple(found), records
 
 

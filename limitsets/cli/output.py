@@ -25,6 +25,7 @@ from limitsets.tables import aligned
 if TYPE_CHECKING:
     from concurrent.futures import Executor
 
+    from limitsets.cli.about import About
     from limitsets.scene import Scene as SceneOf
     from limitsets.tables import Table
 
@@ -44,6 +45,7 @@ __all__ = [
     "progress",
     "save_scene",
     "saved",
+    "scene_file",
     "show",
     "show_scene",
     "stem_of",
@@ -235,9 +237,13 @@ def answer(
     text: Callable[[], None],
     out: Path | None = None,
     csv: tuple[Path | None, Callable[[], Table]] | None = None,
+    about: About | None = None,
 ) -> None:
-    """Give an answer as JSON or as text; write it to a file, and its table as CSV, where they are named."""
-    words = as_json(record)
+    """Give an answer as JSON or as text; write it to a file, and its table as CSV, where they are named.
+
+    Text ends with the model that a verdict is `about`: who looks for assumptions that break does so after the answer.
+    """
+    words = as_json(about.added(record) if json and about is not None else record)
     if csv is not None and csv[0] is not None:
         with saved(csv[0]) as draft:
             draft.write_text(csv[1]().csv(), encoding="utf-8", newline="")
@@ -248,6 +254,17 @@ def answer(
         print(words, end="")
     else:
         text()
+        if about is not None:
+            sys.stdout.flush()  # the answer does not wait for it
+            with progress() as tell:
+                tell("assumptions on the limit set", 0, 1)
+                said = about.line()
+            typer.echo(said)
+
+
+def scene_file(scene: SceneOf, out: Path | None) -> str:
+    """Name the file of a design, as `out` says where; empty where it is written to none."""
+    return "" if out is None else str(out if out.suffix == ".toml" else out / f"{scene.name}.toml")
 
 
 def save_scene(scene: SceneOf, file: Path) -> list[Path]:
@@ -259,7 +276,7 @@ def save_scene(scene: SceneOf, file: Path) -> list[Path]:
     return [file]
 
 
-def show_scene(scene: SceneOf, files: list[Path], *, met: bool = True) -> None:
+def show_scene(scene: SceneOf, files: list[Path], about: About | None) -> None:
     """Say where a design is, or print it where it is in no file; of one that is not as wanted say that it is none.
 
     Parameters
@@ -268,21 +285,19 @@ def show_scene(scene: SceneOf, files: list[Path], *, met: bool = True) -> None:
         The design.
     files : list of Path
         Written files, the scene among them.
-    met : bool
-        Whether it is as wanted: of a near miss nothing is printed that looks like an answer.
+    about : About or None
+        Of which model it is as wanted; None of a near miss, of which nothing is printed that looks like an answer.
     """
-    from limitsets.auditing import audit
-    from limitsets.report.audit_pages import audit_line
     from limitsets.scene import dump
 
     file = next((str(path) for path in files if path.suffix == ".toml"), None)
-    if met:
-        typer.echo(audit_line(audit(scene), file or f"{scene.name}.toml"))
+    if about is not None:
+        typer.echo(about.line())
     elif file is None:
         typer.echo("the values above are the nearest miss, no answer; add -o FILE.toml to save that scene")
         return
     if file is not None:
-        typer.echo(f"scene: {file}" + ("" if met else " (the nearest miss, no answer)"))
+        typer.echo(f"scene: {file}" + ("" if about else " (the nearest miss, no answer)"))
         return
     typer.echo(f"scene (add -o {quote(f'{scene.name}.toml')} to save it):\n\n{dump(scene)}".rstrip("\n"))
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from limitsets.cli.about import About
 from limitsets.cli.arguments import HELP_LAID, HELP_NO_RECHECK, deviations, laid_ranges
 from limitsets.cli.output import (
     Csv,
@@ -100,7 +101,8 @@ def robustness(
         )
         tell("files", len(found.entries), len(found.entries) + 1)
         files = write_robustness(found, folder, form, html=html)
-    answer(found, json, lambda: _text(chosen, found, files), csv=(csv, found.table))
+    about = About(found.model, scene, chosen)
+    answer(found, json, lambda: _text(chosen, found, files), csv=(csv, found.table), about=about)
     raise typer.Exit(0 if found.verdict == "proved" and not found.failed else 1)
 
 
@@ -114,7 +116,7 @@ def _text(given: SceneOf, found: Robustness, files: list[Any]) -> None:
         table(HEADS, lines_of(found))
     elif found.singles:
         typer.echo(none_holds(found))
-        typer.echo(f"next: {without_margin(given, found.goals, fails=found.verdict == 'refuted')}")
+        typer.echo(f"next: {without_margin(given, found.goals, fails=found.decided == 'refuted')}")
     for part in dict.fromkeys(("joint", "curve", "noise", *found.failed)):
         reason = found.left_out.get(part)
         if reason and reason != "it was not asked for":

@@ -59,8 +59,8 @@ def careful_line(found: Estimate, scene: Scene) -> str:
     return "".join(f'<p class="wrong">careful: {line}</p>' for line in lines)
 
 
-def estimate_words(found: Estimate, goal: Goal | None, unit: str) -> str:
-    """Say what is estimated."""
+def estimate_words(found: Estimate, goal: Goal | None, unit: str, of: str = "") -> str:
+    """Say what is estimated; `of` says of which model."""
     rows = []
     for k, (extents, bands, order) in enumerate(zip(found.sets, found.bands, found.orders, strict=True)):
         drawn = sum(map(len, extents.values()))
@@ -87,7 +87,7 @@ def estimate_words(found: Estimate, goal: Goal | None, unit: str) -> str:
     if goal is not None:
         rows.append((f"goal: {escape(goal_sentence(goal, unit))}", _goal_words(found, goal, unit)))
     how = f"from {CELLS} cells a side" + (", ends from the compiled loop of the atlas" if found.sharp else "")
-    return _table("Estimated (follows the sliders, proves nothing)", rows, how)
+    return _table("Estimated (follows the sliders, proves nothing)", rows, "; ".join(filter(None, (how, of))))
 
 
 def _places(parts: Sequence[tuple[float, float]]) -> str:
@@ -111,8 +111,8 @@ def _goal_words(found: Estimate, goal: Goal, unit: str) -> str:
     return words + ("" if found.threshold is None else f"; threshold x = {found.threshold:.4f} {unit}")
 
 
-def proof_words(lines: Sequence[Mapping[str, Any]], knobs: Sequence[Knob], state: str) -> str:
-    """Say what is proved."""
+def proof_words(lines: Sequence[Mapping[str, Any]], knobs: Sequence[Knob], state: str, of: str = "") -> str:
+    """Say what is proved; `of` says of which model."""
     names = {knob.name: knob.words for knob in knobs}
     rows = []
     for line in lines:
@@ -135,7 +135,7 @@ def proof_words(lines: Sequence[Mapping[str, Any]], knobs: Sequence[Knob], state
             )
         elif "error" in line and "margin" not in line:
             rows.append(("no answer", escape(str(line["error"]))))
-    return _table("Proved (once the sliders rest)", rows, state)
+    return _table("Proved (once the sliders rest)", rows, "; ".join(filter(None, (state, of))))
 
 
 def _table(title: str, rows: Sequence[tuple[str, str]], foot: str) -> str:

@@ -30,6 +30,7 @@ from limitsets.explorer.outside import within_reach
 from limitsets.explorer.pictures import ArmPicture, PartPicture
 from limitsets.explorer.sliders import Sliders
 from limitsets.scene import Scene, dump
+from limitsets.scene.left_out import Model
 
 __all__ = ["ScenePage"]
 
@@ -125,6 +126,11 @@ class ScenePage:
             sizing_mode="stretch_width",
         )
 
+    @property
+    def _of(self) -> str:
+        """Of which model the page speaks, and which facts of the scene that leaves out."""
+        return Model.of(self.scene).line()
+
     def say(self, error: object = "") -> None:
         """Show one line of what is wrong, or take it away."""
         self._error.object = error_line(error)
@@ -163,7 +169,7 @@ class ScenePage:
             self._told, self._wrote = True, time.monotonic()
             self.sliders.tell()
             self._careful.object = careful_line(self._found, self.scene)
-            self._estimated.object = estimate_words(self._found, self.scene.goal, self.scene.unit)
+            self._estimated.object = estimate_words(self._found, self.scene.goal, self.scene.unit, self._of)
         for picture in (self.lanes, self.part, self.arm):
             picture.canvas.send()
         self._tell(self._proofs.answers())
@@ -193,7 +199,7 @@ class ScenePage:
         self._found, self._told = found, False
         self._proofs.stop()  # also where nothing is answered yet: an answer would be of another scene
         self._lines = []
-        self._proved.object = proof_words([], (), "waits until the sliders rest")
+        self._proved.object = proof_words([], (), "waits until the sliders rest", self._of)
 
     def _startable(self, scene: Scene) -> bool:
         try:
@@ -206,7 +212,7 @@ class ScenePage:
         self.opening.show(self.scene)
         self._toml.filename = f"{self.scene.name}.toml"
         self.atlas.follow(self.scene, knobs_of(self.scene))
-        self._proved.object = proof_words([], (), BEING)
+        self._proved.object = proof_words([], (), BEING, self._of)
         names = [knob.name for knob in self.sliders.knobs]
         self._proofs.ask({"what": "proof", "scene": dump(self.scene), "margins": names})
 
@@ -215,7 +221,7 @@ class ScenePage:
             self._lines += lines
             claimed = any("claim" in line for line in self._lines)
             state = "" if "done" in self._lines[-1] else MARGINS if claimed else BEING
-            self._proved.object = proof_words(self._lines, self.sliders.knobs, state)
+            self._proved.object = proof_words(self._lines, self.sliders.knobs, state, self._of)
 
     def throw(self, x: float, side: int) -> None:
         """Show throws from a start."""

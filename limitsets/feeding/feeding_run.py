@@ -7,7 +7,7 @@ from concurrent.futures import Executor
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -20,7 +20,7 @@ from limitsets.feeding.fed_shares import ENDED, Curve, FedShares, success_curve
 from limitsets.feeding.proving import FeedingProof, proved_feeding
 from limitsets.feeding.tipping import tipping_times
 from limitsets.feeding.trials import Trials, run_trials, trials_within
-from limitsets.feeding.verdicts import Fed, Safe
+from limitsets.feeding.verdicts import Fed, Safe, without_scatter
 from limitsets.feeding.writing import holds, write_proof
 from limitsets.files import as_table, picked
 from limitsets.goals import by_side
@@ -31,11 +31,13 @@ from limitsets.robust.noise.scattering import Scattering, scattering_of
 from limitsets.robust.sheet.noise_input import still
 from limitsets.scene import Scene, load
 from limitsets.scene.laid import LaidLike
+from limitsets.scene.left_out import Model
 from limitsets.tables import Column, Table, Tabled
 
 __all__ = ["Feeding", "feed"]
 
 Progress = Callable[[str, int, int], None]
+Verdict = TypeVar("Verdict", Safe, Fed)
 
 # Parts thrown unless it is said how many: fewer where that takes more throws than these.
 TRIALS, THROWS = 100_000, 5e7
@@ -104,12 +106,28 @@ class Feeding(Tabled):
     @property
     def safe(self) -> Safe | None:
         """Which sides can be fed from which starts, proved; None where it was not asked for."""
-        return None if self.proof is None else self.proof.safe
+        return None if self.proof is None else self._said(self.proof.safe)
 
     @property
     def fed(self) -> Fed | None:
         """Whether every start is fed, and after how many throws, proved; None where it was not asked for."""
-        return None if self.proof is None else self.proof.fed
+        return None if self.proof is None else self._said(self.proof.fed)
+
+    def _said(self, found: Verdict) -> Verdict:
+        """Give a verdict as what it is about: normal deviations have no bound, and no proof holds with them."""
+        return without_scatter(found) if self.end.scene.effects.spread == "gaussian" else found
+
+    @property
+    def model(self) -> Model:
+        """Of which model safety and progress are, and which facts of the scene that leaves out."""
+        if self.proof is None:
+            return Model.of(self.end.scene)
+        return Model.of(_proved_of(self.end).scene, self.proof.found.cover.box.noise)
+
+    @property
+    def vacuous(self) -> bool:
+        """Whether no part that was thrown is fed, on any side: safety is about no part then."""
+        return not any(self.trials.counts[name] for name in ("right", "wrong", "wall"))
 
     @property
     def tipping(self) -> dict[int, float] | None:
@@ -188,7 +206,9 @@ class Feeding(Tabled):
                 ("every start is fed", self.fed.verdict),
             ]
             lines += [("almost every start is fed", self.fed.almost_every)] if self.fed.almost_every else []
-            found.append(Table(("claim", "verdict"), lines, "Proofs"))
+            left_out = ", ".join(self.model.left_out) or None
+            heads, of = ("claim", "verdict", "not simulated"), self.model.sentence
+            found.append(Table(heads, [(*line, left_out) for line in lines], "Proofs", of))
         if self.brackets is not None:
             found += self.brackets.tables()
         return tuple(found)
@@ -207,6 +227,8 @@ class Feeding(Tabled):
             throw_rate=rate,
             clear=self.clear,
             tipping=self.tipping,
+            vacuous=self.vacuous,
+            model=self.model,
             safety=self.safe,
             progress=self.fed,
             noise=self.noise or None,
@@ -227,6 +249,11 @@ class Feeding(Tabled):
             brackets=self.brackets,
             crowds=[crowd.to_json() | {"right_per_minute": crowd.per_minute(rate)} for crowd in self.crowds],
         )
+
+
+def _proved_of(end: ArmEnd) -> ArmEnd:
+    """Give what can be proved of: normal deviations have no bound, so that nothing holds for every sequence of them."""
+    return end if end.scene.effects.spread != "gaussian" else replace(end, scene=still(end.scene))
 
 
 @shown_in_notebooks
@@ -319,9 +346,7 @@ def feed(
     how: dict[str, Any] = {"batches": batches, "seed": seed, "executor": executor, "progress": progress}
     both = () if parts is None else (True, False)
     crowds = tuple(run_crowd(end, scatter, parts or 0, between=between, **how) for between in both)
-    # normal deviations have no bound, so that nothing holds for every sequence: the proofs are of the still scene then
-    proved = end if read.effects.spread != "gaussian" else replace(end, scene=still(read))
-    proof = proved_feeding(proved, noise, seconds=seconds, progress=progress) if prove else None
+    proof = proved_feeding(_proved_of(end), noise, seconds=seconds, progress=progress) if prove else None
     count = trials_within(end, scatter, TRIALS, THROWS, seed=seed) if trials is None else trials
     curve = None
     if level and scatter.given():

@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
-from typing import Any
+from dataclasses import dataclass, field, replace
+from typing import Any, TypeVar
 
 from limitsets.files import as_table, picked
 from limitsets.proofs.goals import State
+from limitsets.scene.left_out import WITHOUT_SCATTER
 
-__all__ = ["Extents", "Fed", "Safe"]
+__all__ = ["Extents", "Fed", "Safe", "without_scatter"]
 
 Extents = dict[int, list[tuple[float, float]]]
+
+Answer = TypeVar("Answer", "Safe", "Fed")
 
 
 @dataclass(frozen=True)
@@ -21,6 +24,7 @@ class Safe:
     Attributes
     ----------
     verdict : str
+        Where the scene scatters its throws without bounds, followed by "of the scene without its scatter".
         "proved": no start of 99 % of the arm at least feeds another side, under any noise; "refuted": one does;
         "proved-on-cells": only the starts in `only_wanted` are proved not to; else "undecided".
     possible : dict of int to extents
@@ -45,19 +49,20 @@ class Safe:
 
     def lines(self, side: int, *, laid: bool = False) -> list[str]:
         """Put it in words, for the side wanted; of the whole arm, or of where parts are laid down."""
-        if self.verdict == "proved":
+        word, words = self.verdict.partition(" ")[0], _words(self.verdict)
+        if word == "proved":
             starts = (
                 f"no start {'that is laid down' if laid else 'on the arm'}"
                 if self.share == 1.0
                 else f"none of {100 * self.share:.4f} % of the starts"
             )
-            return [f"safety: PROVED, {starts} feeds another side than {side}"]
+            return [f"safety: {words}, {starts} feeds another side than {side}"]
         share = f"{100 * self.share:.2f} % of the starts are proved to feed no other side than {side}"
         if self.counterexample:
             start, landing = self.counterexample[0], self.counterexample[-1]
             shown = f"a throw from x = {start.lo:.6g} on side {start.side} lands on side {landing.side}"
-            return [f"safety: REFUTED, {shown} at x = {landing.lo:.6g}", share]
-        return [f"safety: {self.verdict.upper().replace('-', ' ')}, {share}"]
+            return [f"safety: {words}, {shown} at x = {landing.lo:.6g}", share]
+        return [f"safety: {words}, {share}"]
 
 
 @dataclass(frozen=True)
@@ -67,8 +72,8 @@ class Fed:
     Attributes
     ----------
     verdict : str
-        Of every start and every sequence of the noise: "proved", "proved-on-cells" (of those from `beyond` on),
-        "refuted" or "undecided".
+        As of `Safe`, of every start and every sequence of the noise: "proved", "proved-on-cells" (of those from
+        `beyond` on), "refuted" or "undecided".
     throws : int or None
         Throws after which every start from `beyond` on is fed, at most; None where that is not proved.
     beyond : dict of int to float
@@ -105,23 +110,23 @@ class Fed:
 
     def lines(self, unit: str) -> list[str]:
         """Put it in words."""
+        words = _words(self.verdict)
         if self.never_fed:
             told = " -> ".join(f"{state.lo:.5g} ({state.side})" for state in self.never_fed[:4])
             period = len(self.never_fed) - 1
             found = [
-                f"progress: REFUTED of every start, an orbit of period {period} is never fed: {told} -> ..."
+                f"progress of every start: {words}, an orbit of period {period} is never fed: {told} -> ..."
             ]
         elif self.throws is None:
-            found = [f"progress: UNDECIDED, {self.reason}"]
+            found = [f"progress: {words}, {self.reason}"]
         else:
-            words = self.verdict.upper().replace("-", " ")
             whole = "every start on the arm is fed, " if self.share >= 1.0 else ""
             within = f"every start beyond {_places(self.beyond, unit)} within {self.throws} throws"
             if not self.beyond:
                 whole, within = "", f"every start that is laid down is fed within {self.throws} throws"
             found = [f"progress: {words}, {whole}{within}"]
         if self.almost_every is not None:
-            words = self.almost_every.upper().replace("-", " ")
+            words = _words(self.almost_every)
             places = (
                 f" beyond {_places(self.almost_from['from'], unit)}"
                 if isinstance(self.almost_from, dict)
@@ -143,6 +148,25 @@ class Fed:
             "never_fed",
         )
         return as_table(**picked(self, *names), reason=self.reason or None)
+
+
+def _words(verdict: str) -> str:
+    """Write a verdict for people: its word in capitals."""
+    word, _, of = verdict.partition(" ")
+    return f"{word.upper().replace('-', ' ')} {of}".rstrip()
+
+
+def without_scatter(found: Answer) -> Answer:
+    """Say in the verdicts that they are of the scene without its scatter.
+
+    Examples
+    --------
+    >>> without_scatter(Safe("proved", {}, {}, 1.0, 0.0)).lines(2)
+    ['safety: PROVED of the scene without its scatter, no start on the arm feeds another side than 2']
+    """
+    said = {name: getattr(found, name, None) for name in ("verdict", "almost_every")}
+    changes: dict[str, Any] = {name: f"{word} {WITHOUT_SCATTER}" for name, word in said.items() if word}
+    return replace(found, **changes)
 
 
 def _places(beyond: Mapping[Any, float], unit: str) -> str:

@@ -16,6 +16,7 @@ from limitsets.policies.search import NOT_DECIDED, SOLVED, Found, search
 from limitsets.policies.writing import write
 from limitsets.progress import shown_in_notebooks
 from limitsets.scene import Scene, load
+from limitsets.scene.left_out import Model
 from limitsets.scene.sensing import BeyondSensor, Sensor
 from limitsets.tables import Table, Tabled, facts
 
@@ -63,6 +64,11 @@ class Synthesis(Board, Tabled):
         """What the sensor is asked, a clause."""
         return "nothing is asked" if self.sensor is None else self.sensor.question(self.scene.unit)
 
+    @property
+    def model(self) -> Model:
+        """Of which model the policy is, and which facts of the scene that leaves out."""
+        return Model.of(self.scene, self.noise)
+
     def asking(self, sensor: Sensor | None) -> Synthesis:
         """Play with another sensor on the same cells, whose images are not computed again."""
         return _play(self, sensor, self.limits)
@@ -108,11 +114,12 @@ class Synthesis(Board, Tabled):
         """Give the tables that show it, the one that is saved as CSV first."""
         policy = self.found.policy
         caption = f"{self.scene.name}: {self.question}"
-        verdict = facts(caption, picked(self.found, "verdict", "throws", "beliefs"))
+        of = self.model.sentence
+        verdict = facts(caption, picked(self.found, "verdict", "throws", "beliefs"), of)
         if policy is None:
             return (verdict,)
         return (
-            replace(policy.tables()[0], caption=caption, how="proved for the starts and noise named"),
+            replace(policy.tables()[0], caption=caption, how=f"proved for the starts and noise named; {of}"),
             verdict,
         )
 
@@ -137,6 +144,7 @@ class Synthesis(Board, Tabled):
             starts={"are": self.starts_are, "extents": self.starts.extents()},
             noise=self.noise,
             cells=self.grid.n_cells,
+            model=self.model,
             verdict=self.found.verdict,
             within=self.found.throws,
             policy=policy,

@@ -20,6 +20,7 @@ from limitsets.proofs.goals import State, rechecked
 from limitsets.proofs.proved_pieces import union_of
 from limitsets.proofs.tolerance import whole
 from limitsets.scene import Scene
+from limitsets.scene.left_out import Model
 from limitsets.scene.quantities import texts
 from limitsets.scene.units import convert, parse
 from limitsets.tables import Column, Table, Tabled, bands_of
@@ -152,6 +153,11 @@ class Proof(Tabled):
         """The effects of the scene that the proof is about, but for a spread, which is noise."""
         return tuple(name for name in self.scene.effects.on() if name != "spread")
 
+    @property
+    def model(self) -> Model:
+        """Of which model the claims are, and which facts of the scene that leaves out."""
+        return Model.of(self.scene, self.noise)
+
     def tables(self) -> tuple[Table, ...]:
         """Give the tables that show it, the one that is saved as CSV first."""
         rows = [
@@ -161,11 +167,13 @@ class Proof(Tabled):
                 _starts(each.starts),
                 *(each.shares.get(word) for word in SHARES),
                 each.reason or None,
+                ", ".join(self.model.left_out) or None,
             )
             for each in self.claims
         ]
         shares = [Column(word, show=".4f") for word in SHARES]
-        claims = Table(("claim", "verdict", "starts", *shares, "missing"), rows, f"{self.scene.name}: proofs")
+        heads: tuple[Column | str, ...] = ("claim", "verdict", "starts", *shares, "missing", "not simulated")
+        claims = Table(heads, rows, f"{self.scene.name}: proofs", self.model.sentence)
         if not any(each.written for each in self.claims):
             return (claims,)
         columns = ("side", Column("x", self.scene.unit, ".6f", ends=True))
@@ -197,6 +205,7 @@ class Proof(Tabled):
             least_slope=slope,
             entropy=math.log(slope) if slope is not None and not self.noise else None,
             section=claim.section or None,
+            model=self.model,
             cells=sum(each.cover.grid.n_cells for each in found),
             undecided=sum(_undecided(each) for each in found),
             unresolved=_by_side(each.unresolved.extents() for each in found),

@@ -18,6 +18,7 @@ from limitsets.regions.gluing import regions
 from limitsets.regions.record import CELLS, Record, certify_cell
 from limitsets.regions.writing import write
 from limitsets.scene import Scene, load
+from limitsets.scene.left_out import Model
 from limitsets.tables import Column, Table, Tabled
 
 __all__ = ["CODES", "Regions", "certified"]
@@ -82,7 +83,8 @@ class Regions(Tabled):
         """Give the tables that show it, the one that is saved as CSV first."""
         rows = list(self.shares().items())
         caption = f"{self.scene.name}: regions of {' and '.join(axis.quantity for axis in self.axes)}"
-        return (Table(("verdict", Column("share of the area", show=".6f")), rows, caption, "proved"),)
+        how = f"proved; {Model.of(self.scene).sentence}"
+        return (Table(("verdict", Column("share of the area", show=".6f")), rows, caption, how),)
 
     def raster(self, of: NDArray[Any] | None = None) -> NDArray[Any]:
         """Spread numbers of the cells, by default their own, over the raster of the smallest cells.

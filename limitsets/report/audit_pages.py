@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 
 from limitsets import plot
 from limitsets.files import as_json
-from limitsets.proposals import proposed
 from limitsets.report.pages import words
 from limitsets.report.tables import percent
 from limitsets.report.writing import laid
@@ -17,7 +16,7 @@ from limitsets.report.writing import laid
 if TYPE_CHECKING:
     from limitsets.auditing import Audit, Finding
 
-__all__ = ["HEADS", "audit_line", "audit_page", "lines_of", "summary", "write_audit"]
+__all__ = ["HEADS", "audit_page", "lines_of", "summary", "write_audit"]
 
 HEADS = ("effect", "assumed", "on the limit set", "worst there", "on the whole arm")
 
@@ -98,26 +97,6 @@ def lines_of(found: Audit) -> list[list[str]]:
 def summary(found: Audit) -> list[str]:
     """Say in a few sentences what the scene calls for."""
     return words("audit_summary", found=found).split("\n\n")
-
-
-def audit_line(found: Audit, file: str) -> str:
-    """Say in a line how many assumptions a scene breaks where its parts stay, and which effects they call for.
-
-    Examples
-    --------
-    >>> import limitsets as ls
-    >>> audit_line(ls.audit("paper-initial"), "paper-initial")
-    'audit: 3 assumptions break on the limit set (pivot, roll); limitsets audit paper-initial'
-    """
-    broken = [each for each in found.on("limit-set") if each.called_for and not each.simulated]
-    effects = ", ".join(dict.fromkeys(each.effect for each in broken))
-    count = "1 assumption breaks" if len(broken) == 1 else f"{len(broken)} assumptions break"
-    said = (
-        f"{count} on the limit set ({effects})"
-        if broken
-        else "no assumption is seen to break on the limit set"
-    )
-    return f"audit: {said}; {proposed('audit', file)}"
 
 
 def audit_page(found: Audit, figures: Mapping[str, str] | None = None) -> str:

@@ -23,7 +23,7 @@ def _drawn(found: Robustness) -> Iterator[tuple[str, Figure]]:
     """Draw what there is to draw."""
     yield "part", plot.part(found.scene)
     single = [each for each in found.margins() if each.quantity != "joint"]
-    if found.verdict == "proved" and single:
+    if found.decided == "proved" and single:
         yield "margins", plot.tornado(single)
     if found.joint is not None and found.joint.holds:
         yield "joint", plot.tolerance_box(found.margins()[-1])

@@ -119,7 +119,6 @@ def _told(found: Robustness) -> dict[str, Any]:
         "failing": failing,
         "tightest": tightest,
         "by_tolerance": _by_tolerance,
-        "called_for": _called_for,
     }
 
 
@@ -179,7 +178,7 @@ def none_holds(found: Robustness) -> str:
     """Say of margins that are all nothing what a table of zeros would."""
     count = len({entry.quantity for entry in found.singles})
     whose = "1 quantity has" if count == 1 else f"{count} quantities have"
-    why = "the goal fails already" if found.verdict == "refuted" else "the goal is not proved of it"
+    why = "the goal fails already" if found.decided == "refuted" else "the goal is not proved of it"
     reason = next((entry.reason for entry in found.singles if entry.reason), why)
     return f"{whose} no margin about the scene as it is: {reason}."
 
@@ -330,12 +329,6 @@ def _changes(noise: NoiseStatistics) -> Table:
             [quantity, *(_change(each, NUMBERS[name][1]) for each, name in zip(changes, MOVING, strict=True))]
         )
     return ["with 10 % more noise of", *(NUMBERS[name][0] for name in MOVING)], rows
-
-
-def _called_for(found: Robustness) -> list[str]:
-    """Name the effects that the limit set calls for and that are not simulated."""
-    limit = found.audit.on("limit-set") if found.audit is not None else ()
-    return list(dict.fromkeys(each.effect for each in limit if each.called_for and not each.simulated))
 
 
 def violated_of(entry: Entry, goals: Sequence[Goal]) -> Goal | None:

@@ -20,6 +20,7 @@ from limitsets.maps import coerce, kind_of
 from limitsets.maps.contract import require_dimension
 from limitsets.progress import shown_in_notebooks
 from limitsets.scene import Scene, load
+from limitsets.scene.left_out import Model
 from limitsets.sweep.axes import Axis, axis_of
 from limitsets.sweep.boundaries import STEP
 from limitsets.sweep.classes import UNDECIDED_NAME
@@ -68,6 +69,17 @@ class Atlas(Tabled):
         """The names of the quantities, the slowest first."""
         return tuple(axis["name"] for axis in self.dataset.attrs["plan"]["axes"])
 
+    @property
+    def model(self) -> Model | None:
+        """Of which model the answers are, and which facts of the scene that leaves out; None of a map."""
+        plan = self.dataset.attrs["plan"]
+        return Model.of(load(plan["scene"])) if "scene" in plan else None
+
+    @property
+    def _how(self) -> str:
+        """How the answers were found, and of which model."""
+        return "sampled, not proved" + ("" if self.model is None else f"; {self.model.sentence}")
+
     def to_dataframe(self) -> pd.DataFrame:
         """Give a table with a row for each point, a column for each variable, and one for each entry of an array.
 
@@ -94,15 +106,13 @@ class Atlas(Tabled):
             for head in map(str, frame.columns)
             for name in [head.partition("[")[0] if head not in data else head]
         ]
-        return Table(columns, frame.itertuples(index=False), "Atlas", "sampled, not proved")
+        return Table(columns, frame.itertuples(index=False), "Atlas", self._how)
 
     def tables(self) -> tuple[Table, ...]:
         """Give what the answers range over."""
         rows = [self._range(str(name)) for name in sorted(self.dataset, key=str)]
         axes = " and ".join(self.axes)
-        return (
-            Table(("variable", "values", "unit", "what"), rows, f"Atlas over {axes}", "sampled, not proved"),
-        )
+        return (Table(("variable", "values", "unit", "what"), rows, f"Atlas over {axes}", self._how),)
 
     def _range(self, name: str) -> tuple[str, str, str, str]:
         """Say what one variable ranges over, apart from where there is nothing; of codes how many points have each."""
@@ -136,6 +146,8 @@ class Atlas(Tabled):
             "axes": axes,
             "variables": variables,
         }
+        if self.model is not None:
+            found["model"] = self.model.to_json()
         return found | {
             "task": plan["task"],
             "plan_hash": data.attrs["plan_hash"],

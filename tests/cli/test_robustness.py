@@ -40,7 +40,7 @@ def test_report_and_files(capfd):
     assert code == 0
     assert "this holds, proved" in out
     assert "no joint: the scene has no [tolerance]" in out
-    assert out.splitlines()[-1] == "report: sheet/report.md"
+    assert out.splitlines()[-2] == "report: sheet/report.md"
     folder = Path("sheet")
     page = (folder / "report.md").read_text(encoding="utf-8")
     figures = set(re.findall(r"\]\((\S+\.png)\)", page))

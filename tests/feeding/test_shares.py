@@ -224,7 +224,8 @@ def test_a_level_is_bracketed():
 
 
 KEYS = {
-    "scene", "unit", "position", "side", "starts_from", "laid", "throw_rate", "clear", "tipping", "safety",
+    "scene", "unit", "position", "side", "starts_from", "laid", "throw_rate", "clear", "tipping", "safety", "vacuous",
+    "model",
     "progress", "noise", "scatter", "brackets", "crowds",
     "probabilities", "throws", "right_per_minute", "success", "trials",
 }  # fmt: skip

@@ -420,7 +420,7 @@ def test_json_has_everything_and_no_nan():
     from limitsets.files import as_json
 
     record = json.loads(as_json(run(None)))
-    assert list(record) == ["scene", "unit", "axes", "variables", "task", "plan_hash", "versions"]
+    assert list(record) == ["scene", "unit", "axes", "variables", "model", "task", "plan_hash", "versions"]
     assert record["axes"][1]["values"][20] == 180.0
     assert record["variables"]["kappa"]["values"][0][0] is None
     assert record["variables"]["status"]["codes"] == {"computed": 0, "impossible": 1, "refused": 2}

@@ -117,7 +117,9 @@ def test_margins_designs_and_noise():
     (margin,) = ls.margin("paper-designed", "throw.speed", width=0.2)
     row = saved(margin)[1]
     assert [float(row[2]), float(row[3])] == [margin.proved, margin.refuted]
-    assert captions(margin)[0].endswith("(brackets: proved below, refuted above)")
+    assert captions(margin)[0].endswith(
+        "(brackets: proved below, refuted above; of the minimal model: no fact of [world] is left out)"
+    )
     assert shown(margin)
     design = ls.design("paper-initial", critical_points=[10, 10, 20], vary=["throw.kappa"])
     assert shown(design)

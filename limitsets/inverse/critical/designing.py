@@ -19,6 +19,7 @@ from limitsets.inverse.critical.trials import Trial, TrialLog
 from limitsets.inverse.critical.unknowns import Bounds, Unknowns, unknowns_of
 from limitsets.progress import shown_in_notebooks
 from limitsets.scene import Scene, load
+from limitsets.scene.left_out import Model
 from limitsets.scene.quantities import text_at, texts
 from limitsets.scene.spelling import in_unit_of, in_units_of, unit_of
 from limitsets.scene.units import convert, parse
@@ -91,6 +92,11 @@ class Design(Tabled):
             found[name] = (pair[0], pair[1], unit)
         return found
 
+    @property
+    def model(self) -> Model:
+        """Of which model the design is, and which facts of the scene that leaves out."""
+        return Model.of(self.scene)
+
     def tables(self) -> tuple[Table, ...]:
         """Give the tables that show it, the one that is saved as CSV first."""
         heads = ("quantity", Column("before", show=".9g"), Column("after", show=".9g"), "unit")
@@ -106,7 +112,8 @@ class Design(Tabled):
             (f"r_{side} (first critical point of side {side})", before, after, self.start.unit, wanted, miss)
             for side, (before, after, wanted, miss) in enumerate(points)
         ]
-        return (Table((*heads, *more), rows, f"{self.scene.name}: {self.message}", "computed, not proved"),)
+        how = f"computed, not proved; {self.model.sentence}"
+        return (Table((*heads, *more), rows, f"{self.scene.name}: {self.message}", how),)
 
     def to_json(self) -> dict[str, Any]:
         """Give it as plain tables for JSON."""
@@ -121,6 +128,7 @@ class Design(Tabled):
             after=self.jacobian,
             condition=self.condition,
             path=[scene.as_dict() for scene in self.path],
+            model=self.model,
         )
 
 

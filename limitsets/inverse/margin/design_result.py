@@ -16,6 +16,7 @@ from limitsets.inverse.margin.search import Candidate
 from limitsets.robust.margins.estimate import Estimate
 from limitsets.robust.margins.margin_result import Margin, settled
 from limitsets.scene import Scene, dump
+from limitsets.scene.left_out import Model
 from limitsets.scene.spelling import in_unit_of, unit_of
 from limitsets.tables import Column, Table, Tabled, joined
 
@@ -89,6 +90,11 @@ class RobustDesign(Tabled):
         proved, refuted = both(self.margins)[0], both(self.before_margins)[1]
         return None if proved is None or not refuted else proved / refuted
 
+    @property
+    def model(self) -> Model:
+        """Of which model the design is, and which facts of the scene that leaves out."""
+        return Model.of(self.scene)
+
     def tables(self) -> tuple[Table, ...]:
         """Give the tables that show it, the one that is saved as CSV first."""
         sides = tuple(
@@ -104,7 +110,7 @@ class RobustDesign(Tabled):
             for name in (*sides, *self.varied)
         ]
         columns = ("quantity", Column("before", show=".6g"), Column("design", show=".6g"), "unit")
-        found = Table(columns, rows, f"{self.scene.name}: robust design")
+        found = Table(columns, rows, f"{self.scene.name}: robust design", self.model.sentence)
         return found, *((joined(self.margins),) if self.margins else ())
 
     def to_json(self) -> dict[str, Any]:
@@ -126,6 +132,7 @@ class RobustDesign(Tabled):
             throws=self.feeding,
             before_throws=self.before_feeding,
             **picked(self, "front", "evaluations"),
+            model=self.model,
             timings={"search": self.seconds},
         )
 

@@ -29,6 +29,7 @@ from limitsets.proofs.query import Query
 from limitsets.robust.margins.invariant_set import invariant_intervals, least_slack
 from limitsets.scene import Scene, load
 from limitsets.scene.laid import LaidLike, laid_goal, laid_goals
+from limitsets.scene.left_out import Model
 from limitsets.scene.scene import require_rests
 from limitsets.scene.spelling import in_unit_of, in_units_of, unit_of
 from limitsets.tables import Column, Table, Tabled
@@ -114,6 +115,11 @@ class GoalDesign(Tabled):
         same = load(self.before.as_dict() | {"name": self.scene.name}) == self.scene
         return f"{said}; no other is better, so that {self.scene.name} has its values" if same else said
 
+    @property
+    def model(self) -> Model:
+        """Of which model the design is, and which facts of the scene that leaves out."""
+        return Model.of(self.scene)
+
     def tables(self) -> tuple[Table, ...]:
         """Give the tables that show it, the one that is saved as CSV first."""
         rows = [
@@ -128,7 +134,8 @@ class GoalDesign(Tabled):
         found = "design" if self.room > 0.0 else "nearest miss"
         numbers = [Column("before", show=".6g"), Column(found, show=".6g")]
         numbers += [Column(head, show=".4g") for head in ("lowest", "highest")]
-        return (Table(("quantity", *numbers, "unit"), rows, f"{self.scene.name}: {self.message}"),)
+        caption = f"{self.scene.name}: {self.message}"
+        return (Table(("quantity", *numbers, "unit"), rows, caption, self.model.sentence),)
 
     def to_json(self) -> dict[str, Any]:
         """Give it as plain tables for JSON."""
@@ -149,6 +156,7 @@ class GoalDesign(Tabled):
                 name: {"before": self.before.value(name), "after": self.scene.value(name), "bounds": ends}
                 for name, ends in self.varied.items()
             },
+            model=self.model,
             timings={"design": self.seconds},
         )
 

@@ -18,6 +18,7 @@ from limitsets.proofs.refutation import KINDS, write_refutation
 from limitsets.robust.margins.deviations import nominal_of
 from limitsets.robust.margins.margin_texts import bound, bound_above
 from limitsets.scene import Scene
+from limitsets.scene.left_out import Model
 from limitsets.tables import Column, Table, Tabled
 
 __all__ = ["Margin", "goal_table", "settled"]
@@ -87,16 +88,22 @@ class Margin(Tabled):
         """The orbit that violates a goal, every state enclosed; empty if there is none."""
         return () if self.against is None else self.against.counterexample
 
+    @property
+    def model(self) -> Model:
+        """Of which model the margin is, and which facts of the scene that leaves out."""
+        return Model.of(self.scene)
+
     def tables(self) -> tuple[Table, ...]:
         """Give the tables that show it, the one that is saved as CSV first."""
         shown = Column("proved safe up to", show=bound), Column("shown to fail from", show=bound_above)
         value = Column("value", show=".6g"), "value_unit"
-        columns = ("quantity", "reading", *shown, "unit", *value, "direction")
+        columns = ("quantity", "reading", *shown, "unit", *value, "direction", "not simulated")
         unit = self.unit or "times the tolerance"
         nominal, of = nominal_of(self.scene, self.quantity)
         about = nominal, None if nominal is None else of
-        row = (self.quantity, self.reading, self.proved, self.refuted, unit, *about, self.direction)
-        how = "brackets: proved below, refuted above"
+        left_out = ", ".join(self.model.left_out) or None
+        row = (self.quantity, self.reading, self.proved, self.refuted, unit, *about, self.direction, left_out)
+        how = f"brackets: proved below, refuted above; {self.model.sentence}"
         return (Table(columns, [row], f"{self.scene.name}: margins", how),)
 
     def to_json(self) -> dict[str, Any]:
@@ -112,6 +119,7 @@ class Margin(Tabled):
             counterexample=self._states() or None,
             certificate=None,
             pieces=len(self.pieces),
+            model=self.model,
             timings={"margin": self.seconds},
         )
 

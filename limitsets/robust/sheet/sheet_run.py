@@ -31,6 +31,7 @@ from limitsets.robust.sheet.noise_input import noise_of, still
 from limitsets.robust.sheet.summary import PARTS, Robustness
 from limitsets.scene import Scene, load
 from limitsets.scene.laid import LaidLike
+from limitsets.scene.left_out import WITHOUT_SCATTER
 
 if TYPE_CHECKING:
     from limitsets.auditing import Audit
@@ -383,7 +384,7 @@ def _filled(
     return Robustness(
         scene,
         goals,
-        verdict,
+        verdict if scene == given else f"{verdict} {WITHOUT_SCATTER}",
         reach_of([nominal]) if verdict == "proved" else None,
         tuple(entries),
         sheet.tolerance,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import TYPE_CHECKING, Any
 
@@ -14,6 +14,7 @@ from limitsets.robust.margins.margin_texts import NOT_FOUND, void_of
 from limitsets.robust.noise.statistics import Levels, NoiseStatistics
 from limitsets.robust.sheet.entries import Entry
 from limitsets.scene import Scene
+from limitsets.scene.left_out import WITHOUT_SCATTER, Model
 from limitsets.scene.units import exact_factor
 from limitsets.tables import Table, Tabled, joined
 
@@ -37,7 +38,8 @@ class Robustness(Tabled):
     goals : tuple of Goal
         What has to hold, all of it.
     verdict : str
-        Of the goals in the scene as it is: "proved", "refuted" or "undecided".
+        Of the goals in the scene as it is: "proved", "refuted" or "undecided"; of a scene that scatters its throws
+        followed by "of the scene without its scatter".
     reach : float or None
         Where the attracting cells end in which the goals are proved of the scene as it is.
     entries : tuple of Entry
@@ -82,6 +84,20 @@ class Robustness(Tabled):
     digests: dict[str, str]
     again: int
     seconds: float
+
+    @property
+    def decided(self) -> str:
+        """The first word of the verdict: that on `scene`, whether or not the scene that was asked scatters."""
+        return self.verdict.removesuffix(f" {WITHOUT_SCATTER}")
+
+    @property
+    def model(self) -> Model:
+        """Of which model the proofs are, which facts of the scene that leaves out, and what the audit found."""
+        of = Model.of(self.scene)
+        if self.audit is None:
+            return of
+        found = (each for each in self.audit.on("limit-set") if each.called_for and not each.simulated)
+        return replace(of, broken=tuple(each.effect for each in found))
 
     @property
     def singles(self) -> tuple[Entry, ...]:
@@ -152,5 +168,6 @@ class Robustness(Tabled):
             noise=None if self.noise is None else self.noise.to_json() | {"law": self.law},
             noise_levels=self.levels,
             assumptions=self.audit,
+            model=self.model,
             **picked(self, "left_out", "width", "seconds"),
         )
