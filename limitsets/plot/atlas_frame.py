@@ -93,11 +93,9 @@ def goal_line(axes: Axes, found: Atlas) -> list[Any]:
     data = found.dataset
     if "threshold" not in data:
         return []
-    from limitsets.goals import OrientedBeyond, Reaches
-    from limitsets.scene import load
+    from limitsets.goals import OrientedBeyond
 
-    goal = load(data.attrs["scene"]).goal
-    assert isinstance(goal, OrientedBeyond | Reaches)  # the others have no threshold
+    goal = _goal_of(found)
     over = (data["threshold"].values - goal.x) * (1 if isinstance(goal, OrientedBeyond) else -1)
     fails = over[np.isfinite(over)] > 0.0
     if fails.all() or not fails.any():
@@ -129,6 +127,16 @@ def goal_line(axes: Axes, found: Atlas) -> list[Any]:
     ]
 
 
+def _goal_of(found: Atlas) -> Any:
+    """Read the goal of an atlas that says thresholds: only these two kinds have one."""
+    from limitsets.goals import OrientedBeyond, Reaches
+    from limitsets.scene import load
+
+    goal = load(found.dataset.attrs["scene"]).goal
+    assert isinstance(goal, OrientedBeyond | Reaches)
+    return goal
+
+
 def unreached(axes: Axes, found: Atlas) -> list[Any]:
     """Hatch where no part gets to the goal's X: a goal that asks of parts beyond X holds there of none.
 
@@ -137,9 +145,7 @@ def unreached(axes: Axes, found: Atlas) -> list[Any]:
     data = found.dataset
     if "threshold" not in data or "reach" not in data:
         return []
-    from limitsets.scene import load
-
-    goal = load(data.attrs["scene"]).goal
+    goal = _goal_of(found)
     reach = np.where(np.isnan(data["reach"].values), -np.inf, data["reach"].values)
     farthest = reach.reshape(*data["threshold"].shape, -1, reach.shape[-1]).max(axis=(-2, -1))
     none = np.isfinite(farthest) & (farthest <= goal.x)

@@ -149,7 +149,8 @@ class Processes(Executor):
 
     def _serve(self) -> None:
         """Hand one process after the other what waits, and its answers to those who asked."""
-        process = pipe = None
+        process: Any = None
+        pipe: Any = None
         while task := self._tasks.get():
             future, call = task
             if not future.set_running_or_notify_cancel():

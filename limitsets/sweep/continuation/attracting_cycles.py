@@ -84,7 +84,10 @@ def _as_cycle(place: Place, x: float, side: int, word: Ints) -> Cycle | None:
     for s in np.unique(sides):
         if (images(place.params, xs[sides == s], int(s)).code != word[sides == s]).any():
             return None
-    return Cycle.through(xs, sides, word, multiplier, abs(x - float(xs[0])))
+    first = int(np.lexsort((xs, sides))[0])
+    ahead = (np.arange(sides.size) + first) % sides.size
+    rounding = 16.0 * EPS * place.extent * (1.0 + float(np.abs(slopes).max()))
+    return Cycle(xs[ahead], sides[ahead], word[ahead], multiplier, abs(x - float(xs[0])), rounding)
 
 
 def _shortest(place: Place, cycle: Cycle) -> Cycle:
