@@ -101,7 +101,7 @@ def robustness(
         )
         tell("files", len(found.entries), len(found.entries) + 1)
         files = write_robustness(found, folder, form, html=html)
-    about = About(found.model, scene, chosen)
+    about = About(found.model, scene)  # audited by the sheet itself, unless that was left out
     answer(found, json, lambda: _text(chosen, found, files), csv=(csv, found.table), about=about)
     raise typer.Exit(0 if found.verdict == "proved" and not found.failed else 1)
 

@@ -40,8 +40,8 @@ class FedShares:
 
     Examples
     --------
-    >>> fate, none = np.array([0, 0, 1, 4]), np.zeros(4, dtype=bool)
-    >>> found = FedShares(Trials(fate, np.array([1, 3, 2, 20_000]), none, none, 0))
+    >>> fate, none = np.array([0, 0, 1, 5]), np.zeros(4, dtype=bool)
+    >>> found = FedShares(Trials(fate, np.array([1, 3, 2, 20_000]), none, 0))
     >>> found.shares["right"], found.mean_throws, found.quantile(0.75), found.ended.tolist()
     (0.5, 2.0, 3, [0.0, 0.25, 0.5, 0.75])
     """

@@ -51,12 +51,13 @@ class Case(NamedTuple):
     noise: dict[str, str]
     named: bool = False
 
-    def starts(self) -> dict[int, float] | None:
-        """By side the x from which on almost every start is proved to be fed."""
+    def laid(self) -> dict[int, list[tuple[float, float]]] | None:
+        """By side from where almost every start is proved to be fed to the end of the arm."""
         if not self.named:
             return None
-        fed = proved_feeding(arm_end_of(self.scene), self.noise).fed
-        return {int(side): x for side, x in fed.almost_from["from"].items()}
+        end = arm_end_of(self.scene)
+        fed = proved_feeding(end, self.noise).fed
+        return {int(side): [(x, end.x)] for side, x in fed.almost_from["from"].items()}
 
 
 def cases() -> dict[str, Case]:

@@ -61,7 +61,7 @@ def test_two_basins_in_words(capfd):
         line = next(line for line in out.splitlines() if line.strip().startswith(f"side {side}: R* between"))
         lo, hi = (float(word) for word in line.split("=")[1].removesuffix(" in").split(" and "))
         assert lo < want < hi < lo + 1e-9
-    code, out, _ = run(capfd, "recheck", "paper-designed.proof.zip")
+    code, out, _ = run(capfd, "recheck", "above.proof.zip")
     assert code == 0
     assert "every start a_i < x < R*_i stays on side i and tends to a_i" in out
     _, out, _ = run(capfd, "certify", "above.toml", "--noise", "throw.speed=0.1 %")

@@ -20,7 +20,7 @@ def test_certify_exits_with_0_where_all_that_is_laid_down_is_proved(capfd):
     (record,) = json.loads(out)
     assert (code, record["verdict"], list(record["starts"])) == (0, "proved", ["within"])
     assert record["laid"] == record["starts"]["within"]
-    code, out, _ = run(capfd, "recheck", f"{scene.name}.proof.zip")
+    code, out, _ = run(capfd, "recheck", "left.proof.zip")
     assert (code, out.splitlines()[-1]) == (0, "PROVED")
 
 
@@ -67,7 +67,7 @@ def test_critical_points_have_no_starts(capfd):
 
 def test_feed_says_where_parts_are_laid_down(capfd):
     ls.dump(with_cavity(), "fed.toml")
-    words = "--laid", "0=6:14", "--trials", "50", "--cells", "64", "--certificate", "fed.proof.zip"
+    words = "--laid", "0=6:14", "--trials", "50", "--certificate", "fed.proof.zip"
     code, out, _ = run(capfd, "feed", "fed.toml", *words)
     assert code == 0
     assert "where parts are laid down: x = 6 to 14 in on side 0" in out

@@ -18,7 +18,7 @@ ALL = "of the minimal model: no fact of [world] is left out"
 THROWS = [{"name": "own", "kappa": "25.3778518 in"}]
 FEEDBACK = {"sensor": {"beyond": "20 in"}, "throws": THROWS}
 SPREAD = {"world": {"scatter": {"speed": "0.5 %"}}, "effects": {"spread": "gaussian"}}
-QUICK = ("--trials", "100", "--cells", "32", "--no-level")
+QUICK = ("--trials", "100", "--no-level")
 
 
 def scene(**tables):
@@ -42,7 +42,7 @@ AUDITED = {
     "margin": ("margin", "mine.toml", "throw.speed", "--width", "0.5"),
     "robustness": (
         "robustness", "mine.toml", "-o", "sheet", "--quantity", "throw.speed", "--reading", "fixed", "--width", "0.5",
-        "--seconds", "0", "--without", "noise", "--without", "joint", "--without", "curve", "--without", "audit",
+        "--seconds", "0", "--without", "noise", "--without", "joint", "--without", "curve",
     ),
     "feed": ("feed", "mine.toml", *QUICK),
     "design --critical-points": (
@@ -161,7 +161,7 @@ def test_tables_and_python_name_it():
     (margin,) = ls.margin(scene(world=RUBBED), "throw.speed", width=0.5)
     assert LEFT_OUT in margin._repr_html_()
     assert margin.table().csv().splitlines()[1].endswith('"friction, restitution"')
-    fed = ls.feed(with_cavity(tables={"world": RUBBED}), trials=10, cells=32, level=False)
+    fed = ls.feed(with_cavity(tables={"world": RUBBED}), trials=10, level=False)
     assert LEFT_OUT in fed._repr_html_()
 
 
@@ -191,7 +191,7 @@ def test_a_feeder_that_scatters_without_bounds(capfd):
     assert "safety: PROVED of the scene without its scatter, no start on the arm feeds another side" in out
     assert "progress: PROVED of the scene without its scatter, every start" in out
     assert "of the minimal model, of the scene without its scatter: scatter of [world] is not in it" in out
-    found = ls.feed(file, trials=10, cells=32, level=False)
+    found = ls.feed(file, trials=10, level=False)
     record = found.to_json()
     assert record["safety"]["verdict"] == "proved of the scene without its scatter"
     assert record["progress"]["verdict"] == "proved of the scene without its scatter"
@@ -227,7 +227,7 @@ def test_a_feeder_that_feeds_nothing_says_so_first(capfd):
     record = json.loads(Path("fed/feeding.json").read_text(encoding="utf-8"))
     assert record["vacuous"] is True
     assert sum(record["trials"]["counts"][name] for name in ("right", "wrong", "wall")) == 0
-    assert not ls.feed(with_cavity(), prove=False, level=False, trials=10, cells=32).vacuous
+    assert not ls.feed(with_cavity(), prove=False, level=False, trials=10).vacuous
 
 
 def test_the_explorer_names_it():

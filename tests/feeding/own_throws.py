@@ -2,7 +2,7 @@
 
 import numpy as np
 
-FATES = ("right", "wrong", "wall", "left", "never")
+FATES = ("right", "wrong", "wall", "edge", "left", "never")
 
 
 def thrown(scene, kappa, x, side):
@@ -33,8 +33,16 @@ def shares(end, count, seed, speed=lambda random, n: np.zeros(n), landing=None, 
     random, scene = np.random.default_rng(seed), end.scene
     lengths = np.maximum(end.x - end.starts, 0.0)
     side = random.choice(lengths.size, count, p=lengths / lengths.sum())
-    x, met = random.uniform(end.starts[side], end.x), np.zeros(5)
+    x, met = random.uniform(end.starts[side], end.x), np.zeros(6)
+    d, over = scene.sides.d, scene.sides.length - scene.sides.a
     for _ in range(most):
+        # the impulse acts (rho^2 + d (h + d)) / x right of the foot of the centre of mass
+        acts = x + (scene.radius_of_gyration**2 + d[side] * (scene.surface_height + d[side])) / x
+        edge = (acts > end.x) & (x + over[side] > end.x)
+        met[3] += edge.sum()
+        x, side = x[~edge], side[~edge]
+        if not x.size:
+            break
         x, side = thrown(scene, scene.kappa / (1.0 + speed(random, x.size)) ** 2, x, side)
         x = x if landing is None else x + landing(random, x.size)
         beyond = x - end.x
@@ -47,11 +55,12 @@ def shares(end, count, seed, speed=lambda random, n: np.zeros(n), landing=None, 
             (fed & wanted & clear).sum(),
             (fed & ~wanted).sum(),
             (fed & wanted & ~clear).sum(),
+            0,
             left.sum(),
             0,
         ]
         x, side = x[~left & ~fed], side[~left & ~fed]
         if not x.size:
             break
-    met[4] = x.size
+    met[5] = x.size
     return dict(zip(FATES, met / count, strict=True))

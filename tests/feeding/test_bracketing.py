@@ -1,13 +1,16 @@
 """Proved brackets of the fates: the shares of trials lie in them; what is refused."""
 
 import json
+import re
 
 import pytest
 
 import limitsets as ls
 from limitsets.errors import AnswerError
+from limitsets.feeding.falling import arm_end_of
 from limitsets.robust import Scattering, Uniform
 from tests.cli.command import run
+from tests.feeding.own_throws import shares
 from tests.feeding.scenes import with_cavity
 
 NOISE = Scattering(landing=Uniform(0.2))
@@ -60,5 +63,13 @@ def test_the_command_shows_them(capfd, tmp_path, monkeypatch):
         "--trials", "50", "--brackets", "200",
     )  # fmt: skip
     assert code == 0
-    assert "PROVED: on the wanted side, clear of the wall within 200 throws: 0.29" in out
+    said = re.search(
+        r"PROVED: on the wanted side, clear of the wall within 200 throws: ([\d.]+) to ([\d.]+)", out
+    )
+    assert said, out
+    low, high = (float(number) for number in said.groups())
+    end = arm_end_of(ls.load("fed.toml"))
+    own = shares(end, 20_000, 3, landing=lambda random, n: random.uniform(-0.2, 0.2, n))["right"]
+    error = 4.0 * (own * (1.0 - own) / 20_000) ** 0.5
+    assert low - error <= own <= high + error
     assert "PROVED: the least number of throws within which 95 % have ended: " in out

@@ -94,7 +94,7 @@ def test_random_starts_lie_where_parts_are_laid_down():
         assert mine.size / x.size == pytest.approx((hi - lo) / 18.0, abs=0.01)
         assert lo <= mine.min() < lo + 0.01 < hi - 0.01 < mine.max() <= hi
         assert mine.mean() == pytest.approx(0.5 * (lo + hi), abs=0.1)
-    found = ls.feed(scene, laid=LAID, trials=4000, cells=512, level=False)
+    found = ls.feed(scene, laid=LAID, trials=4000, level=False)
     record = found.to_json()
     assert (record["laid"], record["starts_from"]) == ({"0": [[6.0, 14.0]], "2": [[9.0, 19.0]]}, None)
     # mean number of throws of these starts, by orbits of their own

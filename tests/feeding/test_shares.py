@@ -59,14 +59,14 @@ def test_two_ways_agree(initial):
     assert_within(found, own, 20_000)
 
 
-# 1.2 million parts without noise: issue 27
-TRUE_WALL = {"2 Hz": (0.004378, 6e-5), "3 Hz": (0.019347, 1.3e-4)}
+# 1.2 million parts of `own_throws` without noise, of an arm whose parts tip from rest, and their 95 % intervals.
+TRUE_WALL = {"2 Hz": (0.004421, 1.2e-4), "3 Hz": (0.019176, 2.5e-4)}
 
 
 @pytest.mark.parametrize("rate", TRUE_WALL)
 def test_the_stated_error_of_the_wall_holds_without_noise(rate):
     """Transfer between cells said 0.004732 +- 0.000013 and 0.020389: cells spread the parts next to the end."""
-    found = ls.feed(with_cavity(rate=rate), prove=False)
+    found = ls.feed(with_cavity(rate=rate, tips="rest"), prove=False)
     value, error = TRUE_WALL[rate]
     assert abs(found.shares.shares["wall"] - value) <= found.errors["wall"] + error
     assert found.errors["wall"] < 0.15 * value
@@ -138,7 +138,7 @@ def test_parts_that_creep_to_the_joint_never_leave_the_arm(height):
 
 def test_of_parts_that_all_stay_no_mean_is_told():
     none = np.zeros(5, dtype=bool)
-    stay = FedShares(Trials(np.full(5, 5), np.full(5, 20_000), none, none, 0))
+    stay = FedShares(Trials(np.full(5, 5), np.full(5, 20_000), none, 0))
     assert np.isnan(stay.mean_throws)
     assert stay.per_minute(60.0) is None
 
@@ -259,7 +259,7 @@ def test_json_and_figure():
     words = [text.get_text() for text in fates.get_legend().get_texts()]
     assert words == [
         f"side wanted, clear: {right:.3g} %",
-        f"meets the wall: {wall:.3g} %",
+        *([f"meets the wall: {wall:.3g} %"] if wall else []),
         f"thrown at the end (assumed not fed): {edge:.3g} %",
     ]
     # flush on the ramp a side of the part falls under its angle

@@ -33,12 +33,12 @@ def clean(words, *names):
 def test_feeding(capfd, tmp_path):
     tree = {**with_cavity().as_dict(), "name": "own"}
     scene = ls.load(tree)
-    found = ls.feed(scene, NOISE, trials=40, cells=32, prove=False)
+    found = ls.feed(scene, NOISE, trials=40, prove=False)
     words = [as_json(found), said_by(ls.plot.feeding(found)), *(str(table) for table in found.tables())]
     clean(" ".join(words))
     assert "assumed" in said_by(ls.plot.feeding(found))
     ls.dump(scene, tmp_path / "own.toml")
-    flags = ("--trials", "40", "--cells", "32", "--no-proof", "--scatter", "throw.speed=0.5 %")
+    flags = ("--trials", "40", "--no-proof", "--scatter", "throw.speed=0.5 %")
     _, out, err = run(capfd, "feed", str(tmp_path / "own.toml"), *flags, "-o", str(tmp_path / "out"))
     clean(out + err + (tmp_path / "out" / "feeding.json").read_text(), str(tmp_path))
     assert "assumed: " in out

@@ -161,7 +161,13 @@ def test_exits_share_the_starts_of_an_open_map():
     ):
         for name in ("first", "second", "third"):
             assert found.exits[name].lo <= 1.0 / 3.0 <= found.exits[name].hi
-            assert found.exits[name].share == pytest.approx(1.0 / 3.0, abs=0.02)
+            # more than a tenth of the cells is undecided: there is no best value
+            best = (
+                pytest.approx(1.0 / 3.0, abs=0.02)
+                if found.undecided <= 0.1
+                else pytest.approx(math.nan, nan_ok=True)
+            )
+            assert found.exits[name].share == best
 
 
 def test_orbits_leave_the_domain_by_the_exit_of_its_cells():

@@ -209,7 +209,7 @@ TABLE: list[tuple[dict[str, Any], str, str]] = [
     ({"goal": {"flip_order": []}}, "goal.flip_order", "at least 1"),
     # cavity
     ({"cavity": {}}, "cavity.position", "required"),
-    ({"cavity": CAVITY | {"size": "1 in"}}, "cavity.size", "angle, depth, position, width"),
+    ({"cavity": CAVITY | {"size": "1 in"}}, "cavity.size", "angle, depth, position, tips, width"),
     ({"cavity": CAVITY | {"position": "28.001 in"}}, "cavity.position", "up to the arm's length, 28 in"),
     ({"cavity": CAVITY | {"position": "4.2 in"}}, "cavity.position", "the part resting on side 2 needs"),
     ({"cavity": CAVITY | {"width": "6.7 in"}}, "cavity.width", "at least 6.75 in, the length of side 2"),
