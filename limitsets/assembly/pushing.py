@@ -189,6 +189,9 @@ def push(
     rests = crowd.rests()
     for throw in range(1, MOST_THROWS + 1):
         if watched.acts_beyond(rests):
+            if throw == 1 and last is not None:  # where they began is all that there is to see
+                crowd.film.on = True
+                crowd.film.frame(0.0)
             break
         crowd.film.on = last is not None and throw >= last
         rests = crowd.throw(*draws.throw())
