@@ -78,6 +78,7 @@ _PLAIN = {
     "Path": _Kind(lambda value: isinstance(value, str | os.PathLike), "a path"),
     "None": _Kind(lambda value: value is None, "None"),
     "Callable": _Kind(callable, "a function"),
+    "LaidLike": _Kind(lambda value: isinstance(value, Mapping), "a dict by side, like {0: [(8.0, 20.0)]}"),
     "Progress": _Kind(callable, "a function of (step, done, of)"),
     "Tell": _Kind(callable, "a function of (step, done, of)"),
 }

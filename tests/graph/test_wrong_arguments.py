@@ -318,7 +318,7 @@ def test_a_scene_or_a_map_in_the_wrong_place_is_told_what_goes_there(asked, erro
 
 
 def test_what_certify_takes_is_shown_and_taken_by_name():
-    assert {"scene", "grid", "claims", "noise", "tolerance", "upper", "progress"} == set(
+    assert {"scene", "grid", "claims", "noise", "tolerance", "laid", "upper", "progress"} == set(
         inspect.signature(ls.certify).parameters
     )
     assert ls.certify(scene="paper-designed", claims=["invariant"]).proved
