@@ -146,6 +146,7 @@ def _throws(axes: Axes, found: Feeding) -> None:
     axes.set_xlabel("throws", fontsize=style.SMALL)
     axes.set_ylabel("share of random starts", fontsize=style.SMALL)
     axes.set_ylim(0.0, 1.4 * axes.get_ylim()[1])  # room for the legend over the steps
+    axes.set_yticks([tick for tick in axes.get_yticks() if tick <= 1.0])
     if axes.get_legend_handles_labels()[0]:  # none where all parts stay
         axes.legend(fontsize=style.SMALL, frameon=False, loc="upper left")
     style.open_frame(axes)
