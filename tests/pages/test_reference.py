@@ -10,7 +10,7 @@ import limitsets
 from limitsets.cli.app import app
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
-INNER = {"arguments", "__main__", "cli", "files", "progress", "tables"}  # no public names
+INNER = {"arguments", "__main__", "cli", "files", "progress", "proposals", "tables"}  # no public names
 
 
 def text(page):
