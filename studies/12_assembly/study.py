@@ -88,9 +88,9 @@ def table(found: dict[str, dict[str, Any]]) -> str:
     ]
     lines.append("|---" * (len(names) + 5) + "|")
     interval = words(rate_of(PAPER, OF)).split(", ")[1]
-    others = " | " * (len(names) - 1)
+    others = " |" * (len(names) - 1)
     lines.append(
-        f"| the paper | {OF} | {PAPER} |{others} | {interval} | {PAPER} | {words(rate_of(SURVIVED, OF))} |"
+        f"| the paper | {OF} | {PAPER} |{others} {interval} | {PAPER} | {words(rate_of(SURVIVED, OF))} |"
     )
     for name, each in found.items():
         low, high = each["assembled"]["interval"]
