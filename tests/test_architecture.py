@@ -88,6 +88,13 @@ def test_no_result_of_a_run_is_kept_at_the_top():
     }
 
 
+def test_the_names_of_a_room_are_listed_by_its_face_alone():
+    """A list in an inner file repeats its definitions: nobody imports a star from an inner file."""
+    inner = [path for path in SOURCES if path.name != "__init__.py" and path.parent != PACKAGE]
+    assert inner
+    assert not [path for path in inner if "__all__" in path.read_text(encoding="utf-8")]
+
+
 @pytest.mark.parametrize("source", SOURCES, ids=lambda path: str(path.relative_to(PACKAGE)))
 def test_only_the_engine_room_imports_pymunk(source):
     assert "pymunk" not in imported_names(source) or source.parent == PACKAGE / "engine"

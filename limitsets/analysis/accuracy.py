@@ -27,17 +27,6 @@ if TYPE_CHECKING:
     from limitsets.scene import Scene
     from limitsets.sets import Attractor, LimitSet
 
-__all__ = [
-    "Accuracy",
-    "MethodChoice",
-    "Plan",
-    "best_extents",
-    "left_to_cells",
-    "limit_of",
-    "plan_for",
-    "require_error",
-]
-
 Extents = dict[int, list[tuple[float, float]]]
 
 CELLS, END_POINTS = "cells", "end points"

@@ -11,8 +11,6 @@ from numpy.typing import NDArray
 if TYPE_CHECKING:
     from limitsets.scene import Scene
 
-__all__ = ["in_limit_sets", "other_vertex_first"]
-
 Array = NDArray[np.float64]
 Interval = tuple[float, float]
 Extents = Mapping[int, Sequence[Interval]]

@@ -15,8 +15,6 @@ if TYPE_CHECKING:
     from limitsets.graph import TransitionGraph
     from limitsets.sets import Attractor, Basins
 
-__all__ = ["GoalOutcome", "goal_outcome"]
-
 Extents = Mapping[int, Sequence[tuple[float, float]]]
 
 

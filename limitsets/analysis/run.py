@@ -39,8 +39,6 @@ if TYPE_CHECKING:
     from limitsets.scene import Scene
     from limitsets.sets import Attractor, Basins, Cycle, LimitSet
 
-__all__ = ["Analysis", "analyse"]
-
 Extents = dict[int, list[tuple[float, float]]]
 Progress = Callable[[str, int, int], None]
 

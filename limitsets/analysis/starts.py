@@ -16,8 +16,6 @@ if TYPE_CHECKING:
     from limitsets.graph import TransitionGraph
     from limitsets.sets import Attractor, Basins
 
-__all__ = ["Starts", "against_starts"]
-
 # Starts, and throws after which they are looked at: most have come to an attractor by the first.
 STARTS, THROWS = 1000, (100, 1000, 4000)
 

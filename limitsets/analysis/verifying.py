@@ -21,8 +21,6 @@ if TYPE_CHECKING:
     from limitsets.scene import Scene
     from limitsets.sets import Attractor, LimitSet
 
-__all__ = ["verified"]
-
 # The orbit that brackets the ends from inside: throws at a time, how often, and bins per interval to tell holes.
 THROWS, ROUNDS, MOST_BINS = 1_000_000, 20, 2_000_000
 

@@ -16,8 +16,6 @@ from limitsets.progress import shown_in_notebooks
 if TYPE_CHECKING:
     from limitsets.animation.film import Film
 
-__all__ = ["KINDS", "SUFFIXES", "animate", "film_of", "require_file"]
-
 Progress = Callable[[str, int, int], None] | None
 
 KINDS = {

@@ -13,8 +13,6 @@ from limitsets.animation.picture import THICK
 if TYPE_CHECKING:
     from limitsets.scene import Scene
 
-__all__ = ["cavity_pieces"]
-
 Array = NDArray[np.float64]
 
 

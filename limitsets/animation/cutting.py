@@ -17,8 +17,6 @@ from limitsets.plot.poses import about_centre
 if TYPE_CHECKING:
     from limitsets.scene import Scene
 
-__all__ = ["Asked", "Leg", "Pace", "cut", "labels_of", "require_length"]
-
 Array = NDArray[np.float64]
 
 MOST_FRAMES = 6000

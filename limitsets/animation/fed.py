@@ -30,8 +30,6 @@ if TYPE_CHECKING:
     from limitsets.feeding.falling import ArmEnd
     from limitsets.scene import Cavity, Scene
 
-__all__ = ["film_of_end", "film_of_feeding"]
-
 Array = NDArray[np.float64]
 
 # Starts tried per side for a good one, and angles between which the first contact is searched.

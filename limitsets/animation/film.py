@@ -10,8 +10,6 @@ from numpy.typing import NDArray
 
 from limitsets.plot.poses import turned
 
-__all__ = ["Extents", "Film", "Label", "Lanes", "Mark", "Rest"]
-
 Array = NDArray[np.float64]
 Extents = dict[int, list[tuple[float, float]]]
 

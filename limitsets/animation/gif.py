@@ -8,8 +8,6 @@ from limitsets.animation.film import Film
 from limitsets.animation.picture import Picture
 from limitsets.animation.raster import Progress, frames
 
-__all__ = ["FPS", "write_gif"]
-
 FPS = 20.0
 """Delays are whole hundredths of a second."""
 

@@ -14,8 +14,6 @@ if TYPE_CHECKING:
     from limitsets.analysis import Analysis
     from limitsets.scene import Scene
 
-__all__ = ["Progress", "good_start", "known_of", "lanes_of", "require_start"]
-
 Progress = Any
 
 # Cells per side: enough for a picture a few hundred pixels wide.

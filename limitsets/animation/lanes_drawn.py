@@ -9,8 +9,6 @@ from limitsets.animation.film import Extents, Lanes
 from limitsets.animation.shapes import Shape, shape_of, text_of
 from limitsets.plot import style
 
-__all__ = ["KNOWN", "LANE", "LEFT", "LanePicture", "pointer"]
-
 LEFT = 62.0
 """Left of the joint's side of all pictures there is so much room for names [pixels]."""
 

@@ -19,8 +19,6 @@ from limitsets.plot.throwing import Throw, motion, stroke_of
 if TYPE_CHECKING:
     from limitsets.scene import Scene
 
-__all__ = ["drawn_of", "legs_of", "lowered", "raised", "rest_leg", "riding", "swing_of"]
-
 Array = NDArray[np.float64]
 
 SWING = math.radians(12.0)

@@ -15,8 +15,6 @@ except ImportError as error:
     remedy = "pip install 'limitsets[animate]', or write .html or .gif"
     raise AnswerError("the writer of .mp4", "not installed", "imageio-ffmpeg", remedy) from error
 
-__all__ = ["write_mp4"]
-
 ZOOM = 1.5
 
 

@@ -19,8 +19,6 @@ from limitsets.animation.shapes import Shape
 from limitsets.files import as_plain
 from limitsets.plot import style
 
-__all__ = ["svg_of", "write_page"]
-
 # Digits of a length over all of the picture: a hundredth of a pixel is a tenth of the last one.
 DIGITS = 6
 # Texts that stand beside the picture in a page.

@@ -21,8 +21,6 @@ from limitsets.animation.shapes import Shape, shape_of, text_of
 from limitsets.plot import style
 from limitsets.plot.poses import turned
 
-__all__ = ["ARM", "EDGES", "GROUND", "LEANS", "PARTS", "THICK", "TOP", "Picture"]
-
 Array = NDArray[np.float64]
 
 # The widest and the narrowest picture, its borders, and the most for what is above the lanes.

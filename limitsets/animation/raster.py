@@ -14,8 +14,6 @@ from limitsets.animation.shapes import Shape
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["frames"]
-
 Progress = Callable[[str, int, int], None] | None
 Pixels = NDArray[np.uint8]
 

@@ -28,8 +28,6 @@ if TYPE_CHECKING:
     from limitsets.scene import Scene
     from limitsets.trays import TrayFill
 
-__all__ = ["film_of_assembly", "film_of_recording", "film_of_tray"]
-
 Array = NDArray[np.float64]
 
 # More parts than this are counted, not named.

@@ -15,8 +15,6 @@ if TYPE_CHECKING:
     from limitsets.robust import Margin
     from limitsets.scene import Scene
 
-__all__ = ["film_of_margin"]
-
 # The last throws that are shown unless others are asked for.
 USUAL = 8
 

@@ -14,8 +14,6 @@ from limitsets.plot.throwing import Throw, throws_of
 if TYPE_CHECKING:
     from limitsets.policies import Policy, Synthesis
 
-__all__ = ["film_of_policy"]
-
 # Starts tried in each interval for the one that takes the most throws.
 TRIED = 25
 

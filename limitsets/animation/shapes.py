@@ -9,8 +9,6 @@ from numpy.typing import NDArray
 
 from limitsets.plot import style
 
-__all__ = ["Shape", "shape_of", "text_of"]
-
 Array = NDArray[np.float64]
 
 TEXT = {"fill": style.INK, "size": 14.0}

@@ -15,8 +15,6 @@ if TYPE_CHECKING:
     from limitsets.analysis import Analysis
     from limitsets.scene import Scene
 
-__all__ = ["film_of_analysis", "film_of_scene", "film_of_throws"]
-
 USUAL = 8
 """Throws that are shown unless others are asked for."""
 

@@ -26,8 +26,6 @@ from limitsets.tables import Column, Table, Tabled
 if TYPE_CHECKING:
     from limitsets.engine.recording import Recording
 
-__all__ = ["OUTCOMES", "Assembly", "assemble"]
-
 Progress = Callable[[str, int, int], None]
 
 OUTCOMES = ("assembled", "ejected", "order", "wrong", "wall", "edge", "left", "never", "unfinished")

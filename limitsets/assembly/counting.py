@@ -10,8 +10,6 @@ from typing import Any
 from limitsets.feeding.falling import FATES
 from limitsets.robust.noise.proportions import binomial_interval
 
-__all__ = ["Joint", "Overlaps", "Rate", "joint_of", "overlaps_of", "rate_of"]
-
 Row = Mapping[str, Any]
 
 

@@ -15,8 +15,6 @@ if TYPE_CHECKING:
 
     from limitsets.robust.noise.laws import Law
 
-__all__ = ["Draws"]
-
 # Pairs of starts drawn before it is believed that none are apart; throws drawn at once.
 MOST_DRAWN, AT_ONCE = 10_000, 64
 

@@ -15,8 +15,6 @@ from limitsets.engine.overlaps import depth_of_overlap
 from limitsets.scene import Scene
 from limitsets.thrower import impact_angles
 
-__all__ = ["TOLERANCE", "Way", "meet", "way_of"]
-
 # Parts nearer than this share of the first one's longest side are taken to overlap.
 TOLERANCE = 5e-3
 # Step in which a part turns about the corner that struck [rad], and when turning is given up.

@@ -22,19 +22,6 @@ from limitsets.robust.sheet.noise_input import still
 from limitsets.scene import Scene, load
 from limitsets.scene.scene import require_rests
 
-__all__ = [
-    "SHARED",
-    "Pair",
-    "Start",
-    "angle_on",
-    "are_apart",
-    "at_rest",
-    "outline_at",
-    "pair_of",
-    "require_apart",
-    "seats_of",
-]
-
 SHARED = ("unit", "kappa", "surface_height", "arm_length", "gravity", "flight", "flip", "cavity")
 """What two parts on one arm have in common."""
 

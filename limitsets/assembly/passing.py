@@ -14,8 +14,6 @@ from limitsets.feeding.falling import FATES, ArmEnd
 from limitsets.maps import codes, images
 from limitsets.robust.noise.scattering import thrown
 
-__all__ = ["MOST_THROWS", "Passed", "pass_through"]
-
 MOST_THROWS = 20_000
 """As in `limitsets.feed`."""
 

@@ -14,8 +14,6 @@ if TYPE_CHECKING:
     from limitsets.engine.recording import Recording
     from limitsets.engine.rests import Rest
 
-__all__ = ["FRICTION", "MOST_THROWS", "Pushed", "Question", "push"]
-
 MOST_THROWS = 500
 FRICTION = 0.5
 """On the arm, of scenes that give none: unilateral contact, and parts that are struck where they lie, need one."""

@@ -19,8 +19,6 @@ if TYPE_CHECKING:
     from limitsets.proofs.parameters import ParameterBox
     from limitsets.scene import Scene
 
-__all__ = ["ASSUMPTIONS", "NOTABLE", "Assumption", "Terms"]
-
 # A shift of the landing by the stroke or by scatter counts from this share of the arm's length.
 NOTABLE = 1e-3
 

@@ -15,8 +15,6 @@ from limitsets.scene.facts import NOT_TIPPING
 if TYPE_CHECKING:
     from limitsets.scene import Scene
 
-__all__ = ["EffectChoice", "choose_effects"]
-
 # What no effect lifts: a scene that breaks it has to be changed.
 NO_EFFECT = ("release", "arm")
 

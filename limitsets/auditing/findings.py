@@ -30,8 +30,6 @@ if TYPE_CHECKING:
     from limitsets.proofs.parameters import ParameterBox
     from limitsets.scene import Scene
 
-__all__ = ["Audit", "Finding", "audit", "audited"]
-
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 Extents = dict[int, list[tuple[float, float]]]

@@ -15,8 +15,6 @@ if TYPE_CHECKING:
     from limitsets.auditing.places import Cells
     from limitsets.proofs.parameters import ParameterBox
 
-__all__ = ["Row", "all_hold", "enclosed_at"]
-
 Array: TypeAlias = NDArray[np.float64]
 Flags: TypeAlias = NDArray[np.bool_]
 

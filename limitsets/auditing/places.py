@@ -17,8 +17,6 @@ if TYPE_CHECKING:
     from limitsets.proofs.parameters import ParameterBox
     from limitsets.scene import Scene
 
-__all__ = ["Places", "Sample", "places"]
-
 Array = NDArray[np.float64]
 Cells: TypeAlias = dict[int, tuple[Array, Array]]
 

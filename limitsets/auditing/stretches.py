@@ -7,8 +7,6 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["where"]
-
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 

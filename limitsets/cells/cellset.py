@@ -11,8 +11,6 @@ from numpy.typing import ArrayLike, NDArray
 from limitsets.cells.grid import Grid
 from limitsets.errors import GridError
 
-__all__ = ["CellSet"]
-
 
 @dataclass(frozen=True, eq=False)
 class CellSet:

@@ -9,8 +9,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from limitsets.errors import GridError
 
-__all__ = ["Domain", "as_domain"]
-
 
 @dataclass(frozen=True, eq=False)
 class Domain:

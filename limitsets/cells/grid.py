@@ -15,8 +15,6 @@ from limitsets.cells.domain import Domain, as_domain
 from limitsets.errors import GridError, shown
 from limitsets.tables import Column, Table, Tabled
 
-__all__ = ["Grid", "grid"]
-
 # Graded cells grow with their distance from the anchor up to this share of the side's extent and are equal beyond:
 # near a_i of the throw, where jogs shrink in proportion to R - a_i, resolution is relative; far from it, absolute.
 EQUAL_BEYOND = 0.25

@@ -12,8 +12,6 @@ if TYPE_CHECKING:
     from limitsets.scene import Scene
     from limitsets.scene.left_out import Model
 
-__all__ = ["About"]
-
 
 @dataclass(frozen=True)
 class About:

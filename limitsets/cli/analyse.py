@@ -14,8 +14,6 @@ from limitsets.cli.output import Csv, Form, Format, Html, Json, Scene, answer, o
 if TYPE_CHECKING:
     from limitsets.analysis import Analysis, Plan
 
-__all__ = ["analyse"]
-
 MOST_CELLS = 10_000_000
 
 # Share of the starts that leave the model, above which the speed is likely to have a wrong unit.

@@ -11,8 +11,6 @@ from limitsets.cli.arguments import place
 from limitsets.cli.output import Json, Scene, answer, option, progress, stem_of
 from limitsets.errors import LimitsetsError
 
-__all__ = ["animate"]
-
 # Pairs that are thrown to find one that is assembled, and drops of a tray of which only the passes are shown.
 PAIRS, FEW = 40, 20
 HELP_START = "x and side of the start: 15,2 or '38 cm,2'; default a good one, on the limit set."

@@ -28,8 +28,6 @@ from limitsets.cli.scenes import scenes
 from limitsets.cli.throw import throw
 from limitsets.cli.tray import tray
 
-__all__ = ["app"]
-
 app = typer.Typer(
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},

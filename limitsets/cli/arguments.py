@@ -10,18 +10,6 @@ from limitsets.errors import LimitsetsError
 if TYPE_CHECKING:
     from limitsets.scene import Scene
 
-__all__ = [
-    "HELP_LAID",
-    "HELP_NO_RECHECK",
-    "bounds_of",
-    "deviations",
-    "laid_ranges",
-    "number",
-    "place",
-    "places_of",
-    "position",
-]
-
 HELP_NO_RECHECK = "Write certificates without checking them first."
 
 HELP_LAID = (

@@ -13,8 +13,6 @@ from limitsets.cli.output import Csv, Form, Format, Json, Scene, Words, answer, 
 if TYPE_CHECKING:
     from limitsets.assembly import Assembly
 
-__all__ = ["assemble"]
-
 HELP_SECOND = "The part that is to lie on top of the first, with the same arm, throw and cavity."
 HELP_SCATTER = (
     "Random noise at every throw, like throw.speed='0.5 %'; repeatable. Default: the scenes', if any."

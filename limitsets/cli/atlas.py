@@ -29,8 +29,6 @@ if TYPE_CHECKING:
     from limitsets.sweep import Atlas
     from limitsets.sweep.driving import Progress
 
-__all__ = ["atlas"]
-
 HELP_X = "What varies: throw.speed=120:180:1000, or with units throw.speed='120 deg/s:180 deg/s:1000'."
 HELP_TASK = "What is asked: a function of a scene; by default the topology of the attractors."
 HELP_MARGIN = "Find the goal's margin at every point, by floats: throw.speed, or joint."

@@ -12,8 +12,6 @@ from limitsets.cli.output import Csv, Form, Format, Json, Scene, answer, opened,
 if TYPE_CHECKING:
     from limitsets.auditing import Audit
 
-__all__ = ["audit"]
-
 
 def audit(
     scene: Scene,

@@ -9,8 +9,6 @@ from typing import Any
 from limitsets.cli.output import saved
 from limitsets.proposals import proposed
 
-__all__ = ["certified", "said_of", "with_ending"]
-
 
 def with_ending(file: Path) -> Path:
     """Give a certificate its ending where its name has none; what is there, a folder or a device, keeps its name."""

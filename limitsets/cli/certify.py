@@ -19,8 +19,6 @@ if TYPE_CHECKING:
     from limitsets.proofs import Claim, Proof
     from limitsets.proofs.goals import State
 
-__all__ = ["certify"]
-
 # States of a counterexample that are printed: the start, and the last of them.
 LAST = 8
 

@@ -14,8 +14,6 @@ from limitsets.tables import Table
 if TYPE_CHECKING:
     from limitsets.scene import Scene as SceneOf
 
-__all__ = ["check"]
-
 WORDS = ("key", "thing", "value", "allowed", "remedy")
 
 

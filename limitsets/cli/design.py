@@ -33,8 +33,6 @@ if TYPE_CHECKING:
 
     from limitsets.inverse import Design
 
-__all__ = ["design"]
-
 FREE = "free"
 
 HELP_POINTS = "First critical point wanted on each side, like 10,10,20 or '25 cm',free,free."

@@ -18,8 +18,6 @@ if TYPE_CHECKING:
     from limitsets.inverse.margin.for_goal import GoalDesign
     from limitsets.scene.laid import LaidLike
 
-__all__ = ["run_goal"]
-
 
 def run_goal(
     name: str,

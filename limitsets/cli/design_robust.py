@@ -21,8 +21,6 @@ if TYPE_CHECKING:
     from limitsets.scene import Scene
     from limitsets.scene.laid import LaidLike
 
-__all__ = ["run_robust"]
-
 
 def run_robust(
     name: str,

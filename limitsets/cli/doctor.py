@@ -15,8 +15,6 @@ from limitsets.cli.output import Csv, Json, Out, answer, show
 from limitsets.errors import LimitsetsError
 from limitsets.tables import Table
 
-__all__ = ["doctor"]
-
 # Extras that only whoever works on the package itself needs.
 INNER = ("bench", "dev")
 

@@ -9,8 +9,6 @@ import typer
 
 from limitsets.cli.output import option, progress
 
-__all__ = ["explore"]
-
 FIRST = "paper-designed"
 HELP_ADDRESS = "Where the page listens; any other than 127.0.0.1 needs --allow-origin."
 HELP_ORIGIN = "A name with its port under which browsers may ask for the page."

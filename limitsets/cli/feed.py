@@ -18,8 +18,6 @@ if TYPE_CHECKING:
     from limitsets.feeding import Feeding
     from limitsets.robust import AbsorptionBrackets
 
-__all__ = ["feed"]
-
 # What becomes of parts where none is fed.
 UNFED = {"left": "leave the arm otherwise", "never": "stay on it"}
 

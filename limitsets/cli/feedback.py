@@ -28,8 +28,6 @@ from limitsets.errors import LimitsetsError
 if TYPE_CHECKING:
     from limitsets.policies import Synthesis
 
-__all__ = ["feedback"]
-
 HELP_STARTS = "Where the part may lie at first, like 2=16:18; repeatable. Default: the limit sets of [throw]."
 
 

@@ -13,8 +13,6 @@ from limitsets.cli.output import Csv, Form, Format, Json, Scene, answer, opened,
 if TYPE_CHECKING:
     from limitsets.fitting import Enough, Fit
 
-__all__ = ["fit"]
-
 HELP_FILE = (
     "Throws: x_before [mm], side_before, x_after [mm], side_after, and, if known, error [mm], run; corner_before [mm], "
     "corner_after [mm] for x where the film shows the left corner."

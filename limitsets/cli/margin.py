@@ -27,10 +27,8 @@ from limitsets.files import as_json
 from limitsets.tables import joined
 
 if TYPE_CHECKING:
-    from limitsets.robust.margins.finding import Margin
+    from limitsets.robust.margins.margin_result import Margin
     from limitsets.scene import Scene as SceneOf
-
-__all__ = ["margin"]
 
 HEADS = ("quantity", "reading", "proved safe up to", "shown to fail from")
 

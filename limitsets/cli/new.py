@@ -10,8 +10,6 @@ import typer
 from limitsets.cli.output import Json, answer, option
 from limitsets.proposals import proposed
 
-__all__ = ["new"]
-
 
 def new(
     file: Annotated[

@@ -29,29 +29,6 @@ if TYPE_CHECKING:
     from limitsets.scene import Scene as SceneOf
     from limitsets.tables import Table
 
-__all__ = [
-    "Csv",
-    "Form",
-    "Format",
-    "Html",
-    "Json",
-    "Out",
-    "Scene",
-    "Words",
-    "answer",
-    "opened",
-    "option",
-    "processes",
-    "progress",
-    "save_scene",
-    "saved",
-    "scene_file",
-    "show",
-    "show_scene",
-    "stem_of",
-    "table",
-]
-
 Words: TypeAlias = list[str] | None
 
 # Folders that this process keeps, until it ends.

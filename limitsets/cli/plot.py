@@ -17,8 +17,6 @@ if TYPE_CHECKING:
 
     from matplotlib.figure import Figure
 
-__all__ = ["plot"]
-
 FORMATS = (".png", ".svg", ".pdf")
 
 

@@ -10,8 +10,6 @@ import typer
 from limitsets.cli.output import Csv, Json, Out, answer, progress
 from limitsets.tables import Table
 
-__all__ = ["recheck"]
-
 
 def recheck(
     file: Annotated[Path, typer.Argument(metavar="FILE", help="A certificate, NAME.proof.zip.")],

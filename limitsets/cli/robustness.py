@@ -29,8 +29,6 @@ if TYPE_CHECKING:
     from limitsets.robust.sheet.summary import Robustness
     from limitsets.scene import Scene as SceneOf
 
-__all__ = ["robustness"]
-
 HELP_QUANTITY = "A quantity, like throw.speed; repeatable. Default: all that the scene gives."
 HELP_TOLERANCE = "Of the joint margin, like throw.speed='1 %'; repeatable. Default: the scene's [tolerance]."
 HELP_SCATTER = (

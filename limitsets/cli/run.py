@@ -18,8 +18,6 @@ from typing import Any
 from limitsets.errors import LimitsetsError
 from limitsets.progress import InterruptedRun
 
-__all__ = ["main"]
-
 BAD_INPUT, INTERRUPTED = 2, 130
 
 

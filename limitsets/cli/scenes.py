@@ -5,8 +5,6 @@ from __future__ import annotations
 from limitsets.cli.output import Csv, Json, Out, answer, show
 from limitsets.tables import Column, Table
 
-__all__ = ["scenes"]
-
 
 def scenes(out: Out = None, csv: Csv = None, json: Json = False) -> None:
     """List the built-in scenes."""

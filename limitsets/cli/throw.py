@@ -15,8 +15,6 @@ from limitsets.tables import Column, Table
 if TYPE_CHECKING:
     from limitsets.thrower import Trace
 
-__all__ = ["throw"]
-
 MOST_THROWS = 1_000_000
 
 

@@ -13,8 +13,6 @@ from limitsets.cli.output import Csv, Form, Format, Json, Scene, answer, opened,
 if TYPE_CHECKING:
     from limitsets.trays import TrayDesign, TrayFill
 
-__all__ = ["tray"]
-
 HELP_OUT = "Write tray.json and a figure there; with --depths or --agitations design.json."
 HELP_PARTS = "Let N parts come by at once in each pass, in the engine, that push each other."
 HELP_FILE = "Keep finished batches of --parts there; the same command goes on with what is left."

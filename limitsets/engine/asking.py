@@ -13,8 +13,6 @@ from limitsets.errors import AnswerError
 if TYPE_CHECKING:
     from limitsets.scene import Scene
 
-__all__ = ["area_of", "check_asked"]
-
 
 def area_of(scene: Scene) -> float:
     """Area of the part's outline [length^2]."""

@@ -16,8 +16,6 @@ from limitsets.maps import OUTSIDE_MODEL, images
 if TYPE_CHECKING:
     from limitsets.scene import Scene
 
-__all__ = ["Comparison", "compare"]
-
 
 @dataclass(frozen=True)
 class Comparison:

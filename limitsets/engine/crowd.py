@@ -24,8 +24,6 @@ from limitsets.errors import AnswerError
 if TYPE_CHECKING:
     from limitsets.scene import Scene
 
-__all__ = ["Crowd"]
-
 # Time [rad] between two looks at who is asleep or lost, and between two frames of a film.
 LOOK, FRAME = 0.1, 0.04
 

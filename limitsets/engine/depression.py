@@ -21,8 +21,6 @@ from limitsets.engine.stage import Stage, pymunk_module, set_up
 if TYPE_CHECKING:
     from limitsets.scene import Scene
 
-__all__ = ["EMPTY", "FAR", "UNFINISHED", "Motion", "Plate", "Pose", "Rest", "fall_speed", "state_of"]
-
 EMPTY, UNFINISHED = 0, -1
 """States in which no part rests in the depression: none of it is below the plate's surface; it did not come to rest."""
 

@@ -12,8 +12,6 @@ from limitsets.engine.member import OUT, Member
 from limitsets.engine.recording import Mark, Recording
 from limitsets.engine.rests import Rest
 
-__all__ = ["Film"]
-
 
 class Film:
     """Frames and marks; where nothing is to be kept, it only counts the time.

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from limitsets.engine.stage import Stage
 
-__all__ = ["fly"]
-
 # Between steps of this size [rad] a vertex must not touch and rise again.
 FLIGHT_STEP = 2.0**-7
 # Shorter flights than this [rad] are lost in the rounding of heights.

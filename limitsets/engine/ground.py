@@ -19,8 +19,6 @@ from limitsets.errors import AnswerError
 if TYPE_CHECKING:
     from limitsets.scene import Scene
 
-__all__ = ["Ground", "Piece", "ground_of"]
-
 
 @dataclass(frozen=True, eq=False)
 class Piece:

@@ -10,8 +10,6 @@ import math
 from limitsets.engine.flying import fly
 from limitsets.engine.stage import Stage, pymunk_module
 
-__all__ = ["turn_and_roll", "turn_on_hinge"]
-
 # Farther than this [rad] from a face that a part may already lie on, to rounding.
 LEANING = 0.02
 # Less than this share of the energy that lifts the part by its own size cannot lift it over a vertex.

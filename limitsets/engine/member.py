@@ -16,8 +16,6 @@ from limitsets.engine.stage import pymunk_module, set_up
 if TYPE_CHECKING:
     from limitsets.scene import Scene
 
-__all__ = ["FLYING", "HINGED", "LOOSE", "OUT", "Member", "whole_steps"]
-
 OUT, FLYING, HINGED, LOOSE = "out", "flying", "hinged", "loose"
 """Not in play; in flight and not in contact with the arm; held at a vertex; left to the engine's own contact."""
 

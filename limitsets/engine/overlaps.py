@@ -5,8 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 
-__all__ = ["depth_of_overlap"]
-
 Corners = Sequence[tuple[float, float]]
 
 

@@ -7,8 +7,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["MARKS", "Mark", "Recording"]
-
 Mark = tuple[float, int, str]
 """Time, number of the part, and a word of `MARKS`."""
 

@@ -14,8 +14,6 @@ if TYPE_CHECKING:
     from limitsets.engine.member import Member
     from limitsets.scene import Cavity
 
-__all__ = ["Rest", "lying", "on_arm", "rest_of"]
-
 # Farther from flat than this [rad] a part at rest lies on no side.
 LEANING = 0.02
 # Corners lower than this fraction of the part's size touch the arm.

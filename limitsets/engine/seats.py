@@ -17,8 +17,6 @@ from limitsets.geometry import side_ends
 if TYPE_CHECKING:
     from limitsets.scene import Scene
 
-__all__ = ["SEATED", "off_seat", "seat_of"]
-
 SEATED = 0.01
 """So much of the mouth's width a seated part's corners are off its seat at most: less than the play of
 studies/sizes.toml, 0.1 of 9.3 in.  A part farther off keeps the next one from fitting."""

@@ -11,8 +11,6 @@ from limitsets.engine.stage import Stage
 if TYPE_CHECKING:
     from limitsets.scene import Scene
 
-__all__ = ["IDLE", "Seen", "settle"]
-
 # For this long [rad] the part has to be idle, by the engine's own measure, before it is taken to rest.
 IDLE = 0.5
 # Farther from flat than this [rad] an idle part leans or stands on a vertex.

@@ -23,8 +23,6 @@ if TYPE_CHECKING:
 
     from limitsets.scene import Scene
 
-__all__ = ["INSTANT", "OVERLAP", "Stage", "pymunk_module", "set_up"]
-
 INSTANT = 1e-12
 """A step as short as this lets the solver act and moves nothing."""
 OVERLAP = 1e-4

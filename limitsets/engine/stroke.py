@@ -7,8 +7,6 @@ from typing import Any
 
 from limitsets.engine.stage import INSTANT, OVERLAP, Stage, pymunk_module
 
-__all__ = ["accelerate"]
-
 # Steps of a stroke to one of the way to rest; contact is of first order in them.
 FINER = 0.5
 

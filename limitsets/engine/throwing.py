@@ -17,8 +17,6 @@ from limitsets.errors import AnswerError, MapError
 if TYPE_CHECKING:
     from limitsets.scene import Scene
 
-__all__ = ["EngineThrow", "throw"]
-
 
 @dataclass(frozen=True)
 class EngineThrow:

@@ -13,8 +13,6 @@ from limitsets.engine.stage import ITERATIONS, OVERLAP, TAKEN_BACK, pymunk_modul
 if TYPE_CHECKING:
     from limitsets.engine.ground import Ground
 
-__all__ = ["Touching"]
-
 # A part slower than this share of the speed of a fall by its own size is idle.
 SLOW = 3e-3
 # Collision type of parts; pieces of the ground have those beyond.

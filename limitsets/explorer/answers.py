@@ -18,8 +18,6 @@ from limitsets.plot.style import interval_text
 from limitsets.report.goals import goal_sentence, starts_words, verdict_words
 from limitsets.scene import Scene
 
-__all__ = ["KEY", "careful_line", "error_line", "estimate_words", "points_words", "proof_words"]
-
 KEY = (
     '<p class="how">Bars: limit sets. Strips: where starts lead, hatched unless to limit set 0. Strokes r: critical '
     "points. Dotted: the goal. Triangle: the part; click a lane to throw from there.</p>"

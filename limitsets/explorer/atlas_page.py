@@ -20,8 +20,6 @@ from limitsets.plot.atlas_frame import edges
 from limitsets.scene import Scene, dump
 from limitsets.scene.units import written
 
-__all__ = ["AtlasPage"]
-
 POINTS = 33
 """Along each axis of an atlas that is computed for the page."""
 

@@ -11,8 +11,6 @@ import threading
 import weakref
 from typing import Any
 
-__all__ = ["Background"]
-
 RUNNING = threading.BoundedSemaphore(2)
 """Processes of all visitors together; others wait in line."""
 

@@ -18,8 +18,6 @@ import numpy as np
 import param
 from panel.custom import JSComponent
 
-__all__ = ["Bar", "Canvas", "Hand", "Layer", "Words"]
-
 HERE = Path(__file__).parent
 PACE = (HERE / "pace.js").read_text(encoding="utf-8")
 MOST = 65535

@@ -24,8 +24,6 @@ from limitsets.sets import Attractor, Basins, attractors, basins
 from limitsets.topology import Topologies, topologies
 from limitsets.topology.records import DECIDED
 
-__all__ = ["CELLS", "Estimate", "Points", "estimate", "estimate_of_map", "points_of_map"]
-
 CELLS = 2048
 """Cells per side."""
 

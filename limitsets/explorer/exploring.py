@@ -12,8 +12,6 @@ from limitsets.scene import load
 if TYPE_CHECKING:
     from limitsets.explorer.visits import Explorer
 
-__all__ = ["explore", "required"]
-
 
 def required() -> None:
     """Refuse to go on without the libraries of the extra.

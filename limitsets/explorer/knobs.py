@@ -15,8 +15,6 @@ from limitsets.scene import Scene
 from limitsets.scene.quantities import STANDARD_GRAVITY, find, text_at, unit_read
 from limitsets.scene.units import convert, parse, written
 
-__all__ = ["Knob", "centre_at", "knobs_of", "knobs_of_map", "map_with", "scene_with", "texts_of"]
-
 # Point masses that get sliders; more would be a table, not a picture.
 MOST_POINTS = 3
 STEPS = 400

@@ -15,8 +15,6 @@ from limitsets.goals import OrientedBeyond, Reaches
 from limitsets.plot import style
 from limitsets.scene import Scene
 
-__all__ = ["LanesPicture", "PointsPicture"]
-
 Array = npt.NDArray[np.float64]
 
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-__all__ = ["PAGE", "SAID", "SLIDER", "swatch"]
-
 # Panel's own page, told that a phone is narrow; `base` is what Panel gives.
 PAGE = """{% extends base %}{% block preamble %}
 <meta name="viewport" content="width=device-width, initial-scale=1">

@@ -17,8 +17,6 @@ from limitsets.explorer.lanes import LanesPicture, PointsPicture
 from limitsets.explorer.look import SAID
 from limitsets.explorer.sliders import Sliders
 
-__all__ = ["MapPage"]
-
 WORDS = 0.25
 """Seconds between two changes of the text."""
 

@@ -12,8 +12,6 @@ from limitsets.explorer.look import SLIDER
 from limitsets.explorer.outside import MOST_BYTES, scene_from, with_outline
 from limitsets.scene import Scene, dump
 
-__all__ = ["Opening"]
-
 # Corners that are drawn are kept to so many digits: a click is no more exact.
 DIGITS = 3
 

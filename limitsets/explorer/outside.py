@@ -14,8 +14,6 @@ from limitsets.geometry.polygon import above_side
 from limitsets.scene import Scene, load
 from limitsets.scene.units import written
 
-__all__ = ["MOST_BYTES", "MOST_SIDES", "scene_from", "with_outline", "within_reach"]
-
 MOST_BYTES = 64 * 1024
 """Of a scene's text: the largest that comes with the package has 2 kB."""
 

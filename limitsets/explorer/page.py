@@ -32,8 +32,6 @@ from limitsets.explorer.sliders import Sliders
 from limitsets.scene import Scene, dump
 from limitsets.scene.left_out import Model
 
-__all__ = ["ScenePage"]
-
 RESTS = 0.6
 """Seconds after which a slider that is not moved rests."""
 

@@ -16,8 +16,6 @@ from limitsets.plot.poses import angle_on_side, turned
 from limitsets.scene import Scene
 from limitsets.scene.units import convert, parse
 
-__all__ = ["ArmPicture", "PartPicture", "look_of", "pattern"]
-
 Array = npt.NDArray[np.float64]
 
 PART, ARM, TRAIL = "#F2C14E", "#9a9a9a", "#666666"

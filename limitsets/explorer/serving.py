@@ -13,8 +13,6 @@ from tornado.websocket import WebSocketClosedError
 
 from limitsets.errors import LimitsetsError
 
-__all__ = ["HERE", "serve"]
-
 HERE = "127.0.0.1"
 
 MOST_SENT = 1 << 20

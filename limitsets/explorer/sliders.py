@@ -12,8 +12,6 @@ from limitsets.explorer.canvas import Bar
 from limitsets.explorer.knobs import Knob
 from limitsets.explorer.look import SLIDER
 
-__all__ = ["Sliders"]
-
 
 class Sliders:
     """The sliders of a scene or a map.

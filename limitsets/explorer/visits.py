@@ -24,8 +24,6 @@ from limitsets.maps.contract import require_dimension
 from limitsets.progress import Progress, bar, in_notebook
 from limitsets.scene import Scene, load
 
-__all__ = ["Explorer", "stored_atlas"]
-
 COMPILING = "compiling, once: the throw, images of cells, attractors"
 """Short enough for the bar of a narrow terminal."""
 

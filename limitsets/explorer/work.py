@@ -18,8 +18,6 @@ if TYPE_CHECKING:
 
     from limitsets.scene import Scene
 
-__all__ = ["answers", "table_of"]
-
 # Points along each axis of a stored atlas that are shown; the rest would be smaller than a finger.
 MOST_SHOWN = 48
 

@@ -12,8 +12,6 @@ from limitsets.robust.brackets.result import AbsorptionBrackets
 from limitsets.robust.noise.scattering import Scattering
 from limitsets.robust.sheet.noise_input import still
 
-__all__ = ["fate_brackets"]
-
 Places = list[tuple[int, float, float]]
 
 THROWS = 200

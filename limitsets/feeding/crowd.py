@@ -25,8 +25,6 @@ from limitsets.robust.noise.laws import Gaussian, Law, Uniform
 from limitsets.robust.noise.proportions import binomial_interval
 from limitsets.robust.noise.scattering import Scattering
 
-__all__ = ["BATCHES", "CrowdTrials", "run_crowd"]
-
 BATCHES = 20
 MOST_THROWS = 300
 # A pile that has not come to rest after so long [rad] is thrown as it is.

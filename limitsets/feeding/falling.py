@@ -25,8 +25,6 @@ from limitsets.scene.scene import require_rests
 if TYPE_CHECKING:
     from limitsets.scene import Cavity, Scene
 
-__all__ = ["FATES", "ArmEnd", "arm_end_of", "clear_beyond", "farthest_clear"]
-
 FATES = ("right", "wrong", "wall", "edge", "left", "never")
 """What becomes of a part: fed on the wanted side; on another one; on the wanted side but it meets the far wall (or is
 still tipping at the next throw); it is thrown from so near before the end that the throw acts beyond the end, which is

@@ -15,8 +15,6 @@ from limitsets.feeding.trials import Trials, run_trials, trials_within
 from limitsets.robust.noise.proportions import binomial_interval
 from limitsets.robust.noise.scattering import Scattering
 
-__all__ = ["Curve", "FedShares", "success_curve"]
-
 Progress = Callable[[str, int, int], None]
 
 # Factors on the noise of the curve; the speed's deviation stays above this share of the speed, backwards.

@@ -34,8 +34,6 @@ from limitsets.scene.laid import LaidLike
 from limitsets.scene.left_out import Model
 from limitsets.tables import Column, Table, Tabled
 
-__all__ = ["Feeding", "feed"]
-
 Progress = Callable[[str, int, int], None]
 Verdict = TypeVar("Verdict", Safe, Fed)
 

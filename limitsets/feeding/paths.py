@@ -25,8 +25,6 @@ from limitsets.proofs.goals.laid_starts import reached_from, starts_in
 from limitsets.proofs.near_hinge import SCATTERED
 from limitsets.proofs.perron_frobenius import perron_frobenius_bound
 
-__all__ = ["MOST_SIDES", "Paths", "verdict_of_share"]
-
 Mask = NDArray[np.bool_]
 Bits = NDArray[np.uint8]
 

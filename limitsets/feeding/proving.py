@@ -31,8 +31,6 @@ from limitsets.proofs.goals.violating_starts import one_throw
 from limitsets.proofs.parameters import parameter_box
 from limitsets.proofs.simulated import joined, scattered
 
-__all__ = ["FeedingProof", "proved_feeding"]
-
 Progress = Callable[[str, int, int], None]
 
 # Cells per side, tried in turn until both questions are answered.

@@ -33,8 +33,6 @@ from limitsets.thrower import fly
 if TYPE_CHECKING:
     from limitsets.scene import Scene
 
-__all__ = ["rate_about_end", "time_to_tip", "tipping_times"]
-
 Array = NDArray[np.float64]
 
 # Abscissae of the integral, and starts on the arm whose landings are looked at.

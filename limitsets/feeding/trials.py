@@ -17,8 +17,6 @@ from limitsets.robust.noise.proportions import binomial_interval
 from limitsets.robust.noise.sampling import ManyParts, scattering_map
 from limitsets.robust.noise.scattering import Scattering, still_map
 
-__all__ = ["SERIES", "Trials", "creeping_below", "run_trials", "trials_within"]
-
 SERIES = 20
 """Trials of a series, each from a random start."""
 

@@ -10,8 +10,6 @@ from limitsets.files import as_table, picked
 from limitsets.proofs.goals import State
 from limitsets.scene.left_out import WITHOUT_SCATTER
 
-__all__ = ["Extents", "Fed", "Safe", "without_scatter"]
-
 Extents = dict[int, list[tuple[float, float]]]
 
 Answer = TypeVar("Answer", "Safe", "Fed")

@@ -15,8 +15,6 @@ from limitsets.proofs.certificate import write
 from limitsets.proofs.goals import hexed
 from limitsets.proofs.refutation import thrown_orbit
 
-__all__ = ["holds", "section_of", "verdict_of", "write_proof"]
-
 PROVED = ("proved", "proved-on-cells")
 
 

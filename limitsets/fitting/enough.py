@@ -17,11 +17,10 @@ from limitsets.fitting.fit_result import Fit, rounded_up
 from limitsets.goals import OrientedBeyond
 from limitsets.proofs.certify import certify
 from limitsets.proofs.query import Query
-from limitsets.robust.margins.finding import Margin, margin
+from limitsets.robust.margins.finding import margin
+from limitsets.robust.margins.margin_result import Margin
 from limitsets.robust.margins.margin_texts import bound
 from limitsets.scene import Scene, load
-
-__all__ = ["SIGMAS", "Enough", "enough"]
 
 # Throws scatter without a bound; so many standard deviations are taken for one (1 throw in 370 is outside).
 SIGMAS = 3.0

@@ -23,8 +23,6 @@ from limitsets.fitting.throws import SLACK, Throws
 from limitsets.scene import Scene
 from limitsets.scene.units import UNITS, exact_factor
 
-__all__ = ["MOST_MISREAD", "Explanation", "doubtful", "explained", "explanation"]
-
 # A larger share of sides that do not fit is no accident.
 MOST_MISREAD = 0.2
 # Up to this share of rows that cannot be are single numbers written down wrong.

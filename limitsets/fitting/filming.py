@@ -15,8 +15,6 @@ from limitsets.maps.forced import at_points
 from limitsets.scene import Scene
 from limitsets.scene.arrays import throw_stack
 
-__all__ = ["Bootstrap", "bootstrap", "simulated_throws"]
-
 Progress = Callable[[str, int, int], None]
 
 

@@ -21,8 +21,6 @@ from limitsets.scene import Scene
 from limitsets.scene.spelling import in_unit_of, in_units_of, unit_of
 from limitsets.tables import Column, Table, Tabled
 
-__all__ = ["Fit", "Fitted", "Scatter"]
-
 # A larger share of a value is no tolerance: what is fitted is then not known at all.
 MOST = 0.99
 

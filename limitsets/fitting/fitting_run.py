@@ -32,8 +32,6 @@ from limitsets.progress import shown_in_notebooks
 from limitsets.scene import Scene, load
 from limitsets.scene.quantities import base_unit, find
 
-__all__ = ["fit"]
-
 # Differences of readings of one place from which an error of measurement is taken.
 READ_TWICE = 10
 # A scatter this small beside the end of its interval is none.

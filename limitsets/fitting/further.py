@@ -16,8 +16,6 @@ from limitsets.fitting.likelihood import SHARPEST
 from limitsets.fitting.predicting import predicted
 from limitsets.scene import Scene
 
-__all__ = ["Further", "Question", "further_throws", "information"]
-
 PLACES = 200
 STEP = 1e-4
 # Throws that are filmed more, of which the gain is told.

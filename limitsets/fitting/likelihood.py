@@ -21,8 +21,6 @@ from limitsets.fitting.predicting import Predicted
 from limitsets.fitting.rows import Rows
 from limitsets.scene import Scene
 
-__all__ = ["Likelihood", "Whitened", "whitened"]
-
 # The decision is never sharper than this share of the arm, nor a landing.
 SHARPEST = 1e-7
 SCATTERS = 2

@@ -12,8 +12,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["End", "Maximum", "end_of_profile", "maximised"]
-
 Array = NDArray[np.float64]
 Function = Callable[[Array], Array]
 

@@ -16,8 +16,6 @@ from limitsets.fitting.likelihood import whitened
 from limitsets.fitting.starting import Start, jacobian, units_of_change
 from limitsets.scene import Scene
 
-__all__ = ["LEVEL", "Misfit", "misfit", "misfit_of"]
-
 LEVEL = 0.05
 DRAWS = 1999
 # Of the alternative: how large a share of the landings scatters more, and how many times more.

@@ -16,8 +16,6 @@ from limitsets.maps.forced import at_points
 from limitsets.scene import Scene
 from limitsets.scene.arrays import throw_stack
 
-__all__ = ["Predicted", "predicted"]
-
 STEP = 1e-5
 
 Array = NDArray[np.float64]

@@ -17,8 +17,6 @@ from limitsets.fitting.predicting import Predicted, predicted
 from limitsets.fitting.throws import Throws
 from limitsets.scene import Scene
 
-__all__ = ["Rows", "as_recorded", "assigned"]
-
 # Before the data are seen a side after a throw counts as misrecorded once in fifty readings.  The side before is where
 # the part was laid down: wrong much less often, and where a jog from either side would do, right.
 MISREAD, MISLAID = 0.02, 0.0004

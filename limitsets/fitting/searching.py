@@ -14,8 +14,6 @@ from limitsets.fitting.rows import assigned
 from limitsets.fitting.starting import RADIUS, Start
 from limitsets.scene import Scene
 
-__all__ = ["LEVEL", "largest", "profiles", "threshold_of"]
-
 # Share of the region's volume over all repetitions of the film.
 LEVEL = 0.95
 # Values of the radius of gyration that are tried first, as shares of the largest one.

@@ -15,8 +15,6 @@ from limitsets.errors import DataError
 from limitsets.fitting.rows import Rows, assigned
 from limitsets.scene import Scene
 
-__all__ = ["QUANTITIES", "RADIUS", "Start", "quantities_of", "robust_start", "units_of_change"]
-
 RADIUS = "part.mass.radius_of_gyration"
 QUANTITIES = ("part.mass.center.along", "part.mass.center.above", "arm.surface_height")
 # A direction is told by the landings if they fix it to this share of the speed, or of the part.

@@ -16,8 +16,6 @@ from limitsets.errors import DataError, SceneError, shown
 from limitsets.scene import Scene
 from limitsets.scene.units import UNITS, convert, parse
 
-__all__ = ["SLACK", "Throws", "length_of", "read_throws", "throws_in"]
-
 PLACES = ("x_before", "x_after")
 CORNERS = ("corner_before", "corner_after")
 SIDES = ("side_before", "side_after")

@@ -13,8 +13,6 @@ import numpy.typing as npt
 from limitsets.errors import GeometryError
 from limitsets.geometry.polygon import Scalar, Vector, require_inside
 
-__all__ = ["Mass", "mass_of", "plate_with_points"]
-
 
 @dataclass(frozen=True)
 class Mass:

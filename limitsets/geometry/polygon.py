@@ -14,20 +14,6 @@ import numpy.typing as npt
 
 from limitsets.errors import GeometryError
 
-__all__ = [
-    "Scalar",
-    "Vector",
-    "above_side",
-    "convex_polygon",
-    "heights_inside",
-    "is_convex",
-    "is_triangle",
-    "require_inside",
-    "side_ends",
-    "triangle",
-    "triangle_of",
-]
-
 Scalar: TypeAlias = Any
 """A float, or anything with ``+ - * /``: an mpmath number, a ball of python-flint, an interval."""
 Vector: TypeAlias = tuple[Scalar, Scalar]

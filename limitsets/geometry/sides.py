@@ -17,8 +17,6 @@ import numpy.typing as npt
 from limitsets.errors import GeometryError, TipsError
 from limitsets.geometry.polygon import Scalar, Vector, above_side, side_ends
 
-__all__ = ["OnSide", "RestingSides", "require_rest", "rest_of", "resting_sides"]
-
 Array = npt.NDArray[np.float64]
 
 

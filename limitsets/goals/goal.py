@@ -14,23 +14,6 @@ from typing import Annotated, Any, ClassVar, NamedTuple, TypeAlias, get_type_hin
 
 from limitsets.errors import AnswerError
 
-__all__ = [
-    "GOALS",
-    "Extents",
-    "Found",
-    "Goal",
-    "Laid",
-    "Place",
-    "Side",
-    "Sides",
-    "Verdict",
-    "as_written",
-    "by_side",
-    "declare",
-    "laid_words",
-    "words_of",
-]
-
 Place: TypeAlias = Annotated[float, "place"]
 """A field that a scene writes as a length, where parts can come to rest [length]."""
 

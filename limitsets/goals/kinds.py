@@ -12,17 +12,6 @@ import numpy as np
 from limitsets.errors import AnswerError
 from limitsets.goals.goal import GOALS, Extents, Found, Goal, Laid, Place, Side, Sides, Verdict, declare
 
-__all__ = [
-    "AttractsAll",
-    "FlipOrder",
-    "OrientedBeyond",
-    "Predicate",
-    "Reaches",
-    "StaysOnArm",
-    "order_of",
-    "unknown_goal",
-]
-
 # fractions are sums over cells: a whole one is 1 up to rounding
 _WHOLE = 1 - 1e-12
 

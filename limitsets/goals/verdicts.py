@@ -7,8 +7,6 @@ from collections.abc import Mapping, Sequence
 from limitsets.goals.goal import Found, Goal, Verdict
 from limitsets.goals.kinds import unknown_goal
 
-__all__ = ["evaluate"]
-
 
 def evaluate(
     goal: Goal,

@@ -30,8 +30,6 @@ from limitsets.maps.corners import between, require_corners
 from limitsets.maps.critical import margins
 from limitsets.maps.drivers import columns
 
-__all__ = ["require_agreement"]
-
 Floats = NDArray[np.float64]
 
 # Samples of a side, changes of branch between them that are looked at, and parameters between two corners.

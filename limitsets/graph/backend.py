@@ -24,8 +24,6 @@ from limitsets.graph.graph import TransitionGraph
 if TYPE_CHECKING:
     import networkx as nx
 
-__all__ = ["Backend", "backend"]
-
 
 def _sinks(graph: TransitionGraph) -> Iterator[set[int]]:
     return ({graph.n_cells + e} for e in range(len(graph.exits)))

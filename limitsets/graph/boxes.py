@@ -11,8 +11,6 @@ from numpy.typing import NDArray
 from limitsets.graph.target import Target, place
 from limitsets.jit import kernel
 
-__all__ = ["TargetBoxes", "leaving", "merged", "no_boxes", "placed"]
-
 
 @dataclass(frozen=True, eq=False)
 class TargetBoxes:

@@ -17,8 +17,6 @@ from limitsets.graph import segment_tree
 from limitsets.graph.ranges import RUN, Ranges, Runs, box_at, box_rows, boxes_of, row_start
 from limitsets.jit import kernel
 
-__all__ = ["Components", "descend", "fill_components", "ranks", "reach", "strong_components"]
-
 
 @dataclass(frozen=True, eq=False)
 class Components:

@@ -16,8 +16,6 @@ from limitsets.graph.ranges import RUN, Ranges, box_rows, boxes_of, row_start
 from limitsets.jit import kernel
 from limitsets.maps import codes
 
-__all__ = ["Condensation", "attracting_of"]
-
 # Components per sweep; the other bits of a 64-bit mark are for the ways out.
 SETS_PER_SWEEP = 56
 

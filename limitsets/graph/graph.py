@@ -24,8 +24,6 @@ from limitsets.tables import Table, Tabled, facts
 if TYPE_CHECKING:
     import networkx as nx
 
-__all__ = ["TransitionGraph"]
-
 
 @dataclass(frozen=True, eq=False)
 class TransitionGraph(Tabled):

@@ -9,8 +9,6 @@ from pathlib import Path
 from limitsets.cells import Grid
 from limitsets.errors import AnswerError
 
-__all__ = ["require_memory"]
-
 # Bytes a cell at the peak, in one, two and three dimensions, as measured on textbook maps; "random" for each sample.
 BYTES = {"random": (41, 96, 136), "boxes": (125, 151, 197)}
 BYTES_SAMPLED = (104, 95, 155)

@@ -13,8 +13,6 @@ from limitsets.graph.graph import TransitionGraph
 if TYPE_CHECKING:
     import networkx as nx
 
-__all__ = ["morse_graph"]
-
 
 @arguments_checked
 def morse_graph(graph: TransitionGraph) -> nx.DiGraph[int]:

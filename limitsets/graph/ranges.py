@@ -18,24 +18,6 @@ from numpy.typing import NDArray
 from limitsets.cells import Grid
 from limitsets.jit import generic, kernel
 
-__all__ = [
-    "PLANES",
-    "ROWS",
-    "RUN",
-    "SIDE",
-    "START",
-    "Ranges",
-    "Runs",
-    "box_at",
-    "box_rows",
-    "boxes_of",
-    "build",
-    "count_edges",
-    "expand",
-    "one_run",
-    "row_start",
-]
-
 # Columns of `Ranges.box`.
 START, RUN, ROWS, PLANES, SIDE = range(5)
 

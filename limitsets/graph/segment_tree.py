@@ -23,8 +23,6 @@ from numpy.typing import NDArray
 from limitsets.graph.ranges import PLANES, ROWS, RUN, START, Ranges, boxes_of
 from limitsets.jit import kernel
 
-__all__ = ["descend", "is_wide", "leaves", "ranks", "reach", "strong"]
-
 # Mean cells per image from which the tree is faster than walking the edges.
 WIDE = 48
 

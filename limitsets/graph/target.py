@@ -11,8 +11,6 @@ from limitsets.cells import Grid
 from limitsets.jit import kernel
 from limitsets.maps import codes
 
-__all__ = ["Target", "place"]
-
 
 class Target(NamedTuple):
     """The grid that images land on, as kernels take it."""

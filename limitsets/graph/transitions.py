@@ -19,8 +19,6 @@ from limitsets.graph.target import Target
 from limitsets.maps import kind_of
 from limitsets.maps.contract import require_dimension, require_sides
 
-__all__ = ["transitions"]
-
 
 @arguments_checked
 def transitions(map: Any, grid: Grid, method: str | None = None, **options: Any) -> TransitionGraph:  # noqa: A002  # `map` is the word of the field and of the other calls

@@ -11,27 +11,6 @@ from typing import TypeAlias
 from limitsets.interval.rounding import above, above_sum, below, below_sum
 from limitsets.jit import mark_undefined, proof_kernel
 
-__all__ = [
-    "Ends",
-    "absolute",
-    "add",
-    "contains",
-    "div",
-    "floor",
-    "holds",
-    "hull",
-    "maximum",
-    "minimum",
-    "mul",
-    "neg",
-    "or_empty",
-    "point",
-    "power",
-    "sqr",
-    "sqrt",
-    "sub",
-]
-
 Ends: TypeAlias = tuple[float, float]
 """``(lo, hi)`` with lo <= hi, either of which may be infinite; (nan, nan) is the empty set."""
 

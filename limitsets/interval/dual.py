@@ -22,8 +22,6 @@ import numpy as np
 from limitsets.interval.number import Interval, ends_of, larger, smaller
 from limitsets.jit import number, operation
 
-__all__ = ["Dual", "seed", "slope_of", "value_of"]
-
 
 @number(twice=False)
 @dataclass(frozen=True, slots=True)

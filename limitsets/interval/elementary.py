@@ -17,8 +17,6 @@ from limitsets.interval.arithmetic import Ends, holds, or_empty
 from limitsets.interval.rounding import down, up
 from limitsets.jit import mark_undefined, proof_kernel
 
-__all__ = ["COSINE", "LARGEST", "NEAR", "PARTS", "RELATIVE", "SINE", "atan2", "cos", "sin", "sin_cos"]
-
 LARGEST = 2.0**17
 NEAR = 2.0**-50
 RELATIVE = 2.0**-50

@@ -19,8 +19,6 @@ from limitsets.interval.arithmetic import Ends, add, div, holds, mul, or_empty, 
 from limitsets.interval.rounding import down, up
 from limitsets.jit import proof_kernel
 
-__all__ = ["COEFFICIENTS", "LARGEST", "PARTS", "PER_LN2", "RELATIVE", "exp", "exponential", "tanh"]
-
 LARGEST = 700.0
 RELATIVE = 2.0**-50
 

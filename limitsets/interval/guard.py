@@ -13,8 +13,6 @@ import numpy as np
 from limitsets.errors import AnswerError
 from limitsets.jit import proof_kernel
 
-__all__ = ["guard", "rounding_is_sound"]
-
 
 @proof_kernel(entry=True)
 def _signs(numbers: Any) -> Any:

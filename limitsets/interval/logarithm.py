@@ -15,8 +15,6 @@ import numpy as np
 from limitsets.interval.arithmetic import Ends, add, div, holds, mul, or_empty, sqr
 from limitsets.jit import mark_undefined, proof_kernel
 
-__all__ = ["LN2", "REST", "TERMS", "log"]
-
 TERMS = 12
 REST = math.nextafter(1.0 / 24.0, 1.0)
 

@@ -18,20 +18,6 @@ from limitsets.interval import arithmetic, elementary, exponential, logarithm
 from limitsets.interval.rounding import down, up
 from limitsets.jit import corners_as_numbers, mark_undefined, number, operation
 
-__all__ = [
-    "Interval",
-    "PerSide",
-    "ends_of",
-    "hull_of",
-    "intervals_between",
-    "larger",
-    "signed_square",
-    "smaller",
-    "square_root",
-    "where_positive",
-    "with_sign_of",
-]
-
 Number = TypeVar("Number", bound=Any)
 """A float, an `Interval`, or a number of Python with the same operators."""
 

@@ -11,8 +11,6 @@ import sys
 
 from limitsets.jit import proof_kernel
 
-__all__ = ["above", "above_sum", "below", "below_sum", "down", "up"]
-
 RELATIVE = 3.0 * 2.0**-52
 ABSOLUTE = 3.0 * 2.0**-1074
 LARGEST = sys.float_info.max

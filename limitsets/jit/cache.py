@@ -27,18 +27,6 @@ import numba
 import numpy as np
 from numba import types
 
-__all__ = [
-    "CACHE",
-    "COMPILED",
-    "FOLDER",
-    "FOREIGN",
-    "KEPT_DIGESTS",
-    "PACKAGE",
-    "classes_in",
-    "cover_foreign_class",
-    "names_in",
-]
-
 PACKAGE = Path(__file__).resolve().parents[1]
 
 # Rooms without kernels: editing a picture must not throw away every compiled loop.  An import contract keeps

@@ -17,8 +17,6 @@ from limitsets.errors import LimitsetsError, MapError
 from limitsets.jit.cache import CACHE, COMPILED, FOREIGN, PACKAGE, classes_in, names_in
 from limitsets.jit.options import ESTIMATE, PROOF
 
-__all__ = ["compiled", "kernel", "proof_kernel", "with_helpers"]
-
 F = TypeVar("F", bound=Callable[..., Any])
 
 

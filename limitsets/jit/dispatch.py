@@ -12,8 +12,6 @@ from limitsets.errors import MapError
 from limitsets.jit.compiling import with_helpers
 from limitsets.jit.options import ESTIMATE, OVERLOAD, PROOF
 
-__all__ = ["Generic", "entry_of", "generic", "named_tuple_class", "with_entry"]
-
 P = ParamSpec("P")
 R = TypeVar("R", covariant=True)
 

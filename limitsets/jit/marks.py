@@ -7,8 +7,6 @@ from typing import Any
 from llvmlite import ir
 from numba import extending, types
 
-__all__ = ["mark_undefined", "take_mark"]
-
 # ---------------------------------------------------------------- the mark of what is not defined
 
 # Compiled code notes here that a function was asked beyond where it is defined.  A proof kernel gives back bare

@@ -14,8 +14,6 @@ from numba.core import cgutils
 from limitsets.jit.compiling import compiled
 from limitsets.jit.options import ESTIMATE, OVERLOAD, PROOF
 
-__all__ = ["corners_as_numbers", "entries_of", "formula", "number", "number_class", "of_entries", "operation"]
-
 F = TypeVar("F", bound=Callable[..., Any])
 T = TypeVar("T")
 

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from numba.core import codegen, config
 
-__all__ = ["ESTIMATE", "OVERLOAD", "PROOF"]
-
 
 def _use_widest_vectors() -> None:
     """Let LLVM use vectors of 512 bits where the processor has them; numbers stay the same to the bit.

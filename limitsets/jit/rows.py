@@ -9,8 +9,6 @@ from numba import extending, types
 
 from limitsets.jit.options import ESTIMATE, OVERLOAD
 
-__all__ = ["row_of"]
-
 
 def row_of(stack: Any, k: int) -> Any:
     """Return row k of an array, and of a NamedTuple of arrays the NamedTuple of their rows.

@@ -13,8 +13,6 @@ from numpy.typing import NDArray
 
 from limitsets.maps import codes
 
-__all__ = ["Array", "Codes", "Flags", "bisected", "hidden", "inserted", "located", "sign_code"]
-
 Array = NDArray[np.float64]
 Codes = NDArray[np.int64]
 Flags = NDArray[np.bool_]

@@ -6,20 +6,6 @@ state of its own, never folded into a neighbour.
 
 from __future__ import annotations
 
-__all__ = [
-    "FLIP",
-    "INWARD",
-    "JOG",
-    "NAMES",
-    "OUTSIDE",
-    "OUTSIDE_MODEL",
-    "OUTWARD",
-    "ROLL",
-    "UNDECIDED",
-    "UNDEFINED",
-    "UNSETTLED",
-]
-
 JOG = 0
 """Rests on the same side."""
 FLIP = 1

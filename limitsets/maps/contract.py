@@ -46,19 +46,6 @@ from limitsets.errors import AnswerError, MapError
 from limitsets.jit import cover_foreign_class
 from limitsets.maps import codes, derived, kernels
 
-__all__ = [
-    "MapKind",
-    "coerce",
-    "has_slope",
-    "kind_of",
-    "or_register",
-    "register",
-    "require_codes",
-    "require_dimension",
-    "require_sides",
-]
-
-
 EXITS_OF_A_MAP = {"outside": codes.OUTSIDE}
 
 

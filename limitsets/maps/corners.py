@@ -10,8 +10,6 @@ import numpy as np
 from limitsets.errors import AnswerError, shown
 from limitsets.maps.contract import coerce, kind_of
 
-__all__ = ["between", "require_corners"]
-
 
 def require_corners(lower: Any, upper: Any) -> None:
     """Refuse corners that are not two ends of ranges of numbers.

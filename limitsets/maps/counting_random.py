@@ -14,8 +14,6 @@ import numpy as np
 
 from limitsets.jit import kernel
 
-__all__ = ["normal_pair", "philox", "uniform_pair"]
-
 Words: TypeAlias = tuple[np.uint64, np.uint64, np.uint64, np.uint64]
 
 # np.uint64 throughout: numba turns a mixture of signed and unsigned integers into floats.

@@ -21,15 +21,6 @@ from limitsets.maps.contract import kind_of, require_sides
 from limitsets.maps.drivers import columns, images
 from limitsets.maps.kernels import margin, on_side, pick
 
-__all__ = [
-    "CriticalPoint",
-    "branches_of_side",
-    "critical_points",
-    "margins",
-    "require_domain",
-    "require_one_dimension",
-]
-
 SAMPLES = 4096
 
 # The smallest number of full precision: what is nearer to 0 is 0 to people.
@@ -40,13 +31,20 @@ class Sides(Protocol):
     """What is asked of a domain: a box of x for each side (`limitsets.cells.Domain`)."""
 
     @property
-    def lo(self) -> Array: ...
+    def lo(self) -> Array:
+        """Lower ends of x."""
+
     @property
-    def hi(self) -> Array: ...
+    def hi(self) -> Array:
+        """Upper ends of x."""
+
     @property
-    def anchor(self) -> Array | None: ...
+    def anchor(self) -> Array | None:
+        """Ends of x that images approach and never reach."""
+
     @property
-    def sides(self) -> int: ...
+    def sides(self) -> int:
+        """Number of sides."""
 
 
 def require_domain(params: Any, domain: Any, samples: int) -> None:

@@ -39,18 +39,6 @@ from limitsets.maps.kernels import (
     state_of,
 )
 
-__all__ = [
-    "MAYBE",
-    "NEVER",
-    "NO_WITNESS",
-    "SURE",
-    "UNKNOWN",
-    "BranchBoxes",
-    "branch_boxes",
-    "derive",
-    "try_slope",
-]
-
 Floats: TypeAlias = NDArray[np.float64]
 
 # Whether the map takes a branch on a box.

@@ -30,20 +30,6 @@ from limitsets.maps.kernels import (
 )
 from limitsets.tables import Table, Tabled
 
-__all__ = [
-    "Images",
-    "Orbit",
-    "advance",
-    "columns",
-    "displacements",
-    "fill_images",
-    "images",
-    "images_on",
-    "orbit",
-    "rows",
-    "step",
-]
-
 
 @kernel
 def judged(x: Any, code: Any) -> Any:

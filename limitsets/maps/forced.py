@@ -17,8 +17,6 @@ from limitsets.maps.contract import require_sides
 from limitsets.maps.kernels import image_on, margin
 from limitsets.maps.stacks import point_of, size_of
 
-__all__ = ["along", "at_points"]
-
 
 @kernel(entry=True)
 def _along(params: Any, x: Any, sides: Any, branches: Any, after: Any, side_after: Any, slope: Any) -> None:

@@ -11,26 +11,6 @@ from limitsets.interval import seed, slope_of
 from limitsets.jit import generic, kernel, of_entries
 from limitsets.maps import codes
 
-__all__ = [
-    "decision",
-    "displacement",
-    "entries_of",
-    "fallback",
-    "fallback_box",
-    "forced",
-    "image",
-    "image_box",
-    "image_on",
-    "margin",
-    "on_side",
-    "on_side_box",
-    "pick",
-    "put",
-    "scattered",
-    "seeded",
-    "state_of",
-]
-
 
 def _same(params: Any, side: int) -> Any:
     return params

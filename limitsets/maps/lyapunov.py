@@ -15,8 +15,6 @@ from limitsets.maps.contract import has_slope, kind_of
 from limitsets.maps.drivers import Orbit, as_orbit, empty_orbit, start_of, step
 from limitsets.maps.kernels import image_on, pick, put
 
-__all__ = ["Lyapunov", "lyapunov", "orbit_with_exponent"]
-
 # The tangent vector is scaled back only when its size leaves this range: with a root, a logarithm and a division at
 # every step the Henon map took 39 ns a step, not 4.
 SMALL, LARGE = 1e-100, 1e100

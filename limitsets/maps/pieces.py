@@ -18,8 +18,6 @@ from limitsets.maps.contract import has_slope, kind_of
 from limitsets.maps.critical import SAMPLES, Sides, branches_of_side, require_domain
 from limitsets.maps.forced import along
 
-__all__ = ["Piece", "TurningPoint", "monotone_pieces", "turning_points"]
-
 # A step this large between adjacent floats is a jump; the root of a grazing throw moves by the root of an ulp.
 JUMP = 2.0**-18
 

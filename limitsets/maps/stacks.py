@@ -17,8 +17,6 @@ from limitsets.errors import MapError
 from limitsets.jit import row_of
 from limitsets.maps.contract import coerce, kind_of
 
-__all__ = ["chosen", "point_of", "size_of", "stacked"]
-
 
 def stacked(points: Sequence[Any]) -> Any:
     """Stack the parameters of one map at several points.

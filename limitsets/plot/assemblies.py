@@ -20,8 +20,6 @@ if TYPE_CHECKING:
     from limitsets.assembly import Assembly
     from limitsets.engine.recording import Recording
 
-__all__ = ["assembly"]
-
 WORDS = {
     "assembled": "assembled",
     "ejected": "out of the cavity again",

@@ -18,8 +18,6 @@ if TYPE_CHECKING:
 
     from limitsets.sweep import Atlas
 
-__all__ = ["edges", "frame", "goal_line", "hatched", "mark", "pixels", "title_of"]
-
 
 def title_of(found: Atlas) -> str:
     """Name what is varied."""

@@ -38,8 +38,6 @@ if TYPE_CHECKING:
 
     from limitsets.sweep import Atlas
 
-__all__ = ["atlas", "look_of"]
-
 # Paul Tol's light scheme, made for areas and colour-blind readers, without its orange; a cycle's face.
 FACES = ("#EEDD88", "#44BB99", "#77AADD", "#FFAABB", "#99DDFF", "#BBCC33", "#AAAA00")
 # Bands that no cycle is are darker by this share of ink; without an attractor these, by what every start does.

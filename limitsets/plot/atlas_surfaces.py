@@ -19,8 +19,6 @@ if TYPE_CHECKING:
 
     from limitsets.sweep import Atlas
 
-__all__ = ["atlas_surface"]
-
 Array = npt.NDArray[np.float64]
 
 # Even to the eye, in grey and for colour-blind readers.

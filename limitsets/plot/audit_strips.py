@@ -15,8 +15,6 @@ if TYPE_CHECKING:
 
     from limitsets.auditing import Audit, Finding
 
-__all__ = ["audit"]
-
 HALF = 0.36  # half the height of a strip; strips are 1 apart
 HOLDS: dict[str, Any] = {"facecolor": "#E4EEF5", "edgecolor": "none"}
 BROKEN: dict[str, Any] = {"facecolor": "#E39B72", "edgecolor": "#8A2F00", "hatch": "////", "lw": 0.6}

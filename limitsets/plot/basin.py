@@ -23,8 +23,6 @@ if TYPE_CHECKING:
 
     from limitsets.sets import Basins
 
-__all__ = ["basins"]
-
 # Lightness falls, so that neighbours differ in grey as well; hatches tell them apart in strips.
 ATTRACTORS = ("#CFE5F5", "#F0B429", "#5FB59B", "#B5548A", "#3F4E96", "#2B2A1E")
 HATCHES = ("", "///", "...", "\\\\\\", "xxx", "+++")

@@ -22,8 +22,6 @@ if TYPE_CHECKING:
 
     from limitsets.sweep.continuation import Continuation
 
-__all__ = ["bifurcation"]
-
 CRITICAL: dict[str, Any] = {"color": style.FLIP, "ls": style.FLIP_LINE, "lw": 1.0}
 # Events, in the order of the legend: marker and colour.
 EVENTS: dict[str, dict[str, Any]] = {

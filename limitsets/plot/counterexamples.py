@@ -20,8 +20,6 @@ if TYPE_CHECKING:
 
     from limitsets.scene import Scene
 
-__all__ = ["counterexample"]
-
 # States that are drawn: the last of them; and throws after an orbit of a single state.
 LAST, ONWARD = 40, 12
 

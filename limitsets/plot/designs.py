@@ -20,8 +20,6 @@ if TYPE_CHECKING:
     from limitsets.inverse import Design
     from limitsets.scene import Scene
 
-__all__ = ["design"]
-
 HALF = 0.3  # half the height of a bar; lanes are 1 apart
 MOST = 12  # scenes that are drawn: start, design, and of those between evenly many
 GAP = 0.9  # between the lanes of one scene and the next, beside the 1

@@ -21,8 +21,6 @@ if TYPE_CHECKING:
 
     from limitsets.feeding import Feeding
 
-__all__ = ["feeding"]
-
 LOOKS: dict[str, dict[str, Any]] = {
     "right": {"color": style.GOAL, "ls": "-"},
     "wrong": {"color": style.FLIP, "ls": style.FLIP_LINE},

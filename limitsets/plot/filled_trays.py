@@ -22,8 +22,6 @@ if TYPE_CHECKING:
     from limitsets.engine.depression import Pose
     from limitsets.trays import TrayDesign, TrayFill
 
-__all__ = ["tray", "tray_design"]
-
 # After so many points a curve has no more marks.
 MARKS = 9
 

@@ -24,8 +24,6 @@ if TYPE_CHECKING:
     from limitsets.plot.throwing import Motion, Throw
     from limitsets.scene import Scene
 
-__all__ = ["flight"]
-
 Array = NDArray[np.float64]
 
 SHOWN = 3  # outlines in the air, and as many on the way from the impact to rest

@@ -19,8 +19,6 @@ if TYPE_CHECKING:
 
     from limitsets.inverse import RobustDesign
 
-__all__ = ["robust_design"]
-
 BEFORE, AFTER = "#6E6E6E", style.JOG
 # Bars of the scene before, apart from the design's also in grey.
 PALE = "#D6D6D6"

@@ -22,8 +22,6 @@ if TYPE_CHECKING:
     from limitsets.graph import TransitionGraph
     from limitsets.scene import Scene
 
-__all__ = ["limit_set"]
-
 BAR = 0.085  # half the height of a bar; lanes are 1 apart
 HOP = 0.36  # height of a jog's arc
 SAMPLES = 400

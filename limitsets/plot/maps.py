@@ -22,8 +22,6 @@ if TYPE_CHECKING:
     from limitsets.graph import TransitionGraph
     from limitsets.scene import Scene
 
-__all__ = ["map"]
-
 SAMPLES = 1500
 # Of the branches by number: of throws jog, flip and roll.
 LOOKS: tuple[dict[str, Any], ...] = (

@@ -19,9 +19,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from limitsets.robust.margins.beyond import MarginsBeyond
-    from limitsets.robust.margins.finding import Margin
-
-__all__ = ["margin_curve", "tolerance_box", "tornado"]
+    from limitsets.robust.margins.margin_result import Margin
 
 SAFE: dict[str, Any] = {"facecolor": "#9BD1B8", "edgecolor": "#2F6B52", "lw": 0.7}
 OPEN: dict[str, Any] = {"facecolor": "#F4F4F4", "edgecolor": "#9A9A9A", "hatch": "....", "lw": 0.6}

@@ -16,8 +16,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["morse"]
-
 # More nodes than this cannot be told apart: the attracting and the largest are drawn, the title says how many are not.
 MOST = 12
 Place = tuple[float, float]

@@ -22,8 +22,6 @@ if TYPE_CHECKING:
     from limitsets.robust.noise.sampling import SampledStatistics
     from limitsets.robust.noise.statistics import Levels
 
-__all__ = ["noise_arrivals", "noise_density", "noise_levels"]
-
 BAR = "#C9DCEA"
 LINES = ("-", (0, (5, 2)), (0, (1.2, 1.6)), (0, (6, 1.5, 1.2, 1.5)))
 COLOURS = (style.JOG, style.FLIP, style.ROLL, style.GOAL)

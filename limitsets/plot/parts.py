@@ -21,8 +21,6 @@ if TYPE_CHECKING:
     from limitsets.scene import Scene
     from limitsets.scene.sketch import Sketch
 
-__all__ = ["part", "refused_part"]
-
 Array = NDArray[np.float64]
 
 CENTRE: dict[str, Any] = {"marker": "o", "ms": 9, "mfc": "white", "mec": style.INK, "mew": 1.6, "ls": ""}

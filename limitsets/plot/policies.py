@@ -14,8 +14,6 @@ if TYPE_CHECKING:
 
     from limitsets.policies import Synthesis
 
-__all__ = ["policy"]
-
 # Rows that can be named, and the most height of a row and of all [inches].
 MOST, ROW, TALL = 60, 0.26, 16.0
 COLOURS = (style.JOG, style.FLIP, style.ROLL, style.INK)

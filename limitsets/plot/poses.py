@@ -16,8 +16,6 @@ from limitsets.geometry import side_ends
 if TYPE_CHECKING:
     from limitsets.scene import Scene
 
-__all__ = ["about_centre", "angle_on_side", "centre_in_flight", "outline", "turned"]
-
 Array = NDArray[np.float64]
 
 

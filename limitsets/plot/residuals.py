@@ -14,8 +14,6 @@ if TYPE_CHECKING:
 
     from limitsets.fitting import Fit
 
-__all__ = ["fit_residuals"]
-
 BARS = "#B5C8D6"
 KINDS = ((0, "o", style.JOG, "jog"), (1, "^", style.FLIP, "flip"))
 

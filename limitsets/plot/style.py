@@ -22,27 +22,6 @@ if TYPE_CHECKING:
     from limitsets.plot.subjects import Subject
     from limitsets.scene import Scene
 
-__all__ = [
-    "Extents",
-    "bar",
-    "canvas",
-    "ends_of",
-    "extents_of",
-    "goal",
-    "interval_text",
-    "key",
-    "key_of_goal",
-    "lanes",
-    "legend",
-    "name",
-    "note",
-    "of_set",
-    "open_frame",
-    "panels",
-    "stretch",
-    "title",
-]
-
 Extents: TypeAlias = Mapping[int, Sequence[tuple[float, float]]]
 
 # After Okabe and Ito; as grey their lightness differs too: 0.38, 0.51, 0.59 and so on.

@@ -18,8 +18,6 @@ if TYPE_CHECKING:
     from limitsets.cells import Domain
     from limitsets.goals import Goal
 
-__all__ = ["Subject", "subject_of"]
-
 
 class Subject(NamedTuple):
     """A map in one dimension, and how to speak of it.

@@ -21,8 +21,6 @@ if TYPE_CHECKING:
     from limitsets.scene import Scene
     from limitsets.thrower import Trace
 
-__all__ = ["Motion", "Throw", "throws_of"]
-
 Array = NDArray[np.float64]
 
 # Effects that the turn about the struck vertex does not know.

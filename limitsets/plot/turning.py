@@ -17,8 +17,6 @@ from numpy.typing import NDArray
 
 from limitsets.plot.poses import turned
 
-__all__ = ["Impact", "Turning", "turned_to_rest"]
-
 Array = NDArray[np.float64]
 
 # Longer than this near the top of a vertex is not shown [1/w]; a way that is drawn takes so long at most.

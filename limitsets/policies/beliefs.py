@@ -7,8 +7,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Bits", "Kept", "cells_of", "packed"]
-
 Bits = NDArray[np.uint64]
 
 # Of the beliefs that are looked through for a subset the last so many: one that is not found only costs time.

@@ -21,8 +21,6 @@ from limitsets.proofs.simulated import joined, scattered
 from limitsets.scene import Scene
 from limitsets.scene.scene import require_rests
 
-__all__ = ["MODES", "Board", "Progress", "Starts", "board_of"]
-
 Starts: TypeAlias = float | Mapping[int, tuple[float, float]] | None
 Progress: TypeAlias = Callable[[str, int, int], None] | None
 

@@ -8,8 +8,6 @@ from limitsets.graph import TransitionGraph
 from limitsets.graph.ranges import expand
 from limitsets.policies.game import Image, Mask
 
-__all__ = ["image_of"]
-
 
 def image_of(graph: TransitionGraph) -> Image:
     """Give the image of a graph's cells: proved to hold that of every point where its method is "boxes".

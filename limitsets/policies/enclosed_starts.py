@@ -21,8 +21,6 @@ from limitsets.policies.synthesis import Synthesis
 from limitsets.proofs.parameters import ParameterBox, parameter_box
 from limitsets.scene.sensing import BeyondSensor, SideSensor
 
-__all__ = ["Impossible", "not_within"]
-
 BEAT = 16
 
 

@@ -19,8 +19,6 @@ from numpy.typing import NDArray
 from limitsets.errors import AnswerError
 from limitsets.policies.beliefs import Bits, cells_of, packed
 
-__all__ = ["Game", "Image", "Mask", "game_of"]
-
 Mask: TypeAlias = NDArray[np.bool_]
 Image: TypeAlias = Callable[[Mask], Mask | None]
 """From cells, shape (n_cells,), to all cells that their image may meet; None where some of it may leave them."""

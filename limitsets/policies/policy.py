@@ -13,8 +13,6 @@ from limitsets.policies.beliefs import Kept, cells_of
 from limitsets.policies.game import Game, Mask
 from limitsets.tables import Table, Tabled
 
-__all__ = ["NONE", "Policy", "broken", "policy_of"]
-
 NONE = -1
 """No throw: stop; or no state: the answer cannot come, or comes of a part that is caught."""
 

@@ -18,8 +18,6 @@ from limitsets.policies.beliefs import Bits, Kept
 from limitsets.policies.game import Game, Mask
 from limitsets.policies.policy import Policy, policy_of
 
-__all__ = ["NOT_DECIDED", "NOT_SOLVED", "SOLVED", "Found", "search"]
-
 SOLVED, NOT_SOLVED, NOT_DECIDED = "solved", "not-solved", "not-decided"
 
 # The clock is read once in so many beliefs.

@@ -14,8 +14,6 @@ from limitsets.maps import images
 from limitsets.policies.policy import NONE
 from limitsets.policies.synthesis import Synthesis
 
-__all__ = ["Simulated", "simulate"]
-
 Floats = NDArray[np.float64]
 
 # Kappas drawn for each throw, the two ends of its noise among them.

@@ -20,8 +20,6 @@ from limitsets.scene.left_out import Model
 from limitsets.scene.sensing import BeyondSensor, Sensor
 from limitsets.tables import Table, Tabled, facts
 
-__all__ = ["Synthesis", "feedback", "places"]
-
 
 class Limits(NamedTuple):
     """How long a search may go on: throws, seconds, beliefs."""

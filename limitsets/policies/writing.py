@@ -21,8 +21,6 @@ from limitsets.proofs.cover import Cover, targets
 from limitsets.scene.sensing import Sensor, exact_text
 from limitsets.scene.units import spelled_plainly
 
-__all__ = ["write"]
-
 Arrays = dict[str, NDArray[Any]]
 
 

@@ -20,9 +20,6 @@ from limitsets.proofs.basin import ROUNDING, Basin, basin, shares_of
 from limitsets.proofs.cover import Cover
 from limitsets.proofs.near_hinge import NearHinge, near_hinge
 
-__all__ = ["BELOW", "Attraction", "attraction", "near_section"]
-
-
 BELOW = "with the arm's surface above the joint, starts nearer to it than the fixed point of the jog go there"
 
 

@@ -38,8 +38,6 @@ from limitsets.thrower.side_box import gather_box, with_kappa
 from limitsets.thrower.throw_box import throw_box
 from limitsets.thrower.turn_box import turn_box, turn_point
 
-__all__ = ["ROUNDING", "Basin", "basin", "leaving_cells", "shares_of"]
-
 Mask = NDArray[np.bool_]
 Floats = NDArray[np.float64]
 

@@ -21,8 +21,6 @@ from limitsets.thrower import Energy, Exact, SmallAngle2
 from limitsets.thrower.impact import pose
 from limitsets.thrower.turn_box import turn_box
 
-__all__ = ["FLIP", "JOG", "Angle", "Formulas", "OneSide", "ThrowNumbers", "angle", "variable"]
-
 JOG, FLIP = 0, 1
 
 

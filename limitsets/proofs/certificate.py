@@ -26,8 +26,6 @@ from limitsets.proofs.cover import Cover, targets
 from limitsets.scene.units import spelled_plainly
 from limitsets.thrower import Energy, Exact, Signed, SmallAngle, SmallAngle2
 
-__all__ = ["arrays_of", "brackets", "pack", "tidy", "write"]
-
 FORMAT, VERSION = "limitsets-proof", 2
 
 # Brackets of the impact are widened by this share of the angle, so that another arithmetic can confirm them.

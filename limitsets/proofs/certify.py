@@ -33,8 +33,6 @@ from limitsets.scene.laid import LaidLike, laid_goals
 from limitsets.scene.quantities import deviation, find
 from limitsets.scene.units import parse
 
-__all__ = ["CLAIMS", "certify", "spelled_deviations"]
-
 # Cells per side, tried in turn until everything asked for is proved or refuted.
 LADDER = (2048, 8192, 32768, 131072)
 

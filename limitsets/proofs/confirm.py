@@ -17,8 +17,6 @@ from limitsets.progress import bar, in_notebook
 if TYPE_CHECKING:
     from limitsets.checker import Report
 
-__all__ = ["DeniedError", "recheck", "require_confirmed"]
-
 
 class DeniedError(AnswerError):
     """The checker does not confirm a certificate that was just written.

@@ -23,8 +23,6 @@ from limitsets.maps import kind_of
 from limitsets.proofs.fixed_point import FixedPoint, fixed_points
 from limitsets.proofs.parameters import ParameterBox
 
-__all__ = ["Cover", "cover", "cover_on", "everywhere", "targets"]
-
 # Share of a side's extent that is left to the argument near the joint.
 NEAREST = 1e-6
 

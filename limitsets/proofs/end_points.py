@@ -47,8 +47,6 @@ from limitsets.proofs.proved_pieces import (
 )
 from limitsets.thrower.throw_box import BOTH
 
-__all__ = ["CriticalBracket", "ProvedEnd", "ProvedEnds", "proved_ends"]
-
 
 class CriticalBracket(NamedTuple):
     """Where the decision changes: one branch is proved up to `lo`, another from `hi` on."""

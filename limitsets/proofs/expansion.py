@@ -22,8 +22,6 @@ from limitsets.thrower.motion import FullThrow
 from limitsets.thrower.side_box import gather_box
 from limitsets.thrower.throw_box import slope_between, sure_slope_box
 
-__all__ = ["least_slope", "slopes"]
-
 # Cells are cut into this many pieces, so that the slope is not lost in the width of a cell.
 PIECES = 8
 

@@ -43,8 +43,6 @@ from limitsets.thrower.impact import margin, strike
 from limitsets.thrower.side_box import SideBox, gather_box
 from limitsets.thrower.turn_box import exact_turn, turn_box, turn_point
 
-__all__ = ["FixedPoint", "fixed_points", "leaves"]
-
 # The angles that enclose phi* are so far, relative to it, from what Newton's method proposes: wide against the bounds
 # of sine and cosine (2^-45), narrow against the 1e-9 wanted of the bracket of R*.
 MARGIN = 2.0**-41

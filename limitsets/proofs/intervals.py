@@ -14,8 +14,6 @@ from numpy.typing import NDArray
 
 from limitsets.proofs.rational import RationalInterval
 
-__all__ = ["Intervals"]
-
 Array = NDArray[np.float64]
 
 

@@ -20,8 +20,6 @@ from typing import Any, TypeAlias
 from limitsets.proofs.intervals import Intervals
 from limitsets.proofs.rational import RationalInterval, square_root
 
-__all__ = ["Jet", "about", "middle", "root"]
-
 Number: TypeAlias = Any
 """A `RationalInterval`, or `Intervals` of many boxes."""
 

@@ -32,8 +32,6 @@ from limitsets.thrower.motion_box import gather_full_box
 from limitsets.thrower.side_box import gather_box
 from limitsets.thrower.turn_box import turn_box
 
-__all__ = ["NO_STARTS", "SCATTERED", "NearHinge", "near_hinge"]
-
 # q - 1 is lowered by this share, so that other arithmetic can confirm it where the parameters are wide.
 SLACK_OF_Q = 2.0**-26
 

@@ -47,8 +47,6 @@ from limitsets.sets import Cycle, Cycles, cycles, cycles_of
 from limitsets.sets.passing import longest_stays, passing
 from limitsets.tables import Column, Table, Tabled, bands_of
 
-__all__ = ["CLAIMS_OF_MAP", "CycleOfMap", "ProofOfMap", "certify_map"]
-
 Floats: TypeAlias = NDArray[np.float64]
 Matrix: TypeAlias = list[list[Intervals]]
 

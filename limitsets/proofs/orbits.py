@@ -28,8 +28,6 @@ from limitsets.sets import Cycle, cycles_of
 from limitsets.thrower.side_box import gather_box
 from limitsets.thrower.throw_box import NOTHING, throw_box
 
-__all__ = ["PERIODS", "Followed", "ProvedCycle", "ProvedCycles", "follow", "proved_cycle", "proved_cycles"]
-
 Pair = tuple[float, float]
 
 # Largest periods to search, in turn, until an orbit is found.

@@ -28,8 +28,6 @@ from limitsets.scene.units import exact_factor, parse, share_of_pi
 from limitsets.thrower import Throw
 from limitsets.thrower.motion import FullThrow, Outline
 
-__all__ = ["VARYING", "ParameterBox", "body_at", "lengths_of", "parameter_box"]
-
 NARROWER = "lower the tolerance or noise"
 
 VARYING = ("throw.speed", "gravity.tilt", "landing.x")

@@ -29,8 +29,6 @@ from limitsets.cells import CellSet
 from limitsets.proofs.cover import Cover, targets
 from limitsets.proofs.expansion import slopes
 
-__all__ = ["DensityBound", "perron_frobenius_bound"]
-
 Mask = NDArray[np.bool_]
 
 # Throws after which bounds have to be below 1.

@@ -25,8 +25,6 @@ from limitsets.scene.quantities import texts
 from limitsets.scene.units import convert, parse
 from limitsets.tables import Column, Table, Tabled, bands_of
 
-__all__ = ["SHARES", "Claim", "Proof"]
-
 SHARES = ("share", "leaves", "creeps", "open")
 
 

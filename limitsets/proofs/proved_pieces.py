@@ -26,17 +26,6 @@ from limitsets.proofs.parameters import ParameterBox
 from limitsets.thrower.side_box import gather_box
 from limitsets.thrower.throw_box import BOTH, NOTHING, throw_box
 
-__all__ = [
-    "Intervals",
-    "Pair",
-    "PieceImage",
-    "ProvedPiece",
-    "UnionImages",
-    "at_rest",
-    "proved_pieces_of",
-    "union_of",
-]
-
 Pair = tuple[float, float]
 Intervals = dict[int, list[Pair]]
 Array = NDArray[np.float64]

@@ -28,8 +28,6 @@ from limitsets.proofs.weakest_claim import weakest_of
 from limitsets.proofs.worst import worst_orbit
 from limitsets.scene import Scene, load
 
-__all__ = ["Outcome", "Query", "joined_claims", "unjoined"]
-
 # Cells per side to begin with, then borders over all that attracts, and pieces of a parameter where a cell is open to
 # both decisions; more cells to begin with where nothing attracts.
 BASE, FINE, PIECES = 512, (0, 4000, 16_000, 32_000), (8, 32, 128, 512)

@@ -13,8 +13,6 @@ from fractions import Fraction
 from math import isqrt
 from typing import Any
 
-__all__ = ["RationalInterval", "angle", "pi", "sine", "square_root"]
-
 BITS = 200
 
 

@@ -19,8 +19,6 @@ from limitsets.proofs.goals import State, hexed, rechecked
 from limitsets.scene import Scene
 from limitsets.scene.quantities import text_at
 
-__all__ = ["KINDS", "thrown_orbit", "write_refutation"]
-
 KINDS = ("cycle", "closed", "once")
 """Why an orbit refutes, where a certificate can say it."""
 

@@ -23,8 +23,6 @@ from limitsets.thrower.roll_box import rested_one_way
 from limitsets.thrower.side_box import gather_box, with_kappa
 from limitsets.thrower.throw_box import NOTHING, sure_throw_box, throw_box
 
-__all__ = ["replay"]
-
 
 @proof_kernel(entry=True)
 def _replay(lo_map: Any, hi_map: Any, kappa: Any, landing: Any, lo: Any, hi: Any, side: Any) -> int:

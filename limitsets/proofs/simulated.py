@@ -14,8 +14,6 @@ from limitsets.thrower.effects import EFFECTS
 from limitsets.thrower.effects.spread import Spread
 from limitsets.thrower.motion import FullThrow, without
 
-__all__ = ["joined", "scattered", "simulated"]
-
 REMEDY = "leave the others out of [effects] for a proof; orbits and limit sets by samples have them"
 
 # The scatter of the world and the noise of a proof, by their names.

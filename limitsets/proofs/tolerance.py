@@ -21,8 +21,6 @@ from limitsets.scene import Scene
 from limitsets.scene.quantities import find, text_at
 from limitsets.scene.units import exact_factor, parse, share_of_pi
 
-__all__ = ["SceneBox", "whole"]
-
 # Digits to which a bound that is no short decimal is written, outward.
 DIGITS = 25
 

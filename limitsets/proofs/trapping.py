@@ -12,8 +12,6 @@ import numpy as np
 from limitsets.cells import CellSet
 from limitsets.proofs.attraction import Attraction
 
-__all__ = ["trapping"]
-
 
 def _held(lo: float, hi: float, intervals: list[tuple[float, float]], end: float, arm: float) -> bool:
     """Whether [lo, hi] lies in the interior of one of the intervals, relative to x <= arm."""

@@ -32,8 +32,6 @@ from limitsets.proofs.intervals import Intervals
 from limitsets.proofs.parameters import ParameterBox, body_at, lengths_of
 from limitsets.scene import Scene
 
-__all__ = ["TwoThrows", "kinds_of_two_throws", "stays_below"]
-
 # Variables before the part's lengths: both angles, where the first throw lands beyond its place, kappa, surface height.
 FIRST, SECOND, LANDED, KAPPA, HEIGHT, LENGTHS = range(6)
 

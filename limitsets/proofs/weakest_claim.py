@@ -10,8 +10,6 @@ from typing import Any
 from limitsets.proofs.attraction import Attraction
 from limitsets.proofs.proof import Claim
 
-__all__ = ["weakest_of"]
-
 # For which starts a goal holds: the fewer the later.
 STARTS = ("every", "within", "almost-every", "from", "cells")
 

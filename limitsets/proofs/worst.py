@@ -24,8 +24,6 @@ from limitsets.proofs.goals.violating_orbits import (
     violation,
 )
 
-__all__ = ["worst_orbit"]
-
 # Places of the raster, values of kappa at a throw, throws back from the violation, throws of the orbit, states kept.
 PLACES, KAPPAS, BACK, LENGTH, KEPT = 120_000, 9, 4, 200_000, 4000
 

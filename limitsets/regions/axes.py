@@ -13,8 +13,6 @@ from limitsets.scene import Scene
 from limitsets.scene.quantities import NOISE_ONLY, find
 from limitsets.scene.units import parse
 
-__all__ = ["CellAxis", "evenly"]
-
 
 @dataclass(frozen=True)
 class CellAxis:

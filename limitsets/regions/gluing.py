@@ -15,8 +15,6 @@ from numpy.typing import NDArray
 
 from limitsets.regions.record import Record
 
-__all__ = ["neighbours", "regions"]
-
 Extents = Mapping[int, Sequence[tuple[float, float]]]
 
 

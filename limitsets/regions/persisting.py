@@ -25,8 +25,6 @@ from limitsets.proofs.goals.violating_orbits import MORE_THAN_ROUNDING, middle
 from limitsets.proofs.orbits import follow
 from limitsets.proofs.parameters import ParameterBox
 
-__all__ = ["Chain", "Violation", "violating_chain"]
-
 # Throws until an orbit of the middle scene has settled, and throws of it that are searched.
 SETTLING, SEARCHED = 2_000, 20_000
 

@@ -16,8 +16,6 @@ from limitsets.scene import Scene
 from limitsets.scene.quantities import find
 from limitsets.scene.units import exact_factor, parse
 
-__all__ = ["Pick", "largest_square", "roomiest"]
-
 # Halvings of a size; it is lessened by this share, against the rounding of its ends.
 HALVINGS, ROOM = 40, 1e-9
 

@@ -30,8 +30,6 @@ from limitsets.regions.persisting import Chain, Violation, violating_chain
 from limitsets.regions.visits import Visit, visit
 from limitsets.scene import Scene
 
-__all__ = ["CELLS", "Block", "Record", "certify_cell"]
-
 # Cells per side where nothing is known yet; more where nothing attracts with them.
 COARSE = (64, 256, 1024)
 

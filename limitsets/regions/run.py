@@ -21,8 +21,6 @@ from limitsets.scene import Scene, load
 from limitsets.scene.left_out import Model
 from limitsets.tables import Column, Table, Tabled
 
-__all__ = ["CODES", "Regions", "certified"]
-
 CODES = ("undecided", "proved", "refuted")
 """The codes of `Regions.code`, in order."""
 

@@ -7,8 +7,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Visit", "visit"]
-
 Mask = NDArray[np.bool_]
 Ends = NDArray[np.int32]
 

@@ -23,8 +23,6 @@ from limitsets.regions.record import Record
 from limitsets.scene import Scene
 from limitsets.scene.units import spelled_plainly
 
-__all__ = ["STARTS", "write"]
-
 STARTS = ("every", "almost-every", "from", "cells")
 """The codes of the array `starts`, in order."""
 

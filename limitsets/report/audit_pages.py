@@ -16,8 +16,6 @@ from limitsets.report.writing import laid
 if TYPE_CHECKING:
     from limitsets.auditing import Audit, Finding
 
-__all__ = ["HEADS", "audit_page", "lines_of", "summary", "write_audit"]
-
 HEADS = ("effect", "assumed", "on the limit set", "worst there", "on the whole arm")
 
 

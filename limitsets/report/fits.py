@@ -9,8 +9,6 @@ from limitsets.fitting.explaining import MOST_MISREAD
 if TYPE_CHECKING:
     from limitsets.fitting import Fit
 
-__all__ = ["lines_of"]
-
 
 def lines_of(found: Fit) -> list[str]:
     """Write the sentences, one a line."""

@@ -18,18 +18,6 @@ if TYPE_CHECKING:
     from limitsets.proofs import Proof
     from limitsets.scene import Scene
 
-__all__ = [
-    "after_undecided",
-    "after_unproved",
-    "goal_sentence",
-    "next_command",
-    "starts_words",
-    "verdict_of",
-    "verdict_words",
-    "void_of",
-    "without_margin",
-]
-
 # So many times as many cells are proposed where starts are undecided, up to the last.
 FINER, MOST_CELLS = 4, 1_000_000
 

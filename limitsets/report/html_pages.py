@@ -12,8 +12,6 @@ from limitsets.report.pages import environment
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["as_html", "as_uri"]
-
 
 def as_uri(figure: Figure) -> str:
     """Write a figure as SVG into a `data:` address."""

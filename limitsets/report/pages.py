@@ -23,8 +23,6 @@ if TYPE_CHECKING:
 
     from limitsets.analysis import Analysis
 
-__all__ = ["environment", "page", "words"]
-
 # Blocks of these signs keep their lines: headings, tables, lists, commands.
 LINES = ("#", "|", "* ", "    ")
 

@@ -16,8 +16,6 @@ if TYPE_CHECKING:
 
     from limitsets.robust.sheet.summary import Robustness
 
-__all__ = ["write_robustness"]
-
 
 def _drawn(found: Robustness) -> Iterator[tuple[str, Figure]]:
     """Draw what there is to draw."""

@@ -19,19 +19,6 @@ if TYPE_CHECKING:
     from limitsets.robust.noise.statistics import NoiseStatistics
     from limitsets.robust.sheet.summary import Robustness
 
-__all__ = [
-    "HEADS",
-    "READINGS",
-    "answer",
-    "deviation_of",
-    "lines_of",
-    "none_holds",
-    "robustness_page",
-    "shown",
-    "tightest",
-    "violated_of",
-]
-
 HEADS = ("quantity", "value", "deviates", "proved safe up to", "shown to fail from", "in % of the value")
 READINGS = {"fixed": "fixed, but unknown", "per-throw": "at every throw", "tolerance": "together"}
 

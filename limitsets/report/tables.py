@@ -6,8 +6,6 @@ from collections.abc import Iterable, Mapping, Sequence
 from itertools import pairwise
 from math import isfinite
 
-__all__ = ["bands", "count", "in_time", "intervals", "number", "percent", "table"]
-
 Extents = Mapping[int, Sequence[tuple[float, float]]]
 
 

@@ -26,8 +26,6 @@ if TYPE_CHECKING:
 
     from limitsets.analysis import Analysis
 
-__all__ = ["DPI", "FIGURES", "figure", "filled", "laid", "require_place", "write"]
-
 Progress = Callable[[str, int, int], None]
 
 DPI = 150

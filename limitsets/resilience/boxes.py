@@ -17,16 +17,6 @@ from limitsets.maps import codes
 from limitsets.resilience.colours import Colours
 from limitsets.resilience.orbits import labelled_lattice
 
-__all__ = [
-    "Boxes",
-    "counted_starts",
-    "entropy_of",
-    "largest_entropy",
-    "least_entropy",
-    "of_cells",
-    "of_starts",
-]
-
 Floats = NDArray[np.float64]
 
 # Fewest starts along each axis of a box: every second of them gives two.

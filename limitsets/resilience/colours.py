@@ -18,8 +18,6 @@ from limitsets.graph.components import reach
 from limitsets.maps import codes
 from limitsets.sets import Attractor, Basins, basins
 
-__all__ = ["MOST_UNDECIDED", "ROUNDING", "Colours", "best", "colours", "told"]
-
 # Bits of one sweep over the graph.
 BITS = 64
 

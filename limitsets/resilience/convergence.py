@@ -27,8 +27,6 @@ from limitsets.sets import Attractor
 from limitsets.sets.passing import longest_stays
 from limitsets.tables import Column, Table, Tabled, how_found
 
-__all__ = ["ConvergenceTimes", "Times", "convergence_times"]
-
 STARTS = 10_000
 
 

@@ -38,8 +38,6 @@ from limitsets.resilience.orbits import STEPS, leaves_by_the_border
 from limitsets.sets import Attractor
 from limitsets.tables import Column, Table, Tabled, how_found
 
-__all__ = ["BasinEntropy", "basin_entropy", "boundary_basin_entropy"]
-
 Floats = NDArray[np.float64]
 
 # Cells along each side of a box.

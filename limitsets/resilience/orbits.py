@@ -18,17 +18,6 @@ from limitsets.graph.target import Target
 from limitsets.maps import codes, images
 from limitsets.resilience.colours import Colours
 
-__all__ = [
-    "STEPS",
-    "follow",
-    "labelled_lattice",
-    "labelled_starts",
-    "leaves_by_the_border",
-    "random_cells",
-    "random_starts",
-    "starts_in",
-]
-
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 

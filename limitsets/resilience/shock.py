@@ -27,8 +27,6 @@ from limitsets.resilience.orbits import STEPS, follow
 from limitsets.sets import Attractor
 from limitsets.tables import Column, Table, Tabled, how_found
 
-__all__ = ["FatalShock", "minimal_fatal_shock"]
-
 # Without proofs the bracket is widened by so many cells at both ends.
 CELLS = 2
 

@@ -21,8 +21,6 @@ from limitsets.resilience.orbits import STEPS, follow, leaves_by_the_border, ran
 from limitsets.sets import Attractor
 from limitsets.tables import Column, Table, Tabled, how_found
 
-__all__ = ["BasinStability", "Share", "basin_stability"]
-
 # A sampled share lies in its interval with this probability.
 CONFIDENCE = 0.95
 

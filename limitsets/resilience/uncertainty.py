@@ -33,8 +33,6 @@ from limitsets.resilience.orbits import STEPS, follow, labelled_starts, leaves_b
 from limitsets.sets import Attractor
 from limitsets.tables import Column, Table, Tabled, how_found
 
-__all__ = ["UncertaintyExponent", "uncertainty_exponent"]
-
 # Distances in cells: two decades, cut off where there are fewer than four times as many cells along an axis.
 FARTHEST, DISTANCES, PARTS = 100, 13, 4
 

@@ -36,8 +36,6 @@ from limitsets.resilience.orbits import (
 from limitsets.sets import Attractor
 from limitsets.tables import Column, Table, Tabled
 
-__all__ = ["Wada", "wada"]
-
 # Starts per cell and axis at the four refinements; the first is one start in each cell of a box.
 REFINEMENTS = (1, 2, 4, 8)
 

@@ -9,8 +9,8 @@ from __future__ import annotations
 
 from limitsets.robust.brackets.absorption import absorption_brackets as absorption_brackets
 from limitsets.robust.brackets.result import AbsorptionBrackets as AbsorptionBrackets
-from limitsets.robust.margins.finding import Margin as Margin
 from limitsets.robust.margins.finding import margin as margin
+from limitsets.robust.margins.margin_result import Margin as Margin
 from limitsets.robust.noise.absorbing import absorption as absorption
 from limitsets.robust.noise.communicating_classes import classes as classes
 from limitsets.robust.noise.laws import Gaussian as Gaussian

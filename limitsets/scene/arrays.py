@@ -29,8 +29,6 @@ from limitsets.scene.units import convert, fits, parse
 if TYPE_CHECKING:
     from limitsets.thrower import Throw
 
-__all__ = ["ThrowStack", "repeated", "throw_stack"]
-
 Array = npt.NDArray[np.float64]
 
 

@@ -19,8 +19,6 @@ from limitsets.scene.validation import Tree, plain, validate
 if TYPE_CHECKING:
     from limitsets.scene.schema import SceneTable
 
-__all__ = ["resolved"]
-
 
 def resolved(structure: object, file: str | None) -> dict[str, Any]:
     """Check a structure and resolve it: the fields of its `Scene`, by name.

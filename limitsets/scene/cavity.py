@@ -13,8 +13,6 @@ if TYPE_CHECKING:
     from limitsets.goals import Goal
     from limitsets.scene.schema import CavityTable
 
-__all__ = ["Cavity", "resolve_cavity"]
-
 # A ramp may be longer than its cavity by this share: its sizes are decimals, and what fits exactly is rounded.
 ROUNDED = 1e-6
 

@@ -20,8 +20,6 @@ from limitsets.scene.starting import example_at
 from limitsets.scene.units import convert, parse
 from limitsets.scene.validation import Tree, plain, refusals, respelled
 
-__all__ = ["examined"]
-
 # Without these there is no scene; all other tables can be left out to look at the rest.
 NEEDED = ("name", "part", "arm", "throw")
 

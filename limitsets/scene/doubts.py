@@ -11,8 +11,6 @@ from limitsets.scene.quantities import find
 from limitsets.scene.scene import Scene, turns
 from limitsets.scene.units import convert, density_dimension, exact_factor, parse
 
-__all__ = ["Doubt", "doubts"]
-
 # A speed in deg/s for rad/s turns a part by 1/3000 of what is usual, one in rpm for deg/s 36 times as far.
 LEAST_TURNS, MOST_TURNS = 0.005, 4
 USUAL_TURNS = (0.05, 1)

@@ -7,18 +7,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-__all__ = [
-    "FACTS",
-    "NOT_TIPPING",
-    "TIPPING",
-    "WITHOUT_EDGE",
-    "Deviation",
-    "Effects",
-    "Fact",
-    "Scatter",
-    "World",
-]
-
 TIPPING = ("landing", "roll")
 """Effects by which a part that comes down on a side on which it cannot rest goes on to the next."""
 

@@ -29,8 +29,6 @@ from limitsets.scene.numbers import Numbers
 from limitsets.scene.quantities import find, text_at
 from limitsets.scene.resolve import LEAST, Resolver
 
-__all__ = ["Body", "Floats", "hull_of"]
-
 # Quantities that may be 0 or below; of the others so small a number is refused that its square is none.
 SIGNED = ("part.vertices", "part.mass.center", "arm.surface_height", "gravity.tilt")
 SIGNED_POINT = (".x", ".y")

@@ -18,8 +18,6 @@ from limitsets.scene.units import exact_factor, parse
 if TYPE_CHECKING:
     from limitsets.scene.scene import Scene
 
-__all__ = ["LaidLike", "laid_goal", "laid_goals", "read_laid"]
-
 LaidLike = Mapping[int, Sequence[tuple[float | str, float | str]]]
 """By side the ranges of x: pairs of numbers in the scene's unit, or of texts with a unit."""
 

@@ -14,28 +14,6 @@ from pydantic_core import PydanticCustomError
 from limitsets.errors import SceneError
 from limitsets.scene.units import density_dimension, parse
 
-__all__ = [
-    "Acceleration",
-    "Angle",
-    "AngularSpeed",
-    "Density",
-    "Deviation",
-    "Flag",
-    "Flight",
-    "Flip",
-    "Length",
-    "Mass",
-    "Name",
-    "Pair",
-    "SideNumber",
-    "Tips",
-    "Yes",
-    "number",
-    "quantity",
-    "says",
-    "word",
-]
-
 
 def _refusal(thing: str, allowed: str, remedy: str) -> PydanticCustomError:
     return PydanticCustomError("refused", "{thing}", {"thing": thing, "allowed": allowed, "remedy": remedy})

@@ -13,8 +13,6 @@ from limitsets.scene.facts import FACTS
 if TYPE_CHECKING:
     from limitsets.scene.scene import Scene
 
-__all__ = ["WITHOUT_SCATTER", "Model"]
-
 WITHOUT_SCATTER = "of the scene without its scatter"
 """Said of what holds where all throws are alike, in a scene that scatters its throws."""
 

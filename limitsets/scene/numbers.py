@@ -16,8 +16,6 @@ from limitsets.geometry.polygon import Scalar, Vector
 from limitsets.scene.quantities import STANDARD_GRAVITY
 from limitsets.scene.units import density_dimension
 
-__all__ = ["Numbers", "Shape"]
-
 
 class Shape(NamedTuple):
     """A part.

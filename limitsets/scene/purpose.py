@@ -13,8 +13,6 @@ from limitsets.scene.resolve import Resolver
 if TYPE_CHECKING:
     from limitsets.scene.schema import EffectsTable, GoalTable, WorldTable
 
-__all__ = ["resolve_effects", "resolve_goal", "resolve_world"]
-
 
 def resolve_goal(table: GoalTable, rests: list[bool], arm_length: float, resolver: Resolver) -> Goal:
     """Resolve ``[goal]`` for a part that rests on these of its sides."""

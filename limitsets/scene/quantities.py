@@ -15,23 +15,6 @@ from limitsets.scene.facts import Deviation
 from limitsets.scene.units import Quantity, convert, parse, written
 from limitsets.scene.validation import Tree
 
-__all__ = [
-    "NAMES",
-    "NOISE_ONLY",
-    "STANDARD_GRAVITY",
-    "Place",
-    "base_unit",
-    "deviation",
-    "find",
-    "in_units",
-    "parsed_deviation",
-    "replaced",
-    "require",
-    "text_at",
-    "texts",
-    "unit_read",
-]
-
 NAMES: dict[str, str] = {
     "throw.speed": "angular speed",
     "throw.kappa": "length",

@@ -14,8 +14,6 @@ from limitsets.errors import SceneError, TipsError, shown
 from limitsets.scene.facts import TIPPING
 from limitsets.scene.scene import Scene
 
-__all__ = ["can_name", "load", "load_to_analyse", "scenes", "structure_of"]
-
 _MOST_BYTES = 1 << 20
 _MOST_DOTS = 16
 # what may hold a point without being a dotted key; the order is that of TOML's own lexer

@@ -10,8 +10,6 @@ from limitsets.errors import GeometryError, SceneError, shown
 from limitsets.scene.quantities import base_unit
 from limitsets.scene.units import convert, parse
 
-__all__ = ["LEAST", "Resolver"]
-
 LEAST = 1e-12
 """Least size of what has to be above 0, in the scene's units."""
 

@@ -27,8 +27,6 @@ if TYPE_CHECKING:
     from limitsets.thrower import Throw
     from limitsets.thrower.motion import FullThrow
 
-__all__ = ["MOST_TURNS", "Scene", "require_rests", "resting_places", "turns"]
-
 # below this share of the way from a_i to the arm's end the number of throws needed to get away is unbounded
 _NEAREST = 1e-6
 

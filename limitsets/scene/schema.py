@@ -36,8 +36,6 @@ from limitsets.scene.leaves import (
     word,
 )
 
-__all__ = ["SceneTable", "Table", "scene_table"]
-
 
 class Table(BaseModel):
     """A table of a scene: no key but those named, no value converted."""

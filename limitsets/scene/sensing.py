@@ -19,16 +19,6 @@ if TYPE_CHECKING:
     from limitsets.cells import Grid
     from limitsets.scene.schema import FeedbackTable, SensorTable
 
-__all__ = [
-    "BeyondSensor",
-    "ChosenThrow",
-    "Feedback",
-    "Sensor",
-    "SideSensor",
-    "exact_text",
-    "resolve_feedback",
-]
-
 Mask = NDArray[np.bool_]
 
 

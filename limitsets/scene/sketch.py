@@ -18,8 +18,6 @@ from limitsets.scene.reading import structure_of
 from limitsets.scene.units import UNITS, convert, parse
 from limitsets.scene.validation import plain
 
-__all__ = ["Sketch", "sketch"]
-
 
 class Sketch(NamedTuple):
     """A part as it is written, whether or not it can be one.

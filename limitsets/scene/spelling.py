@@ -8,8 +8,6 @@ from limitsets.scene.quantities import base_unit, find, text_at
 from limitsets.scene.scene import Scene
 from limitsets.scene.units import exact_factor, parse, written
 
-__all__ = ["in_unit_of", "in_units_of", "unit_of"]
-
 # Of what a scene does not write itself.
 USUAL = {"angular speed": "deg/s", "angle": "deg"}
 

@@ -18,8 +18,6 @@ if TYPE_CHECKING:
 
     from limitsets.scene.schema import Table
 
-__all__ = ["example_at", "new_scene", "starting_text"]
-
 # The scene that it is, as it stands, under another name.
 LIKE = "paper-designed"
 

@@ -18,8 +18,6 @@ if TYPE_CHECKING:
     from limitsets.goals import Goal
     from limitsets.scene.schema import TrayTable
 
-__all__ = ["Tray", "heights_over_sides", "resolve_tray"]
-
 
 @dataclass(frozen=True)
 class Tray:

@@ -15,19 +15,6 @@ from typing import Any, NamedTuple
 
 from limitsets.errors import LONGEST, SceneError, shown
 
-__all__ = [
-    "UNITS",
-    "Quantity",
-    "convert",
-    "density_dimension",
-    "exact_factor",
-    "fits",
-    "parse",
-    "share_of_pi",
-    "spelled_plainly",
-    "written",
-]
-
 UNITS: dict[str, tuple[str, ...]] = {
     "length": ("m", "cm", "mm", "in", "ft", "um"),
     "angle": ("deg", "rad"),

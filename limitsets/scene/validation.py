@@ -14,8 +14,6 @@ from limitsets.scene.units import UNITS
 if TYPE_CHECKING:
     from limitsets.scene.schema import SceneTable, Table
 
-__all__ = ["Tree", "plain", "refusals", "respelled", "validate"]
-
 Tree: TypeAlias = dict[str, Any]
 """A scene as TOML holds it: tables, lists, text, switches and numbers."""
 

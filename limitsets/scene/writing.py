@@ -11,8 +11,6 @@ from limitsets.errors import SceneError
 from limitsets.files import replaced
 from limitsets.scene.scene import Scene
 
-__all__ = ["dump", "replace_file"]
-
 _WIDTH = 100
 # tables with a heading of their own below the first level; all others are written in one line
 _HEADED = {"part.mass"}

@@ -17,8 +17,6 @@ from limitsets.maps.kernels import scattered
 from limitsets.maps.lyapunov import lyapunov, orbit_with_exponent
 from limitsets.tables import Column, Table, Tabled, facts, how_found
 
-__all__ = ["Attractor", "attractors"]
-
 # Steps thrown away before anything is counted.
 TRANSIENT = 1000
 

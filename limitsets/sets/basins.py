@@ -18,8 +18,6 @@ from limitsets.sets.attractors import Attractor
 from limitsets.sets.passing import passing
 from limitsets.tables import Column, Table, Tabled, how_found
 
-__all__ = ["Basins", "basins"]
-
 # A recurrent set of more cells is hardly one unstable cycle.
 MOST_OF_A_CYCLE = 64
 

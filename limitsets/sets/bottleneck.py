@@ -15,8 +15,6 @@ from limitsets.maps.drivers import displacements, images
 from limitsets.maps.forced import along
 from limitsets.sets.unions import Union
 
-__all__ = ["in_bottleneck"]
-
 
 def in_bottleneck(params: Any, union: Union, tolerance: float, scale: float) -> bool:
     """Tell whether a step moves some end, by no more than the tolerance, and no fixed point is that near."""

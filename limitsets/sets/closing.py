@@ -25,8 +25,6 @@ from limitsets.maps.drivers import images
 from limitsets.sets.cycle import NEAR, Array, Cycle, Ints
 from limitsets.sets.unions import EPS
 
-__all__ = ["Closed", "Slopes", "closed", "corrected", "distinct"]
-
 # Rounding of a step in units of the last place; the largest correction, and the largest uncertainty of a point that is
 # believed, relative to the extent of x.
 ROUNDING, FARTHEST, VAGUE = 64.0, 1e-6, 1e-4

@@ -12,8 +12,6 @@ from numpy.typing import NDArray
 from limitsets.errors import AnswerError
 from limitsets.tables import Column, Table, Tabled
 
-__all__ = ["NEAR", "Array", "Cycle", "Cycles", "Ints", "require_period"]
-
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 

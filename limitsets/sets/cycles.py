@@ -15,8 +15,6 @@ from limitsets.sets.cycle import Array, Cycle, Cycles, Ints
 from limitsets.sets.line_cycles import cycles_of
 from limitsets.sets.plane_cycles import cycles_from
 
-__all__ = ["cycles"]
-
 MOST_STARTS = 20_000
 
 

@@ -20,8 +20,6 @@ from limitsets.maps.forced import along
 from limitsets.maps.pieces import monotone_pieces
 from limitsets.sets.unions import Extents
 
-__all__ = ["topological_entropy"]
-
 # Images after which a diagram is cut off, and nodes at most.
 MOST_IMAGES, MOST_NODES = 2000, 20_000
 # Parts of a node that are shorter are rounding, a share of the largest side; ends that agree so well are one.

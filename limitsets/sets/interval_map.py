@@ -18,8 +18,6 @@ from limitsets.maps.forced import along
 from limitsets.maps.pieces import monotone_pieces
 from limitsets.sets.unions import BORDER, EPS, Track, TrackedInterval, Union, cut, merged
 
-__all__ = ["IntervalMap"]
-
 
 def _critical_error(params: Any, side: int, x: float, extent: float) -> float:
     """How well a bisected change of branch is known: the noise of the margin over its slope, seen on nearby floats.

@@ -23,8 +23,6 @@ from limitsets.maps.pieces import monotone_pieces
 from limitsets.sets.cycle import NEAR, Array, Ints
 from limitsets.sets.unions import EPS, Extents
 
-__all__ = ["Alphabet", "Words", "alphabet_of", "grown", "letters_alone", "solved"]
-
 
 @dataclass(frozen=True)
 class Alphabet:

@@ -29,8 +29,6 @@ from limitsets.sets.interval_map import IntervalMap
 from limitsets.sets.unions import Extents, Track, Union, read, same
 from limitsets.tables import Column, Table, Tabled, bands_of
 
-__all__ = ["End", "LimitSet", "Origin", "ends_of", "limit_set", "limit_set_of"]
-
 # Near a_i of the throw an orbit takes some 1200 throws to get away from 1e-9 of the arm; beyond this the map is no
 # longer expanding there and a set that still moves is said to move.
 MOST_ITERATIONS = 20_000
@@ -40,7 +38,8 @@ class HasExtents(Protocol):
     """An answer that knows its intervals per side, such as an attractor or a set of cells."""
 
     @property
-    def extents(self) -> Extents: ...
+    def extents(self) -> Extents:
+        """Intervals by side."""
 
 
 class Origin(NamedTuple):

@@ -19,8 +19,6 @@ from limitsets.sets.cycle import NEAR, Array, Cycles, Ints, require_period
 from limitsets.sets.itineraries import Alphabet, Words, alphabet_of, grown, letters_alone, solved
 from limitsets.sets.unions import EPS, Extents
 
-__all__ = ["cycles_of"]
-
 # Samples of G(x) - x per word; between two of them of one sign an extremum towards zero is followed.
 SAMPLES = 17
 MOST_WORDS = 400_000

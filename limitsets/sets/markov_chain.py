@@ -17,8 +17,6 @@ from limitsets.cells import Grid
 from limitsets.graph import TransitionGraph
 from limitsets.maps import along, has_slope, images, monotone_pieces
 
-__all__ = ["UlamMatrix", "sample_points", "ulam_matrix"]
-
 # Points per cell and axis, by dimension.
 SAMPLES = {1: 64, 2: 4, 3: 3}
 

@@ -19,8 +19,6 @@ from limitsets.cells import CellSet
 from limitsets.graph import TransitionGraph
 from limitsets.sets.markov_chain import ulam_matrix
 
-__all__ = ["Measure", "invariant_measures"]
-
 MOST_STEPS = 100_000
 
 

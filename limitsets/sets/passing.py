@@ -19,8 +19,6 @@ from limitsets.graph.images.hulls import BOTH, NOTHING, BoxImages
 from limitsets.jit import kernel
 from limitsets.maps import images
 
-__all__ = ["longest_stays", "passing"]
-
 # Parts of a cell along an axis, step by step: few sets need the finest ones.  A step ends the search that would take
 # more fine cells than this.
 PARTS, MOST_CELLS = (2, 4, 16, 64), 100_000

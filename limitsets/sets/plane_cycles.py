@@ -19,8 +19,6 @@ from limitsets.maps.kernels import image_on
 from limitsets.sets.closing import Closed, closed, distinct
 from limitsets.sets.cycle import NEAR, Array, Cycles, Ints, require_period
 
-__all__ = ["cycles_from"]
-
 NEWTON_STEPS = 60
 # Relative to the extent of x: after a Newton step this small the next one, at all points, ends the search.
 ARRIVED = 1e-7

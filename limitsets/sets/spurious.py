@@ -9,8 +9,6 @@ import numpy as np
 from limitsets.cells import CellSet
 from limitsets.graph import TransitionGraph, transitions
 
-__all__ = ["spurious"]
-
 # Refinements are tried from coarse to fine, and only up to this many cells in all.
 MOST_CELLS = 4_000_000
 

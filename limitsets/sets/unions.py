@@ -15,8 +15,6 @@ import numpy as np
 from limitsets.errors import AnswerError
 from limitsets.maps.critical import Sides
 
-__all__ = ["BORDER", "EPS", "Extents", "Track", "TrackedInterval", "Union", "cut", "merged", "read", "same"]
-
 Extents = Mapping[int, Iterable[tuple[float, float]]]
 
 EPS = float(np.finfo(np.float64).eps)

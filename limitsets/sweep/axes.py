@@ -14,8 +14,6 @@ import numpy.typing as npt
 
 from limitsets.errors import LimitsetsError
 
-__all__ = ["Axis", "axis_of"]
-
 _BARE = re.compile(r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]{1,3})?")
 _MOST = 10_000_000
 ALLOWED = 'NAME=LO:HI:COUNT, like throw.speed=120:180:1000 or "throw.speed=120 deg/s:180 deg/s:1000"'

@@ -18,8 +18,6 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-__all__ = ["FILLED", "STEP", "Refined", "refined"]
-
 # Of the coarse grid.
 STEP = 8
 FILLED = -1

@@ -20,8 +20,6 @@ from limitsets.sweep.tasks import Block
 from limitsets.topology import Topologies, topologies
 from limitsets.topology.records import DECIDED
 
-__all__ = ["ABOUT", "CODES", "NOT_CHECKED", "checks"]
-
 NOT_CHECKED, AGREES, DIFFERS, PROVED, CONTRADICTED = range(5)
 CODES = {
     "not_checked": NOT_CHECKED,

@@ -22,18 +22,6 @@ from limitsets.errors import AnswerError
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = [
-    "NOWHERE",
-    "UNDECIDED",
-    "AttractorKind",
-    "Entry",
-    "TopologyClass",
-    "classes",
-    "is_classified",
-    "legend",
-    "named_class",
-]
-
 # Numbers beside those of classes: undecided points, and points at which there is no scene or map.
 UNDECIDED, NOWHERE = 0, -1
 UNDECIDED_NAME = "undecided"

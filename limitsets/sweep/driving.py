@@ -17,8 +17,6 @@ if TYPE_CHECKING:
 
     from limitsets.sweep.executors import Given, Processes
 
-__all__ = ["Kept", "Progress", "Work", "drive"]
-
 Progress: TypeAlias = Callable[[str, int, int], None]
 
 # How often a chunk may kill the worker that computes it, alone.

@@ -8,8 +8,6 @@ from typing import Any
 from limitsets import maps
 from limitsets.scene import Scene
 
-__all__ = ["critical_points"]
-
 
 def critical_points(scene: Scene) -> dict[str, Any]:
     """Give the first critical point of each side, nan where there is none up to the arm's end.

@@ -20,8 +20,6 @@ from typing import Any
 from limitsets.errors import LimitsetsError
 from limitsets.sweep.store import imported
 
-__all__ = ["Given", "Here", "Processes", "chosen_pool", "on_cluster", "present_cores"]
-
 # Chunks that wait beside those that are computed: enough that no worker ever waits for the driver.
 _WAITING = 2
 

@@ -24,8 +24,6 @@ from limitsets.scene.facts import Deviation
 from limitsets.topology import Topologies, reaches, region_of
 from limitsets.topology.records import DECIDED
 
-__all__ = ["float_margins", "threshold_of", "unit_of_margin"]
-
 Floats: TypeAlias = NDArray[np.float64]
 Ints: TypeAlias = NDArray[np.int64]
 Values: TypeAlias = Mapping[str, Floats]

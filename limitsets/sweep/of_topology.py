@@ -26,8 +26,6 @@ from limitsets.topology import DOUBTS, Topologies, topologies
 from limitsets.topology.records import BANDS_JOIN, DECIDED, MOVING, NOT_ONE, STAYING, TOO_FINE, UNSURE_EXIT
 from limitsets.topology.work import MOST_ATTRACTORS
 
-__all__ = ["topology"]
-
 _CODES = {
     "decided": DECIDED,
     "too_fine": TOO_FINE,

@@ -39,8 +39,6 @@ if TYPE_CHECKING:
 
     from limitsets.regions import Regions
 
-__all__ = ["Atlas", "atlas"]
-
 TOPOLOGY = "limitsets.sweep.of_topology:topology"
 
 

@@ -20,8 +20,6 @@ from limitsets.sweep.axes import Axis
 from limitsets.sweep.subjects import Subject, source_of
 from limitsets.sweep.tasks import registered, resolved
 
-__all__ = ["Plan", "chunk_shape", "code_of", "differences", "digest_of", "require_same_code"]
-
 Region: TypeAlias = tuple[slice, ...]
 
 # Points of a chunk: a block task does 10 000 in about a second, a task of one scene at a time 64 in some ten.

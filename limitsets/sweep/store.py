@@ -31,8 +31,6 @@ if TYPE_CHECKING:
     from limitsets.sweep.tasks import Variable
     from limitsets.sweep.work import Answer
 
-__all__ = ["CHECKSUM", "SEAL", "Store", "imported"]
-
 CHECKSUM = "chunk_checksum"
 SEAL = "metadata_checksum"
 _REMEDY = "name another store, or remove this one"

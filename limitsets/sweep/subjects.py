@@ -23,8 +23,6 @@ from limitsets.scene.units import Quantity, convert, parse
 if TYPE_CHECKING:
     from limitsets.sweep.axes import Axis
 
-__all__ = ["MapSubject", "Points", "SceneSubject", "Subject", "source_of"]
-
 Array: TypeAlias = npt.NDArray[np.float64]
 
 # What people read these in, where the scene gives no unit for them.

@@ -17,8 +17,6 @@ import numpy.typing as npt
 from limitsets.errors import LimitsetsError
 from limitsets.sweep.subjects import Points
 
-__all__ = ["Block", "BlockTask", "Coded", "Variable", "block_task", "named", "registered", "resolved"]
-
 Task = TypeVar("Task", bound=Callable[..., Any])
 
 

@@ -14,8 +14,6 @@ from limitsets.files import as_json, as_plain, locked, replaced
 from limitsets.sweep.driving import Progress, Work, drive
 from limitsets.sweep.executors import chosen_pool
 
-__all__ = ["Row", "TrialFile", "complete"]
-
 Row = dict[str, Any]
 
 

@@ -16,8 +16,6 @@ from limitsets.sweep.boundaries import FILLED, refined
 from limitsets.sweep.plan import Plan, require_same_code
 from limitsets.sweep.tasks import Block, BlockTask, Coded, Variable, registered, resolved
 
-__all__ = ["STATUS", "Answer", "answer", "seed_of", "variables_of"]
-
 COMPUTED, IMPOSSIBLE, REFUSED = 0, 1, 2
 _OURS = ("status", "level")
 STATUS = Variable(

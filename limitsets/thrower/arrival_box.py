@@ -27,8 +27,6 @@ from limitsets.thrower.motion_box import (
 )
 from limitsets.thrower.turn_box import exact_turn, turn_box, turn_point
 
-__all__ = ["came_down", "landed"]
-
 # A proposed bracket reaches this far, relative to phi, beyond what Newton's method proposes, and then ever farther.
 SLACK = 2.0**-40
 STEPS, WIDENINGS = 12, 40

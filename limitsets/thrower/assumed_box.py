@@ -26,8 +26,6 @@ from limitsets.thrower.throw_box import NOTHING, sure_throw_box, throw_box
 from limitsets.thrower.turn import Turned
 from limitsets.thrower.turn_box import turn_box, turn_point
 
-__all__ = ["Assumed", "assumed", "corner_bounds"]
-
 
 class Assumed(IntEnum):
     """Columns of `assumed`."""

@@ -14,8 +14,6 @@ from limitsets.errors import MapError
 from limitsets.jit import cover_foreign_class
 from limitsets.thrower import motion, motion_box
 
-__all__ = ["EFFECTS", "Effect", "declare"]
-
 
 class Effect(NamedTuple):
     """What the rest of the package knows of an effect.

@@ -18,8 +18,6 @@ from limitsets.jit import generic, kernel
 from limitsets.thrower.params import Exact, Side, SmallAngle, SmallAngle2
 from limitsets.thrower.turn import Turned, rough_turn, turn, turn_back, turn_back_slightly
 
-__all__ = ["first_root", "impact_angle", "sure_impact_angle"]
-
 # Halley's method: the step before the last is small enough for `turn_back`, and a last step this small against phi
 # leaves an error of its cube, below half an ulp.
 SMALL = 2.0**-4

@@ -17,8 +17,6 @@ from limitsets.thrower.side_box import SideBox
 from limitsets.thrower.turn import Turned
 from limitsets.thrower.turn_box import exact_turn, turn_point
 
-__all__ = ["angle_slope", "bracket", "sure_bracket"]
-
 # The bracket of an impact reaches this far, relative to phi, beyond what Halley's method proposes: wide against the
 # rounding of f (some 2^-46 of its terms), narrow against the 1e-9 asked of end points.
 SLACK = 2.0**-43

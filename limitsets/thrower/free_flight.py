@@ -20,8 +20,6 @@ from limitsets.thrower.march import STILL, sure_step
 from limitsets.thrower.motion import Arrival, Contact, FullSide, above, right_of, side_number
 from limitsets.thrower.turn import Turned, turn
 
-__all__ = ["fly_on", "next_contact"]
-
 # Vertices that may be the lowest in turn before a flight is given up: no throw turns a part that far.
 MOST_RANGES = 10_000
 

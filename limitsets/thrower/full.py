@@ -40,8 +40,6 @@ from limitsets.thrower.params import Exact, Throw, gather
 from limitsets.thrower.throw import EXITS
 from limitsets.thrower.trace import details
 
-__all__ = ["MOST_EVENTS", "with_effects"]
-
 # Impacts of one throw at which it is given up, as outside the model: far more than the energy of any allows.
 MOST_EVENTS = 10_000
 

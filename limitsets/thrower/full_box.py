@@ -27,8 +27,6 @@ from limitsets.thrower.motion_box import (
 from limitsets.thrower.roll_box import rested
 from limitsets.thrower.throw_box import sure_throw_box, throw_box
 
-__all__ = ["full_fallback_box", "full_image_box", "full_ways", "gather_full_pair"]
-
 
 @proof_kernel
 def _none() -> Ways:

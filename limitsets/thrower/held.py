@@ -18,8 +18,6 @@ from limitsets.thrower.march import STILL, sure_step
 from limitsets.thrower.motion import LOST, OFF, ON, Contact, FullSide, above, right_of, side_number
 from limitsets.thrower.turn import turn
 
-__all__ = ["force", "gives_way", "holds_now", "lets_go"]
-
 # What the march along the way of a held vertex meets first.
 FACE, TURNS, SLIPS = range(3)
 

@@ -17,8 +17,6 @@ from limitsets.interval import Interval
 from limitsets.interval.number import square_root
 from limitsets.jit import proof_kernel
 
-__all__ = ["hinge_force", "peak"]
-
 # Slices of the way on which the friction is enclosed; at their borders it is attained.
 SLICES = 48
 

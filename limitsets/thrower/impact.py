@@ -20,9 +20,6 @@ from limitsets.interval.number import signed_square, where_positive, with_sign_o
 from limitsets.jit import formula, generic
 from limitsets.thrower.params import Energy, Exact, Signed, SmallAngle, SmallAngle2, per_inertia
 
-__all__ = ["jog_displacement", "margin", "pose", "strike", "swing"]
-
-
 # ---------------------------------------------------------------- impact
 
 

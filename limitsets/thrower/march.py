@@ -10,8 +10,6 @@ import math
 
 from limitsets.jit import kernel
 
-__all__ = ["STILL", "sure_step"]
-
 # Steps below this fraction of where the march has got to no longer move it.
 STILL = 2.0**-52
 

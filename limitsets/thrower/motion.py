@@ -20,33 +20,6 @@ from limitsets.jit import generic, kernel
 from limitsets.thrower.params import Side, Throw
 from limitsets.thrower.turn import Turned
 
-__all__ = [
-    "DOWN",
-    "LOST",
-    "OFF",
-    "ON",
-    "Arrival",
-    "Contact",
-    "Face",
-    "FullSide",
-    "FullThrow",
-    "Outline",
-    "above",
-    "at_kappa",
-    "impacted",
-    "moved",
-    "on_to_next",
-    "outline_of",
-    "possible",
-    "right_of",
-    "side_number",
-    "stays",
-    "thrown",
-    "tips",
-    "varied",
-    "without",
-]
-
 # What a vertex on the arm comes to: it stays there, a side comes down, it lets go, or the model does not say.
 ON, DOWN, OFF, LOST = range(4)
 

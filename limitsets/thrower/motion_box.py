@@ -20,27 +20,6 @@ from limitsets.thrower.motion import FullThrow
 from limitsets.thrower.params import Throw
 from limitsets.thrower.side_box import SideBox, gather_box, with_kappa
 
-__all__ = [
-    "NOTHING",
-    "ROOM",
-    "FullSideBox",
-    "Way",
-    "Ways",
-    "all_enclosed",
-    "box_of",
-    "corner_box",
-    "enclosed",
-    "encloses",
-    "gather_full_box",
-    "moved_box",
-    "no_way",
-    "put",
-    "thrown_box",
-    "tips_box",
-    "vertex_box",
-    "wait",
-]
-
 NOTHING = -1
 
 # Undecided continuations of one cell that may wait; where more are possible nothing is proved.

@@ -15,8 +15,6 @@ from numpy.typing import ArrayLike, NDArray
 from limitsets.errors import MapError
 from limitsets.jit import generic
 
-__all__ = ["Energy", "Exact", "Side", "Signed", "SmallAngle", "SmallAngle2", "Throw", "gather", "throw_map"]
-
 
 class Exact(NamedTuple):
     """Flight with the rotation kept exact.

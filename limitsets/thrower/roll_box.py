@@ -27,8 +27,6 @@ from limitsets.thrower.motion_box import (
     wait,
 )
 
-__all__ = ["rested", "rested_one_way"]
-
 # Strikes of one cell, in all its ways, after which it is given up.
 MOST_STRIKES = 512
 

@@ -9,8 +9,6 @@ from limitsets.interval.number import square_root
 from limitsets.jit import proof_kernel
 from limitsets.thrower.params import Throw
 
-__all__ = ["SideBox", "gather_box", "with_kappa"]
-
 
 class SideBox(NamedTuple):
     """What the box kernels of one side need, each an interval; names as in `params.Side`."""

@@ -21,8 +21,6 @@ from limitsets.jit import kernel
 from limitsets.thrower.motion import DOWN, LOST, OFF, ON, Contact, FullSide, side_number
 from limitsets.thrower.turn import turn
 
-__all__ = ["slide_on"]
-
 # psi, omega, slide, and how far the vertex has slid.
 State: TypeAlias = tuple[float, float, float, float]
 

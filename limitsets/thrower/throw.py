@@ -26,8 +26,6 @@ from limitsets.thrower.throw_box import (
 )
 from limitsets.thrower.turn import Turned
 
-__all__ = ["outcome"]
-
 EXITS = {"inward": codes.INWARD, "outward": codes.OUTWARD, "outside-model": codes.OUTSIDE_MODEL}
 
 gather_side = kernel(gather)

@@ -19,8 +19,6 @@ from limitsets.thrower.params import Throw
 from limitsets.thrower.side_box import SideBox, gather_box
 from limitsets.thrower.turn_box import turn_box, turn_point
 
-__all__ = ["gather_pair", "side_image_box", "slope_between", "sure_slope_box", "throw_box", "throw_image_box"]
-
 NOTHING, DECIDED, BOTH = -1, 1, 2
 
 

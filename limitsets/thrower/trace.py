@@ -19,8 +19,6 @@ from limitsets.thrower.motion import FullThrow
 from limitsets.thrower.params import Throw, gather
 from limitsets.thrower.throw import flip_margin, outcome, settle
 
-__all__ = ["Flight", "Trace", "details", "fly", "impact_angles", "trace"]
-
 _gather = kernel(gather)
 
 

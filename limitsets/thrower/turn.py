@@ -15,8 +15,6 @@ from typing import Any, NamedTuple
 
 from limitsets.jit import kernel
 
-__all__ = ["Turned", "rough_turn", "turn", "turn_back", "turn_back_slightly"]
-
 # (phi - sin phi)/phi^3 and (1 - cos phi)/phi^2 in powers of phi^2.  At phi = pi/4 the first term left out is
 # below 1e-17 of the sum.
 W0, W1, W2, W3, W4, W5, W6, W7 = ((-1) ** k / math.factorial(2 * k + 3) for k in range(8))

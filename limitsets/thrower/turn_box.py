@@ -16,8 +16,6 @@ from limitsets.interval import Interval
 from limitsets.jit import proof_kernel
 from limitsets.thrower.turn import V0, V1, V2, V3, V4, V5, V6, V7, W0, W1, W2, W3, W4, W5, W6, W7, Turned
 
-__all__ = ["BOUND", "exact_turn", "turn_box", "turn_point"]
-
 BOUND = 2.0**-45
 # Below the normal range errors are absolute.
 TINY = 2.0**-1040

@@ -13,26 +13,6 @@ from limitsets.maps.kernels import image_on, on_side
 from limitsets.topology.cells import cell_of
 from limitsets.topology.work import MOST_INTERVALS, Cells, Components, Pieces, Region, Unions
 
-__all__ = [
-    "ANY",
-    "COVERED",
-    "GAP",
-    "IMAGE",
-    "MOVES",
-    "NOTHING",
-    "PUSHED",
-    "SET",
-    "begin_union",
-    "cover_more",
-    "images_of",
-    "is_still",
-    "merge",
-    "push_through",
-    "put",
-    "settle",
-    "stays_around",
-]
-
 # Rows of `Unions`.
 SET, IMAGE, PUSHED, COVERED = 0, 1, 2, 3
 # Of the largest side: ends rest that move by less; a gap this small is rounding, and a part this short.

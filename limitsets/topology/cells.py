@@ -14,8 +14,6 @@ from limitsets.maps.drivers import fill_images
 from limitsets.maps.kernels import image_on, on_side
 from limitsets.topology.work import Cells, Pieces, Region
 
-__all__ = ["COLLAPSES", "LEAVES", "cell_of", "fill_cells"]
-
 # Bits of the ways out: beyond the domain or out of the model; back to the joint.
 LEAVES, COLLAPSES = 1, 2
 # Edges this near to the end of a piece, as a share of a cell, are left out; so much of an image is rounding.

@@ -17,8 +17,6 @@ from limitsets.topology.bands import COVERED, PUSHED, SET, merge, put
 from limitsets.topology.orbits import CLOSES
 from limitsets.topology.work import Pieces, Unions
 
-__all__ = ["DOUBTFUL", "NO_CYCLE", "one_cycle"]
-
 # Throws before a cycle is sought, and further ones before it is sought once more; the longest that is found.
 SHORT, LONG, MOST_PERIOD = 1000, 8000, 512
 # Of the largest side: a return from which Newton's method begins, how far it may lead, and when it has come to rest;

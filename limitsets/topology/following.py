@@ -21,8 +21,6 @@ from limitsets.topology.pieces import find_pieces
 from limitsets.topology.records import Topologies
 from limitsets.topology.work import MOST_INTERVALS, Pieces, Region, Unions, Work, work_for
 
-__all__ = ["reaches"]
-
 Floats = NDArray[np.float64]
 
 # Share of a hull that is left off at either end: its ends are images of the rest.

@@ -12,8 +12,6 @@ from limitsets.maps.drivers import step
 from limitsets.topology.bands import ANY, COVERED, GAP, IMAGE, PUSHED, SET, cover_more, images_of, merge, put
 from limitsets.topology.work import Pieces, Unions
 
-__all__ = ["fills"]
-
 # Of the length of the set: half the interval that is followed, and its length from which its images are joined.
 SEED, LONG = 1e-5, 1e-2
 # Throws before the interval is placed; images that are taken; ends that differ by less are one [of the largest side].

@@ -12,8 +12,6 @@ from limitsets.topology.bands import SET
 from limitsets.topology.cells import cell_of
 from limitsets.topology.work import Cells, Components, Starts, Unions
 
-__all__ = ["CLOSES", "INNER", "STRETCHES", "averages", "mean_of", "remaining", "visits_all"]
-
 # Throws of the orbits from cells that recur though they are left, and those between two looks at where they are.
 THROWS, LOOKED = 160, 8
 # Throws until every band has to be visited.

@@ -14,8 +14,6 @@ from limitsets.maps import codes
 from limitsets.maps.kernels import decision, fallback, image, image_on, margin
 from limitsets.topology.work import MOST_PIECES, Pieces, Region, Samples
 
-__all__ = ["branch_at", "find_pieces"]
-
 # Steps of a search for a change or for the bottom of a dip, and how close its ends come, as a share of the side.
 MOST_STEPS, CLOSE = 100, 1e-15
 # A dip is followed where a parabola through three samples comes below this share of the lowest.

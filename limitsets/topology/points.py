@@ -35,8 +35,6 @@ from limitsets.topology.records import (
 from limitsets.topology.recurrence import find_components, shares
 from limitsets.topology.work import MOST_ATTRACTORS, Region, Work, work_for
 
-__all__ = ["region_of", "topologies"]
-
 # Cells and samples a side: from coarse to fine; no edge of some is one of others, for cycles may lie on them.
 LEVELS = ((240, 40), (701, 112), (2803, 448), (16_381, 1536))
 # Bands whose gap is below this are one or two: not decided [of the largest side].

@@ -9,19 +9,6 @@ from numpy.typing import NDArray
 
 from limitsets.topology.work import MOST_ATTRACTORS
 
-__all__ = [
-    "BANDS_JOIN",
-    "DECIDED",
-    "DOUBTS",
-    "MOVING",
-    "NOT_ONE",
-    "STAYING",
-    "TOO_FINE",
-    "UNSURE_EXIT",
-    "Topologies",
-    "empty",
-]
-
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 

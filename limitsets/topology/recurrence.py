@@ -14,8 +14,6 @@ from limitsets.jit import kernel
 from limitsets.topology.cells import COLLAPSES, LEAVES
 from limitsets.topology.work import MOST_ATTRACTORS, Cells, Components, Region
 
-__all__ = ["FIRST", "find_components", "shares"]
-
 # Bit of the first attractor in `Components.ends`; the ways out have those below.
 FIRST = 4
 # Sweeps over a component that orbits leave, until the shares of its cells move by less.

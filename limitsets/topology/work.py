@@ -8,21 +8,6 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = [
-    "MOST_ATTRACTORS",
-    "MOST_INTERVALS",
-    "MOST_PIECES",
-    "Cells",
-    "Components",
-    "Pieces",
-    "Region",
-    "Samples",
-    "Starts",
-    "Unions",
-    "Work",
-    "work_for",
-]
-
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 

@@ -17,8 +17,6 @@ from numpy.typing import NDArray
 from limitsets.files import as_table
 from limitsets.trays.counting import Counts
 
-__all__ = ["Chain", "Filled", "chain_of", "filled"]
-
 Array = NDArray[np.float64]
 
 # Passes after which nothing changes any more: 2 to this power.

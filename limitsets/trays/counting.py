@@ -17,8 +17,6 @@ from limitsets.files import as_table
 from limitsets.robust.noise.proportions import binomial_interval
 from limitsets.trays.passing import Passes, random_of
 
-__all__ = ["Counts", "Progress", "count"]
-
 Progress = Callable[[str, int, int], None]
 
 # Trials of one task, and the streams of random numbers: a part that comes by; from here on kicks, by state.

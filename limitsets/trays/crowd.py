@@ -14,8 +14,6 @@ from limitsets.robust.noise.proportions import binomial_interval
 from limitsets.sweep.trial_file import Row
 from limitsets.trays.pouring import Pouring
 
-__all__ = ["TrayCrowd", "crowds_of"]
-
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 

@@ -20,8 +20,6 @@ from limitsets.tables import Column, Table, Tabled
 from limitsets.trays.counting import Progress
 from limitsets.trays.filling import TrayFill, tray
 
-__all__ = ["TrayDesign", "tray_design"]
-
 Array = NDArray[np.float64]
 
 

@@ -23,8 +23,6 @@ from limitsets.trays.histories import Histories, histories
 from limitsets.trays.passing import Passes, passes_of, random_of
 from limitsets.trays.pouring import Pouring, made
 
-__all__ = ["TrayFill", "tray"]
-
 # The stream of random numbers of the intervals.
 INTERVALS = 10_000
 

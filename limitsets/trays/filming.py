@@ -12,8 +12,6 @@ from limitsets.errors import AnswerError
 from limitsets.scene import Scene
 from limitsets.trays.passing import passes_of, random_of
 
-__all__ = ["filmed"]
-
 # The stream of random numbers, frames per unit of time, and pitches to either side that are shown.
 STREAM, FRAMES, SHOWN = 10_003, 25.0, 1.0
 

@@ -17,8 +17,6 @@ from limitsets.robust.noise.proportions import binomial_interval
 from limitsets.trays.counting import Progress, spread_over
 from limitsets.trays.passing import Passes, random_of
 
-__all__ = ["Histories", "histories"]
-
 # The streams of random numbers, beyond those of kicks: 2 + n states at most.
 FRESH, RETURNING = 10_001, 10_002
 # So many past misses are told apart.

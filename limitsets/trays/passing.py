@@ -17,8 +17,6 @@ from limitsets.scene.tray import heights_over_sides
 if TYPE_CHECKING:
     from limitsets.scene import Scene, Tray
 
-__all__ = ["Passes", "passes_of", "random_of"]
-
 
 def random_of(seed: int, *number: int) -> np.random.Generator:
     """Give the random numbers of one trial: the same whatever else is drawn, where and in which order."""

@@ -23,8 +23,6 @@ from limitsets.trays.passing import Passes, random_of
 if TYPE_CHECKING:
     from limitsets.engine.recording import Recording
 
-__all__ = ["CROWD", "Pouring", "made"]
-
 # The stream of random numbers, beside those of `histories` and `filming`.
 CROWD = 10_004
 # Parts that the engine holds ready for each depression beside those that come by; so many never lie in one.

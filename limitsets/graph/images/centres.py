@@ -9,8 +9,6 @@ import numpy as np
 from limitsets.cells import Grid
 from limitsets.graph.images.samples import SamplePoints
 
-__all__ = ["centres"]
-
 
 def centres(grid: Grid, side: int, **_: Any) -> SamplePoints:
     """One point per cell: the middle."""

@@ -16,8 +16,6 @@ from limitsets.cells import Grid
 from limitsets.errors import AnswerError
 from limitsets.graph.images.samples import SamplePoints
 
-__all__ = ["corners", "corners_padded", "end_points"]
-
 
 def corners(grid: Grid, side: int, **_: Any) -> SamplePoints:
     """Two, four or eight corners per cell."""

@@ -23,8 +23,6 @@ from limitsets.graph.target import Target
 from limitsets.interval import guard
 from limitsets.maps import kind_of
 
-__all__ = ["Enclosures", "boxes_of", "enclosed", "enclosures"]
-
 Floats: TypeAlias = NDArray[np.float64]
 
 # Cells done at a time: few enough for the processor's cache, and for memory that is used again.

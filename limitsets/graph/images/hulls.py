@@ -15,8 +15,6 @@ from numpy.typing import NDArray
 from limitsets.jit import proof_kernel, take_mark
 from limitsets.maps.kernels import fallback_box, image_box, on_side_box, pick, put
 
-__all__ = ["BOTH", "DECIDED", "NOTHING", "BoxImages", "Columns", "Hulls"]
-
 Floats: TypeAlias = NDArray[np.float64]
 Columns: TypeAlias = tuple[Floats, ...]
 

@@ -10,8 +10,6 @@ from limitsets.cells import Grid
 from limitsets.errors import AnswerError
 from limitsets.graph.images.samples import SamplePoints
 
-__all__ = ["random"]
-
 
 def random(grid: Grid, side: int, *, samples: int = 16, seed: int = 0, **_: Any) -> SamplePoints:
     """Draw `samples` uniform points per cell, from a seeded generator, so that a graph can be built again."""

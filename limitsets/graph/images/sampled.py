@@ -22,8 +22,6 @@ from limitsets.maps import codes, images
 from limitsets.maps.drivers import judged
 from limitsets.maps.kernels import fallback, image, on_side, pick, put
 
-__all__ = ["sampled"]
-
 DECIDED, EMPTY, MIXED = 1, 0, 2
 
 

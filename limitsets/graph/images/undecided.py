@@ -25,8 +25,6 @@ from limitsets.maps import codes, images, images_on, kind_of
 from limitsets.maps.drivers import step
 from limitsets.maps.kernels import on_side
 
-__all__ = ["every_branch", "mark_bends", "split"]
-
 # Pieces that one cell may be cut into, at first and at last: more than six are rare, more than the last an error.
 FEW_PIECES, MOST_PIECES = 6, 1536
 

@@ -14,8 +14,6 @@ from limitsets.thrower.impact import margin, strike
 from limitsets.thrower.params import FLIGHTS, FLIPS
 from limitsets.thrower.turn import Turned
 
-__all__ = ["DecidingNumber", "SideNumbers", "decided"]
-
 # Newton steps on an angle that is right to rounding but for the kernel's last bits.
 STEPS = 3
 # Below this angle phi - sin phi is summed from its series.

@@ -23,8 +23,6 @@ from limitsets.maps.critical import CriticalPoint
 from limitsets.scene import Scene, load
 from limitsets.thrower import impact_angles
 
-__all__ = ["CriticalJacobian", "critical_jacobian", "is_share", "require_minimal"]
-
 Array = npt.NDArray[np.float64]
 
 # Newton steps from the number that a bisection of the kernels found.

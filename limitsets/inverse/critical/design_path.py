@@ -11,8 +11,6 @@ from limitsets.scene import Scene
 from limitsets.sets.attractors import attractors
 from limitsets.sets.limit_set import limit_set
 
-__all__ = ["limit_sets_along"]
-
 Extents = dict[int, list[tuple[float, float]]]
 
 # As many cells per side as an analysis takes.

@@ -25,8 +25,6 @@ from limitsets.scene.spelling import in_unit_of, in_units_of, unit_of
 from limitsets.scene.units import convert, parse
 from limitsets.tables import Column, Table, Tabled
 
-__all__ = ["Design", "design"]
-
 Progress = Callable[[str, int, int], None]
 
 # Standard deviations of other starts by turns, in the solver's numbers: shares, or sizes of the part.

@@ -16,8 +16,6 @@ from limitsets.maps import critical_points
 from limitsets.maps.critical import CriticalPoint, margins
 from limitsets.scene import Scene
 
-__all__ = ["first_points", "nearest_miss"]
-
 SAMPLES = 2048
 # Samples below a critical point where the decision is nearly drawn.
 BELOW = 512

@@ -14,8 +14,6 @@ import numpy.typing as npt
 from limitsets.inverse.critical.solving import REACHED
 from limitsets.inverse.critical.trials import Trial, TrialLog
 
-__all__ = ["nearest_to_start", "nearest_to_targets"]
-
 Array = npt.NDArray[np.float64]
 
 MOST = 60

@@ -16,8 +16,6 @@ from limitsets.scene.numbers import Numbers
 from limitsets.scene.quantities import base_unit
 from limitsets.scene.units import convert, parse
 
-__all__ = ["Seeded", "numbers_of", "present", "with_present"]
-
 SPEED, KAPPA = "throw.speed", "throw.kappa"
 
 

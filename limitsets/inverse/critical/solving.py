@@ -13,8 +13,6 @@ import numpy.typing as npt
 
 from limitsets.inverse.critical.trials import Trial, TrialLog
 
-__all__ = ["REACHED", "Solution", "continued", "restarted", "solved", "staged"]
-
 Array = npt.NDArray[np.float64]
 
 REACHED = 1e-9

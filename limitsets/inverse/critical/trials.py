@@ -14,8 +14,6 @@ from limitsets.inverse.critical.seeded import with_present
 from limitsets.inverse.critical.unknowns import Unknowns
 from limitsets.scene import Scene
 
-__all__ = ["Trial", "TrialLog"]
-
 Array = npt.NDArray[np.float64]
 Progress = Callable[[str, int, int], None]
 

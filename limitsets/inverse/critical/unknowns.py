@@ -21,8 +21,6 @@ from limitsets.inverse.critical.seeded import present
 from limitsets.scene import Scene
 from limitsets.scene.quantities import find, in_units
 
-__all__ = ["Unknowns", "unknowns_of"]
-
 Array = npt.NDArray[np.float64]
 # No search goes farther than by this factor's logarithm.
 FARTHEST = 20.0

@@ -10,8 +10,6 @@ from limitsets.errors import AnswerError
 from limitsets.scene import Scene
 from limitsets.scene.quantities import find
 
-__all__ = ["Ends", "bounds_of", "of_the_arm"]
-
 Ends = tuple[float | None, float | None]
 """Lowest and highest [scene's units]; None for the usual one."""
 

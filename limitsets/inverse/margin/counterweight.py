@@ -20,8 +20,6 @@ from limitsets.geometry import plate_with_points, side_ends
 from limitsets.geometry.polygon import above_side
 from limitsets.scene import Scene
 
-__all__ = ["Counterweight", "counterweight_for", "counterweight_of"]
-
 
 class Counterweight(NamedTuple):
     """A point mass on a uniform plate.

@@ -20,8 +20,6 @@ from limitsets.scene.left_out import Model
 from limitsets.scene.spelling import in_unit_of, unit_of
 from limitsets.tables import Column, Table, Tabled, joined
 
-__all__ = ["RobustDesign", "both", "save"]
-
 
 @dataclass(frozen=True, eq=False)
 class RobustDesign(Tabled):

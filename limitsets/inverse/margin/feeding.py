@@ -10,8 +10,6 @@ from limitsets.maps import advance
 from limitsets.maps.contract import kind_of
 from limitsets.scene import Scene
 
-__all__ = ["ThrowsToFeed", "throws_to_feed"]
-
 # Starts, and throws after which one that is not fed is given up.
 STARTS, MOST = 2000, 2000
 # Starts keep this share of the way from a_i to X away from a_i, where the number of throws has no bound.

@@ -34,8 +34,6 @@ from limitsets.scene.scene import require_rests
 from limitsets.scene.spelling import in_unit_of, in_units_of, unit_of
 from limitsets.tables import Column, Table, Tabled
 
-__all__ = ["GoalDesign", "design_for_goal"]
-
 EARLY = "let another side get beyond X"
 SHORT = "do not reach X on the wanted side"
 

@@ -39,8 +39,6 @@ from limitsets.scene.laid import LaidLike, read_laid
 from limitsets.scene.scene import require_rests
 from limitsets.scene.spelling import in_units_of
 
-__all__ = ["TOLERANCE", "NoDesignError", "fed_at", "robust_design"]
-
 TOLERANCE = {
     "throw.speed": "1 %",
     "part.sides": "1 %",

@@ -13,8 +13,6 @@ from limitsets.inverse.margin.feeding import ThrowsToFeed, throws_to_feed
 from limitsets.inverse.margin.search import Candidate, DesignSearch
 from limitsets.robust.margins.estimate import on_all_corners
 
-__all__ = ["Option", "best_of", "front_of", "unbeaten"]
-
 # Candidates whose throws are counted: the surest of each class of margins, and classes.
 CLASSES, PER_CLASS = 30, 6
 # Designs that are looked at on all corners, seconds each.

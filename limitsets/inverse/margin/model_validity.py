@@ -15,8 +15,6 @@ from limitsets.robust.margins.invariant_set import InvariantIntervals
 from limitsets.scene import Scene
 from limitsets.thrower.assumed_box import assumed
 
-__all__ = ["validity_slack"]
-
 # The left vertex lands first, the throw does not tip the part over, and the vertex that lands presses on the arm.
 NAMED = {("landing", "angle"), ("release", "tipping"), ("slip", "press")}
 ASKED = [about for about in ASSUMPTIONS if (about.effect, about.what) in NAMED]

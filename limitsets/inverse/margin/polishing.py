@@ -17,8 +17,6 @@ from limitsets.robust.margins.estimate import FINE, FINELY, Estimate, estimated,
 from limitsets.robust.margins.vector import Signs
 from limitsets.scene import Scene
 
-__all__ = ["polished"]
-
 # Edges of the simplex at its starts, in shares of the bounds.
 EDGES = (0.02, 0.007, 0.0025)
 

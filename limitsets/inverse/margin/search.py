@@ -24,8 +24,6 @@ from limitsets.robust.margins.invariant_set import least_slack
 from limitsets.robust.margins.vector import Signs, Tolerance
 from limitsets.scene import Scene
 
-__all__ = ["Candidate", "DesignSearch", "said"]
-
 # Designs in the population, generations between two looks at all corners, and corners kept as hard.
 POPULATION, GENERATIONS, MOST_HARD = 24, 4, 24
 # A lead weight is at most this share of the part: the rest is the plate.

@@ -12,8 +12,6 @@ from limitsets.maps.contract import register
 from limitsets.maps.textbook.domains import DOMAINS
 from limitsets.maps.textbook.slots import Line, line_of_two
 
-__all__ = ["Circle"]
-
 
 class Circle(NamedTuple):
     """x' = x + omega - coupling / (2 pi) sin(2 pi x) mod 1 on the circle [0, 1); x = 1 is read as 0.

@@ -13,8 +13,6 @@ from limitsets.maps.contract import register
 from limitsets.maps.textbook.domains import DOMAINS
 from limitsets.maps.textbook.slots import Line, line
 
-__all__ = ["Cubic"]
-
 
 class Cubic(NamedTuple):
     """u' = r u - u^3, with three monotone branches that meet at the turning points +-sqrt(r/3).

@@ -9,8 +9,6 @@ from typing import Any
 
 from limitsets.errors import MapError
 
-__all__ = ["DOMAINS", "domain_of"]
-
 DOMAINS: dict[type, tuple[tuple[float, float], ...]] = {}
 """Class of a map -> one pair (lo, hi) per coordinate; each map's file adds its own."""
 

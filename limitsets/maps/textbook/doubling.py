@@ -11,8 +11,6 @@ from limitsets.maps.contract import register
 from limitsets.maps.textbook.domains import DOMAINS
 from limitsets.maps.textbook.slots import Line, line_of_two
 
-__all__ = ["Doubling"]
-
 
 class Doubling(NamedTuple):
     """x' = factor x mod 1 on the circle [0, 1); x = 1 is read as the end of the upper branch.

@@ -12,8 +12,6 @@ import numpy as np
 
 from limitsets.jit import kernel
 
-__all__ = ["exponential"]
-
 # exp r = 1 + r + r^2 (E2 + E3 r + ...). The first term left out, r^14/14!, is below 5e-18.
 E2, E3, E4, E5, E6, E7, E8, E9, E10, E11, E12, E13 = (1 / math.factorial(k) for k in range(2, 14))
 PER_LN2 = 1.0 / math.log(2.0)

@@ -10,8 +10,6 @@ from limitsets.maps.contract import register
 from limitsets.maps.textbook.domains import DOMAINS
 from limitsets.maps.textbook.slots import Point
 
-__all__ = ["Henon"]
-
 
 class Henon(NamedTuple):
     """(x, y)' = (1 - a x^2 + y, b x).

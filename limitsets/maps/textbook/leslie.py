@@ -14,8 +14,6 @@ from limitsets.maps.textbook.domains import DOMAINS
 from limitsets.maps.textbook.exponential import exponential
 from limitsets.maps.textbook.slots import Plane, Point, plane, rectangle
 
-__all__ = ["Leslie"]
-
 
 class Leslie(NamedTuple):
     """(x, y)' = ((young x + old y) exp(-crowding (x + y)), survival x).

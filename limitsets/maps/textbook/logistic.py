@@ -12,8 +12,6 @@ from limitsets.maps.contract import register
 from limitsets.maps.textbook.domains import DOMAINS
 from limitsets.maps.textbook.slots import Line, line
 
-__all__ = ["Logistic"]
-
 
 class Logistic(NamedTuple):
     """x' = r x (1 - x), with a monotone branch on either side of 1/2.

@@ -11,8 +11,6 @@ from limitsets.maps.contract import register
 from limitsets.maps.textbook.domains import DOMAINS
 from limitsets.maps.textbook.slots import Line, line_of_two
 
-__all__ = ["Rotation"]
-
 
 class Rotation(NamedTuple):
     """x' = x + angle mod 1 on the circle [0, 1); x = 1 is read as 0, so that cells may end there.

@@ -12,16 +12,6 @@ from limitsets.interval import Interval
 from limitsets.jit import proof_kernel
 from limitsets.maps.derived import NO_WITNESS
 
-__all__ = [
-    "Line",
-    "Plane",
-    "Point",
-    "line",
-    "line_of_two",
-    "plane",
-    "rectangle",
-]
-
 Point: TypeAlias = tuple[float, float]
 Pair: TypeAlias = tuple[Interval, Interval]
 

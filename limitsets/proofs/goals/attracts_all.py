@@ -15,9 +15,6 @@ from limitsets.proofs.goals.violating_orbits import State
 from limitsets.proofs.goals.violating_starts import start_that_leaves
 from limitsets.scene import Scene
 
-__all__ = ["KIND"]
-
-
 TWO_BASINS = (
     "starts nearer to the joint than the fixed point of the jog tend to the joint: there are two basins"
 )

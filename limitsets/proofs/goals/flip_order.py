@@ -20,8 +20,6 @@ from limitsets.proofs.goals.kind import Answer, Kind, against, begins, common, t
 from limitsets.proofs.goals.recurrent_orbits import Loop, cycle_that, meets
 from limitsets.scene import Scene
 
-__all__ = ["KIND"]
-
 AGAINST = "a flip leads from each side to the one that is next in number, and the last one's to side 0"
 
 

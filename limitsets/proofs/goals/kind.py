@@ -24,21 +24,6 @@ from limitsets.proofs.goals.recurrent_orbits import Refutation
 from limitsets.proofs.goals.violating_orbits import State
 from limitsets.scene import Scene
 
-__all__ = [
-    "Answer",
-    "Kind",
-    "above",
-    "against",
-    "begins",
-    "below",
-    "common",
-    "once",
-    "place_text",
-    "thrown_into",
-    "throws_to_reach",
-    "undecided",
-]
-
 Mask = NDArray[np.bool_]
 
 

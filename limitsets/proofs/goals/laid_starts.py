@@ -28,8 +28,6 @@ from limitsets.scene import Scene
 # Of whose starts so small a share is open, while others leave, finer cells are not asked.
 LITTLE = 1e-3
 
-__all__ = ["hexed", "laid_only", "narrowed", "prove_laid", "reached_from", "starts_in"]
-
 
 def starts_in(found: Attraction, laid: Laid) -> tuple[Mask, bool]:
     """Find the cells that meet the ranges, and whether the ranges lie in the cells as far as they lie on the arm."""

@@ -31,8 +31,6 @@ from limitsets.proofs.perron_frobenius import perron_frobenius_bound
 from limitsets.proofs.two_throws import stays_below
 from limitsets.scene import Scene
 
-__all__ = ["KIND", "section_of"]
-
 
 def _exceptions(found: Attraction, goal: OrientedBeyond) -> NDArray[np.bool_]:
     """Cells that lie, in part, beyond x on another side."""

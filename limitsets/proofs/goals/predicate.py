@@ -21,8 +21,6 @@ from limitsets.proofs.goals.violating_orbits import State
 from limitsets.proofs.goals.violating_starts import one_throw
 from limitsets.scene import Scene
 
-__all__ = ["KIND"]
-
 
 def _good(goal: Predicate, lo: NDArray[np.float64], hi: NDArray[np.float64], side: int) -> NDArray[np.bool_]:
     """Ask the caller, and refuse what is no answer."""

@@ -29,8 +29,6 @@ from limitsets.proofs.goals.violating_orbits import sample_passage
 from limitsets.proofs.perron_frobenius import perron_frobenius_bound
 from limitsets.scene import Scene
 
-__all__ = ["KIND", "falls_short", "not_null"]
-
 
 def _wanted(found: Attraction, goal: Reaches) -> Mask:
     """Cells on the side that lie at x or beyond."""

@@ -43,8 +43,6 @@ from limitsets.proofs.replay import replay
 from limitsets.scene import Scene
 from limitsets.sets import Cycle
 
-__all__ = ["Loop", "Refutation", "closed", "cycle_near", "cycle_that", "meets", "recurrent_violation"]
-
 # Places of a long orbit, and of a short one, from which it is followed back to them; throws until it has come back.
 TRIED, FEW, LONGEST = 48, 6, 80
 

@@ -11,8 +11,6 @@ from limitsets.proofs.goals.kind import Answer, Kind, common, once, undecided
 from limitsets.proofs.goals.violating_starts import start_that_leaves
 from limitsets.scene import Scene
 
-__all__ = ["KIND"]
-
 
 def _prove(found: Attraction, _: Scene, goal: StaysOnArm) -> Answer:
     missing = common(found, anywhere=goal.from_anywhere)

@@ -19,23 +19,6 @@ from limitsets.proofs.attraction import Attraction
 from limitsets.proofs.parameters import ParameterBox
 from limitsets.proofs.replay import replay
 
-__all__ = [
-    "Path",
-    "ReachedStates",
-    "State",
-    "ThrowChoice",
-    "Wrong",
-    "middle",
-    "on_limit_set",
-    "proved_wrong",
-    "replayed",
-    "sample_passage",
-    "throw_choices",
-    "throws",
-    "violating_path",
-    "violation",
-]
-
 Wrong: TypeAlias = Callable[[Any, Any], Any]
 """From places and sides to whether each violates the goal; of an enclosure, its lower end is asked."""
 

@@ -24,8 +24,6 @@ from limitsets.proofs.goals.violating_orbits import (
 )
 from limitsets.proofs.parameters import ParameterBox
 
-__all__ = ["one_throw", "start_that_leaves"]
-
 # Starts per side, throws, and orbits that are tried, in the search for one that leaves the arm.
 STARTS, UNTIL_GONE, TRIED = 256, 400, 8
 

@@ -30,8 +30,6 @@ from limitsets.robust.noise.scattering import Scattering, scattering_of
 if TYPE_CHECKING:
     from limitsets.scene import Scene
 
-__all__ = ["absorption_brackets", "mean_brackets", "within_brackets"]
-
 Array = NDArray[np.float64]
 
 CELLS, THROWS = 4000, 200

@@ -30,8 +30,6 @@ from numpy.typing import NDArray
 from limitsets.robust.brackets.nodes import Nodes
 from limitsets.robust.brackets.spans import Curvature, Gaps, Kinks, Running, Span, Swings, Windows, running
 
-__all__ = ["Average", "mean_matrix", "rounding_of"]
-
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 

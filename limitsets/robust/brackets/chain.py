@@ -20,8 +20,6 @@ from limitsets.robust.brackets.scatter_of_landing import landing_average
 from limitsets.robust.brackets.throws import throw_average
 from limitsets.robust.noise.scattering import Scattering
 
-__all__ = ["EXITS", "Chain", "chain_of"]
-
 Array = NDArray[np.float64]
 Place = tuple[int, float, float]
 

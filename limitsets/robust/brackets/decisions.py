@@ -23,8 +23,6 @@ from limitsets.proofs.intervals import Intervals
 from limitsets.proofs.mean_value import Jet
 from limitsets.robust.brackets.landings import OneSide, landed, slopes
 
-__all__ = ["Decided", "Piece", "crossings", "decided", "hull", "margin"]
-
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 Flags = NDArray[np.bool_]

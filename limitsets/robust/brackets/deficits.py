@@ -18,8 +18,6 @@ from limitsets.robust.brackets.landings import Derivatives, OneSide, landed, slo
 from limitsets.robust.brackets.nodes import Nodes
 from limitsets.robust.brackets.spans import Bends, Curvature, Gaps, Kinks, Span, Swings, Windows
 
-__all__ = ["Deficits", "Rows"]
-
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 Flags = NDArray[np.bool_]

@@ -24,8 +24,6 @@ from limitsets.errors import AnswerError
 from limitsets.proofs.rational import RationalInterval, pi, square_root
 from limitsets.robust.noise.laws import Gaussian, Uniform
 
-__all__ = ["Staircase", "staircase"]
-
 Array = NDArray[np.float64]
 
 # Standard deviations up to which a normal law is cut into strata.

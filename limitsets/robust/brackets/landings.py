@@ -20,8 +20,6 @@ from limitsets.proofs.intervals import Intervals
 from limitsets.robust.brackets.moments import ERROR, moments
 from limitsets.thrower import Exact, SmallAngle2
 
-__all__ = ["Derivatives", "Landed", "OneSide", "kappa_of", "landed", "one_side", "slopes"]
-
 Array = NDArray[np.float64]
 
 NEWTON = 12

@@ -13,8 +13,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["ERROR", "Moments", "moments"]
-
 Array = NDArray[np.float64]
 
 # The first term left out is below 1e-22 for p <= 2 pi.

@@ -12,8 +12,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["CLOSE", "Nodes", "nodes_of"]
-
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 

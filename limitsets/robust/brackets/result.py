@@ -19,8 +19,6 @@ from limitsets.tables import Column, Table, Tabled
 if TYPE_CHECKING:
     from limitsets.scene import Scene
 
-__all__ = ["ANY", "AbsorptionBrackets"]
-
 Array = NDArray[np.float64]
 
 # Any absorbing set or exit.

@@ -10,8 +10,6 @@ from limitsets.robust.brackets.densities import Staircase
 from limitsets.robust.brackets.nodes import Nodes
 from limitsets.robust.brackets.spans import Bends, Curvature, Span, Swings
 
-__all__ = ["landing_average"]
-
 Array = NDArray[np.float64]
 
 # Above the relative error of one addition.

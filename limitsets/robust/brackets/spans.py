@@ -7,8 +7,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Bends", "Curvature", "Gaps", "Kinks", "Running", "Span", "Swings", "Windows", "running"]
-
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 

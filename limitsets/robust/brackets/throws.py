@@ -28,8 +28,6 @@ from limitsets.robust.brackets.landings import Derivatives, OneSide, landed, slo
 from limitsets.robust.brackets.nodes import Nodes
 from limitsets.robust.brackets.spans import Gaps, Span, Swings, Windows
 
-__all__ = ["throw_average"]
-
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 

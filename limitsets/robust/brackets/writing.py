@@ -25,8 +25,6 @@ from limitsets.robust.noise.scattering import Scattering
 from limitsets.scene import Scene
 from limitsets.scene.units import spelled_plainly
 
-__all__ = ["write"]
-
 # Strata of the speed for the checker: between their ends it takes landing places to be linear.
 STRATA = 32
 QUANTILES = ("50 %", "95 %", "99 %")

@@ -20,14 +20,13 @@ from limitsets.files import as_table, picked
 from limitsets.goals import Goal, OrientedBeyond, Reaches
 from limitsets.progress import shown_in_notebooks
 from limitsets.proofs.query import Query
-from limitsets.robust.margins.finding import Margin, goals_of, margin
+from limitsets.robust.margins.finding import goals_of, margin
 from limitsets.robust.margins.joint import joint_margin
+from limitsets.robust.margins.margin_result import Margin
 from limitsets.robust.margins.margin_texts import bound, bound_above
 from limitsets.scene import Scene, load
 from limitsets.scene.laid import LaidLike
 from limitsets.tables import Column, Table, Tabled
-
-__all__ = ["MarginsBeyond", "margins_beyond", "places_beyond"]
 
 Progress = Callable[[str, int, int], None]
 

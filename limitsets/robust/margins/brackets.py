@@ -19,8 +19,6 @@ from limitsets.robust.margins.deviations import DeviationScale, short
 from limitsets.robust.margins.halving import a_little_beyond, halved
 from limitsets.robust.margins.vector import Signs, Tolerance
 
-__all__ = ["Bracket", "Ray", "Tell", "bracket_fixed", "bracket_per_throw"]
-
 Tell = Callable[[float], None]
 """Called with the share of the bracket that is closed."""
 

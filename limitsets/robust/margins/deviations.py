@@ -20,17 +20,6 @@ from limitsets.scene.facts import Deviation
 from limitsets.scene.quantities import base_unit, find, parsed_deviation, text_at, texts
 from limitsets.scene.units import Quantity, exact_factor, parse
 
-__all__ = [
-    "READINGS",
-    "DeviationScale",
-    "decimal",
-    "deviation_scale",
-    "deviation_scales",
-    "given",
-    "nominal_of",
-    "short",
-]
-
 READINGS = ("fixed", "per-throw")
 """Fixed but unknown, or another one at every throw."""
 

@@ -22,8 +22,6 @@ from limitsets.robust.margins.invariant_set import InvariantIntervals, invariant
 from limitsets.robust.margins.vector import Signs, Tolerance, corners, worst_corner
 from limitsets.scene import Scene
 
-__all__ = ["Estimate", "estimated", "failing", "on_all_corners"]
-
 Array = NDArray[np.float64]
 
 # Steps towards the margin between two factors.

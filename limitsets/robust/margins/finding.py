@@ -26,8 +26,6 @@ from limitsets.scene import Scene, load
 from limitsets.scene.laid import LaidLike, laid_goal, read_laid
 from limitsets.scene.units import exact_factor
 
-__all__ = ["Margin", "goals_of", "margin"]
-
 Progress = Callable[[str, int, int], None]
 GoalLike = Goal | Callable[..., Any]
 

@@ -7,8 +7,6 @@ from fractions import Fraction
 
 from limitsets.robust.margins.deviations import short
 
-__all__ = ["a_little_beyond", "halved"]
-
 
 def halved(
     low: Fraction,

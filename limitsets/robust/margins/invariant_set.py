@@ -17,8 +17,6 @@ from limitsets.maps.critical import margins
 from limitsets.maps.forced import along
 from limitsets.thrower import Throw
 
-__all__ = ["InvariantIntervals", "invariant_intervals", "least_slack"]
-
 Array = NDArray[np.float64]
 
 # Throws of an orbit before it counts, and of those that count.

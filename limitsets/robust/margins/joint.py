@@ -20,8 +20,6 @@ from limitsets.robust.margins.subdivision import Subdivision
 from limitsets.robust.margins.vector import Tolerance
 from limitsets.scene import Scene
 
-__all__ = ["joint_margin"]
-
 # Seconds after which the proof of the box ends with what it has.
 SECONDS = 150.0
 

@@ -21,8 +21,6 @@ from limitsets.scene import Scene
 from limitsets.scene.left_out import Model
 from limitsets.tables import Column, Table, Tabled
 
-__all__ = ["Margin", "goal_table", "settled"]
-
 
 @dataclass(frozen=True, eq=False)
 class Margin(Tabled):

@@ -9,8 +9,6 @@ from limitsets.errors import LimitsetsError
 from limitsets.goals import Goal, OrientedBeyond
 from limitsets.proofs.query import Outcome
 
-__all__ = ["NOT_FOUND", "bound", "bound_above", "failing", "failure", "reach_of", "void_of"]
-
 NOT_FOUND = "it was not found"
 """How the reason begins where the search for a margin ends with an error."""
 

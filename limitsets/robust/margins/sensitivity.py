@@ -23,8 +23,6 @@ from limitsets.proofs.query import Query
 from limitsets.proofs.tolerance import SceneBox
 from limitsets.robust.margins.vector import Signs, Tolerance, worst_corner
 
-__all__ = ["Sensitivity", "sensitivity_of"]
-
 Array = NDArray[np.float64]
 
 # Throws of an orbit that is read, after so many that are not.

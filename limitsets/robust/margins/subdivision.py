@@ -21,8 +21,6 @@ from limitsets.robust.margins.halving import halved
 from limitsets.robust.margins.sensitivity import Sensitivity
 from limitsets.robust.margins.vector import Parts, Tolerance
 
-__all__ = ["Subdivision"]
-
 # Pieces after which the proof of the box ends with what it has.
 MOST_PIECES = 4000
 

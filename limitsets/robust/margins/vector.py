@@ -23,8 +23,6 @@ from limitsets.scene import Scene
 from limitsets.scene.facts import Deviation
 from limitsets.scene.quantities import deviation, parsed_deviation
 
-__all__ = ["Parts", "Signs", "Tolerance", "corners", "worst_corner"]
-
 Parts = tuple[Fraction, ...]
 Signs = tuple[int, ...]
 

@@ -19,8 +19,6 @@ from limitsets.robust.noise.boxcars import Array
 from limitsets.robust.noise.communicating_classes import graph_of, recurrent_classes
 from limitsets.robust.noise.ulam import SubOperator, Transfer
 
-__all__ = ["Absorption", "absorption"]
-
 RESIDUAL = 1e-12
 
 

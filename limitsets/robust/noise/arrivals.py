@@ -13,8 +13,6 @@ from limitsets.robust.noise.absorbing import Absorption
 from limitsets.robust.noise.boxcars import Array
 from limitsets.robust.noise.ulam import Transfer
 
-__all__ = ["Feeding", "cells_for_noise", "feeding", "random_starts", "with_border"]
-
 # Share of the starts that is still under way when counting ends.
 UNDER_WAY = 1e-9
 MOST_THROWS = 200_000

@@ -17,8 +17,6 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["BoxcarBlock", "BoxcarOperator", "Boxcars", "cells_met", "first_cells", "laid", "mass_rows"]
-
 Array = NDArray[np.float64]
 
 # Share of a cell that is the least width of a boxcar: the image of a fixed or a turning point may have none.

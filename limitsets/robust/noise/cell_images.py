@@ -20,8 +20,6 @@ from limitsets.robust.noise.boxcars import Boxcars
 from limitsets.robust.noise.interpolated_pieces import Pieces
 from limitsets.sets.markov_chain import sample_points
 
-__all__ = ["boxes_of_pieces", "rows_of_points", "uses_pieces"]
-
 Array = NDArray[np.float64]
 MapOf = Callable[[float], Any]
 

@@ -25,17 +25,6 @@ from limitsets.robust.noise.ulam import STRATA, Transfer, transfer
 if TYPE_CHECKING:
     from limitsets.scene import Scene
 
-__all__ = [
-    "ChainProblem",
-    "ChainSolution",
-    "LevelSensitivity",
-    "chain_problem_of",
-    "errors_of",
-    "slopes_of",
-    "solve",
-    "starts_from",
-]
-
 # Random starts begin this share of the arm beyond a_i: nearer to it the number of throws has no bound.
 BEYOND_FOOT = 0.05
 # Relative change of the noise for derivatives, and half of it.

@@ -22,8 +22,6 @@ from limitsets.maps import kind_of
 from limitsets.robust.noise.boxcars import Array, BoxcarOperator, cells_met
 from limitsets.robust.noise.ulam import SubOperator, Transfer
 
-__all__ = ["NoisyClass", "classes", "distribution", "graph_of", "recurrent_classes"]
-
 Cells = NDArray[np.int64]
 
 # Escapes per step from which a class is not worth a name.

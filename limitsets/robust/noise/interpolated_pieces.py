@@ -15,8 +15,6 @@ from numpy.typing import NDArray
 from limitsets.cells import Domain
 from limitsets.maps import monotone_pieces
 
-__all__ = ["BranchInterval", "InterpolatedPieces", "Pieces"]
-
 # Values of the parameter at which cuts are computed, and the error allowed at one more, as a share of the side.
 NODES = 7
 ALLOWED = 1e-7

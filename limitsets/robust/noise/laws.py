@@ -17,8 +17,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from limitsets.errors import MapError
 
-__all__ = ["Gaussian", "Given", "Law", "Samples", "Strata", "Uniform", "certain", "regrouped", "transformed"]
-
 # Standard deviations at which a Gaussian is cut off; beyond lies a probability of 2e-9.
 SIGMAS = 6.0
 # Probability that is cut off at each end of a user's distribution without bounds.

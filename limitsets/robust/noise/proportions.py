@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-__all__ = ["binomial_interval"]
-
 
 def binomial_interval(successes: int, trials: int, confidence: float = 0.95) -> tuple[float, float]:
     """Give the interval of Clopper and Pearson for the probability of success.

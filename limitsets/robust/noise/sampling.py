@@ -22,8 +22,6 @@ from limitsets.robust.noise.scattering import Scattering, still_map
 if TYPE_CHECKING:
     from limitsets.scene import Scene
 
-__all__ = ["ManyParts", "SampledStatistics", "require_seed", "scattering_map", "throw_many", "uniform_starts"]
-
 # Throws that are not counted: the part comes onto the limit set first.
 BEFORE = 400
 MOST_THROWS = 20_000

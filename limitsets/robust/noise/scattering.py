@@ -15,8 +15,6 @@ from limitsets.robust.noise.laws import Gaussian, Law, Strata, Uniform, certain,
 if TYPE_CHECKING:
     from limitsets.scene import Scene
 
-__all__ = ["LAWS", "Scattering", "kappa_strata", "scattering_of", "still_map", "thrown"]
-
 LAWS: dict[str, Any] = {"gaussian": Gaussian, "bounded": Uniform}
 """Words for laws: a deviation is the standard deviation of the one, the bound of the other."""
 

@@ -24,8 +24,6 @@ from limitsets.robust.noise.cell_images import boxes_of_pieces, rows_of_points
 from limitsets.robust.noise.interpolated_pieces import InterpolatedPieces
 from limitsets.robust.noise.laws import Strata
 
-__all__ = ["beyond", "from_pieces", "from_points", "landing_stage"]
-
 # Most cells that go on beyond an end of the domain.
 MOST_BEYOND = 2048
 

@@ -28,8 +28,6 @@ from limitsets.tables import Column, Table, Tabled, how_found
 if TYPE_CHECKING:
     from limitsets.scene import Scene
 
-__all__ = ["Levels", "NoiseStatistics", "noise_levels", "noise_statistics"]
-
 CELLS = 1024
 
 Progress = Callable[[str, int, int], None]

@@ -27,8 +27,6 @@ from limitsets.robust.noise.interpolated_pieces import InterpolatedPieces
 from limitsets.robust.noise.laws import Law, Strata, certain
 from limitsets.robust.noise.stages import beyond, from_pieces, from_points, landing_stage
 
-__all__ = ["STRATA", "SubOperator", "Transfer", "transfer"]
-
 STRATA = 24
 # Landing places are cut more finely, into boxcars about as narrow as cells, as long as there are no more than this.
 LANDING_STRATA, LANDING_BOXCARS = 128, 4_000_000
@@ -120,13 +118,6 @@ class Transfer:
         moved = self.throw.adjoint(masses)
         # Sums along the cells leave rounding errors of either sign where nothing lands.
         return np.maximum(moved if self.landing is None else self.landing.adjoint(moved), 0.0)
-
-    def linear_operator(self) -> Any:
-        """P as `scipy.sparse.linalg.LinearOperator`."""
-        from scipy.sparse.linalg import LinearOperator
-
-        shape = (self.n_cells, self.n_cells)
-        return LinearOperator(shape, matvec=self.apply, rmatvec=self.adjoint, dtype=np.float64)
 
 
 class SubOperator:

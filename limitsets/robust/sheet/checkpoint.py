@@ -15,12 +15,9 @@ from typing import Any
 from limitsets.errors import AnswerError
 from limitsets.files import as_json, code_digest, replaced
 from limitsets.goals import Goal, Predicate
-from limitsets.robust.margins.finding import Margin
-from limitsets.robust.margins.margin_result import goal_table, settled
+from limitsets.robust.margins.margin_result import Margin, goal_table, settled
 from limitsets.robust.sheet.entries import Entry
 from limitsets.scene import Scene
-
-__all__ = ["CERTIFICATES", "RECORD", "Checkpoint", "written"]
 
 RECORD, CERTIFICATES = "robustness.json", "certificates"
 

@@ -15,9 +15,7 @@ from limitsets.robust.margins.deviations import nominal_of
 from limitsets.scene.units import exact_factor
 
 if TYPE_CHECKING:
-    from limitsets.robust.margins.finding import Margin
-
-__all__ = ["Entry", "in_unit_of", "percent_of"]
+    from limitsets.robust.margins.margin_result import Margin
 
 REFUTED = ".refuted.zip"
 

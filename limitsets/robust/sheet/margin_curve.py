@@ -14,8 +14,6 @@ from limitsets.robust.margins.beyond import MarginsBeyond, margins_beyond, place
 from limitsets.scene import Scene
 from limitsets.scene.laid import LaidLike
 
-__all__ = ["curve", "curve_read"]
-
 # Places; how close their brackets are; most and least seconds for the proof of one joint margin, and seconds in all.
 PLACES, COARSE, EACH, LEAST, SECONDS = 7, 0.1, 15.0, 1.0, 20.0
 

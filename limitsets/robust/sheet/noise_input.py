@@ -11,8 +11,6 @@ from limitsets.robust.noise.scattering import LAWS, Scattering, scattering_of
 from limitsets.scene import Scene, load
 from limitsets.scene.quantities import deviation, find
 
-__all__ = ["noise_of", "scattering_from", "still"]
-
 FIELDS = {"throw.speed": "speed", "gravity.tilt": "tilt", "landing.x": "landing"}
 
 

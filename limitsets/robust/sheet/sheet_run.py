@@ -36,8 +36,6 @@ from limitsets.scene.left_out import WITHOUT_SCATTER
 if TYPE_CHECKING:
     from limitsets.auditing import Audit
 
-__all__ = ["robustness"]
-
 NO_TOLERANCE = (
     "the scene has no [tolerance]; give it one, a deviation for each quantity that deviates together with others: "
     '"throw.speed" = "1 %"'

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from limitsets.files import as_table, picked
 from limitsets.goals import Goal
 from limitsets.robust.margins.beyond import MarginsBeyond
-from limitsets.robust.margins.finding import Margin
+from limitsets.robust.margins.margin_result import Margin
 from limitsets.robust.margins.margin_texts import NOT_FOUND, void_of
 from limitsets.robust.noise.statistics import Levels, NoiseStatistics
 from limitsets.robust.sheet.entries import Entry
@@ -20,8 +20,6 @@ from limitsets.tables import Table, Tabled, joined
 
 if TYPE_CHECKING:
     from limitsets.auditing import Audit
-
-__all__ = ["PARTS", "Robustness"]
 
 PARTS = ("margins", "joint", "curve", "noise", "audit")
 """What an answer is put together from."""

@@ -14,8 +14,6 @@ from limitsets.sets.cycle import Cycle, Ints
 from limitsets.sets.unions import EPS
 from limitsets.sweep.continuation.path import Place
 
-__all__ = ["MOST_PERIOD", "Recorded", "attracting_cycles", "on_itinerary", "recorded"]
-
 MOST_PERIOD = 128
 # Of the extent: a return that may be one of a cycle; how far Newton's method may lead; cycles nearer are one.
 RETURN, FAR, ONE = 1e-4, 0.05, 1e-9

@@ -28,8 +28,6 @@ from limitsets.sweep.continuation.path import LEAVING, Border, Path, Place
 from limitsets.sweep.continuation.result import Collision
 from limitsets.sweep.continuation.snapshot import Found, Snapshot
 
-__all__ = ["Approach", "approaches", "crossing", "nearest"]
-
 # Of the extent: the window in which a critical point is looked for again; slopes and images that differ by less are
 # the same.
 WINDOW, SMOOTH = 0.01, 1e-6

@@ -11,8 +11,6 @@ from limitsets.sweep.continuation.result import LEAST, Event, State
 from limitsets.sweep.continuation.snapshot import Found, Snapshot, arrivals
 from limitsets.sweep.continuation.stepping import Follower, Met
 
-__all__ = ["events_of", "numbered"]
-
 
 def numbered(follower: Follower) -> list[list[int]]:
     """Give every attractor at every step its number."""

@@ -19,8 +19,6 @@ from limitsets.sweep.continuation.result import Continuation, State
 from limitsets.sweep.continuation.snapshot import Snapshot
 from limitsets.sweep.continuation.stepping import Follower
 
-__all__ = ["continuation"]
-
 Progress = Callable[[str, int, int], None]
 
 

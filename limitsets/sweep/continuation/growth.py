@@ -16,8 +16,6 @@ from limitsets.sets.cycle import Ints
 from limitsets.sets.interval_map import IntervalMap
 from limitsets.sets.unions import BORDER, Union, read, same
 
-__all__ = ["carried", "grown"]
-
 # Of the extent: half the length of the first pieces, the length at which their images are kept, what counts as none.
 SHORT, LONG, NONE = 1e-9, 1e-3, 1e-14
 MOST_STEPS, MOST_INTERVALS = 3000, 4000

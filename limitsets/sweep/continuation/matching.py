@@ -10,8 +10,6 @@ import numpy as np
 from limitsets.cells import CellSet
 from limitsets.sweep.continuation.snapshot import Found, Snapshot, arrivals
 
-__all__ = ["REACH", "Group", "Match", "distance", "matched"]
-
 # Of the extent of a side: sets this near overlap, and a set that moves by no more has only moved.
 REACH = 0.02
 

@@ -20,8 +20,6 @@ from limitsets.scene.quantities import in_units
 from limitsets.scene.spelling import in_unit_of, unit_of
 from limitsets.sets.interval_map import IntervalMap
 
-__all__ = ["LEAVING", "Border", "Curve", "Path", "Place", "between", "read_path"]
-
 Values: TypeAlias = Mapping[str, Any]
 Curve: TypeAlias = Mapping[str, tuple[Any, Any]] | Callable[[float], Any]
 

@@ -16,8 +16,6 @@ from limitsets.tables import Column, Table, Tabled
 if TYPE_CHECKING:
     pass
 
-__all__ = ["LEAST", "Collision", "Continuation", "Event", "State"]
-
 # Of the bands that a resolution shows.
 LEAST = "at least "
 

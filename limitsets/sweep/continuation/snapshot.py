@@ -28,8 +28,6 @@ from limitsets.sweep.continuation.attracting_cycles import (
 from limitsets.sweep.continuation.growth import carried, grown
 from limitsets.sweep.continuation.path import Place
 
-__all__ = ["Found", "Snapshot", "arrivals", "confirmed", "snapshot_at"]
-
 Intervals = dict[int, list[tuple[float, float]]]
 
 # Steps before an orbit is taken to be where it stays; starts per side beside those at critical points.

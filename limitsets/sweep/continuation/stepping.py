@@ -11,8 +11,6 @@ from limitsets.sweep.continuation.path import Path
 from limitsets.sweep.continuation.result import Collision
 from limitsets.sweep.continuation.snapshot import Snapshot, confirmed, snapshot_at
 
-__all__ = ["Follower", "Met"]
-
 # Width of the brackets, as a share of the path.
 BRACKET = 1e-9
 # The same where cells decide: two sizes of cells that agree on a place do not agree on the last digits of an event.

@@ -17,8 +17,6 @@ from limitsets.thrower.declared import Effect, declare
 from limitsets.thrower.effects.slip import compressed, dragged
 from limitsets.thrower.motion import Arrival, Contact, FullSide, above, impacted, right_of
 
-__all__ = ["Bounce", "struck"]
-
 
 class Bounce(NamedTuple):
     """Restitution of the normal impulse, and the height of the bounce below which it is none [length]."""

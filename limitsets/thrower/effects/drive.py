@@ -26,8 +26,6 @@ from limitsets.thrower.declared import Effect, declare
 from limitsets.thrower.motion import FullSide, at_kappa, possible, stays, thrown
 from limitsets.thrower.params import Throw
 
-__all__ = ["Drive", "all_the_way", "leant", "pulled"]
-
 
 class Drive(NamedTuple):
     """A stroke.

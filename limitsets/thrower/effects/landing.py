@@ -21,8 +21,6 @@ from limitsets.thrower.motion_box import enclosed, encloses
 from limitsets.thrower.throw import settle
 from limitsets.thrower.turn import Turned, turn
 
-__all__ = ["Landing", "first_arrival"]
-
 # Steps of the march below this fraction of phi no longer move it.
 STILL = 2.0**-52
 

@@ -36,8 +36,6 @@ from limitsets.thrower.motion import (
 )
 from limitsets.thrower.sliding import slide_on
 
-__all__ = ["Pivot", "turned_down"]
-
 # Times that a vertex may stop and slide again before a side is down.
 MOST_SLIDES = 1000
 

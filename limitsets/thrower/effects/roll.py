@@ -34,8 +34,6 @@ from limitsets.thrower.motion import (
 from limitsets.thrower.motion_box import enclosed, encloses
 from limitsets.thrower.turn import turn
 
-__all__ = ["Roll", "next_arrival"]
-
 # A part that slides and turns with less than this share of the energy that would lift it lies flat: what is left is
 # rocking without end, by which it moves less than its size times the share's root.
 FLAT = 1e-12

@@ -22,8 +22,6 @@ from limitsets.jit import kernel
 from limitsets.thrower.declared import Effect, declare
 from limitsets.thrower.motion import Arrival, Contact, Face, FullSide, above, moved, right_of, side_number
 
-__all__ = ["Slip", "compressed", "dragged"]
-
 
 class Slip(NamedTuple):
     """Friction of finite strength at an impact, and on the side the part comes to lie on."""

@@ -21,8 +21,6 @@ from limitsets.thrower.declared import Effect, declare
 from limitsets.thrower.motion import Face, FullSide, FullThrow, at_kappa, moved, varied
 from limitsets.thrower.motion_box import encloses, moved_box, thrown_box
 
-__all__ = ["Even", "Normal", "Spread"]
-
 
 class Even(NamedTuple):
     """Anywhere between the bounds, equally likely."""
