@@ -1,13 +1,33 @@
-"""`--certificate FILE`: an answer's certificate, checked before it gets its name."""
+"""Certificates as files of the commands: their names, and `--certificate FILE`, checked before it gets its name."""
 
 from __future__ import annotations
 
 import time
+from contextlib import suppress
+from json import loads
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
+from zipfile import BadZipFile, ZipFile
 
-from limitsets.cli.output import saved
+from limitsets.cli.output import saved, stem_of
+from limitsets.errors import LimitsetsError
 from limitsets.proposals import proposed
+
+if TYPE_CHECKING:
+    from limitsets.scene import Scene
+
+
+def own_file(scene: Scene) -> Path:
+    """Name a certificate after the scene's file; a certificate of another scene that has this name stays."""
+    file, name = Path(f"{stem_of(scene)}.proof.zip"), scene.name
+    with suppress(OSError, BadZipFile, ValueError, TypeError, LookupError), ZipFile(file) as other:
+        name = loads(other.read("header.json"))["boxes"][0]["scene"]["name"]
+    if name != scene.name:
+        raise LimitsetsError(
+            "the certificate", str(file), f"one of {scene.name}, or a new one",
+            f"it is one of {name}; name another with --out, or delete it",
+        )  # fmt: skip
+    return file
 
 
 def with_ending(file: Path) -> Path:

@@ -11,8 +11,8 @@ import typer
 
 from limitsets.cli.about import About
 from limitsets.cli.arguments import HELP_LAID, HELP_NO_RECHECK, deviations, laid_ranges
-from limitsets.cli.certificates import with_ending
-from limitsets.cli.output import Csv, Json, Scene, Words, answer, option, progress, saved, stem_of, table
+from limitsets.cli.certificates import own_file, with_ending
+from limitsets.cli.output import Csv, Json, Scene, Words, answer, option, progress, saved, table
 from limitsets.proposals import proposed
 
 if TYPE_CHECKING:
@@ -60,7 +60,7 @@ def certify(
         from limitsets.scene import load
 
         chosen = load(scene)
-        file = Path(f"{stem_of(chosen)}.proof.zip") if out is None else with_ending(out)
+        file = own_file(chosen) if out is None else with_ending(out)
         from limitsets.proofs import certify as run
         from limitsets.proofs.confirm import DeniedError
 

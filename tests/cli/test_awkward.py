@@ -103,6 +103,21 @@ def test_a_report_of_another_scene_is_not_replaced(capfd):
     assert "reports holds the report of paper-designed with other values: it is replaced" in err
 
 
+def test_a_certificate_of_another_scene_is_not_replaced(capfd):
+    """Two folders may hold files of one name, started from a third."""
+    for folder, scene in (("first", "paper-designed"), ("second", "paper-initial")):
+        Path(folder).mkdir()
+        Path(folder, "mine.toml").write_text(ls.dump(ls.load(scene)))
+    ask = ("certify", "--claim", "invariant", "--no-recheck")
+    assert run(capfd, *ask, "first/mine.toml")[0] == 0
+    kept = Path("mine.proof.zip").read_bytes()
+    status, _, err = run(capfd, *ask, "second/mine.toml")
+    assert status == 2
+    assert "it is one of paper-designed; name another with --out, or delete it" in err
+    assert Path("mine.proof.zip").read_bytes() == kept
+    assert run(capfd, *ask, "first/mine.toml")[0] == 0  # of this scene again
+
+
 def test_outputs_bear_the_name_of_the_file(capfd):
     """Two files may hold scenes of one name."""
     Path("mine.toml").write_text(ls.dump(ls.load("paper-designed")))
