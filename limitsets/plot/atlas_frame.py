@@ -24,8 +24,8 @@ def title_of(found: Atlas) -> str:
     return str(found.dataset.attrs.get("title", "")).removeprefix("atlas of ")
 
 
-# Hatch of points at which no part gets to the X of the goal.
-UNREACHED = "...."
+# Hatch of points at which no part gets to the X of the goal: another than those of the classes in `atlas_maps`.
+UNREACHED = "oo"
 
 
 def frame(found: Atlas, tall: float = 0.0) -> tuple[Figure, Axes]:

@@ -10,7 +10,8 @@ from matplotlib.colors import to_rgb
 import limitsets as ls
 from limitsets import maps
 from limitsets.errors import AnswerError
-from limitsets.plot.atlas_maps import look_of
+from limitsets.plot.atlas_frame import UNREACHED
+from limitsets.plot.atlas_maps import COLLAPSE_HATCH, DOUBT_HATCH, LEAVE_HATCH, look_of
 from limitsets.sweep.classes import UNDECIDED, legend
 
 X, Y = "throw.speed=130:180:24", "arm.surface_height=-1:0.2:16"
@@ -195,6 +196,12 @@ def test_where_no_line_is_the_legend_says_whether_the_goal_holds():
         found = ls.atlas("paper-designed", f"throw.speed={speeds}", variables=["threshold", "class"])
         texts = [text.get_text() for text in ls.plot.atlas(found).legends[0].get_texts()]
         assert f"the goal {word} wherever there is a limit set" in texts
+
+
+def test_each_hatch_says_one_thing():
+    """Dots meant "some starts collapse" and "no part gets to X" in one figure."""
+    marks = [set(hatch) for hatch in (LEAVE_HATCH, COLLAPSE_HATCH, DOUBT_HATCH, UNREACHED)]
+    assert sum(map(len, marks)) == len(set.union(*marks))
 
 
 def test_where_no_part_gets_to_x_it_is_said():
