@@ -12,10 +12,13 @@ BESIDE = "part.mass.center.along"
 
 def _of(name: str, **tables: Any) -> dict[str, Any]:
     tree = ls.load(name).as_dict()
-    return tree | {
+    joined = {
         key: (tree.get(key, {}) | value) if isinstance(value, dict) else value
         for key, value in tables.items()
     }
+    return (
+        tree | joined | {key: tables[key] for key in ("goal", "throw", "gravity") if key in tables}
+    )  # each says one thing
 
 
 def _goal(x: str, side: int, **more: Any) -> dict[str, Any]:
