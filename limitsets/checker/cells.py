@@ -53,7 +53,7 @@ def range_max(values: Array, first: Array, last: Array) -> Array:
     return out
 
 
-def check_structure(c: Cells, scene: Scene, least_rank: int) -> str:
+def check_structure(c: Cells, scene: Scene) -> str:
     """Check order of the edges, brackets, branches and targets, which every claim needs; "" or the reason."""
     n_sides = len(c.edges)
     for i, edges in enumerate(c.edges):
@@ -66,7 +66,7 @@ def check_structure(c: Cells, scene: Scene, least_rank: int) -> str:
         ((lo > 0) & (lo < hi) & (hi <= FULL_TURN), "the bracket of phi is not one"),
         ((c.branch >= 0) & (c.branch <= 2), "the branch is not 0, 1 or 2"),
         (c.component >= -1, "the component is below -1"),
-        (c.rank >= least_rank, f"the rank is below {least_rank}"),
+        (c.rank >= -1, "the rank is below -1"),
     ]
     for array, mine, target in ((c.jog, 0, c.side), (c.flip, 1, (c.side + 1) % n_sides)):
         first, last = array[:, 0], array[:, 1]

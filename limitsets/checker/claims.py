@@ -34,9 +34,7 @@ MORE_KEYS = {"refuted": "recurs start throws", "feeds": FEEDS_KEYS}  # further k
 Failed = tuple[list[str], str]  # the claims that fail, and the reason
 
 
-def read_claims(
-    value: object, n_sides: int, version: int
-) -> tuple[dict[str, dict[str, Any]], list[tuple[str, str, str]]]:
+def read_claims(value: object, n_sides: int) -> tuple[dict[str, dict[str, Any]], list[tuple[str, str, str]]]:
     """Read the claims that can be checked, name -> section, and those that cannot."""
     known: dict[str, dict[str, Any]] = {}
     unknown = []
@@ -52,7 +50,7 @@ def read_claims(
         else:
             require(name not in known, f"claim {name} is made twice")
             if name == "goal":
-                known[name] = read_goal_claim(section, n_sides, version)
+                known[name] = read_goal_claim(section, n_sides)
             else:
                 section = table(section, f"section of {name}", SECTIONS[name], MORE_KEYS.get(name, ""))
                 known[name] = read_section(name, section, n_sides)
@@ -100,8 +98,7 @@ def check_cell_claims(
 ) -> list[Failed]:
     """Check the claims about cells: first by integers, then decision, images and slope of the cells concerned."""
     goal, attracts = claims.get("goal"), claims.get("attracts-all")
-    first_version = goal is not None and goal["starts"] is None
-    bad = check_structure(c, scene, 0 if first_version else -1) or check_components(c)
+    bad = check_structure(c, scene) or check_components(c)
     if bad:
         return [(list(claims), bad)]
     failed: list[Failed] = []
@@ -110,12 +107,9 @@ def check_cell_claims(
         bad = check_goal(c, scene, goal)
         if bad:
             failed.append((["goal"], bad))
-        elif not is_laid(goal) and (
-            (first_version and goal["all"]) or (goal["anywhere"] and goal["kind"] != "attracts_all")
-        ):
-            wide.append("goal")
-        elif not first_version:
-            some.append("goal")
+        else:
+            everywhere = goal["anywhere"] and goal["kind"] != "attracts_all" and not is_laid(goal)
+            (wide if everywhere else some).append("goal")
     if attracts is not None:
         bad = check_attracts_all(c, scene, attracts)
         if bad:

@@ -59,7 +59,7 @@ def check_feeds(scene: Scene, c: Cells, box: int, feeds: dict[str, Any], crew: C
     """Check all parts of the claim; "" or the reason.  Shares and intervals of starts are kept for the report."""
     if scene.end is None:
         return "the scene has no cavity"
-    bad = check_structure(c, scene, -1)
+    bad = check_structure(c, scene)
     for i, edges in enumerate(c.edges):
         if not (bad or float(edges[0]) < scene.end < float(edges[-1])):
             bad = f"side {i}: the cells do not reach from before the end of the arm to beyond"

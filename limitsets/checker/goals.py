@@ -9,12 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from .cells import check_ranks, first_bad, range_max
+from .cells import first_bad, range_max
 from .file import Cells
 from .near_hinge import check_everywhere, near_landing
 from .scene import Scene
 from .starts import (
-    ATTRACTING,
     MOST_COUNTED,
     Starts,
     check_starts,
@@ -24,7 +23,7 @@ from .starts import (
     starts_in_words,
 )
 from .texts import LENGTHS, quantity, require, rows, table
-from .thinning import check_null, check_thinning, not_arriving
+from .thinning import check_thinning, not_arriving
 from .two_throws import check_two_throws
 
 GOAL_KEYS = "x side every_orbit throws order jogs from_anywhere"
@@ -37,14 +36,14 @@ GOALS = {  # the kinds that are known, and the keys of their sections; from_anyw
 }
 
 
-def read_goal_claim(section: object, n_sides: int, version: int) -> dict[str, Any]:
+def read_goal_claim(section: object, n_sides: int) -> dict[str, Any]:
     """Read the section of a goal, with the starts for which it is claimed."""
-    starts = "starts thinning near_joint lost" if version > 1 else ""
+    starts = "starts thinning near_joint lost"
     known = table(section, "section of goal", "kind", f"{GOAL_KEYS} {starts}")
     own = {key: value for key, value in known.items() if key not in starts.split()}
     more = "from_anywhere throws" if own["kind"] == "oriented_beyond" else "from_anywhere"
     goal = read_goal(table(own, "section of goal", GOALS[own["kind"]], more), n_sides)
-    return goal | {"starts": read_starts(known, goal, n_sides) if version > 1 else None}
+    return goal | {"starts": read_starts(known, goal, n_sides)}
 
 
 def read_goal(section: dict[str, Any], n_sides: int) -> dict[str, Any]:
@@ -113,12 +112,8 @@ def check_goal(c: Cells, scene: Scene, goal: dict[str, Any]) -> str:
         c, bad = laid_down(c, scene, starts)
         if bad:
             return bad
-    everywhere = goal["all"] if starts is None else goal["anywhere"] and goal["kind"] != "attracts_all"
-    bad = check_everywhere(c, scene) if everywhere and not laid else ""
-    if not bad and starts is not None:
-        bad = check_starts(c, scene, goal, starts)
-    elif not bad and goal["all"] and goal["kind"] in ("attracts_all", "flip_order"):
-        bad = check_ranks(c, scene, int(c.rank.max()))
+    everywhere = goal["anywhere"] and goal["kind"] != "attracts_all" and not laid
+    bad = (check_everywhere(c, scene) if everywhere else "") or check_starts(c, scene, goal, starts)
     if bad:
         return bad
     if goal["kind"] == "oriented_beyond":
@@ -134,7 +129,7 @@ def check_goal(c: Cells, scene: Scene, goal: dict[str, Any]) -> str:
 
 def is_laid(goal: dict[str, Any]) -> bool:
     """Whether the goal is claimed for starts that are laid down in some ranges."""
-    return goal["starts"] is not None and goal["starts"].laid is not None
+    return goal["starts"].laid is not None
 
 
 def check_oriented(c: Cells, scene: Scene, goal: dict[str, Any]) -> str:
@@ -177,10 +172,6 @@ def check_reaches(c: Cells, scene: Scene, goal: dict[str, Any]) -> str:
         cells = c.rank >= 0 if goal["anywhere"] else inside
         late = not_arriving(c, [c.jog, c.flip], cells, wanted, goal["throws"])
         return first_bad(c, [(~late, f"{goal['throws']} throws are not proved to be enough")])
-    if goal["anywhere"] and goal["starts"] is None:
-        bad = check_ranks(c, scene, int(c.rank.max())) or check_null(c, scene, ~inside, True)
-        if bad:
-            return bad
     return check_thinning(c, scene, inside & ~wanted, goal["throws"], np.zeros(len(inside), dtype=np.int32))
 
 
@@ -222,7 +213,7 @@ def check_flip_order(c: Cells, goal: dict[str, Any]) -> str:
 
 def statement_of_goal(goal: dict[str, Any], noisy: bool) -> str:
     """Put a goal in words; its `starts` are those for which it is proved."""
-    starts = goal["starts"] or (Starts("every") if goal["all"] else ATTRACTING)
+    starts = goal["starts"]
     place = starts_in_words(starts, noisy)
     those = "the attracting cells" + (" to which starts laid down can come" if is_laid(goal) else "")
     into = f"; into the attracting cells comes, and there stays, {place}"

@@ -75,7 +75,7 @@ def check_region_cell(claimed: Claimed) -> str:
 def check_record(scene: Scene, goal: dict[str, Any] | None, claimed: Claimed) -> str:
     """Check the blocks, the starts that come to them, the goal if it is claimed, and the throws; "" or the reason."""
     c = cells_of(claimed)
-    bad = check_structure(c, scene, -1) or check_components(c)
+    bad = check_structure(c, scene) or check_components(c)
     if bad:
         return bad
     starts = starts_of(claimed)

@@ -38,7 +38,7 @@ from .plane import (
 )
 from .policy import Policy, holds_policy, policy_in_words, read_policy
 from .scene import Scene, check_parameters, check_tolerance, left_out, over_halves, quantities, read_scene
-from .starts import ATTRACTING, first_version_starts, shares
+from .starts import shares
 from .texts import KINDS, BadFileError, model_in_words, plain, quantity, require, rows, table
 
 MOST_OPEN = 0.01  # the share of the arm that may be open where a goal is proved from some x on
@@ -127,7 +127,6 @@ class Report:
 class Certificate:
     """The content of a file: read, and not yet believed."""
 
-    version: int
     model: tuple[str, str]  # flight and flip
     raw: list[dict[str, Any]]  # the scene of each box, as written
     parameters: list[object]  # of each box, as the producer computed them
@@ -146,7 +145,8 @@ def open_and_look(path: str | os.PathLike[str]) -> tuple[dict[str, Any], dict[st
     table(header, "header.json", needed, "state producer")
     version = header["version"]
     right = header["format"] == "limitsets-proof" and type(version) is int and version in (1, 2)
-    require(right, "the format is not limitsets-proof, version 1 or 2")
+    require(right, "the format is not limitsets-proof, version 2")
+    require(version == 2, "version 1 of the format is not read any more: prove the scene again")
     the_map = table(header["map"], "map", "name version flight flip", "formulas")
     first = type(the_map["version"]) is int and the_map["version"] == 1
     require(the_map["name"] == "throw" and first, "the map is not throw, version 1")
@@ -155,7 +155,7 @@ def open_and_look(path: str | os.PathLike[str]) -> tuple[dict[str, Any], dict[st
 
 def read_certificate(header: dict[str, Any], entries: dict[str, memoryview]) -> Certificate:
     """Read the content of a file; raises BadFileError."""
-    version, model = header["version"], (header["map"]["flight"], header["map"]["flip"])
+    model = (header["map"]["flight"], header["map"]["flip"])
     boxes = rows(header["boxes"], "boxes", 1, 5_000)
     prefixes = [table(b, "a box", "scene parameters prefix")["prefix"] for b in boxes]
     named = all(isinstance(p, str) and re.fullmatch(r"[0-9]{1,6}\.", p) for p in prefixes)
@@ -169,10 +169,10 @@ def read_certificate(header: dict[str, Any], entries: dict[str, memoryview]) -> 
     require(all(len(s.sides) == n_sides for s in scenes), "the boxes do not have the same number of sides")
     cells = [read_cells(entries, header["arrays"], prefix, n_sides) for prefix in prefixes]
     require_no_more_arrays(header["arrays"], entries, prefixes, n_sides)
-    claims, unknown = read_claims(header["claims"], n_sides, version)
+    claims, unknown = read_claims(header["claims"], n_sides)
     parameters = [b["parameters"] for b in boxes]
     noise, tolerance = header["noise"], header["tolerance"]
-    return Certificate(version, model, raw, parameters, noise, tolerance, scenes, cells, claims, unknown)
+    return Certificate(model, raw, parameters, noise, tolerance, scenes, cells, claims, unknown)
 
 
 def require_no_more_arrays(
@@ -373,7 +373,7 @@ def work_of(file: Certificate) -> int:
     everywhere = bool({"attracts-all", "feeds"} & set(file.claims)) or file.claims.get("goal", {}).get(
         "all", False
     )
-    ranked = "goal" in file.claims and file.version > 1
+    ranked = "goal" in file.claims
     return sum(
         len(c.side) if everywhere else int(((c.component >= 0) | (ranked & (c.rank >= 0))).sum())
         for c in file.cells
@@ -390,8 +390,6 @@ def check_boxes(file: Certificate, crew: Crew, failed: dict[str, str]) -> None:
         for names, reason in found:
             for name in names:
                 failed.setdefault(name, where + reason)
-        if file.version == 1 and not {"goal", "attracts-all"} & set(failed):
-            first_version_starts(scene, c, claims)
         scene.parts.clear()  # room
         if len(failed) == len(claims):
             break
@@ -401,8 +399,6 @@ def conclude(report: Report, file: Certificate, failed: dict[str, str], own: dic
     """Put the claims in words and the verdicts into the report."""
     claims = file.claims
     if "goal" in claims and "goal" not in failed:
-        if "attracts-all" in failed and not claims["goal"]["all"]:
-            claims["goal"].pop("found", None)
         tell_starts(report, claims["goal"], file.scenes, file.cells)
     if "feeds" in claims and "feeds" not in failed:
         shares_fed = claims["feeds"]["shares"].items()
@@ -448,7 +444,7 @@ def state_of(report: Report, name: str, section: dict[str, Any], failed: dict[st
 
 def tell_starts(report: Report, goal: dict[str, Any], scenes: list[Scene], cells: list[Cells]) -> None:
     """Fill in the starts for which the goal is proved, and their share of the arm, the least of all boxes."""
-    goal["starts"] = starts = goal["starts"] or goal.get("found") or ATTRACTING
+    starts = goal["starts"]
     both = []
     for scene, c in zip(scenes, cells, strict=True):
         some = c.component >= 0 if starts.only else c.rank >= 0

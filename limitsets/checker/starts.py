@@ -52,9 +52,6 @@ class Starts(NamedTuple):
         return None if self.near is None else self.near[1][side]
 
 
-ATTRACTING = Starts("cells", only=True)  # a goal of version 1 that names no starts
-
-
 def read_starts(section: dict[str, Any], goal: dict[str, Any], n_sides: int) -> Starts:
     """Read for which starts a goal is claimed."""
     require("starts" in section, "goal.starts is missing")
@@ -364,24 +361,6 @@ def shares(c: Cells, scene: Scene, starts: Starts, cells: Array) -> tuple[float,
         explained += max(0.0, min(until, end) - begin)
     room = 1 - 2.0**-30  # against the rounding of these sums
     return claimed / whole * room, explained / whole * room
-
-
-def first_version_starts(scene: Scene, c: Cells, claims: dict[str, dict[str, Any]]) -> None:
-    """Find the starts of a goal of version 1, which "attracts-all" in the same file brings to the attracting cells."""
-    goal, attracts = claims.get("goal"), claims.get("attracts-all")
-    if goal is None or goal.get("found") == ATTRACTING:
-        return
-    almost = goal["kind"] == "reaches" and not goal["every"]
-    every = Starts("almost-every" if almost else "every")
-    found = every if goal["all"] else ATTRACTING
-    if attracts is not None and not goal["all"]:
-        fixed = attracts["fixed"]
-        found = every._replace(near=(attracts["q"], fixed))
-        if None not in fixed:
-            found = found._replace(kind="from", x=[point[1] for point in fixed])
-        if almost and check_null(c, scene, c.component < 0, not any(fixed)):
-            found = ATTRACTING
-    goal["found"] = found
 
 
 def starts_in_words(starts: Starts, noisy: bool) -> str:

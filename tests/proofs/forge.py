@@ -227,18 +227,6 @@ def starts_of(m: Plain, edges: list, rank: np.ndarray, near: dict, landing: floa
     return {"starts": {"from": begins}, "lost": lost}
 
 
-def first_version(f: "Forged") -> "Forged":
-    """The same certificate as version 1 of the format had it."""
-    f = f.copy()
-    f.header["version"] = 1
-    for claim in f.header["claims"]:
-        for key in ("starts", "thinning", "near_joint", "lost") if claim["claim"] == "goal" else ():
-            claim["section"].pop(key, None)
-    for name in [name for name in f.arrays if name.endswith("rank")]:
-        f.arrays[name] = np.maximum(f.arrays[name], 0)
-    return f.seal()
-
-
 def forge(
     model: str,
     *,

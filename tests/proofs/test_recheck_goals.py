@@ -71,23 +71,12 @@ def test_almost_every_orbit_is_no_matter_of_every_start(good, tmp_path):
         assert report.verdict == "bad file"
 
 
-@pytest.mark.parametrize("section", TRUE, ids=str)
-def test_a_goal_of_the_first_version_is_of_every_start_if_these_are_attracted(good, tmp_path, section):
-    f = with_goal(good, section)
-    attracts = good.header["claims"][0]
-    old = forge.first_version(f)
-    report = verdict(old, tmp_path)
-    everywhere = section.get("from_anywhere") or section["kind"] == "attracts_all"
-    assert report.verdict == ("proved" if everywhere else "proved-on-cells")
-    assert report.starts == (of_every(section) if everywhere else "cells")
-    assert 0.2 < report.share <= 1.0
-    old.header["claims"].append(attracts)
-    report = verdict(old, tmp_path)
-    assert (report.verdict, report.reason, report.starts) == ("proved", "", of_every(section))
-    old.arrays["0.rank"][np.argmax(old.arrays["0.rank"])] = 0
-    report = verdict(old.seal(), tmp_path)
-    assert report.verdict == "failed"
-    assert report.claims[0][1] != "proved" or everywhere
+def test_version_1_is_refused_with_what_to_do(good, tmp_path):
+    f = with_goal(good, TRUE[0])
+    f.header["version"] = 1
+    report = verdict(f.seal(), tmp_path)
+    assert report.verdict == "bad file"
+    assert "version 1 of the format is not read any more: prove the scene again" in report.reason
 
 
 # Landings from 28 in reach some 26 in on other sides; the limit set ends at 23.3832 in on side 2; an orbit of period 13

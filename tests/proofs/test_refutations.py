@@ -367,11 +367,6 @@ def passing(header):
     del section(header)["recurs"]
 
 
-def first_version(header):
-    header["version"] = 1
-    passing(header)
-
-
 def of_throw(key, value):
     def change(header):
         for throw in section(header)["throws"]:
@@ -411,7 +406,6 @@ def right_order(header):
         ("order", right_order, "no state of the orbit violates"),
         ("closed", at("23 in"), "no state of the orbit violates"),
         ("closed", passing, "passing orbit only"),
-        ("closed", first_version, "passing orbit only"),
         ("closed", recurs(once=True), "two values of kappa"),
         ("closed", moved, ""),
         ("closed", not_closed, "comes back"),
