@@ -102,21 +102,22 @@ def check_cell_claims(
     if bad:
         return [(list(claims), bad)]
     failed: list[Failed] = []
-    wide, some = [], []  # claims about throws from all cells, and from those that have a rank
+    # claims about throws from all cells, and from those that have a rank
+    about: tuple[list[str], list[str]] = ([], [])
     if goal is not None:
         bad = check_goal(c, scene, goal)
         if bad:
             failed.append((["goal"], bad))
         else:
             everywhere = goal["anywhere"] and goal["kind"] != "attracts_all" and not is_laid(goal)
-            (wide if everywhere else some).append("goal")
+            about[not everywhere].append("goal")
     if attracts is not None:
         bad = check_attracts_all(c, scene, attracts)
         if bad:
             failed.append((["attracts-all"], bad))
         else:
-            wide.append("attracts-all")
-    return failed + check_throws_of_cells(scene, c, box, claims, (wide, some), crew)
+            about[0].append("attracts-all")
+    return failed + check_throws_of_cells(scene, c, box, claims, about, crew)
 
 
 def check_attracts_all(c: Cells, scene: Scene, section: dict[str, Any]) -> str:
