@@ -17,7 +17,7 @@ import limitsets
 ROOT = Path(__file__).resolve().parents[1]
 PACKAGE = ROOT / "limitsets"
 SOURCES = sorted(PACKAGE.rglob("*.py"))
-LATE = ["numba", "scipy", "networkx", "matplotlib", "pint", "pydantic", "typer", "rich", "jinja2", "tomlkit"]
+LATE = ["numba", "scipy", "networkx", "matplotlib", "pydantic", "typer", "rich", "jinja2", "tomlkit"]
 LATE += ["pymunk", "xarray", "zarr", "pandas", "pyarrow", "dask", "distributed"]
 
 

@@ -1,8 +1,8 @@
 """Quantities in text: a decimal number and a unit from a fixed list.
 
-The number is read by a regular expression and only the unit is handed to pint, which would read "5,75 in" as 575 in,
-never come back from "9**9**9 in" and let 1/s pass as rad/s.  Conversions are exact fractions up to one last rounding;
-a value already in the target unit is the float of its text.
+A library of units would read "5,75 in" as 575 in, never come back from "9**9**9 in" and let 1/s pass as rad/s: a number
+is read by a regular expression, a unit by one table.  Conversions are exact fractions up to one last rounding; a value
+already in the target unit is the float of its text.
 """
 
 from __future__ import annotations
@@ -89,37 +89,19 @@ _NUMBER = r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]{1,3})?"
 _QUANTITY = re.compile(rf"({_NUMBER})(?: +|(?=[%\u00b0]))([^\s].*)")
 _SMALLEST, _LARGEST = 1e-300, 1e12
 
-# pint's own 900 definitions take 0.4 s to read; these are the ones needed, and a test compares them with pint's
-_DEFINITIONS = """
-centi- = 0.01 = c-
-milli- = 0.001 = m-
-micro- = 0.000001 = u-
-kilo- = 1000 = k-
-pi = 3.1415926535897932384626433832795028841971693993751
-meter = [length] = m
-inch = 0.0254 * meter = in
-foot = 12 * inch = ft
-second = [time] = s
-radian = [] = rad
-degree = pi / 180 * radian = deg
-revolution_per_minute = pi / 30 * radian / second = rpm
-gram = [mass] = g
-tonne = 1000000 * gram = t
-pound = 453.59237 * gram = lb
-"""
+_PI = Fraction("3.1415926535897932384626433832795028841971693993751")
 
-
-# Lengths are converted in every scene: without the library of units, which takes a tenth of a second to load.
-_METRES = {
-    unit: Fraction(size)
-    for unit, size in {
-        "m": "1",
-        "cm": "0.01",
-        "mm": "0.001",
-        "um": "0.000001",
-        "in": "0.0254",
-        "ft": "0.3048",
-    }.items()
+# Sizes in m, kg, rad and s, by what the units measure; a test compares quotients of them with those of pint.
+_SIZES_BY_KIND: dict[str, dict[str, str | Fraction]] = {
+    "m": {"m": "1", "cm": "0.01", "mm": "0.001", "um": "0.000001", "in": "0.0254", "ft": "0.3048"},
+    "kg": {"kg": "1", "g": "0.001", "mg": "0.000001", "t": "1000", "lb": "0.45359237"},
+    "rad": {"rad": "1", "deg": _PI / 180},
+    "rad/s": {"rpm": _PI / 30},
+    "s": {"s": "1"},
+    "Hz": {"Hz": "1"},
+}
+_SIZES = {
+    unit: (kind, Fraction(size)) for kind, sizes in _SIZES_BY_KIND.items() for unit, size in sizes.items()
 }
 
 
@@ -273,18 +255,22 @@ def exact_factor(unit: str, target: str) -> Fraction:
     >>> exact_factor("in", "cm")
     Fraction(127, 50)
     """
-    if unit in _METRES and target in _METRES:
-        return _METRES[unit] / _METRES[target]
     if unit == target:
         return Fraction(1)
-    return Fraction(_registry().Quantity(Fraction(1), unit).to(target).magnitude)
+    (kind, size), (other, of) = _measured(unit), _measured(target)
+    if kind != other:
+        raise ValueError(f"{unit} and {target} measure different things")
+    return size / of
 
 
-@lru_cache(maxsize=1)
-def _registry() -> Any:
-    import pint  # lazily: it takes 0.1 s, and most scenes need no conversion
-
-    return pint.UnitRegistry(_DEFINITIONS.strip().splitlines(), non_int_type=Fraction)
+def _measured(unit: str) -> tuple[str, Fraction]:
+    """Give what a unit measures and its size, also of a quotient like kg/in^2."""
+    if unit in _SIZES:
+        return _SIZES[unit]
+    top, below = unit.split("/")
+    name, caret, power = below.partition("^")
+    (kind, size), (per, part) = _SIZES[top], _SIZES[name]
+    return f"{kind}/{per}{caret}{power}", size / part ** int(power or 1)
 
 
 def density_dimension(text: object) -> str:

@@ -283,7 +283,7 @@ def test_help_loads_no_room():
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     loaded = {name.split(".")[0] for name in done.stdout.splitlines()[-1].split()}
     assert "typer" in loaded
-    assert not {"numpy", "numba", "scipy", "matplotlib", "networkx", "pint"} & loaded
+    assert not {"numpy", "numba", "scipy", "matplotlib", "networkx"} & loaded
 
 
 def test_exit_codes_and_streams_of_a_process():

@@ -243,10 +243,10 @@ def test_domain_begins_just_beyond_the_feet() -> None:
 
 
 def test_reading_a_scene_loads_little() -> None:
-    """Numba takes a second, pint a tenth: neither is needed for a scene in one unit; pydantic only to read."""
+    """Numba takes a second, and is not needed for a scene; pydantic only to read."""
     code = (
         "import sys, limitsets.scene as scene\n"
-        "heavy = ('numba', 'pint', 'pydantic', 'scipy')\n"
+        "heavy = ('numba', 'pydantic', 'scipy')\n"
         "print([name for name in heavy if name in sys.modules])\n"
         "scene.load('paper-designed')\n"
         "print([name for name in heavy if name in sys.modules])\n"
