@@ -99,7 +99,7 @@ class MapKind:
         return (one, "margin") if self.has_margin else (one,)
 
 
-_KINDS: dict[type, MapKind] = {}
+_KINDS: dict[Any, MapKind] = {}
 
 
 def register(
