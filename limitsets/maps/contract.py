@@ -86,7 +86,7 @@ class MapKind:
         return (one, "margin") if self.has_margin else (one,)
 
 
-_KINDS: dict[type, MapKind] = {}
+_KINDS: dict[Any, MapKind] = {}
 
 
 def register(
@@ -112,6 +112,7 @@ def register(
     ----------
     cls : type
         A NamedTuple class whose fields are floats, arrays with one entry per side, NamedTuples of such, or None.
+        A second class of one name and the same fields is shown with a number, ``Tent#2``.
         Build its values with `limitsets.maps.coerce`, or give floats and float64 arrays.
     image : callable
         ``image(params, x, side) -> (x', side', code)``; code is the index of the branch taken, or
@@ -218,6 +219,10 @@ def register(
         displacement is not None,
         image_box is not None,
     )
+    # Compiled code knows classes of values by name and fields alone: it would take the second such class for the first.
+    alike = sum((kind.name, each._fields) == (cls.__name__, cls._fields) for each, kind in _KINDS.items())
+    if alike > 1:
+        cls.__name__ = f"{cls.__name__}#{alike}"
     return cls
 
 

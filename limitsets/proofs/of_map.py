@@ -431,7 +431,7 @@ def _proved(proof: ProofOfMap, at: Intervals, cycle: Cycle) -> CycleOfMap | str:
     ):
         return "its period may be smaller"
     if not _within(proof.cells, *points[0], int(cycle.side[0])):
-        return "it is not in the attracting cells"
+        return "its box is not in the attracting cells"
     slope = _slope(found[1])
     return CycleOfMap(at.lo, at.hi, cycle.side, cycle.branches, *_ends(slope), _attracts(slope))
 

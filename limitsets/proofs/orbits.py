@@ -301,7 +301,7 @@ def proved_cycles(found: Attraction, up_to: int | None = None) -> ProvedCycles:
     for cycle in cycles:
         answer = proved_cycle(box, cycle)
         if isinstance(answer, ProvedCycle) and not _inside(found, answer):
-            answer = "it is not in the attracting cells"
+            answer = "its box is not in the attracting cells"
         if isinstance(answer, ProvedCycle):
             proved.append(answer)
         else:

@@ -16,17 +16,22 @@ from typing import Any
 
 import numpy as np
 
-from limitsets.maps.bisection import Flags
 from limitsets.maps.critical import Sides
 from limitsets.maps.forced import along
 from limitsets.maps.pieces import monotone_pieces
 from limitsets.sets.cycle import NEAR, Array, Ints
 from limitsets.sets.unions import EPS, Extents
 
+# Doublings of the step, of one rounding at first, by which an end is held inside a letter.
+HELD = 16
+
 
 @dataclass(frozen=True)
 class Alphabet:
-    """Monotone pieces of the map, cut to a set: letter k is the range [lo, hi] of a side and a branch."""
+    """Monotone pieces of the map, cut to a set: letter k is the range [lo, hi] of a side and a branch.
+
+    `torn` says that a branch jumps, so that two of its letters are different functions.
+    """
 
     params: Any
     side: Ints
@@ -34,6 +39,7 @@ class Alphabet:
     lo: Array
     hi: Array
     scale: float
+    torn: bool
 
     def follow(self, letters: Ints, x: Array) -> tuple[Array, Ints, Array]:
         """Send starts along their words: image, side, slope."""
@@ -70,17 +76,18 @@ class Words:
 def alphabet_of(params: Any, extents: Extents, domain: Sides) -> Alphabet:
     """Cut the monotone pieces to a set, a little widened."""
     scale = float(max(np.abs(domain.lo).max(), np.abs(domain.hi).max()))
-    rows = []
     pieces = monotone_pieces(params, domain)
-    for side, pairs in sorted(extents.items()):
-        for piece in pieces.get(side, ()):
-            for a, b in sorted(pairs):
-                lo, hi = max(piece.lo, float(a) - NEAR * scale), min(piece.hi, float(b) + NEAR * scale)
-                if lo <= hi:
-                    rows.append((side, piece.branch, lo, hi))
+    rows = [
+        (side, piece.branch, max(piece.lo, a - NEAR * scale), min(piece.hi, b + NEAR * scale))
+        for side, pairs in sorted(extents.items())
+        for piece in pieces.get(side, ())
+        for a, b in sorted(pairs)
+    ]
     table = np.array(rows, dtype=np.float64).reshape(-1, 4)
+    table = table[table[:, 2] <= table[:, 3]]
     sides, branches = table[:, 0].astype(np.int64), table[:, 1].astype(np.int64)
-    return Alphabet(params, sides, branches, table[:, 2].copy(), table[:, 3].copy(), scale)
+    torn = any(piece.above == "jump" for row in pieces.values() for piece in row)
+    return Alphabet(params, sides, branches, table[:, 2].copy(), table[:, 3].copy(), scale, torn)
 
 
 def letters_alone(alphabet: Alphabet) -> Words:
@@ -110,8 +117,8 @@ def solved(alphabet: Alphabet, letters: Ints, lo: Array, hi: Array, target: Arra
         # Every fourth turn halves the bracket, so that a Newton step that crawls does not last.
         inside = (newton > lo[active]) & (newton < hi[active]) & (turn % 4 < 3)
         proposal = np.where(inside, newton, middle)
-        moving = (f != 0.0) & (middle > lo[active]) & (middle < hi[active])
-        moving &= ~(inside & (np.abs(newton - x[active]) <= 0.5 * EPS * np.abs(x[active])))
+        crawls = inside & (np.abs(newton - x[active]) <= 0.5 * EPS * np.abs(x[active]))
+        moving = (f != 0.0) & (middle > lo[active]) & (middle < hi[active]) & ~crawls
         active = active[moving]
         x[active] = proposal[moving]
         if active.size == 0:
@@ -119,16 +126,12 @@ def solved(alphabet: Alphabet, letters: Ints, lo: Array, hi: Array, target: Arra
     return x
 
 
-def _fits(alphabet: Alphabet, words: Words, to: Ints, low: Array, high: Array) -> tuple[Flags, Ints]:
-    """Which letters may follow which word, and the letter each word has one repetition back.
-
-    G sends X(w) to [low, high], which has to meet the letter; and a letter less than the one a repetition back would
-    begin a lesser rotation.
-    """
-    mirror = words.letters[np.arange(to.size), words.length - words.repeat]
-    meets = (high[:, None] >= alphabet.lo) & (low[:, None] <= alphabet.hi)
-    letter = np.arange(alphabet.lo.size)
-    return (to[:, None] == alphabet.side) & meets & (letter >= mirror[:, None]), mirror
+def _held(alphabet: Alphabet, letters: Ints, x: Array, inward: Array, low: Array, high: Array) -> Array:
+    """Move ends of starts inward until G sends them into [low, high]: beyond a jump the branch leads elsewhere."""
+    for doublings in range(HELD if alphabet.torn else 0):
+        y = alphabet.follow(letters, x)[0]
+        x = np.where((y < low) | (y > high), x + inward * 2.0**doublings, x)
+    return x
 
 
 def grown(alphabet: Alphabet, words: Words) -> Words:
@@ -136,18 +139,22 @@ def grown(alphabet: Alphabet, words: Words) -> Words:
     a, to, _ = alphabet.follow(words.letters, words.lo)
     b, _, _ = alphabet.follow(words.letters, words.hi)
     low, high = np.minimum(a, b), np.maximum(a, b)
-    fits, mirror = _fits(alphabet, words, to, low, high)
-    row, letter = np.nonzero(fits)
+    # Which letters may follow which word: G sends X(w) to [low, high], which has to meet the letter; and a letter less
+    # than the one a repetition back (its mirror) would begin a lesser rotation.
+    mirror = words.letters[np.arange(to.size), words.length - words.repeat]
+    meets = (high[:, None] >= alphabet.lo) & (low[:, None] <= alphabet.hi) & (to[:, None] == alphabet.side)
+    row, letter = np.nonzero(meets & (np.arange(alphabet.lo.size) >= mirror[:, None]))
     old, rising = words.letters[row], b[row] >= a[row]
     lo, hi = words.lo[row], words.hi[row]
-    starts = [lo.copy(), hi.copy()]
+    starts = np.stack([lo, hi])
     bottom, top = alphabet.lo[letter], alphabet.hi[letter]
     # Where G reaches beyond the letter, the start that it sends to the letter's end is an end of the new X.
     for bound, beyond, is_lo in ((bottom, low[row] < bottom, rising), (top, high[row] > top, ~rising)):
         which = np.flatnonzero(beyond)
-        at = solved(alphabet, old[which], lo[which], hi[which], bound[which])
         first = is_lo[which]
-        starts[0][which[first]] = at[first]
-        starts[1][which[~first]] = at[~first]
+        at = solved(alphabet, old[which], lo[which], hi[which], bound[which])
+        inward = np.where(first, EPS, -EPS) * alphabet.scale
+        at = _held(alphabet, old[which], at, inward, bottom[which], top[which])
+        starts[np.where(first, 0, 1), which] = at
     repeat = np.where(letter == mirror[row], words.repeat[row], words.length + 1)
     return Words(np.column_stack([old, letter]), starts[0], np.maximum(*starts), repeat)

@@ -91,8 +91,6 @@ def _closed(alphabet: Alphabet, words: Words) -> list[Closed]:
     slack = NEAR * alphabet.scale
     back = (np.minimum(a, b) <= words.hi + slack) & (np.maximum(a, b) >= words.lo - slack)
     k = np.flatnonzero(whole & back & (to == alphabet.side[words.letters[:, 0]]))
-    if k.size == 0:
-        return []
     rows, roots = _roots(alphabet, words.letters[k], words.lo[k], words.hi[k])
     if rows.size == 0:
         return []

@@ -1,7 +1,7 @@
-"""Images of cells on which the branch changes, or the map turns.
+"""Images of cells on which the branch changes, or the map turns or jumps.
 
-In one dimension such a cell is cut into equal parts and where the branch changes, and each piece gets its image, from
-its least value to its greatest.  Otherwise the cell gets the
+In one dimension such a cell is cut into equal parts, where the branch changes and where the image jumps on a branch
+(a floor), and each piece gets its image, from its least value to its greatest.  Otherwise the cell gets the
 image of every branch that one of its points takes, from all its points and from the borders between two that do
 different things: together with the closed cells that is the
 closed relation, which holds the limits from both sides.  Ways out are taken from real images only; the image of a
@@ -43,8 +43,10 @@ SAME_IMAGE = 1e-9
 def _pieces(
     params: Any, side: int, lo: Any, hi: Any, most: int, ends: Any, x: Any, side_after: Any, code_after: Any
 ) -> int:
-    """Cut [lo, hi] where the branch changes: ends of up to `most` pieces and their images, in the order met.
+    """Cut [lo, hi] where the branch changes or the image jumps: ends of up to `most` pieces and images, as met.
 
+    A jump is a step between adjacent floats that is wider than [lo, hi]; a smaller one is not seen in cells.  One is
+    looked for, and first: beside a pole there are thousands.
     Returns how many cells have more.
     """
     here = on_side(params, side)
@@ -55,24 +57,29 @@ def _pieces(
         end, to_end, code_end = step(here, hi[cell], side)
         for piece in range(most):
             ends[cell, piece, 0], ends[cell, piece, 1] = left, hi[cell]
-            x[cell, piece, 0], side_after[cell, piece], code_after[cell, piece] = step(here, left, side)
-            if code_after[cell, piece] == code_end and side_after[cell, piece] == to_end:
-                x[cell, piece, 1] = end
-                more -= 1
-                break
-            a, b = left, hi[cell]
+            first, side_first, code_first = step(here, left, side)
+            x[cell, piece, 0], side_after[cell, piece], code_after[cell, piece] = (
+                first,
+                side_first,
+                code_first,
+            )
+            alike = (code_first == code_end) & (side_first == to_end)
+            a, b, at_a, at_b = left, hi[cell], first, end
             while True:
                 middle = 0.5 * (a + b)
                 if not a < middle < b:
                     break
-                _, to, code = step(here, middle, side)
-                if code == code_after[cell, piece] and to == side_after[cell, piece]:
-                    a = middle
+                at, to, code = step(here, middle, side)
+                nearer = not alike or abs(at - at_a) <= abs(at_b - at)
+                if nearer and code == code_first and to == side_first:
+                    a, at_a = middle, at
                 else:
-                    b = middle
-            ends[cell, piece, 1] = a
-            x[cell, piece, 1], _, _ = step(here, a, side)
-            left = b
+                    b, at_b = middle, at
+            if alike and (piece > 0 or not abs(at_b - at_a) > hi[cell] - lo[cell]):
+                x[cell, piece, 1] = end
+                more -= 1
+                break
+            ends[cell, piece, 1], x[cell, piece, 1], left = a, at_a, b
     return more
 
 
@@ -232,16 +239,15 @@ def every_branch(
         to = np.concatenate([to, met.side.reshape(shape)], axis=1)
         code = np.concatenate([code, met.code.reshape(shape)], axis=1)
     landed = (code > codes.OUTSIDE_MODEL) & np.isfinite(real).all(axis=-1)
-    found = []
     owner = np.repeat(cells, code.shape[1])
     gone = ((code < 0) | ~landed).ravel()
     named = np.where(code < 0, code, codes.OUTSIDE).ravel()
-    found.append(leaving(target, owner[gone], named[gone], real.shape[-1]))
     # Points that land beyond the domain leave, whichever box they end up in.
     flat = landed.ravel()
     points = real.reshape(-1, real.shape[-1])[flat]
     alone = placed(target, owner[flat], to.ravel()[flat], points, points, 0, inside=False)
-    found.append(TargetBoxes(alone.cell[:0], alone.side[:0], alone.lo[:0], alone.hi[:0], alone.exits, 0.0))
+    beyond = TargetBoxes(alone.cell[:0], alone.side[:0], alone.lo[:0], alone.hi[:0], alone.exits, 0.0)
+    found = [leaving(target, owner[gone], named[gone], real.shape[-1]), beyond]
     if kind.has_image_on:
         for branch in range(len(kind.branches)):
             forced, forced_to = images_on(params, _states(starts), side, branch)
