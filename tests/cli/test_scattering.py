@@ -121,3 +121,14 @@ def test_a_deviation_without_its_unit_is_told_of_percent(capfd):
     assert '"<decimal number> %" or an angular speed' in err
     _, _, err = run(capfd, "certify", "paper-designed", "--noise", "landing.x=1")
     assert "%" not in err  # a share of a landing means nothing
+
+
+def test_the_explorer_says_of_which_model_its_proofs_are():
+    """The starts of the last claim stood in place of the model's sentence."""
+    from limitsets.explorer.answers import proof_words
+
+    model = "of the minimal model: friction of [world] is not in it"
+    claim = {"claim": "goal", "verdict": "proved", "reason": "", "starts": "every", "share": 1.0, "note": ""}
+    shown = proof_words([claim], [], "rested", model)
+    assert model in shown
+    assert "for every start" in shown
