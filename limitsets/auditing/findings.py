@@ -290,6 +290,7 @@ def audited(model: Model, scene: Scene) -> Model:
         row.about.effect
         for row in rows
         if row.about.effect not in model.simulated
+        and (row.about.effect != "spread" or "scatter" in model.left_out)  # else noise covers the scatter
         and any(row.broken(found, side).any() for side, found in seen.items())
     ]
     return replace(model, broken=tuple(broken)) if seen else model

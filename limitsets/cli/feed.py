@@ -21,6 +21,9 @@ if TYPE_CHECKING:
 # What becomes of parts where none is fed.
 UNFED = {"left": "leave the arm otherwise", "never": "stay on it"}
 
+# What ends the throws of a part that is not fed.
+ENDED = {"left": "leaves the arm", "edge": "comes to lie where its throw acts beyond the end"}
+
 # Shares below this are what rounding leaves of nothing.
 NOTHING = 1e-9
 
@@ -128,10 +131,12 @@ def _unused(found: Feeding) -> str:
 
 
 def _text(found: Feeding, files: list[Path], written: dict[str, Any] | None) -> None:
+    from limitsets.report.robust_pages import law_words
     from limitsets.report.tables import in_time
 
     end, unit = found.end, found.end.scene.unit
-    note = "".join(f"; {said}" for said in [_unused(found)] if said)
+    laws = (law_words(name, getattr(found.scatter, name), unit) for name in found.scatter.given())
+    note = "".join(f"; {said}" for said in [_unused(found), *laws] if said)
     if found.vacuous:
         computed = found.shares.shares
         ways = ", ".join(
@@ -158,9 +163,8 @@ def _text(found: Feeding, files: list[Path], written: dict[str, Any] | None) -> 
             f"assumed: {100 * edge:.2f} % of the parts are thrown from so near the end of the arm that the throw acts"
             " beyond it; what that throw does is not simulated, and the proofs throw as if the arm went on"
         )
-    if found.brackets is not None:
-        for line in _proved(found.brackets):
-            typer.echo(line)
+    for line in () if found.brackets is None else _proved(found.brackets):
+        typer.echo(line)
     most = found.shares.quantile(0.95)
     throw_rate = end.scene.world.throw_rate
     until = "" if most is None else f", 95 % of the starts after {most}{in_time(most, throw_rate)}"
@@ -168,8 +172,11 @@ def _text(found: Feeding, files: list[Path], written: dict[str, Any] | None) -> 
     if found.vacuous:
         typer.echo("no part comes beyond the end of the arm: limitsets analyse says how far they come")
     else:
-        ended = "is fed" if found.shares.shares["left"] < NOTHING else "is fed or leaves the arm"
-        typer.echo(f"throws until a part {ended}: {mean:.1f} in the mean{in_time(mean, throw_rate)}{until}")
+        ended = [how for fate, how in ENDED.items() if found.shares.shares[fate] >= NOTHING]
+        typer.echo(
+            f"throws until a part {' or '.join(['is fed', *ended])}: "
+            f"{mean:.1f} in the mean{in_time(mean, throw_rate)}{until}"
+        )
     rate = found.shares.per_minute(throw_rate)
     if rate is not None:
         typer.echo(f"{rate:.2f} parts per minute are fed on the wanted side, one after the other")
@@ -198,11 +205,10 @@ def _proved(brackets: AbsorptionBrackets) -> list[str]:
 
     last = brackets.within["any"].shape[1] - 1
     found = []
-    for name in ("right", "wrong", "wall"):
-        if name in brackets.within:
-            low, high = (float(end) for end in brackets.within[name][:, -1])
-            lo, hi = math.floor(low * 1e6) / 1e6, math.ceil(high * 1e6) / 1e6
-            found.append(f"PROVED: {FED[name]} within {last} throws: {lo:.6f} to {hi:.6f}")
+    for name in (each for each in ("right", "wrong", "wall") if each in brackets.within):
+        low, high = (float(end) for end in brackets.within[name][:, -1])
+        lo, hi = math.floor(low * 1e6) / 1e6, math.ceil(high * 1e6) / 1e6
+        found.append(f"PROVED: {FED[name]} within {last} throws: {lo:.6f} to {hi:.6f}")
     first, by = brackets.quantile(0.95)
     if first is not None and by is not None:
         count = f"{first}" if first == by else f"{first} to {by}"

@@ -53,7 +53,8 @@ def margin(
 ) -> None:
     """Bracket how much each quantity may deviate before the goal fails: proved below, refuted above.
 
-    Exit 1 where nothing is proved of one of them, or its two ends are farther apart than asked.
+    Exit 1 where nothing is proved of one of them, its two ends are farther apart than asked, or the scene scatters its
+    throws: margins are those of the scene without its scatter.
     """
     with progress() as tell:
         from limitsets.robust.margins.finding import margin as run
@@ -77,7 +78,10 @@ def margin(
         about=about,
     )
     raise typer.Exit(
-        0 if all(each.proved > 0 and (each.closed or each.refuted is None) for each in found) else 1
+        0
+        if chosen.effects.spread is None
+        and all(each.proved > 0 and (each.closed or each.refuted is None) for each in found)
+        else 1
     )
 
 
@@ -127,6 +131,7 @@ def _text(given: SceneOf, found: tuple[Margin, ...], out: Path | None, *, no_rec
     from limitsets.report.goals import goal_sentence, without_margin
     from limitsets.report.robust_pages import READINGS
     from limitsets.robust.margins.margin_texts import bound, failing, reach_of, void_of
+    from limitsets.scene.left_out import WITHOUT_SCATTER
 
     rows = []
     for each in found:
@@ -134,7 +139,8 @@ def _text(given: SceneOf, found: tuple[Margin, ...], out: Path | None, *, no_rec
         low, high = bound(each.proved, unit), failing(each.refuted, unit, each.direction)
         rows.append([each.quantity, READINGS[each.reading], low, high])
     scene = found[0].scene
-    typer.echo(f"{scene.name}: {' and '.join(goal_sentence(goal, scene.unit) for goal in found[0].goals)}")
+    whose = f"{scene.name}: {WITHOUT_SCATTER}, " if given.effects.spread else f"{scene.name}: "
+    typer.echo(whose + " and ".join(goal_sentence(goal, scene.unit) for goal in found[0].goals))
     if len(found) == 1 or any(each.proved > 0.0 or each.refuted for each in found):
         table(HEADS, rows)
     else:
@@ -144,10 +150,8 @@ def _text(given: SceneOf, found: tuple[Margin, ...], out: Path | None, *, no_rec
         found = ()
     for each in found:
         void = void_of(each.goals, reach_of(each.pieces), scene.unit)
-        if void:
-            typer.echo(f"{each.quantity}: what is proved holds vacuously, {void}")
-        if each.reason:
-            typer.echo(f"{each.quantity}: {each.reason}")
+        for said in filter(None, (void and f"what is proved holds vacuously, {void}", each.reason)):
+            typer.echo(f"{each.quantity}: {said}")
     if out is not None:
         typer.echo(
             f"written to {out}: margins.json, figures, certificates"

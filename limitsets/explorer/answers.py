@@ -118,17 +118,16 @@ def proof_words(lines: Sequence[Mapping[str, Any]], knobs: Sequence[Knob], state
             reason = f" ({escape(str(line['reason']))})" if line.get("reason") else ""
             verdict = str(line["verdict"])
             written = verdict.startswith("proved") and line.get("starts")
-            of = f", {escape(starts_words(line['starts'], line['share']))}" if written else ""
+            whose = f", {escape(starts_words(line['starts'], line['share']))}" if written else ""
             left = "" if verdict == "proved" else reason
             note = f"; {escape(str(line['note']))}" if line.get("note") else ""
-            rows.append((escape(str(line["claim"])), f"{VERDICTS[verdict]}{of}{left}{note}"))
+            rows.append((escape(str(line["claim"])), f"{VERDICTS[verdict]}{whose}{left}{note}"))
         elif "margin" in line and "proved" in line:
             limit = "" if line["refuted"] is None else f"; refuted at {escape(str(line['refuted']))}"
-            held = line["proved"]
             rows.append(
                 (
                     f"margin of {names.get(str(line['margin']), '')}",
-                    f"proved up to &plusmn; {escape(str(held))}{limit}",
+                    f"proved up to &plusmn; {escape(str(line['proved']))}{limit}",
                 )
             )
         elif "error" in line and "margin" not in line:

@@ -47,6 +47,7 @@ def _proofs(scene: Scene, margins: list[str]) -> Iterator[dict[str, Any]]:
     from limitsets.proofs.certify import certify
     from limitsets.robust.margins.finding import margin
     from limitsets.robust.margins.margin_texts import bound
+    from limitsets.scene.left_out import WITHOUT_SCATTER
 
     proof = certify(scene)
     for claim in proof.claims:
@@ -61,7 +62,12 @@ def _proofs(scene: Scene, margins: list[str]) -> Iterator[dict[str, Any]]:
             yield {"margin": name, "error": str(error)}
             continue
         refuted = None if found.refuted is None else bound(found.refuted, found.unit, up=True)
-        yield {"margin": name, "proved": bound(found.proved, found.unit), "refuted": refuted}
+        yield {
+            "margin": name,
+            "proved": bound(found.proved, found.unit)
+            + (f" {WITHOUT_SCATTER}" if scene.effects.spread else ""),
+            "refuted": refuted,
+        }
 
 
 def _atlas(scene: Scene, x: str, y: str) -> dict[str, Any]:

@@ -22,7 +22,6 @@ from limitsets.proofs.goals.laid_starts import laid_only, narrowed, starts_in
 from limitsets.proofs.goals.reaches import falls_short
 from limitsets.proofs.parameters import ParameterBox, parameter_box
 from limitsets.proofs.proof import Claim
-from limitsets.proofs.simulated import scattered
 from limitsets.proofs.tolerance import SceneBox
 from limitsets.proofs.weakest_claim import weakest_of
 from limitsets.proofs.worst import worst_orbit
@@ -94,22 +93,14 @@ class Query:
 
     @classmethod
     def of(cls, scene: Scene, goals: tuple[Goal, ...]) -> Query:
-        """Put goals to a scene; its own goal is left out, so that a certificate says what was asked.
+        """Put goals to a scene, without what a margin is not asked about.
 
-        Raises
-        ------
-        AnswerError
-            The scene scatters its throws: a margin is that of the quantities asked about, and of nothing else.
+        The scene's own goal is left out, so that a certificate says what was asked; and its scatter, because no
+        quantity deviates in a margin but those asked about.
         """
-        if scattered(scene):
-            raise AnswerError(
-                "the scene's effect spread",
-                "bounded",
-                "a scene whose throws are all alike",
-                "leave spread out of [effects]; reading per-throw asks about noise",
-            )
         tree = scene.as_dict()
         tree.pop("goal", None)
+        tree.get("effects", {}).pop("spread", None)
         return cls(load(tree), goals)
 
     @property

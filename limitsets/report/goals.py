@@ -100,7 +100,7 @@ def next_command(analysis: Analysis) -> str:
     if not can_be_proved(scene):
         return audited
     if outcome.holds and not outcome.goal.from_anywhere and any(analysis.basins.exits.values()):
-        return f"{proposed('certify', source)} (a proof for the starts that stay; a margin is there where all do)"
+        return f"{proposed('certify', source)} (a proof for the starts that stay; margins need all to stay)"
     if outcome.holds and not outcome.vacuous:
         proof, margins = proposed("certify", source), proposed("margin", source)
         return f"{proof} (a proof), {margins} (how much each quantity may deviate)"
@@ -148,10 +148,10 @@ def after_undecided(analysis: Analysis) -> str:
 def after_unproved(proof: Proof) -> str:
     """Name the command that goes on from a proof in which a claim is not proved."""
     scene, goal = proof.scene, proof.scene.goal
-    refuted = any(claim.claim == "goal" and claim.verdict == "refuted" for claim in proof.claims)
-    if proof.noise or proof.tolerance:
+    verdicts = {claim.verdict for claim in proof.claims if claim.claim == "goal"}
+    if (proof.noise or proof.tolerance) and "proved-on-cells" not in verdicts:
         return f"{proposed('margin', _source(scene))} (how much each quantity may deviate)"
-    if refuted and goal is not None and (design := design_command(scene, [goal])):
+    if "refuted" in verdicts and goal is not None and (design := design_command(scene, [goal])):
         return design
     source = _source(scene)
     sampled, audited = proposed("analyse", source), proposed("audit", source)
@@ -162,8 +162,10 @@ def without_margin(scene: Scene, goals: Sequence[Goal], *, fails: bool) -> str:
     """Name the command that goes on from a scene without margins: its goal fails, or is not proved of it."""
     analysed = proposed("analyse", _source(scene))
     starts = f"{analysed} (which starts leave the arm: margins need a scene in which none does)"
-    certify = f"{proposed('certify', _source(scene))} (what is proved of it, and what is not), {starts}"
-    return (design_command(scene, goals) if fails else "") or certify
+    certify = f"{proposed('certify', _source(scene))} (what is proved of it, and what is not), "
+    return (design_command(scene, goals) if fails else "") or (
+        certify if can_be_proved(scene) else ""
+    ) + starts
 
 
 def design_command(scene: Scene, goals: Sequence[Goal]) -> str:
@@ -178,13 +180,15 @@ def _source(scene: Scene) -> str:
     return scene.file or f"{scene.name}.toml"
 
 
-def void_of(outcome: GoalOutcome, unit: str) -> str:
+def void_of(outcome: GoalOutcome, unit: str, spread: str | None) -> str:
     """Say where a goal that holds speaks of nothing; empty where it does not.
+
+    With `spread` the scene scatters its throws, and the limit set is that without scatter.
 
     Examples
     --------
     >>> from limitsets.analysis import GoalOutcome
-    >>> void_of(GoalOutcome(OrientedBeyond(20.0, 2), True, 17.5, reach=(19.0,)), "in")
+    >>> void_of(GoalOutcome(OrientedBeyond(20.0, 2), True, 17.5, reach=(19.0,)), "in", None)
     'no part gets there: the limit set ends at x = 19.000 in, before x = 20 in'
     """
     goal = outcome.goal
@@ -200,4 +204,8 @@ def void_of(outcome: GoalOutcome, unit: str) -> str:
     else:
         ends = [f"limit set {k} ends at x = {outcome.reach[k]:.3f} {unit}" for k in short]
     who = "no part gets there" if outcome.vacuous else "not every part gets there"
-    return f"{who}: {', '.join(ends)}, before x = {goal.x:g} {unit}" if ends else ""
+    return (
+        f"{'without scatter ' if spread else ''}{who}: {', '.join(ends)}, before x = {goal.x:g} {unit}"
+        if ends
+        else ""
+    )

@@ -82,7 +82,7 @@ def robustness_page(found: Robustness, figures: Mapping[str, str]) -> str:
             beyond=own and OrientedBeyond(own.x, own.side),
             places=found.curve and _places(found.curve),
             laws=noise
-            and [_law(name, getattr(noise.scatter, name), noise.unit) for name in noise.scatter.given()],
+            and [law_words(name, getattr(noise.scatter, name), noise.unit) for name in noise.scatter.given()],
             numbers=noise and _numbers(noise, len(found.scene.sides), found.scene.world.throw_rate),
             changes=noise and _changes(noise),
             files=list(dict.fromkeys(proofs)),
@@ -266,13 +266,13 @@ def _change(value: float, kind: str) -> str:
     return f"{value:+.1e}" if kind == "rate" else f"{100.0 * value:+.2g} %"
 
 
-def _law(name: str, law: Law, unit: str) -> str:
+def law_words(name: str, law: Law, unit: str) -> str:
     """Say a law as people give it.
 
     Examples
     --------
     >>> from limitsets.robust import Gaussian
-    >>> _law("speed", Gaussian(0.005), "in")
+    >>> law_words("speed", Gaussian(0.005), "in")
     'speed: normal, standard deviation 0.5 %'
     """
 

@@ -245,7 +245,7 @@ def parsed_deviation(text: object, name: str, *, key: str | None = None, file: s
     place = find(name, key=key, file=file)
     # where a landing is measured from is a convention: a share of it means nothing
     relative = isinstance(text, str) and text.rstrip().endswith("%") and name != NOISE_ONLY
-    return parse(text, "share" if relative else place.dimension, key=key, file=file)
+    return parse(text, "share" if relative else place.dimension, share=name != NOISE_ONLY, key=key, file=file)
 
 
 def deviation(

@@ -112,7 +112,14 @@ class Quantity(NamedTuple):
     unit: str
 
 
-def parse(text: object, dimension: str, *, key: str | None = None, file: str | None = None) -> Quantity:
+def parse(
+    text: object,
+    dimension: str,
+    *,
+    share: bool = False,
+    key: str | None = None,
+    file: str | None = None,
+) -> Quantity:
     """Read a quantity of a given dimension.
 
     Parameters
@@ -121,6 +128,8 @@ def parse(text: object, dimension: str, *, key: str | None = None, file: str | N
         What stands in the scene; anything but a string is refused.
     dimension : str
         A key of `UNITS`.
+    share : bool
+        Whether percent is allowed as well: for the error.
     key, file : str, optional
         Where it stands, for the error.
 
@@ -143,9 +152,11 @@ def parse(text: object, dimension: str, *, key: str | None = None, file: str | N
     example = _EXAMPLES[dimension]
 
     def refuse(value: object, remedy: str) -> SceneError:
-        other = [sign for sign, unit in _SPELLINGS.items() if unit in UNITS[dimension]]
-        units = ", ".join([*UNITS[dimension], *other[:1]])
-        allowed = f'{article} {dimension}, "<decimal number> <unit>" with a unit of {units}'
+        percent = '"<decimal number> %" or ' if share and dimension != "share" else ""
+        units = ", ".join(
+            [*UNITS[dimension], *[sign for sign, unit in _SPELLINGS.items() if unit in UNITS[dimension]][:1]]
+        )
+        allowed = f'{percent}{article} {dimension}, "<decimal number> <unit>" with a unit of {units}'
         return SceneError(f"this {dimension}", value, allowed, remedy, key=key, file=file)
 
     if not isinstance(text, str):

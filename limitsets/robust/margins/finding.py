@@ -99,7 +99,11 @@ def margin(
     Raises
     ------
     AnswerError
-        No goal, a quantity or a reading that the scene does not have.
+        No goal, a quantity or a reading that the scene does not have, or effects of which nothing is proved.
+
+    Notes
+    -----
+    Margins of a scene that scatters its throws are those of the scene without its scatter.
 
     Examples
     --------
@@ -113,6 +117,7 @@ def margin(
         raise AnswerError("the width", width, "from 0.0001 to below 1", "0.01 is a hundredth")
     goals = goals_of(loaded, goal, laid)
     query = Query.of(loaded, goals)
+    query.box(None, {})  # refuses a scene of which nothing can be proved
     names: tuple[str, ...] = tuple(dict.fromkeys(quantities))
     todo: list[DeviationScale | str] = []
     if names:
