@@ -123,7 +123,7 @@ class Curve:
 
     def line(self) -> str:
         """Put the level in words."""
-        share = f"{100 * self.wanted:g} %"
+        share = f"{100 * self.wanted:g} % of the parts not thrown at the edge"
         if self.level is None:
             least, at = float(self.right.min()), float(self.factors[-1])
             return (

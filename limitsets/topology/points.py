@@ -33,7 +33,7 @@ from limitsets.topology.records import (
     empty,
 )
 from limitsets.topology.recurrence import find_components, shares
-from limitsets.topology.work import MOST_ATTRACTORS, Region, Work, work_for
+from limitsets.topology.work import MOST_ATTRACTORS, Region, Unions, Work, work_for
 
 # Cells and samples a side: from coarse to fine; no edge of some is one of others, for cycles may lie on them.
 LEVELS = ((240, 40), (701, 112), (2803, 448), (16_381, 1536))
@@ -41,6 +41,17 @@ LEVELS = ((240, 40), (701, 112), (2803, 448), (16_381, 1536))
 GAP = 1e-7
 # A set all of whose intervals are shorter is a cycle [of the largest side].
 POINT = 1e-8
+
+
+@kernel(entry=True, counting=False)
+def _meets_both_ends(r: Region, scale: float, u: Unions) -> bool:
+    """Whether SET has points at both ends of the sides: on a circle these are one place, named by rounding."""
+    low = high = False
+    for k in range(u.size[SET]):
+        side, x = u.side[SET, k], u.lo[SET, k]
+        low = low or x <= r.lo[side] + CLOSES * scale
+        high = high or x >= r.hi[side] - CLOSES * scale
+    return low and high
 
 
 @kernel(entry=True, counting=False)
@@ -64,7 +75,8 @@ def _attractor(params: Any, a: int, r: Region, scale: float, w: Work, t: Topolog
     t.period[i, a] = u.size[SET] if cycle > 0 or widest <= POINT * scale else 0
     if cycle > 0:
         x, side = u.lo[SET, 0], u.side[SET, 0]
-    if not visits_all(params, CLOSES * scale, u):
+    named_twice = t.period[i, a] > 0 and _meets_both_ends(r, scale, u)
+    if named_twice or not visits_all(params, CLOSES * scale, u):
         return NOT_ONE
     if t.period[i, a] == 0 and not fills(params, x, side, scale, w.pieces, u):
         return NOT_ONE

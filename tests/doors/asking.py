@@ -12,6 +12,7 @@ from limitsets.cli import main
 from limitsets.errors import LimitsetsError
 from limitsets.explorer.work import answers
 from limitsets.robust.margins.margin_texts import bound
+from limitsets.scene.left_out import WITHOUT_SCATTER
 
 # How much narrower than what is proved, and wider than what is refuted, a tolerance is asked of `certify`.
 INSIDE, OUTSIDE = 1.0 - 1e-3, 1.0 + 1e-3
@@ -86,6 +87,6 @@ def disagreements(found: dict[str, Any]) -> list[str]:
     told = found["explorer"]
     if isinstance(told, dict):
         shown = bound(proved, found["unit"]), refuted and bound(refuted, found["unit"], up=True)
-        if (told["proved"], told["refuted"]) != shown:
+        if (told["proved"].removesuffix(f" {WITHOUT_SCATTER}"), told["refuted"]) != shown:
             wrong.append(f"explorer: {told}, Python as shown: {shown}")
     return wrong

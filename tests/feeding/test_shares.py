@@ -207,7 +207,7 @@ def test_the_level_at_which_success_falls():
     assert success_curve(end, NOISE, factors=(0.0, 1.0)).level == (0.0, 0.0)
     curve = success_curve(arm_end_of(with_cavity()), Scattering(speed=Uniform(0.01)), factors=(0.0, 1.0))
     assert curve.level is None
-    assert "stays above 95 %" in curve.line()
+    assert "stays above 95 % of the parts not thrown at the edge" in curve.line()
 
 
 @pytest.mark.sweep

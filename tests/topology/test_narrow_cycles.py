@@ -15,6 +15,51 @@ from limitsets.maps.stacks import point_of, stacked
 from limitsets.scene.arrays import throw_stack
 from limitsets.topology import topologies
 
+
+class TwoSines(NamedTuple):
+    """A circle map of two harmonics with a branch for each whole turn."""
+
+    omega: float
+    k: float
+    m: float
+
+
+def _lift(p, x):
+    turned = p.k / (2 * math.pi) * math.sin(2 * math.pi * x) + p.m / (4 * math.pi) * math.sin(4 * math.pi * x)
+    return x + p.omega - turned
+
+
+def _sines(p, x, side):
+    y = _lift(p, x)
+    return y - math.floor(y), side, math.floor(y) + 1
+
+
+def _sines_on(p, x, side, branch):
+    return _lift(p, x) - (branch - 1), side
+
+
+ls.register(TwoSines, image=_sines, image_on=_sines_on, branches=("back", "same", "on"))
+
+
+class Monotone(NamedTuple):
+    """The same map where it rises: two branches."""
+
+    omega: float
+    k: float
+    m: float
+
+
+def _monotone(p, x, side):
+    y = _lift(p, x)
+    return (y, side, 0) if y < 1.0 else (y - 1.0, side, 1)
+
+
+def _monotone_on(p, x, side, branch):
+    return _lift(p, x) - branch, side
+
+
+ls.register(Monotone, image=_monotone, image_on=_monotone_on, branches=("same", "on"))
+
 # The longest cycle that is looked for, and what is near enough for Newton's method to begin.
 LONGEST, NEAR = 256, 1e-2
 
@@ -117,6 +162,17 @@ def test_at_a_bifurcation_no_longer_cycle_is_told(r, period):
     # the multiplier is 1 or -1 to rounding: orbits close as slowly as 1 / sqrt(throws)
     t = topologies(stacked([maps.Logistic(r)]), [[0.0]], [[1.0]])
     assert t.undecided[0] or t.period[0, 0] == period
+
+
+@pytest.mark.parametrize(
+    ("circle", "period"),
+    # the orbit {0, 1/2} of multiplier (1 - m)^2 - k^2, and the fixed point 0 of multiplier 1 - k - m
+    [(Monotone(0.5, 0.75, 0.2), 2), (Monotone(0.5, 0.4, 0.2), 2), (TwoSines(0.0, 1.5, 0.3), 1)],
+)
+def test_a_cycle_on_the_cut_of_a_circle_is_not_told_twice(circle, period):
+    """0 and 1 are one place of the circle: the same cycle was told as two attractors, of periods 3 and 2."""
+    t = topologies(stacked([circle]), [[0.0]], [[1.0]])
+    assert t.undecided[0] or (t.attractors[0] == 1 and t.period[0, 0] == period)
 
 
 @pytest.mark.parametrize("cubic", [1.5, 2.4, 2.9])
