@@ -45,7 +45,6 @@ GIVEN_BY = {
     "Scene": 'limitsets.load("paper-designed")',
     "Synthesis": "limitsets.feedback(scene)",
     "TransitionGraph": "limitsets.transitions(scene.map, limitsets.grid(scene.domain))",
-    "TrayDesign": "limitsets.trays.tray_design(scene)",
     "TrayFill": "limitsets.tray(scene)",
 }
 

@@ -1,12 +1,19 @@
-"""Maps with answers on paper that only tests use, registered from outside the package as a user's maps are."""
+"""Maps with answers on paper, and an image method, that only tests use, added from outside the package as users do."""
 
 from __future__ import annotations
 
 import math
 from typing import NamedTuple
+from unittest import mock
+
+import numpy as np
 
 import limitsets as ls
 import limitsets.interval as iv
+from limitsets.cells import Grid
+from limitsets.graph.images import METHODS
+from limitsets.graph.images.sampled import sampled
+from limitsets.graph.images.samples import SamplePoints
 from limitsets.interval import Interval
 from limitsets.interval.number import hull_of
 from limitsets.jit import proof_kernel
@@ -339,3 +346,15 @@ DOMAINS: dict[type, tuple[tuple[float, float], ...]] = {
     TwoState: ((-2.0, 2.0), (-2.0, 2.0)),
     ThreeState: ((-3.0, 3.0),),
 }
+
+
+def _middles(grid: Grid, side: int) -> SamplePoints:
+    """One point a cell, its middle."""
+    axes = tuple(0.5 * (edges[1:] + edges[:-1]) for edges in grid.edges[side])
+    shape = grid.shape[side]
+    strides = tuple(math.prod(shape[axis + 1 :].tolist()) for axis in range(grid.dimension))
+    return SamplePoints(axes, strides, np.zeros(1, np.int64))
+
+
+with_middles = mock.patch.dict(METHODS, {"middles": sampled(_middles)})
+"""An image method of the tests' own: the image of its middle stands for a cell, so that images of others are missed."""

@@ -31,7 +31,7 @@ KINDS = {
 }
 """What can be shown, by the name of its class, and which function makes a film of it."""
 
-SUFFIXES = {".gif": "gif:write_gif", ".mp4": "mp4:write_mp4", ".html": "page:write_page"}
+SUFFIXES = {".gif": "gif:write_gif", ".html": "page:write_page"}
 """Which function writes a film, by how the file's name ends."""
 
 
@@ -46,12 +46,13 @@ def require_file(path: Path) -> Any:
     Raises
     ------
     AnswerError
-        No film has a name like this, or what writes it is not installed.
+        No film has a name like this.
     """
     writer = SUFFIXES.get(path.suffix.lower())
     if writer is None:
         allowed = f"a name that ends in {', '.join(SUFFIXES)}"
-        raise AnswerError("the film's file", str(path), allowed, "rename it")
+        remedy = "rename it, or convert a GIF: ffmpeg -i film.gif -pix_fmt yuv420p film.mp4"
+        raise AnswerError("the film's file", str(path), allowed, remedy)
     return _found(writer)
 
 
@@ -109,7 +110,7 @@ def animate(
         `limitsets.margin`; a pair of `limitsets.assemble` in contact; a depression of `limitsets.tray`; a recording of
         the rigid-body engine.
     file : str or Path
-        Where to: .html (a page that stands alone), .gif, or .mp4 (with ``pip install 'limitsets[animate]'``).
+        Where to: .html (a page that stands alone) or .gif.
     start : (float, int), optional
         x [length] and side of the start; default a good one, on the limit set.
     throws : int, optional

@@ -71,7 +71,9 @@ class Picture:
         left = LEFT + 0.5 * (wide - LEFT - RIGHT - scale * across)
         bottom = TOP + scale * up
         lanes = 0.0 if film.lanes is None else LanePicture.room(film.lanes)
-        tall = 2 * math.ceil(0.5 * (bottom + lanes + FOOT))  # even, as the codecs of mp4 ask
+        tall = 2 * math.ceil(
+            0.5 * (bottom + lanes + FOOT)
+        )  # even, as codecs of video ask of who converts a GIF
         return cls(
             film, scale, (left - scale * float(lo[0]), TOP + scale * float(hi[1])), bottom, (wide, tall)
         )

@@ -20,7 +20,7 @@ def animate(
     scene: Scene,
     out: Annotated[
         Path | None,
-        option("--out -o", "FILE", "A name that ends in .html, .gif or .mp4; ./NAME.html by default."),
+        option("--out -o", "FILE", "A name that ends in .html or .gif; ./NAME.html by default."),
     ] = None,
     start: Annotated[str | None, option("--start", "X,SIDE", HELP_START)] = None,
     throws: Annotated[

@@ -7,13 +7,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from limitsets.cli.arguments import places_of
-from limitsets.cli.output import Csv, Form, Format, Json, Scene, answer, opened, option, progress, show, table
+from limitsets.cli.output import Csv, Form, Format, Json, Scene, answer, opened, option, progress, show
 
 if TYPE_CHECKING:
-    from limitsets.trays import TrayDesign, TrayFill
+    from limitsets.trays import TrayFill
 
-HELP_OUT = "Write tray.json and a figure there; with --depths or --agitations design.json."
+HELP_OUT = "Write tray.json and a figure there."
 HELP_PARTS = "Let N parts come by at once in each pass, in the engine, that push each other."
 HELP_FILE = "Keep finished batches of --parts there; the same command goes on with what is left."
 HELP_HISTORIES = "Depressions followed pass by pass in the engine, with new parts and with parts that return."
@@ -39,83 +38,45 @@ def tray(
     batches: Annotated[int, option("--batches", "N", "How often --parts are tried.", min=1)] = 10,
     workers: Annotated[int | None, option("--workers", "N", "Processes that run the batches.", min=1)] = None,
     file: Annotated[Path | None, option("--file", "FILE", HELP_FILE)] = None,
-    depths: Annotated[
-        str | None, option("--depths", "LO:HI:N", "Try N depths of the depressions instead.")
-    ] = None,
-    agitations: Annotated[str | None, option("--agitations", "LO:HI:N", "Try N agitations instead.")] = None,
     form: Format = Form.PNG,
     csv: Csv = None,
     out: Annotated[Path | None, option("--out -o", "DIR", HELP_OUT)] = None,
     json: Json = False,
 ) -> None:
-    """Say how a tray's depressions fill: captures and releases counted in the engine, then the chain.
-
-    With --depths or --agitations: for each of them, and the best again with another seed.
-    """
+    """Say how a tray's depressions fill: captures and releases counted in the engine, then the chain."""
     with progress() as tell:
         chosen, _ = opened(scene, out)
-        common: dict[str, Any] = {
-            "passes": passes,
-            "drops": drops,
-            "kicks": kicks,
-            "seed": seed,
-            "side": side,
-            "progress": tell,
-        }
-        found: TrayFill | TrayDesign
-        if depths is None and agitations is None:
-            from limitsets.trays import tray as run
+        from limitsets.trays import tray as run
 
-            crowd: dict[str, Any] = {
-                "parts": parts,
-                "depressions": depressions,
-                "batches": batches,
-                "file": file,
-            }
-            found = run(chosen, **common, histories=histories, **crowd, workers=workers)
-        else:
-            found = _designed(chosen, depths, agitations, common)
+        found = run(
+            chosen,
+            passes=passes,
+            drops=drops,
+            kicks=kicks,
+            histories=histories,
+            seed=seed,
+            side=side,
+            parts=parts,
+            depressions=depressions,
+            batches=batches,
+            file=file,
+            workers=workers,
+            progress=tell,
+        )
         record = found.to_json()
         files = [] if out is None else _written(found, record, out, form)
     answer(record, json, lambda: _text(found, files), csv=(csv, found.table))
 
 
-def _designed(chosen: Any, depths: str | None, agitations: str | None, common: dict[str, Any]) -> TrayDesign:
-    """Try the depths and agitations named; where one is not, the scene's own."""
-    from limitsets.trays import tray_design
-
-    own = chosen.tray
-    at = [] if depths is None else places_of(chosen, depths, "--depths")
-    kicks = [] if agitations is None else places_of(chosen, agitations, "--agitations")
-    if own is not None:
-        at, kicks = at or [own.depression_depth], kicks or [own.agitation]
-    return tray_design(chosen, at, kicks, **common)
-
-
-def _written(found: TrayFill | TrayDesign, record: dict[str, Any], out: Path, form: str) -> list[Path]:
+def _written(found: TrayFill, record: dict[str, Any], out: Path, form: str) -> list[Path]:
     from limitsets import plot
     from limitsets.files import as_json
     from limitsets.report.writing import laid
-    from limitsets.trays import TrayDesign
 
-    drawn = (
-        ("design", plot.tray_design(found)) if isinstance(found, TrayDesign) else ("tray", plot.tray(found))
-    )
-    return laid(out, [drawn], lambda _: {f"{drawn[0]}.json": as_json(record)}, form)
+    return laid(out, [("tray", plot.tray(found))], lambda _: {"tray.json": as_json(record)}, form)
 
 
-def _text(found: TrayFill | TrayDesign, files: list[Path]) -> None:
-    from limitsets.trays import TrayDesign
-
-    if isinstance(found, TrayDesign):
-        _say_design(found)
-    else:
-        _say_fill(found)
-    if files:
-        typer.echo(f"written: {', '.join(map(str, files))}")
-
-
-def _say_fill(found: TrayFill) -> None:
+def _text(found: TrayFill, files: list[Path]) -> None:
     filled, counts, unit = found.filled, found.counts, found.scene.unit
     sizes, plate = found.passes.tray, found.passes.plate
     typer.echo(
@@ -148,21 +109,5 @@ def _say_fill(found: TrayFill) -> None:
         typer.echo(f"by the chain, of as many parts one by one: right {right:.4f} ({low:.4f} to {high:.4f})")
     if counts.unfinished:
         typer.echo(f"{counts.unfinished} parts did not come to rest; they are left out")
-
-
-def _say_design(found: TrayDesign) -> None:
-    unit = found.scene.unit
-    heads = [f"depth [{unit}] \\ agitation [{unit}]", *(f"{each:.4g}" for each in found.agitations)]
-    rows = [
-        [f"{depth:.4g}", *(f"{share:.4f}" for share in row)]
-        for depth, row in zip(found.depths, found.right, strict=True)
-    ]
-    typer.echo(f"{found.scene.name}: filled rightly after {found.passes} passes")
-    table(heads, rows)
-    depth, agitation = found.best
-    again = found.confirmed.filled
-    low, high = again.interval[-1].tolist()
-    typer.echo(
-        f"best: depth {depth:.4g} {unit}, agitation {agitation:.4g} {unit}; on fresh seeds {again.right[-1]:.4f} "
-        f"({low:.4f} to {high:.4f}), rest {again.unfilled['empty']:.4f} empty, {again.unfilled['wrong']:.4f} wrong"
-    )
+    if files:
+        typer.echo(f"written: {', '.join(map(str, files))}")

@@ -9,9 +9,8 @@ from pathlib import Path
 from limitsets.cells import Grid
 from limitsets.errors import AnswerError
 
-# Bytes a cell at the peak, in one, two and three dimensions, as measured on textbook maps; "random" for each sample.
-BYTES = {"random": (41, 96, 136), "boxes": (125, 151, 197)}
-BYTES_SAMPLED = (104, 95, 155)
+# Bytes a cell at the peak, in one, two and three dimensions, as measured on textbook maps.
+BYTES_BOXES, BYTES_SAMPLED = (125, 151, 197), (104, 95, 155)
 
 # Below this the system is not asked, which takes longer than a small graph.
 SMALL = 64 * 2**20
@@ -46,10 +45,10 @@ def _free_bytes() -> int | None:
     return min(found, default=None)
 
 
-def require_memory(grid: Grid, method: str, samples: int) -> None:
+def require_memory(grid: Grid, method: str) -> None:
     """Refuse a grid whose graph takes more memory than there is, and say what one takes that is large."""
-    per_cell = BYTES.get(method, BYTES_SAMPLED)[grid.dimension - 1] * (samples if method == "random" else 1)
-    wanted = per_cell * grid.n_cells
+    per_cell = BYTES_BOXES if method == "boxes" else BYTES_SAMPLED
+    wanted = per_cell[grid.dimension - 1] * grid.n_cells
     if wanted <= SMALL:
         return
     free = _free_bytes()

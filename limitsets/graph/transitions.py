@@ -30,11 +30,11 @@ def transitions(map: Any, grid: Grid, method: str | None = None, **options: Any)
         A map (`scene.map`, `limitsets.maps`, or your own after `limitsets.register`).
     grid : Grid
         Cells to go between.
-    method : {"end-points", "corners", "corners-padded", "centres", "random", "boxes"}, optional
+    method : {"end-points", "corners", "corners-padded", "boxes"}, optional
         How the image of a cell is found.  Default: the end points in one dimension, padded corners in more.  "boxes"
         proves that no image of any point is missed, for a map with `image_box`; the others sample.
     **options
-        For "random": samples=16, seed=0.  For "boxes": upper, the upper corner of a box of parameters.
+        For "boxes": upper, the upper corner of a box of parameters.
 
     Returns
     -------
@@ -64,7 +64,7 @@ def transitions(map: Any, grid: Grid, method: str | None = None, **options: Any)
     chosen = method or ("end-points" if grid.dimension == 1 else "corners-padded")
     if chosen not in METHODS:
         raise AnswerError("the image method", chosen, ", ".join(METHODS), "correct the word")
-    require_memory(grid, chosen, options.get("samples", 16))
+    require_memory(grid, chosen)
     require_agreement(map, grid.domain, chosen == "boxes", options.get("upper"))
     target = Target.of(grid, kind.exits)
     inhabited = grid.domain.inhabited.tolist()

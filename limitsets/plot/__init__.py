@@ -27,7 +27,6 @@ if TYPE_CHECKING:
     from limitsets.plot.designs import design as design
     from limitsets.plot.fed_parts import feeding as feeding
     from limitsets.plot.filled_trays import tray as tray
-    from limitsets.plot.filled_trays import tray_design as tray_design
     from limitsets.plot.flights import flight as flight
     from limitsets.plot.fronts import robust_design as robust_design
     from limitsets.plot.limit_sets import limit_set as limit_set
@@ -67,7 +66,6 @@ _FILES = {
     "tolerance_box": "margins",
     "tornado": "margins",
     "tray": "filled_trays",
-    "tray_design": "filled_trays",
 }
 
 __all__ = [*_FILES]

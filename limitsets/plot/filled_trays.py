@@ -16,11 +16,10 @@ from limitsets.robust.noise.proportions import binomial_interval
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-    from matplotlib.patches import Patch
     from numpy.typing import NDArray
 
     from limitsets.engine.depression import Pose
-    from limitsets.trays import TrayDesign, TrayFill
+    from limitsets.trays import TrayFill
 
 # After so many points a curve has no more marks.
 MARKS = 9
@@ -229,49 +228,3 @@ def _grid(axes: Axes, shares: NDArray[np.float64], rows: list[str], columns: lis
         axes.text(column, row, f"{value:.2f}", ha="center", va="center", fontsize=style.SMALL, color=colour)
     axes.set_xticks(range(len(columns)), columns, fontsize=style.SMALL)
     axes.set_yticks(range(len(rows)), rows, fontsize=style.SMALL)
-
-
-def _marked(axes: Axes, cells: NDArray[np.bool_]) -> list[Patch]:
-    """Mark cells of a grid in a corner."""
-    corner = np.array([[0.5, -0.5], [0.5, -0.2], [0.32, -0.5]])
-    places = np.argwhere(cells)[:, ::-1]
-    return [axes.add_patch(Polygon(corner + place, fc=style.FLIP, ec="white", lw=0.5)) for place in places]
-
-
-@arguments_checked
-def tray_design(found: TrayDesign) -> Figure:
-    """Draw how a tray fills by depth and agitation.
-
-    Parameters
-    ----------
-    found : TrayDesign
-        From `limitsets.trays.tray_design`.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-        The fraction filled rightly after the passes; the rest after endless ones, as empty and as wrong parts, marked
-        where no counted kick changed some wrong state.
-    """
-    figure, axes = style.canvas(12.6, 4.9, 1, 3)
-    unit = found.scene.unit
-    endless = "after endless passes"
-    titles = f"filled rightly after {found.passes} passes", f"empty, {endless}", f"wrong, {endless}"
-    rows, columns = ([f"{each:.3g}" for each in values] for values in (found.depths, found.agitations))
-    for each, shares, title in zip(axes, (found.right, found.empty, found.wrong), titles, strict=True):
-        _grid(each, shares, rows, columns)
-        each.set_title(title, loc="left", fontsize=style.TEXT)
-        each.set_xlabel(f"agitation [{unit}]", fontsize=style.SMALL)
-    marks = [_marked(each, found.held) for each in axes[1:]]
-    if found.held.any():
-        words = "no counted kick changed some wrong state: endless passes never leave it, by the counts"
-        figure.legend(marks[0][:1], [words], loc="outside lower right", fontsize=style.SMALL, frameon=False)
-    axes[0].set_ylabel(f"depth of the depressions [{unit}]", fontsize=style.SMALL)
-    depth, agitation = found.best
-    at = found.agitations.tolist().index(agitation), found.depths.tolist().index(depth)
-    axes[0].plot(*at, marker="s", ms=30, mfc="none", mec=style.FLIP, mew=1.6)
-    again = found.confirmed.filled
-    low, high = again.interval[-1].tolist()
-    words = f"best {again.right[-1]:.2f} on fresh seeds ({low:.2f} to {high:.2f})"
-    style.title(figure, f"{found.scene.name}, side {found.confirmed.passes.side} wanted: {words}")
-    return figure

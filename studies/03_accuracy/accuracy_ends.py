@@ -21,14 +21,14 @@ from limitsets.proofs.cover import cover
 from limitsets.proofs.end_points import proved_ends
 from limitsets.proofs.parameters import parameter_box
 
-__all__ = ["BORDERS", "CENTRES", "CRITICAL", "ORBIT", "PROVED", "distance", "reference", "set_errors"]
+__all__ = ["BORDERS", "CRITICAL", "ORBIT", "PROVED", "distance", "reference", "set_errors"]
 
 Extents = dict[int, list[tuple[float, float]]]
 
 DIGITS = 50
 CELLS = [2**k for k in range(11, 20)]  # fewer show thousands of sets that are not there
 THROWS = [10**k for k in range(3, 8)]
-ORBIT, BORDERS, CENTRES = "one long orbit", "border cells refined", "cells, centres"
+ORBIT, BORDERS = "one long orbit", "border cells refined"
 CRITICAL, PROVED = "end points by critical orbits", "end points, proved"
 
 
@@ -168,7 +168,6 @@ def set_errors(scene: Any, exact: Any, quick: bool = False) -> list[Point]:
         ("the same, equal cells", "end-points", "uniform"),
         ("cells, padded corners", "corners-padded", "graded"),
         ("cells, corners", "corners", "graded"),
-        (CENTRES, "centres", "graded"),
         ("cells, proved boxes", "boxes", "graded"),
     ]
     points = []

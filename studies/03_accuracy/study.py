@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 from accuracy_effects import SCENES, effect_costs, effects_figure
-from accuracy_ends import BORDERS, CENTRES, CRITICAL, ORBIT, PROVED, reference, set_errors
+from accuracy_ends import BORDERS, CRITICAL, ORBIT, PROVED, reference, set_errors
 from accuracy_figures import ROUNDING, long_run_figure, set_figure, throw_figure
 from accuracy_long_run import (
     CELLS,
@@ -129,7 +129,6 @@ def table(numbers: dict[str, Any]) -> str:
         }
         count = "throws" if name == ORBIT else "cells"
         falls = f"{count}^{fitted[name]:.2f}" if name in fitted else words.get(name, "")
-        falls = "no law" if name == CENTRES else falls
         lines.append(f"| {name} | {falls} | {best['error']:.1e} | {_duration(best['seconds'])} |")
     return "\n".join(lines)
 

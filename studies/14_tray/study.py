@@ -1,4 +1,4 @@
-"""The tray: how its depressions fill, whether they forget, and which depth and agitation fill them best.
+"""The tray: how its depressions fill, and whether they forget.
 
 Run it as ``python studies/14_tray/study.py [--seed 0] [--drops 8000] [--histories 200] [--out FOLDER] [--json]``.
 """
@@ -15,16 +15,13 @@ import numpy as np
 
 import limitsets as ls
 from limitsets.engine.depression import UNFINISHED
-from limitsets.files import as_json
 from limitsets.robust.noise.proportions import binomial_interval
-from limitsets.trays import TrayDesign, TrayFill, tray_design
+from limitsets.trays import TrayFill
 from limitsets.trays.histories import Histories
 from limitsets.trays.histories import histories as follow
 from limitsets.trays.passing import passes_of, random_of
 
 HERE = Path(__file__).resolve().parent
-DEPTHS = (0.4, 0.75, 1.1, 1.53, 2.0, 2.5, 3.0)
-AGITATIONS = (0.1, 0.2, 0.4, 0.8, 1.6)
 PASSES, SHORT = 200, 3
 STEP = 4e-3
 
@@ -93,9 +90,7 @@ def after(counts: Sequence[tuple[int, int]]) -> list[dict[str, Any]]:
     return [{"count": n, "of": of, "interval": binomial_interval(n, of)} for n, of in counts]
 
 
-def main(
-    seed: int = 0, out: Path = HERE, drops: int = 8000, histories: int = 200, *, design: bool = True
-) -> dict[str, Any]:
+def main(seed: int = 0, out: Path = HERE, drops: int = 8000, histories: int = 200) -> dict[str, Any]:
     """Run the study, write the figures into `out`, return the numbers."""
     out.mkdir(parents=True, exist_ok=True)
     found = ls.tray(scene(), passes=PASSES, drops=drops, histories=histories, seed=seed, step=STEP)
@@ -116,19 +111,7 @@ def main(
         "captured rightly after misses, short": forgetting(seed, 30 * histories),
         "step halved": halved(seed, max(drops // 4, 10)),
     }
-    if design:
-        best = designed(seed, max(drops // 16, 10), max(drops // 8, 10))
-        ls.plot.tray_design(best).savefig(out / "design.png", dpi=130)
-        numbers["design"] = best.to_json() | {"confirmed": best.confirmed.filled.to_json()}
-        (out / "design.json").write_text(as_json(numbers["design"]), encoding="utf-8")
     return numbers
-
-
-def designed(seed: int, drops: int, kicks: int) -> TrayDesign:
-    """Try depths and agitations."""
-    return tray_design(
-        scene(), DEPTHS, AGITATIONS, passes=PASSES, drops=drops, kicks=kicks, seed=seed, step=STEP
-    )
 
 
 def table(numbers: dict[str, Any]) -> str:

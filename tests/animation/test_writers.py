@@ -1,8 +1,7 @@
-"""Files: what a page holds, frames and delays of a GIF, frames of an MP4; the page needs nothing from elsewhere."""
+"""Files: what a page holds, frames and delays of a GIF; the page needs nothing from elsewhere."""
 
 import json
 import re
-import sys
 from html.parser import HTMLParser
 
 import numpy as np
@@ -96,22 +95,6 @@ def test_a_gif_has_the_frames_and_their_delays(tmp_path):
     assert film.frames - 5 <= len(delays) <= film.frames
 
 
-@pytest.mark.sweep
-def test_an_mp4_has_the_frames(tmp_path):
-    import imageio_ffmpeg
-
-    film = film_of("paper-designed", **SHORT)
-    file = ls.animate("paper-designed", tmp_path / "run.mp4", **SHORT)
-    count, seconds = imageio_ffmpeg.count_frames_and_secs(str(file))
-    assert count == film.frames
-    assert seconds == pytest.approx(film.frames / 20.0, abs=0.06)
-    reader = imageio_ffmpeg.read_frames(str(file))
-    about = next(reader)
-    reader.close()
-    assert about["size"] == tuple(2 * round(0.75 * each) for each in Picture.of(film).size)
-    assert about["codec"] == "h264"
-
-
 def test_pixels_show_the_part_where_it_is():
     """The colour of the part's face is at its centre of mass, aside from the sign there, and nowhere under the arm."""
     film = film_of("paper-designed", **SHORT)
@@ -127,14 +110,6 @@ def test_pixels_show_the_part_where_it_is():
             assert found[:, 1].min() >= corners[:, 0].min() - 3
             assert found[:, 1].max() <= corners[:, 0].max() + 3
             assert found[:, 0].max() <= corners[:, 1].max() + 3
-
-
-def test_without_imageio_ffmpeg_one_line_says_what_to_install(tmp_path, monkeypatch):
-    monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
-    monkeypatch.delitem(sys.modules, "limitsets.animation.mp4", raising=False)
-    with pytest.raises(AnswerError, match=r"pip install 'limitsets\[animate\]'"):
-        ls.animate("paper-designed", tmp_path / "run.mp4", **SHORT)
-    assert not list(tmp_path.iterdir())
 
 
 def test_a_film_that_is_not_finished_leaves_the_old_file(tmp_path):
@@ -159,14 +134,11 @@ def test_a_place_that_cannot_be_written_is_named(tmp_path):
 
 def test_importing_limitsets_loads_none_of_it():
     loaded = run_python("import sys, limitsets; print(*sys.modules)").split()
-    assert not [name for name in loaded if name.startswith(("limitsets.animation", "PIL", "imageio"))]
+    assert not [name for name in loaded if name.startswith(("limitsets.animation", "PIL"))]
     loaded = run_python("import sys, limitsets as ls; ls.animate; print(*sys.modules)").split()
-    assert not {*LATE, "PIL", "imageio_ffmpeg"} & set(loaded) - {"numba", "scipy", "networkx"}
+    assert not {*LATE, "PIL"} & set(loaded) - {"numba", "scipy", "networkx"}
 
 
 def test_every_kind_and_writer_of_the_tables_is_there():
-    for where in (
-        *animating.KINDS.values(),
-        *(each for each in animating.SUFFIXES.values() if "mp4" not in each),
-    ):
+    for where in (*animating.KINDS.values(), *animating.SUFFIXES.values()):
         assert callable(animating._found(where))

@@ -46,7 +46,8 @@ def test_a_margin(capfd):
 
 def test_what_cannot_be_is_one_line_and_exit_2(capfd):
     for words, expected in (
-        (("-o", "run.avi"), ".gif, .mp4, .html"),
+        (("-o", "run.avi"), "ends in .gif, .html"),
+        (("-o", "run.mp4"), "ffmpeg -i film.gif"),
         (("--start", "40,2"), "x of the start is 40.0; allowed: more than 4.22558 and up to 28 in on side 2"),
         (("--start", "40 kg,2"), "--start: "),
         (("--start", "15"), "X,SIDE"),

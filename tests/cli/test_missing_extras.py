@@ -35,7 +35,6 @@ def without(modules, *words):
         ("atlas", "zarr", ATLAS),
         ("atlas", "pandas", (*ATLAS, "--csv", "a.csv")),
         ("cluster", "distributed", (*ATLAS, "--cluster", "tcp://127.0.0.1:1")),
-        ("animate", "imageio_ffmpeg", ("animate", "paper-designed", "-o", "film.mp4")),
         ("explore", "panel", ("explore", "paper-designed")),
         ("engine", "pymunk", ("tray", "tray.toml", "--drops", "1")),
     ],
@@ -53,7 +52,7 @@ def test_one_line_names_the_extra(extra, modules, words):
 
 @pytest.mark.sweep
 def test_without_any_extra_the_rest_works():
-    every = "pymunk,xarray,zarr,pandas,pyarrow,imageio_ffmpeg,panel,bokeh,distributed,dask,IPython"
+    every = "pymunk,xarray,zarr,pandas,pyarrow,panel,bokeh,distributed,dask,IPython"
     throw = ("throw", "paper-designed", "--x", "15", "--side", "2")
     for words in (("scenes",), ("check", "paper-designed"), ("doctor",), throw):
         done = without(every, *words)

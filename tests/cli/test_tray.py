@@ -91,31 +91,11 @@ def test_many_parts_at_once(capfd):
     assert len(json.loads(Path("kept.json").read_text())["trials"]) == 2
 
 
-@pytest.mark.sweep
-def test_depths_and_agitations(capfd):
-    words = ("--depths", "0.8:1.6:2", "--agitations", "0.4:0.8 in:2")
-    code, out, _ = run(capfd, "tray", "tray.toml", *FEW, *words, "-o", "out", "--csv", "grid.csv", "--json")
-    assert code == 0
-    record = json.loads(out)
-    assert set(record) == documented("tray: depths and agitations")
-    assert (record["depths"], record["agitations"]) == ([0.8, 1.6], [0.4, 0.8])
-    assert {path.name for path in Path("out").iterdir()} == {"design.json", "design.png"}
-    rows = list(csv.DictReader(Path("grid.csv").read_text().splitlines()))
-    assert [float(row["filled rightly"]) for row in rows] == pytest.approx(
-        [share for shares in record["right"] for share in shares], abs=1e-9
-    )
-    code, out, _ = run(capfd, "tray", "tray.toml", *FEW, "--depths", "1:2:2")
-    assert code == 0
-    assert "on fresh seeds" in out
-
-
 @pytest.mark.parametrize(
     ("words", "said"),
     [
         (("paper-designed",), "add [tray]"),
         (("tray.toml", "--side", "7"), "side wanted"),
-        (("tray.toml", "--depths", "1:2"), "LO:HI:N"),
-        (("tray.toml", "--depths", "3.2:3.3:2"), "deeper than the part"),
     ],
 )
 def test_one_clear_error(capfd, words, said):

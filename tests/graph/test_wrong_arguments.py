@@ -343,8 +343,15 @@ def test_every_public_function_holds_its_arguments_against_its_annotations():
 def test_a_large_graph_is_told_of_before_it_is_built(monkeypatch, capsys):
     cover = ls.grid([(0.0, 1.0)] * 3, cells=512)
     monkeypatch.setattr(memory, "_free_bytes", lambda: 10**12)
-    memory.require_memory(cover, "corners-padded", 16)
+    memory.require_memory(cover, "corners-padded")
     said = capsys.readouterr().err
     assert "limitsets: the graph of 134217728 cells takes about 21 GB and" in said  # 155 bytes a cell
-    memory.require_memory(ls.grid([(0.0, 1.0)] * 3, cells=64), "corners-padded", 16)
+    memory.require_memory(ls.grid([(0.0, 1.0)] * 3, cells=64), "corners-padded")
     assert capsys.readouterr().err == ""
+
+
+@pytest.mark.parametrize("method", ["random", "centres", "corner"])
+def test_an_image_method_that_there_is_not(method):
+    allowed = "boxes, corners, corners-padded, end-points"
+    with pytest.raises(AnswerError, match=f"^the image method is '{method}'; allowed: {allowed}; correct"):
+        ls.transitions(MAP, LINE, method)

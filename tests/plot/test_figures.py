@@ -18,7 +18,7 @@ from limitsets import plot
 from limitsets.errors import AnswerError, MapError
 from limitsets.plot.style import SETS, extents_of, keep_apart, stretch
 from limitsets.thrower import fly
-from tests.maps_of_tests import TwoState
+from tests.maps_of_tests import TwoState, with_middles
 
 SCENES = Path(__file__).parents[1] / "analysis"
 SOURCES = [
@@ -182,8 +182,9 @@ def test_basins_in_strips(source):
     assert len(named(axes, "attractor")) == sum(len(parts) for parts in found.extents[0].values())
 
 
+@with_middles
 def test_basins_in_the_plane():
-    graph = ls.transitions(TwoState(1.0), ls.grid([(-2, 2), (-2, 2)], cells=32), method="centres")
+    graph = ls.transitions(TwoState(1.0), ls.grid([(-2, 2), (-2, 2)], cells=32), method="middles")
     shares = ls.basins(graph, ls.attractors(graph))
     figure = plot.basins(graph.grid, shares)
     (axes,) = figure.axes

@@ -5,7 +5,6 @@ import pytest
 from matplotlib.patches import Polygon
 
 import limitsets as ls
-from limitsets.trays import tray_design
 from tests.trays.scenes import with_tray
 
 pytest.importorskip("pymunk")
@@ -46,32 +45,3 @@ def test_many_parts_stand_beside_the_chain():
     assert drawn["4 at once that pass through each other"] == pytest.approx(
         passing.share(passing.right)[0][1:]
     )
-
-
-def test_a_design_is_three_grids_and_its_best_is_marked():
-    found = tray_design(with_tray(), [0.8, 1.53, 2.0], [0.4, 1.6], passes=10, drops=30, kicks=20, step=8e-3)
-    panels = ls.plot.tray_design(found).axes
-    assert [each.images[0].get_array().shape for each in panels] == [(3, 2)] * 3
-    (mark,) = panels[0].lines
-    row, column = np.unravel_index(found.right.argmax(), found.right.shape)
-    assert (mark.get_xdata()[0], mark.get_ydata()[0]) == (column, row)
-
-
-@pytest.mark.sweep
-def test_a_design_marks_where_no_kick_moved_some_wrong_state():
-    found = tray_design(with_tray(), [0.8, 2.0], [0.2, 3.0], passes=10, drops=40, kicks=30, step=8e-3)
-    # a state that no kick changes is one from which all 30 kicks lead back to it
-    for row, column in np.ndindex(found.held.shape):
-        tree = with_tray(
-            depression_depth=f"{found.depths[row]} in", agitation=f"{found.agitations[column]} in"
-        )
-        counts = ls.tray(tree, passes=1, drops=40, kicks=30, step=8e-3).counts
-        stands = [counts.kicked[k, k] == counts.kicked[k].sum() for k in counts.met if k != counts.right]
-        assert found.held[row, column] == any(stands)
-    assert found.held.any()
-    assert not found.held.all()
-    figure = ls.plot.tray_design(found)
-    for panel in figure.axes[1:]:
-        marked = {(round(x - 0.5), round(y + 0.5)) for each in panel.patches for x, y in each.get_xy()[:1]}
-        assert marked == {(column, row) for row, column in np.argwhere(found.held).tolist()}
-    assert "no counted kick" in figure.legends[0].get_texts()[0].get_text()

@@ -9,7 +9,7 @@ import pytest
 
 import limitsets as ls
 from limitsets.maps import OUTSIDE, UNDECIDED, UNDEFINED, images
-from tests.maps_of_tests import Baker, Contraction, Linear2, Product, ThreeState, TwoState
+from tests.maps_of_tests import Baker, Contraction, Linear2, Product, ThreeState, TwoState, with_middles
 
 # ---------------------------------------------------------------- maps with holes: roots, logarithms, quotients
 
@@ -259,9 +259,10 @@ def test_no_label_of_proved_images_is_contradicted(params, domain, cells):
     assert contradicted(params, domain, cells // 2, "boxes") == []
 
 
+@with_middles
 def test_an_orbit_would_contradict_a_wrong_label():
     """One point for a whole cell misses most of its image: the comparison above sees it."""
-    assert contradicted(ls.maps.Cubic(2.6), [(-1.7, 1.7)], 1001, "centres") != []
+    assert contradicted(ls.maps.Cubic(2.6), [(-1.7, 1.7)], 1001, "middles") != []
 
 
 # ---------------------------------------------------------------- undefined

@@ -16,7 +16,7 @@ pytestmark = pytest.mark.sweep  # thousands of drops
 def ran(tmp_path_factory):
     study = load_study("14_tray")
     out = tmp_path_factory.mktemp("tray")
-    return study, study.main(seed=7, out=out, drops=1200, histories=40, design=False), out
+    return study, study.main(seed=7, out=out, drops=1200, histories=40), out
 
 
 def interval(count, of):

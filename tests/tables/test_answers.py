@@ -171,7 +171,6 @@ def test_every_answer_of_a_public_function_is_tabled():
         policies.Synthesis,
         robust.AbsorptionBrackets,
         robust.Margin,
-        trays.TrayDesign,
         trays.TrayFill,
         Atlas,
         Continuation,

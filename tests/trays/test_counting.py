@@ -12,9 +12,9 @@ import pytest
 import limitsets as ls
 from limitsets.engine.depression import Rest
 from limitsets.engine.recording import MARKS
-from limitsets.errors import AnswerError, SceneError
+from limitsets.errors import AnswerError
 from limitsets.robust.noise.proportions import binomial_interval
-from limitsets.trays import filmed, tray_design
+from limitsets.trays import filmed
 from limitsets.trays.counting import count
 from limitsets.trays.histories import Histories, _history, histories
 from limitsets.trays.passing import passes_of, random_of
@@ -209,30 +209,9 @@ def test_what_cannot_be_is_refused(monkeypatch):
     with pytest.raises(AnswerError, match="deeper than the part") as caught:
         ls.tray(low, side=2, drops=1)
     assert caught.value.key == "tray.depression_depth"
-    with pytest.raises(SceneError, match="deeper than the part"):
-        tray_design(with_tray(), [3.2], [0.5], drops=1)
-    with pytest.raises(AnswerError, match="depths and agitations"):
-        tray_design(with_tray(), [], [0.5])
     monkeypatch.setitem(sys.modules, "pymunk", None)
     with pytest.raises(AnswerError, match=r"limitsets\[engine\]"):
         ls.tray(with_tray(), drops=1)
-
-
-@pytest.mark.sweep
-def test_a_design_confirms_its_best_on_fresh_seeds():
-    found = tray_design(
-        with_tray(), [0.8, 1.53], [0.4, 1.6], passes=20, drops=60, kicks=40, seed=3, step=8e-3
-    )
-    depth, agitation = found.best
-    row, column = found.depths.tolist().index(depth), found.agitations.tolist().index(agitation)
-    assert found.right.max() == found.right[row, column]
-    sizes = found.confirmed.passes.tray
-    assert (sizes.depression_depth, sizes.agitation) == (depth, agitation)
-    assert found.confirmed.seed == 4
-    assert found.confirmed.counts.captured.sum() == 240
-    # one point alone is the same point
-    alone = tray_design(with_tray(), [depth], [agitation], passes=20, drops=60, kicks=40, seed=3, step=8e-3)
-    assert alone.right[0, 0] == found.right[row, column]
 
 
 def test_a_film_shows_what_the_engine_does():

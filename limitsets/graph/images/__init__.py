@@ -4,19 +4,15 @@ A method is a function ``(map, grid, side, target, **options) -> Boxes``.  Most 
 ``(grid, side, **options) -> Samples`` in `sampled`.  To add one, write its file and name it here.
 """
 
-from limitsets.graph.images.centres import centres
 from limitsets.graph.images.corners import corners, corners_padded, end_points
 from limitsets.graph.images.enclosed import enclosed
-from limitsets.graph.images.random import random
 from limitsets.graph.images.sampled import sampled
 
 __all__ = ["METHODS"]
 
 METHODS = {
     "boxes": enclosed,
-    "centres": sampled(centres),
     "corners": sampled(corners),
     "corners-padded": sampled(corners_padded),
     "end-points": sampled(end_points),
-    "random": sampled(random),
 }

@@ -18,7 +18,7 @@ from limitsets.graph.images.samples import SamplePoints
 from limitsets.graph.images.undecided import every_branch, mark_bends, split
 from limitsets.graph.target import Target, place
 from limitsets.jit import kernel
-from limitsets.maps import codes, images
+from limitsets.maps import codes
 from limitsets.maps.drivers import judged
 from limitsets.maps.kernels import fallback, image, on_side, pick, put
 
@@ -141,18 +141,11 @@ def _boxes_of_side(params: Any, grid: Grid, side: int, target: Target, samples: 
     """Boxes of all cells of one side."""
     dimension, shape = grid.dimension, grid.shape[side]
     n = int(shape.prod())
-    if samples.scattered:
-        got = images(params, np.stack(samples.axes, axis=-1), side)
-        after = tuple(
-            np.ascontiguousarray(got.x.reshape(-1, dimension)[:, axis]) for axis in range(dimension)
-        )
-        to, code, second = got.side.astype(np.int16), got.code.astype(np.int8), got.second_pass
-    else:
-        count = int(np.prod([axis.size for axis in samples.axes]))
-        after = tuple(np.empty(count) for _ in range(dimension))
-        to, code = np.empty(count, np.int16), np.empty(count, np.int8)
-        run = tuple(np.empty(samples.axes[-1].size) for _ in range(dimension))
-        second = _images_of_product(params, side, samples.axes, run, after, to, code) / count
+    count = int(np.prod([axis.size for axis in samples.axes]))
+    after = tuple(np.empty(count) for _ in range(dimension))
+    to, code = np.empty(count, np.int16), np.empty(count, np.int8)
+    run = tuple(np.empty(samples.axes[-1].size) for _ in range(dimension))
+    second = _images_of_product(params, side, samples.axes, run, after, to, code) / count
     _require_sides(grid, to, code)
     state, side_out, exits = np.empty(n, np.int8), np.empty(n, np.int32), np.empty(n, np.uint8)
     lo, hi = np.empty((n, dimension), np.int32), np.empty((n, dimension), np.int32)

@@ -17,8 +17,7 @@ class SamplePoints:
     Attributes
     ----------
     axes : tuple of ndarray
-        The points are all combinations of these values, the last axis running fastest; with `scattered`, one array
-        of coordinates per axis instead.
+        The points are all combinations of these values, the last axis running fastest.
     strides : tuple of int
         s_0, s_1, ...
     offsets : ndarray of int64, shape (points per cell,)
@@ -28,8 +27,6 @@ class SamplePoints:
     split : bool
         In one dimension: an undecided cell is cut where the branch changes, and each piece's image taken, instead
         of the image of the whole cell under every branch.
-    scattered : bool
-        See `axes`.
     """
 
     axes: tuple[NDArray[np.float64], ...]
@@ -37,10 +34,7 @@ class SamplePoints:
     offsets: NDArray[np.int64]
     pad: int = 0
     split: bool = False
-    scattered: bool = False
 
     def points(self) -> tuple[NDArray[np.float64], ...]:
         """All points, one array per coordinate."""
-        if self.scattered or len(self.axes) == 1:
-            return self.axes
         return tuple(m.ravel() for m in np.meshgrid(*self.axes, indexing="ij"))

@@ -230,14 +230,13 @@ def every_branch(
     starts = np.stack(samples.points(), axis=-1)[numbers]  # (cells, points, dimension)
     real = np.stack([values[numbers] for values in after], axis=-1)
     to, code = to[numbers].astype(np.int64), code[numbers].astype(np.int64)
-    if not samples.scattered:
-        borders = _borders(params, side, starts, to, code)
-        met = images(params, _states(borders), side)
-        shape = borders.shape[:-1]
-        starts = np.concatenate([starts, borders], axis=1)
-        real = np.concatenate([real, met.x.reshape(borders.shape)], axis=1)
-        to = np.concatenate([to, met.side.reshape(shape)], axis=1)
-        code = np.concatenate([code, met.code.reshape(shape)], axis=1)
+    borders = _borders(params, side, starts, to, code)
+    met = images(params, _states(borders), side)
+    shape = borders.shape[:-1]
+    starts = np.concatenate([starts, borders], axis=1)
+    real = np.concatenate([real, met.x.reshape(borders.shape)], axis=1)
+    to = np.concatenate([to, met.side.reshape(shape)], axis=1)
+    code = np.concatenate([code, met.code.reshape(shape)], axis=1)
     landed = (code > codes.OUTSIDE_MODEL) & np.isfinite(real).all(axis=-1)
     owner = np.repeat(cells, code.shape[1])
     gone = ((code < 0) | ~landed).ravel()
