@@ -23,6 +23,9 @@ def pytest_addoption(parser):
     parser.addoption(
         "--bench-table", default=".benchmarks/table.json", help="where the table of the benchmarks goes"
     )
+    parser.addoption(
+        "--feeders", type=int, default=12, help="how many random feeders are thrown in C (about 5 s each)"
+    )
 
 
 def pytest_configure(config):

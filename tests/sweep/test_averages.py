@@ -1,6 +1,8 @@
 """Numbers along an attractor: topological entropy of its own bands, errors of means; against other ways to them."""
 
 import math
+import re
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -8,6 +10,9 @@ import pytest
 import limitsets as ls
 from limitsets import maps
 from limitsets.maps import advance
+from limitsets.sweep.of_topology import topology
+from limitsets.sweep.subjects import SceneSubject
+from limitsets.sweep.tasks import registered
 
 UNIT = [(0, 1)]
 
@@ -113,3 +118,17 @@ def test_errors_of_means_cover_the_mean():
         off = np.abs(mean - np.nanmean(mean)) / error
         assert (off <= 2.0).mean() >= 0.9
         assert (off <= 0.5).mean() <= 0.6  # nor is the error far too large
+
+
+def test_the_page_explains_every_number_of_the_topology():
+    """docs/json.md sends to this table for the names of an atlas."""
+    page = (Path(__file__).parents[2] / "docs" / "atlas.md").read_text(encoding="utf-8")
+    section = page.split("## What is said of each point\n", 1)[1].split("\n## ", 1)[0]
+    explained = {
+        name
+        for line in section.splitlines()
+        if line.startswith("| `")
+        for name in re.findall(r"`(\w+)`", line.split("|")[1])
+    }
+    subject = SceneSubject(ls.load("paper-designed"))
+    assert explained == {*registered(topology).variables(subject, margin="throw.speed")}
