@@ -128,6 +128,8 @@ def _written(found: RobustDesign, out: Path, form: str, *, recheck: bool) -> tup
 
     with filled(out) as folder:
         found, paths = save(found, folder, recheck=recheck)
+        record = About(found.model, str(out / paths[0].name), found.scene).added(found)
+        (folder / "design.json").write_text(as_json(record), encoding="utf-8", newline="\n")
         names = [path.name for path in paths] + [f"part.{form}"]
         plot.part(found.scene).savefig(folder / names[-1], dpi=DPI)
         if found.front:

@@ -37,6 +37,9 @@ def test_a_search_writes_scene_answer_and_figure(here, capfd):
         "front.png",
         "part.png",
     }
+    kept = json.loads(Path("found/design.json").read_text(encoding="utf-8"))
+    assert isinstance(kept["model"]["assumptions_broken"], int)  # as it is printed
+    assert kept["model"] == record["model"]
     again = ls.load(Path("found") / "paper-designed-robust.toml")
     assert again.value("throw.kappa") == record["values"]["throw.kappa"]
 

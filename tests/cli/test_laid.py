@@ -3,10 +3,12 @@
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import limitsets as ls
 from tests.cli.command import run
+from tests.feeding.own_throws import thrown
 from tests.feeding.scenes import with_cavity
 from tests.lead_triangle import left_by_some
 
@@ -63,6 +65,31 @@ def test_critical_points_have_no_starts(capfd):
     code, _, err = run(capfd, "design", "paper-designed", "--critical-points", "10,10,20", "--laid", "0=8:9")
     assert code == 2
     assert "critical points have no starts" in err
+
+
+def test_a_design_is_asked_for_what_is_laid_down_alone(capfd):
+    """Of the whole arm no throw of 60 is proved: from some starts parts leave; of 120 to 150 mm on side 2 one is."""
+    ls.dump(ls.load(left_by_some()).with_values({"throw.kappa": "300 mm"}), "left.toml")
+    words = "left.toml", "--goal", "--vary", "throw.kappa", "--evaluations", "60", "--json"
+    code, out, _ = run(capfd, "design", *words)
+    assert (code, json.loads(out)["verdict"]) == (1, "undecided")
+    laid = "--laid", "2=120:150"
+    code, out, _ = run(capfd, "design", *words, *laid, "-o", "found.toml")
+    record = json.loads(out)
+    assert (code, record["verdict"]) == (0, "proved")
+    assert record["room"] > 0.0 >= record["room_before"]
+    assert run(capfd, "certify", "found.toml", "--claim", "goal", *laid)[0] == 0
+    assert run(capfd, "recheck", "found.proof.zip")[0] == 0
+    # apart from the package: every part that is laid down comes beyond X, on side 2 alone, and none leaves the arm
+    scene = ls.load("found.toml")
+    x, side = np.linspace(120.0, 150.0, 3001), np.full(3001, 2)
+    met = np.zeros(x.size, dtype=bool)
+    for _ in range(2000):
+        x, side = thrown(scene, scene.kappa, x, side)
+        assert ((x > scene.sides.a[side]) & (x <= scene.arm_length)).all()
+        assert (side[x >= 160.0] == 2).all()
+        met |= x >= 160.0
+    assert met.all()
 
 
 def test_feed_says_where_parts_are_laid_down(capfd):

@@ -136,6 +136,15 @@ def test_parts_that_creep_to_the_joint_never_leave_the_arm(height):
     assert run_trials(end, Scattering(landing=Gaussian(0.02)), 300).counts["left"] > 0
 
 
+def test_feed_says_of_parts_that_creep_that_they_stay():
+    """And its answer is not a number for each of the 20 000 throws that they are thrown."""
+    arm = {**ls.load("paper-designed").as_dict()["arm"], "surface_height": "0.5 in"}
+    told = ls.feed(with_cavity(tables={"arm": arm}), prove=False, level=False, trials=300).to_json()
+    assert told["probabilities"]["left"]["value"] == 0.0
+    assert told["probabilities"]["never"]["value"] > 0.0
+    assert len(as_json(told["throws"])) < 5000
+
+
 def test_of_parts_that_all_stay_no_mean_is_told():
     none = np.zeros(5, dtype=bool)
     stay = FedShares(Trials(np.full(5, 5), np.full(5, 20_000), none, 0))
