@@ -7,7 +7,8 @@ boundary gives a = 1.  Where a = 0.3 an error of the start that is ten times sma
 One start is drawn in each cell, so that starts of one row differ in one coordinate only, and compared over whole
 cells; or as many random starts as are asked for, with neighbours as near as a ten thousandth of a cell.  Far apart, f
 no longer grows: three independent starts differ with the probability 1 - sum p_j^3, p_j being the shares of the basins.
-The fit takes the distances at which f is at most half of this.  Its error holds the difference between the
+The fit takes the distances at which f is at most half of this along each axis: of a boundary parallel to one axis only
+the others tell.  Its error holds the difference between the
 slopes of their nearer and farther half, since the range is a choice.
 
 Source: Grebogi, McDonald, Ott, Yorke, "Final state sensitivity: an obstruction to predictability", Physics Letters A
@@ -41,6 +42,8 @@ NEAREST, IN_A_DECADE, FEWEST_UNCERTAIN = 1e-4, 4, 20
 
 # The fit takes shares up to this part of that of independent starts, at so many distances at least.
 UNSATURATED, FEWEST_FITTED = 0.5, 4
+
+Floats = NDArray[np.float64]
 
 # Fewer cells along an axis than this do not give one decade.
 FEWEST = 40
@@ -80,8 +83,8 @@ class UncertaintyExponent(Tabled):
 
     exponent: float
     error: float
-    apart: NDArray[np.float64]
-    shares: NDArray[np.float64]
+    apart: Floats
+    shares: Floats
     fitted: NDArray[np.bool_]
     dimension: int
     undecided: float
@@ -178,16 +181,16 @@ def uncertainty_exponent(
     if starts is None:
         label = labelled_starts(parted, steps, rng)
         apart = np.unique(np.rint(np.geomspace(1, farthest, DISTANCES)))
-        shares = np.array([_uncertain(graph.grid, label, int(m)) for m in apart])
+        shares, largest = np.array([_uncertain(graph.grid, label, int(m)) for m in apart]).T
         uncertain = np.full(apart.size, np.inf)  # the starts of a row are no independent ones
         weight = graph.grid.measure
     else:
-        apart, shares, uncertain, label = _sampled(parted, farthest, starts, steps, rng)
+        apart, shares, largest, uncertain, label = _sampled(parted, farthest, starts, steps, rng)
         weight = np.ones(label.size)
     undecided = float(weight[label == codes.UNDECIDED].sum() / weight.sum())
     p = np.array([weight[label == code].sum() for code in parted.codes])
     most = UNSATURATED * (1.0 - ((p / max(p.sum(), 1e-300)) ** 3).sum())
-    fitted = (shares > 0.0) & (shares <= most) & (uncertain >= FEWEST_UNCERTAIN)
+    fitted = (shares > 0.0) & (largest <= most) & (uncertain >= FEWEST_UNCERTAIN)
     slope, error = _fit(apart[fitted], shares[fitted], uncertain[fitted])
     cut = starts is None and leaves_by_the_border(graph)
     return UncertaintyExponent(
@@ -205,17 +208,18 @@ def uncertainty_exponent(
 
 def _sampled(
     parted: Colours, farthest: int, starts: int, steps: int, rng: np.random.Generator
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]]:
+) -> tuple[Floats, Floats, Floats, Floats, NDArray[np.int64]]:
     """Compare random starts with their neighbours along an axis, as many for each distance, from the farthest in.
 
-    Gives the distances, ascending, the shares and numbers of uncertain starts, and the labels of all starts.
+    Gives the distances, ascending, the shares of uncertain starts, those along the axis that has most, the numbers of
+    uncertain starts, and the labels of all starts.
     """
     grid = parted.grid
     count = round(IN_A_DECADE * np.log10(farthest / NEAREST)) + 1
     if starts < count * FEWEST_UNCERTAIN:
         fewest = f"an integer from {count * FEWEST_UNCERTAIN}, for {count} distances"
         raise AnswerError("the number of starts", starts, fewest, "pass starts=100000")
-    apart, shares, uncertain, labels = np.geomspace(farthest, NEAREST, count), [], [], []
+    apart, found, labels = np.geomspace(farthest, NEAREST, count), [], []
     for distance in apart:
         cell, (x, side) = random_cells(grid, starts // count, rng)
         axis, row = rng.integers(grid.dimension, size=side.size), np.arange(side.size)
@@ -233,21 +237,23 @@ def _sampled(
             known &= ~within | (label != codes.UNDECIDED)
             differs |= within & (label != own)
         labels.append(own)
-        uncertain.append(float((known & differs).sum()))
-        shares.append(uncertain[-1] / max(int(known.sum()), 1))
-        if uncertain[-1] < FEWEST_UNCERTAIN:
+        of, uncertain = (
+            np.bincount(axis[some], minlength=grid.dimension) for some in (known, known & differs)
+        )
+        number = int(uncertain.sum())
+        found.append((number / max(int(of.sum()), 1), float((uncertain / np.maximum(of, 1)).max()), number))
+        if number < FEWEST_UNCERTAIN:
             break  # nearer ones are fewer still
-    return (
-        apart[: len(shares)][::-1],
-        np.array(shares[::-1]),
-        np.array(uncertain[::-1]),
-        np.concatenate(labels),
-    )
+    shares, largest, numbers = np.array(found[::-1], dtype=np.float64).T
+    return apart[: len(found)][::-1], shares, largest, numbers, np.concatenate(labels)
 
 
-def _uncertain(grid: Grid, label: NDArray[np.int64], apart: int) -> float:
-    """Share of the starts whose label is not that of a start so many cells away, up or down an axis."""
-    uncertain = total = 0.0
+def _uncertain(grid: Grid, label: NDArray[np.int64], apart: int) -> tuple[float, float]:
+    """Share of the starts whose label is not that of a start so many cells away, up or down an axis.
+
+    The mean over the axes, and the share along the axis that has most.
+    """
+    uncertain, total = np.zeros((2, grid.dimension))
     for side in range(grid.sides):
         shape = tuple(int(n) for n in grid.shape[side])
         block, weight = (values[grid.of_side(side)].reshape(shape) for values in (label, grid.measure))
@@ -260,14 +266,13 @@ def _uncertain(grid: Grid, label: NDArray[np.int64], apart: int) -> float:
             other = one[apart:] != one[:-apart]
             differs[apart:] |= other
             differs[:-apart] |= other
-            total += float(of[known].sum())
-            uncertain += float(of[known & differs].sum())
-    return uncertain / total if total else np.nan
+            total[axis] += of[known].sum()
+            uncertain[axis] += of[known & differs].sum()
+    with np.errstate(invalid="ignore"):  # nothing is known of an axis: nan
+        return float(uncertain.sum() / total.sum()), float(np.nanmax(uncertain / total, initial=0.0))
 
 
-def _fit(
-    apart: NDArray[np.float64], shares: NDArray[np.float64], uncertain: NDArray[np.float64]
-) -> tuple[float, float]:
+def _fit(apart: Floats, shares: Floats, uncertain: Floats) -> tuple[float, float]:
     """Slope of the logarithms, and an error that holds it in nineteen of twenty cases."""
     if apart.size < FEWEST_FITTED:
         return np.nan, np.nan
@@ -287,9 +292,7 @@ def _fit(
     return slope, float(np.hypot(stdtrit(x.size - 2, 0.975) * random, farther - nearer))
 
 
-def _line(
-    x: NDArray[np.float64], y: NDArray[np.float64], variance: NDArray[np.float64]
-) -> tuple[float, float, float]:
+def _line(x: Floats, y: Floats, variance: Floats) -> tuple[float, float, float]:
     """Slope by weighted least squares, its variance, and the weighted sum of squares that is left."""
     weight = 1.0 / variance
     x, y = x - (weight * x).sum() / weight.sum(), y - (weight * y).sum() / weight.sum()

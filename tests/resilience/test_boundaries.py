@@ -56,11 +56,19 @@ def test_an_open_map_in_the_plane_has_the_same_exponent_along_its_steep_axis():
     assert found.boundary_dimension == pytest.approx(1.0 + math.log(3) / math.log(5), abs=0.05)
 
 
+def test_the_axis_with_most_uncertain_starts_says_what_saturates():
+    """No start is uncertain along x_1: the mean over both axes is half the share along x_0, that saturates."""
+    graph, attractors = setting(Sheet(1.0, 1.0), UNIT + [(-1.0, 1.0)], (601, 60))
+    found = ls.resilience.uncertainty_exponent(graph, attractors, starts=20_000, seed=1000)
+    assert 2.0 * found.shares[found.fitted].max() <= 0.5 * 0.75 * 1.05  # two basins alike: 1 - 2 (1/2)^3 = 3/4
+    assert abs(found.exponent - 1.0 + math.log(2) / math.log(3)) <= found.error < 0.2
+
+
 def test_starts_beside_undecided_ones_are_left_out():
     """Of five starts in a row the middle one is undecided: the two beside it are left out, the others agree."""
     row, label = ls.grid([(0.0, 1.0)], cells=5), np.array([0, 0, ls.maps.UNDECIDED, 1, 1])
-    assert uncertainty._uncertain(row, label, 1) == 0.0
-    assert uncertainty._uncertain(row, label, 3) == 1.0  # 0 with 3, 1 with 4
+    assert uncertainty._uncertain(row, label, 1) == (0.0, 0.0)
+    assert uncertainty._uncertain(row, label, 3) == (1.0, 1.0)  # 0 with 3, 1 with 4
 
 
 def test_starts_on_their_way_are_told_and_left_out():
