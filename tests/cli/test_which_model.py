@@ -134,6 +134,8 @@ def test_noise_that_allows_for_the_scatter_has_it():
     assert Model.of(found, both).left_out == ()
     assert Model.of(found, both | {"landing.x": "0.03 in"}).left_out == ("scatter",)
     assert Model.of(found, {"throw.speed": "0.5 %"}).left_out == ("scatter",)
+    # a third of a percent of 150 deg/s, though 0.0087 rad/s is the larger number
+    assert Model.of(found, both | {"throw.speed": "0.5 deg/s"}).left_out == ("scatter",)
 
 
 def test_nothing_is_left_out_of_a_scene_whose_effects_have_all_its_facts(capfd):

@@ -163,6 +163,11 @@ def test_where_no_part_comes_beyond_the_end_nothing_is_fed(capsys):
     assert "no part comes beyond the end of the arm" in capsys.readouterr().out
 
 
+def test_half_of_three_parts_are_two():
+    ended = FedShares(Trials(np.zeros(3, dtype=int), np.array([4, 1, 2]), np.zeros(3, dtype=bool), 0))
+    assert [ended.quantile(share) for share in (0.3, 0.5, 2.0 / 3.0, 0.7)] == [1, 2, 2, 4]
+
+
 def test_parts_per_minute_are_right_feeds_over_the_time_of_all(initial):
     trials = initial[1]
     found = FedShares(trials)
@@ -216,6 +221,7 @@ def test_the_level_at_which_success_falls():
     assert success_curve(end, NOISE, factors=(0.0, 1.0)).level == (0.0, 0.0)
     curve = success_curve(arm_end_of(with_cavity()), Scattering(speed=Uniform(0.01)), factors=(0.0, 1.0))
     assert curve.level is None
+    assert curve.right[0] == 1.0  # of the parts that are not thrown at the edge, each
     assert "stays above 95 % of the parts not thrown at the edge" in curve.line()
 
 

@@ -193,6 +193,27 @@ def test_no_other_word_says_how_it_tips():
         with_cavity(tips="fast")
 
 
+@pytest.mark.parametrize("beyond", [1e-6, 1e-4, 1e-3])
+def test_the_way_over_the_end_is_known_next_to_the_end(beyond):
+    """Between the last start that comes down before the end and the first beyond."""
+    scene = with_cavity()
+    x = brentq(lambda x: float(ls.orbit(scene.map, x, 2, 1).x[1]) - 20.0 - beyond, 17.0, 17.6, xtol=1e-13)
+    given = scene.sides.d[2], scene.radius_of_gyration, scene.gravity, scene.cavity.angle
+    time = float(time_to_tip(beyond, *given, rate_about_end(scene, x, 2, beyond)))
+    assert tipping_times(scene, 2)(np.array([beyond]))[0] == pytest.approx(time, rel=1e-6)
+
+
+def test_what_does_not_reach_over_the_end_is_not_thrown_at_the_edge():
+    """A tall part 1 in wide: its throw acts 1 in right of its middle, from where half an inch of it lies."""
+    part = {
+        "vertices": [["0 in", "0 in"], ["1 in", "0 in"], ["1 in", "8 in"], ["0 in", "8 in"]],
+        "mass": {"plate_density": "1 kg/m^2"},
+    }
+    end = arm_end_of(with_cavity(tables={"part": part}), side=0)
+    assert end.edges[[0, 2]] == pytest.approx(19.5)
+    assert end.at_edge(np.array([19.4, 19.6]), np.zeros(2, dtype=int)).tolist() == [False, True]
+
+
 def test_a_throw_that_acts_beyond_the_end_is_a_fate_of_its_own():
     """The impulse acts (rho^2 + d (h + d)) / x right of the foot of the centre of mass."""
     scene = with_cavity()

@@ -60,7 +60,9 @@ def test_the_axis_with_most_uncertain_starts_says_what_saturates():
     """No start is uncertain along x_1: the mean over both axes is half the share along x_0, that saturates."""
     graph, attractors = setting(Sheet(1.0, 1.0), UNIT + [(-1.0, 1.0)], (601, 60))
     found = ls.resilience.uncertainty_exponent(graph, attractors, starts=20_000, seed=1000)
-    assert 2.0 * found.shares[found.fitted].max() <= 0.5 * 0.75 * 1.05  # two basins alike: 1 - 2 (1/2)^3 = 3/4
+    assert (
+        2.0 * found.shares[found.fitted].max() <= 0.5 * 0.75 * 1.05
+    )  # two basins alike: 1 - 2 (1/2)^3 = 3/4
     assert abs(found.exponent - 1.0 + math.log(2) / math.log(3)) <= found.error < 0.2
 
 
