@@ -58,7 +58,7 @@ def test_an_open_map_in_the_plane_has_the_same_exponent_along_its_steep_axis():
 
 def test_the_axis_with_most_uncertain_starts_says_what_saturates():
     """No start is uncertain along x_1: the mean over both axes is half the share along x_0, that saturates."""
-    graph, attractors = setting(Sheet(1.0, 1.0), UNIT + [(-1.0, 1.0)], (601, 60))
+    graph, attractors = setting(Sheet(1.0, 1.0), [*UNIT, (-1.0, 1.0)], (601, 60))
     found = ls.resilience.uncertainty_exponent(graph, attractors, starts=20_000, seed=1000)
     assert (
         2.0 * found.shares[found.fitted].max() <= 0.5 * 0.75 * 1.05
