@@ -186,7 +186,7 @@ def test_the_doctor_says_what_is_there(capfd, monkeypatch, tmp_path):
     assert set(record) == documented("doctor")
     assert record["limitsets"] == ls.__version__
     assert {"numba", "typer"} <= {each["package"] for each in record["packages"] if each["extra"] is None}
-    assert {each["extra"] for each in record["packages"]} >= {"atlas", "engine", "animate", "cluster"}
+    assert {each["extra"] for each in record["packages"]} >= {"atlas", "engine", "cluster", "explore"}
     assert Path(record["cache"]["folder"]).is_dir()
     rows = list(csv.DictReader((tmp_path / "packages.csv").read_text(encoding="utf-8").splitlines()))
     assert [row["package"] for row in rows] == [each["package"] for each in record["packages"]]

@@ -182,10 +182,10 @@ def test_a_limit_set_that_ends_before_is_named_where_another_does_not():
     assert verdict_of(asked, 1.0) == "holds of each limit set"
     assert verdict_of(asked, 0.35) == "holds of each limit set, to which 35.0 % of all starts come"
     assert (
-        void_of(asked, "in")
+        void_of(asked, "in", None)
         == "not every part gets there: limit set 1 ends at x = 12.000 in, before x = 20 in"
     )
-    assert void_of(GoalOutcome(goal, False, 21.0, reach=(23.4, 12.0)), "in") == ""
+    assert void_of(GoalOutcome(goal, False, 21.0, reach=(23.4, 12.0)), "in", None) == ""
 
 
 def test_no_throw_leads_out_of_any_limit_set():
