@@ -112,7 +112,7 @@ def register(
     ----------
     cls : type
         A NamedTuple class whose fields are floats, arrays with one entry per side, NamedTuples of such, or None.
-        A second class of one name and the same fields is shown with a number, ``Tent#2``.
+        A second class of one name and the same fields is shown with a number, ``Tent\u00b72``.
         Build its values with `limitsets.maps.coerce`, or give floats and float64 arrays.
     image : callable
         ``image(params, x, side) -> (x', side', code)``; code is the index of the branch taken, or
@@ -222,7 +222,7 @@ def register(
     # Compiled code knows classes of values by name and fields alone: it would take the second such class for the first.
     alike = sum((kind.name, each._fields) == (cls.__name__, cls._fields) for each, kind in _KINDS.items())
     if alike > 1:
-        cls.__name__ = f"{cls.__name__}#{alike}"
+        cls.__name__ = f"{cls.__name__}\u00b7{alike}"  # an identifier, which the cache on disk asks for
     return cls
 
 

@@ -34,6 +34,9 @@ def test_each_of_two_classes_of_one_name_is_followed_by_its_own_formula():
         assert lo <= 2.0 * c <= hi
     assert ls.maps.kind_of(old(1.0)).name == ls.maps.kind_of(new(1.0)).name == "Again"
     assert repr(new(1.0)) != repr(old(1.0))
+    assert (
+        new.__name__.isidentifier()
+    )  # the cache on disk makes the class again, under this name, in the next process
 
 
 class Henon(NamedTuple):
