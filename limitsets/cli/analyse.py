@@ -86,10 +86,8 @@ def _text(analysis: Analysis, page: Path) -> None:
                 f"Almost all starts are; kappa is {kappa}: has the speed the right unit?"
             )
     for k, (attractor, extents) in enumerate(zip(analysis.attractors, analysis.extents, strict=True)):
-        typer.echo(
-            f"limit set {k}{', of throws without scatter' * (analysis.scene.effects.spread is not None)}: "
-            f"from {percent(analysis.basins.attractors[k])} of all starts"
-        )
+        whose = "" if analysis.scene.effects.spread is None else ", of throws without scatter"
+        typer.echo(f"limit set {k}{whose}: from {percent(analysis.basins.attractors[k])} of all starts")
         rows = [
             [side, intervals(parts), count(*attractor.jogs_per_visit.get(side, (0, 0)))]
             for side, parts in extents.items()
@@ -111,9 +109,10 @@ def _text(analysis: Analysis, page: Path) -> None:
         typer.echo(f"undecided: {percent(undecided)} of all starts; next: {finer}")
     if analysis.goal is not None:
         void = void_of(analysis.goal, unit, analysis.scene.effects.spread)
+        said = verdict_of(analysis.goal, sum(analysis.basins.attractors))
         typer.echo(
-            f"goal {analysis.goal.goal.kind}: {verdict_of(analysis.goal, sum(analysis.basins.attractors))}"
-            f" ({analysis.goal.how}, not proved)" + (f"; but {void}" if void else "")
+            f"goal {analysis.goal.goal.kind}: {said} ({analysis.goal.how}, not proved)"
+            + (f"; but {void}" if void else "")
         )
         threshold = analysis.goal.threshold
         if analysis.goal.holds is False and threshold is not None and math.isfinite(threshold):

@@ -163,8 +163,9 @@ def _text(found: Feeding, files: list[Path], written: dict[str, Any] | None) -> 
             f"assumed: {100 * edge:.2f} % of the parts are thrown from so near the end of the arm that the throw acts"
             " beyond it; what that throw does is not simulated, and the proofs throw as if the arm went on"
         )
-    for line in () if found.brackets is None else _proved(found.brackets):
-        typer.echo(line)
+    if found.brackets is not None:
+        for line in _proved(found.brackets):
+            typer.echo(line)
     most = found.shares.quantile(0.95)
     throw_rate = end.scene.world.throw_rate
     until = "" if most is None else f", 95 % of the starts after {most}{in_time(most, throw_rate)}"
@@ -205,10 +206,11 @@ def _proved(brackets: AbsorptionBrackets) -> list[str]:
 
     last = brackets.within["any"].shape[1] - 1
     found = []
-    for name in (each for each in ("right", "wrong", "wall") if each in brackets.within):
-        low, high = (float(end) for end in brackets.within[name][:, -1])
-        lo, hi = math.floor(low * 1e6) / 1e6, math.ceil(high * 1e6) / 1e6
-        found.append(f"PROVED: {FED[name]} within {last} throws: {lo:.6f} to {hi:.6f}")
+    for name in ("right", "wrong", "wall"):
+        if name in brackets.within:
+            low, high = (float(end) for end in brackets.within[name][:, -1])
+            lo, hi = math.floor(low * 1e6) / 1e6, math.ceil(high * 1e6) / 1e6
+            found.append(f"PROVED: {FED[name]} within {last} throws: {lo:.6f} to {hi:.6f}")
     first, by = brackets.quantile(0.95)
     if first is not None and by is not None:
         count = f"{first}" if first == by else f"{first} to {by}"

@@ -77,12 +77,8 @@ def margin(
         csv=(csv, lambda: joined(found)),
         about=about,
     )
-    raise typer.Exit(
-        0
-        if chosen.effects.spread is None
-        and all(each.proved > 0 and (each.closed or each.refuted is None) for each in found)
-        else 1
-    )
+    bracketed = all(each.proved > 0 and (each.closed or each.refuted is None) for each in found)
+    raise typer.Exit(0 if bracketed and chosen.effects.spread is None else 1)
 
 
 def _goal_at(scene: Any, text: str) -> Any:
@@ -150,8 +146,10 @@ def _text(given: SceneOf, found: tuple[Margin, ...], out: Path | None, *, no_rec
         found = ()
     for each in found:
         void = void_of(each.goals, reach_of(each.pieces), scene.unit)
-        for said in filter(None, (void and f"what is proved holds vacuously, {void}", each.reason)):
-            typer.echo(f"{each.quantity}: {said}")
+        if void:
+            typer.echo(f"{each.quantity}: what is proved holds vacuously, {void}")
+        if each.reason:
+            typer.echo(f"{each.quantity}: {each.reason}")
     if out is not None:
         typer.echo(
             f"written to {out}: margins.json, figures, certificates"

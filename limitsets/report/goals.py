@@ -162,10 +162,9 @@ def without_margin(scene: Scene, goals: Sequence[Goal], *, fails: bool) -> str:
     """Name the command that goes on from a scene without margins: its goal fails, or is not proved of it."""
     analysed = proposed("analyse", _source(scene))
     starts = f"{analysed} (which starts leave the arm: margins need a scene in which none does)"
-    certify = f"{proposed('certify', _source(scene))} (what is proved of it, and what is not), "
-    return (design_command(scene, goals) if fails else "") or (
-        certify if can_be_proved(scene) else ""
-    ) + starts
+    if can_be_proved(scene):
+        starts = f"{proposed('certify', _source(scene))} (what is proved of it, and what is not), {starts}"
+    return (design_command(scene, goals) if fails else "") or starts
 
 
 def design_command(scene: Scene, goals: Sequence[Goal]) -> str:
@@ -204,8 +203,5 @@ def void_of(outcome: GoalOutcome, unit: str, spread: str | None) -> str:
     else:
         ends = [f"limit set {k} ends at x = {outcome.reach[k]:.3f} {unit}" for k in short]
     who = "no part gets there" if outcome.vacuous else "not every part gets there"
-    return (
-        f"{'without scatter ' if spread else ''}{who}: {', '.join(ends)}, before x = {goal.x:g} {unit}"
-        if ends
-        else ""
-    )
+    thrown = "without scatter " if spread else ""
+    return f"{thrown}{who}: {', '.join(ends)}, before x = {goal.x:g} {unit}" if ends else ""

@@ -153,9 +153,8 @@ def parse(
 
     def refuse(value: object, remedy: str) -> SceneError:
         percent = '"<decimal number> %" or ' if share and dimension != "share" else ""
-        units = ", ".join(
-            [*UNITS[dimension], *[sign for sign, unit in _SPELLINGS.items() if unit in UNITS[dimension]][:1]]
-        )
+        other = [sign for sign, unit in _SPELLINGS.items() if unit in UNITS[dimension]]
+        units = ", ".join([*UNITS[dimension], *other[:1]])
         allowed = f'{percent}{article} {dimension}, "<decimal number> <unit>" with a unit of {units}'
         return SceneError(f"this {dimension}", value, allowed, remedy, key=key, file=file)
 

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from limitsets.errors import SceneError
 from limitsets.scene.quantities import base_unit
-from limitsets.scene.units import UNITS, convert, parse, spelled_plainly, written
+from limitsets.scene.units import UNITS, convert, exact_factor, parse, spelled_plainly, written
 
 
 def test_factors_are_those_of_pints_own_registry() -> None:
@@ -18,6 +18,12 @@ def test_factors_are_those_of_pints_own_registry() -> None:
             for target in (*units, *(base_unit(dimension, length) for length in UNITS["length"])):
                 factor = full.Quantity(Fraction(1), unit).to(target).magnitude
                 assert convert(parse(f"1 {unit}", dimension), target) == float(factor)
+
+
+def test_what_measures_different_things_has_no_factor() -> None:
+    for unit, target in (("in", "kg"), ("kg/m^2", "kg/m^3"), ("rpm", "rad"), ("Hz", "rad/s")):
+        with pytest.raises(ValueError, match="measure different things"):
+            exact_factor(unit, target)
 
 
 @pytest.mark.parametrize(
